@@ -74,8 +74,7 @@ class NightResult(Result):
         """`points`: a row a point; `ranges`: a row a shot that was adjusted; `surface`: a row a prism of the dish."""
         from catseye.gateways.epoch.tables import kind_of
 
-        blocks = self.covariance.reshape(len(self.names), 3, len(self.names), 3)
-        own = blocks[np.arange(len(self.names)), :, np.arange(len(self.names))]
+        own = self.reduction.coordinates.joint.blocks
         points = {
             "point": (self.names, ""),
             "kind": ([kind_of(self.reduction, name) for name in self.names], ""),
@@ -154,7 +153,7 @@ def reduce(
         tuple(coordinates.points),
         coordinates.x,
         coordinates.covariance,
-        np.sqrt(np.maximum(np.diag(coordinates.covariance), 0.0)).reshape(-1, 3),
+        coordinates.u,
         np.array([coordinates.shots[k] for k in range(len(coordinates.points))]),
         coordinates.variance_factor,
         coordinates.degrees_of_freedom,

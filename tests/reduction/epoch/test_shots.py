@@ -10,7 +10,8 @@ from catseye.estimation.least_squares.rows import full_jacobian
 from catseye.optics.retroreflector.prism import obliquity_correction
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
-from catseye.reduction.epoch.shots import _obliquity, _tilted, shot_group
+from catseye.reduction.epoch.shots import _obliquity, shot_group
+from catseye.reduction.site.places import RangedPoint
 
 F = 1.5e9
 N_GLASS = 1.527077
@@ -99,11 +100,10 @@ def test_a_prism_seen_straight_has_no_obliquity_and_from_behind_a_finite_one(net
     assert incidence[0] == pytest.approx(np.pi, abs=1e-6)
 
 
-def test_tilts_turn_a_normal_by_as_many_radians():
+def test_a_faces_two_directions_lie_across_its_normal():
     for normal in np.array([[0, 0, 1.0], [0.6, 0.8, 0], [0.48, 0.6, 0.64]]):
-        turned, across = _tilted(normal, np.array([3e-3, -4e-3]))
-        assert np.linalg.norm(turned) == pytest.approx(1.0, abs=1e-15)
-        assert np.arccos(normal @ turned) == pytest.approx(5e-3, rel=1e-4)
+        across = RangedPoint("DP001", "prism", np.zeros(3), normal).across
+        np.testing.assert_allclose(across @ across.T, np.eye(2), atol=1e-15)
         np.testing.assert_allclose(across @ normal, 0.0, atol=1e-15)
 
 

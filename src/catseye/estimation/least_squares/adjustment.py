@@ -10,8 +10,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import sparray
 
 from catseye.errors import EstimationError
+from catseye.estimation.least_squares.bordered import Border
 from catseye.estimation.least_squares.covariance import Covariance, Dense
 from catseye.estimation.least_squares.normal import NormalEquations
 from catseye.estimation.least_squares.rows import ActiveRows, variances
@@ -112,11 +114,13 @@ class SolverSettings:
     iterations   cap of Gauss-Newton steps; a step that raises the cost is halved, ten times at most
     tests        False leaves the fits at residual and sigma and the covariance at zero, on the way to an answer
     sparse       solve sparse or dense; chosen by size if None
+    border       eliminate everything off a border by blocks, see `bordered`; None: as `sparse` says
     """
 
     iterations: int = 50
     tests: bool = True
     sparse: bool | None = None
+    border: Border | None = None
 
 
 COMPLETE = SolverSettings()
@@ -154,8 +158,9 @@ def adjust(
     given = [[None] * len(groups) if part is None else list(part) for part in (active, extra_variance, inflation)]
     rows = [ActiveRows.of(g, *parts) for g, *parts in zip(groups, *given, strict=True)]
     tests, iterations = solver.tests, solver.iterations
-    normal = NormalEquations.of(rows, moving, n, solver.sparse)
-    q: Covariance = Dense(np.zeros((n, n))) if not normal.sparse else _Nothing(n)
+    normal = NormalEquations.of(rows, moving, n, solver.sparse, solver.border)
+    small = not normal.sparse and normal.border is None and len(moving) > 0
+    q: Covariance = Dense(np.zeros((n, n))) if small else _Nothing(n)
     floating = np.zeros((0, n))
     status, taken, size = NOT_CONVERGED, 0, np.inf
     while taken < iterations:
@@ -221,6 +226,12 @@ class _Nothing:
 
     def blocks(self, first: np.ndarray) -> np.ndarray:
         return np.full((len(first), 3, 3), self.value)
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        return np.full(b.shape, self.value)
+
+    def carried(self, matrix: sparray) -> np.ndarray:
+        return np.full((matrix.shape[0],) * 2, self.value)
 
     def diagonal(self) -> np.ndarray:
         return np.full(self.size, self.value)

@@ -1,15 +1,15 @@
 """Observations that meet in one point and cannot all be right: which are the fewest that might be wrong?"""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from itertools import combinations
 
 import numpy as np
 from scipy.special import chdtri
 
-from catseye.estimation.least_squares.adjustment import LeastSquaresSolution, SolverSettings, adjust
+from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
 from catseye.estimation.least_squares.rows import variances
-from catseye.estimation.observations.kinds import ObservationGroup
+from catseye.estimation.observations.kinds import Distances, MovingDistances, ObservationGroup
 
 MOST_AT_ONE_POINT = 2  # wrong observations searched for at one point, exhaustively
 LARGEST_SEARCH = 24  # observations at a point; a point with more has redundancy enough for the robust fit alone
@@ -77,62 +77,142 @@ class LocalConflict:
         return None
 
 
-def search(
-    columns: np.ndarray,
-    groups: Sequence[ObservationGroup],
-    jacobians: Sequence[np.ndarray],
-    *,
-    removable: Sequence[np.ndarray],
-    solution: LeastSquaresSolution,
-    advice: Sequence[ObservationGroup] = (),
-) -> tuple[LocalConflict, tuple[int, ...] | None]:
+@dataclass(frozen=True, eq=False)
+class Meeting:
+    """Where observations and what is known besides stand, so that those that meet in a point are quickly found.
+
+    groups, removable   as of `adjust_robustly`
+    advice              what is known of single points besides
+    x                   (n,) parameters
+    residual, sigma     one (m,) a group, at x
+    jacobians           one a group, at x
+    by_column           one a group: columns in order and the rows that they stand in, for groups with rows of their own
+    advice_at           column of a point: index of an advice
+    """
+
+    groups: Sequence[ObservationGroup]
+    removable: Sequence[np.ndarray]
+    advice: Sequence[ObservationGroup]
+    x: np.ndarray
+    residual: Sequence[np.ndarray]
+    sigma: Sequence[np.ndarray]
+    jacobians: Sequence[np.ndarray]
+    by_column: Sequence[tuple[np.ndarray, np.ndarray]]
+    advice_at: Mapping[int, Sequence[int]]
+
+    @staticmethod
+    def of(
+        groups: Sequence[ObservationGroup],
+        solution: LeastSquaresSolution,
+        removable: Sequence[np.ndarray],
+        advice: Sequence[ObservationGroup],
+    ) -> "Meeting":
+        """Of a solution of the groups."""
+        advice_at: dict[int, list[int]] = {}
+        for i, one in enumerate(advice):
+            for column in np.unique(one.columns).tolist():
+                advice_at.setdefault(column, []).append(i)
+        return Meeting(
+            groups,
+            removable,
+            advice,
+            solution.x,
+            [f.residual for f in solution.fits],
+            [f.sigma for f in solution.fits],
+            [g.predict(solution.x)[1] for g in groups],
+            [_by_column(g.columns) for g in groups],
+            advice_at,
+        )
+
+    def rows(self, i: int, columns: np.ndarray) -> np.ndarray:
+        """Rows of a group that depend on some columns."""
+        group, (order, rows) = self.groups[i], self.by_column[i]
+        if group.columns.ndim == 1:
+            here = np.isin(group.columns, columns)
+            return np.flatnonzero(np.any(self.jacobians[i][:, here] != 0.0, axis=1)) if here.any() else rows[:0]
+        ends = np.searchsorted(order, columns), np.searchsorted(order, columns, side="right")
+        near = np.unique(np.concatenate([rows[low:high] for low, high in zip(*ends, strict=True)]))
+        here = np.isin(group.columns[near], columns)
+        return near[np.any(here & (self.jacobians[i][near] != 0.0), axis=1)]
+
+    def at(self, x: np.ndarray, columns: np.ndarray) -> "Meeting":
+        """The same at other parameters, as far as some columns reach; elsewhere it is not to be asked."""
+        residual, jacobians = list(self.residual), list(self.jacobians)
+        for i, group in enumerate(self.groups):
+            near = self.rows(i, columns)
+            if not len(near):
+                continue
+            part = _part(group, near)
+            values, slopes = part.predict(x)
+            residual[i], jacobians[i] = residual[i].copy(), jacobians[i].copy()
+            if part is group:
+                residual[i], jacobians[i] = group.observed - values, slopes
+            else:
+                residual[i][near], jacobians[i][near] = part.observed - values, slopes
+        return replace(self, x=x, residual=residual, jacobians=jacobians)
+
+
+def _by_column(columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    if columns.ndim == 1:
+        return columns[:0], columns[:0]
+    flat = columns.ravel()
+    order = np.argsort(flat, kind="stable")
+    return flat[order], order // columns.shape[1]
+
+
+def _part(group: ObservationGroup, rows: np.ndarray) -> ObservationGroup:
+    """Some rows of a group of independent lengths; any other group itself."""
+    if group.covariance.ndim != 1 or not isinstance(group, Distances | MovingDistances):
+        return group
+    m = len(group.observed)
+    cut = {
+        f.name: value[rows]
+        for f in fields(group)
+        if isinstance(value := getattr(group, f.name), np.ndarray) and value.ndim and len(value) == m
+    }
+    return replace(group, **cut)
+
+
+def search(columns: np.ndarray, meeting: Meeting) -> tuple[LocalConflict, tuple[int, ...] | None]:
     """The smallest conflict at a point; where there is none, searched again about the place of the best explanation.
 
     A wrong range of half a metre carries its point so far that slopes taken there explain nothing to 25 um.
     """
     for _ in range(SEARCHES):
-        local = at_point(columns, groups, jacobians, removable=removable, solution=solution, advice=advice, slack=SLACK)
+        local = at_point(columns, meeting, slack=SLACK)
         if not 2 <= len(local.rows) <= LARGEST_SEARCH:
             return local, None
         wrong = local.smallest_conflict()
         place = local.likeliest_place()
         if wrong is not None or place is None:
             return local, wrong
-        x = solution.x.copy()
+        x = meeting.x.copy()
         x[columns] += place
-        solution = adjust(x, groups, free=np.zeros(len(x), dtype=bool), solver=SolverSettings(tests=False))
-        jacobians = [g.predict(x)[1] for g in groups]
+        meeting = meeting.at(x, columns)
     return local, None
 
 
-def at_point(
-    columns: np.ndarray,
-    groups: Sequence[ObservationGroup],
-    jacobians: Sequence[np.ndarray],
-    *,
-    removable: Sequence[np.ndarray],
-    solution: LeastSquaresSolution,
-    advice: Sequence[ObservationGroup] = (),
-    slack: float,
-) -> LocalConflict:
+def at_point(columns: np.ndarray, meeting: Meeting, *, slack: float) -> LocalConflict:
     """What meets in a point: removable observations that depend on it; others, and advice, that depend on it alone."""
     rows: list[tuple[int, int]] = []
     doubted: list[tuple[float, np.ndarray]] = []
     prior: list[tuple[float, np.ndarray]] = []
-    for i, (group, jacobian, may, fit) in enumerate(zip(groups, jacobians, removable, solution.fits, strict=True)):
-        slope, touching, alone = _slopes(columns, group, jacobian)
-        for k in np.flatnonzero(touching & may):
-            sigma = slack * fit.sigma[k]
-            doubted.append((fit.residual[k] / sigma, slope[k] / sigma))
-            rows.append((i, int(k)))
-        prior += [(fit.residual[k] / fit.sigma[k], slope[k] / fit.sigma[k]) for k in np.flatnonzero(alone & ~may)]
-    for group in advice:
-        if np.isin(columns, group.columns).any():
-            values, jacobian = group.predict(solution.x)
-            slope, _, alone = _slopes(columns, group, jacobian)
-            sigma = np.sqrt(variances(group))
-            residual = group.observed - values
-            prior += [(residual[k] / sigma[k], slope[k] / sigma[k]) for k in np.flatnonzero(alone)]
+    for i, group in enumerate(meeting.groups):
+        near = meeting.rows(i, columns)
+        if not len(near):
+            continue
+        slope, alone = _slopes(columns, group.columns, meeting.jacobians[i], near)
+        residual, sigma, may = meeting.residual[i][near], meeting.sigma[i][near], meeting.removable[i][near]
+        for k in np.flatnonzero(may):
+            doubted.append((residual[k] / (slack * sigma[k]), slope[k] / (slack * sigma[k])))
+            rows.append((i, int(near[k])))
+        prior += [(residual[k] / sigma[k], slope[k] / sigma[k]) for k in np.flatnonzero(alone & ~may)]
+    for i in dict.fromkeys(i for c in columns.tolist() for i in meeting.advice_at.get(c, ())):
+        group = meeting.advice[i]
+        values, jacobian = group.predict(meeting.x)
+        slope, alone = _slopes(columns, group.columns, jacobian, np.arange(len(values)))
+        sigma, residual = np.sqrt(variances(group)), group.observed - values
+        prior += [(residual[k] / sigma[k], slope[k] / sigma[k]) for k in np.flatnonzero(alone)]
     (residual, slopes), (prior_residual, prior_slopes) = (
         (np.array([v for v, _ in part]), np.array([a for _, a in part]).reshape(-1, 3)) for part in (doubted, prior)
     )
@@ -140,29 +220,24 @@ def at_point(
 
 
 def _slopes(
-    columns: np.ndarray, group: ObservationGroup, jacobian: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Derivatives (m, 3) of a group by a point, which rows depend on it, and which on nothing else."""
-    here = group.columns[..., None] == columns  # in any order, and perhaps not all three
+    columns: np.ndarray, own: np.ndarray, jacobian: np.ndarray, rows: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives (k, 3) of some rows of a group by a point, and which of them depend on nothing else."""
+    at, jacobian = (own if own.ndim == 1 else own[rows]), jacobian[rows]
+    here = at[..., None] == columns  # in any order, and perhaps not all three
     if here.ndim == 2:
         slope, others = jacobian @ here, jacobian[:, ~here.any(axis=1)]
     else:
         slope, others = np.einsum("mw,mwa->ma", jacobian, here), np.where(here.any(axis=2), 0.0, jacobian)
-    touching = np.any(slope != 0.0, axis=1)
-    return slope, touching, touching & ~np.any(others != 0.0, axis=1)
+    return slope, np.any(slope != 0.0, axis=1) & ~np.any(others != 0.0, axis=1)
 
 
-def touched(
-    points: Sequence[np.ndarray],
-    groups: Sequence[ObservationGroup],
-    jacobians: Sequence[np.ndarray],
-    *,
-    chosen: Sequence[np.ndarray],
-) -> list[np.ndarray]:
+def touched(points: Sequence[np.ndarray], meeting: Meeting, *, chosen: Sequence[np.ndarray]) -> list[np.ndarray]:
     """The points that the chosen observations depend on."""
     columns = {
         int(c)
-        for group, jacobian, rows in zip(groups, jacobians, chosen, strict=True)
+        for group, jacobian, rows in zip(meeting.groups, meeting.jacobians, chosen, strict=True)
+        if rows.any()
         for c in _columns_of(group, jacobian, rows)
     }
     return [p for p in points if columns.intersection(p.tolist())]

@@ -5,6 +5,7 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+from scipy.sparse import csr_array, sparray
 
 from catseye.errors import EstimationError
 
@@ -36,6 +37,14 @@ class Covariance(Protocol):
 
     def diagonal(self) -> np.ndarray:
         """The variances of all parameters, (n,)."""
+        ...
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        """The covariance times b, (n,) or (n, k)."""
+        ...
+
+    def carried(self, matrix: sparray) -> np.ndarray:
+        """(k, k) covariance of k combinations of parameters, the rows of a sparse matrix (k, n)."""
         ...
 
 
@@ -71,6 +80,12 @@ class Dense:
     def diagonal(self) -> np.ndarray:
         return np.diag(self.full)
 
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        return np.asarray(self.full @ b)
+
+    def carried(self, matrix: sparray) -> np.ndarray:
+        return np.asarray(matrix @ (matrix @ self.full).T)
+
 
 @dataclass(frozen=True, eq=False)
 class Sparse:
@@ -105,7 +120,8 @@ class Sparse:
         return self.across(np.arange(self.size))
 
     def solve(self, b: np.ndarray) -> np.ndarray:
-        """Covariance (of all parameters) times b, (n, k)."""
+        if b.ndim == 1:
+            return self.solve(b[:, None])[:, 0]
         from catseye.estimation.least_squares.sparse_kernel import solve
 
         inside = np.zeros((len(self.scale), b.shape[1]))
@@ -116,6 +132,9 @@ class Sparse:
         result = np.zeros_like(b)
         result[moving] = inside[at] * self.scale[at][:, None]
         return result
+
+    def carried(self, matrix: sparray) -> np.ndarray:
+        return np.asarray(matrix @ self.solve(matrix.T.toarray()))
 
     def across(self, columns: np.ndarray) -> np.ndarray:
         unit = np.zeros((self.size, len(columns)))
@@ -188,6 +207,68 @@ class Transformed:
         inside = np.einsum("kid,de,kje->kij", t, self.c, t)
         return self.inner.blocks(first) - cross - cross.transpose(0, 2, 1) + inside
 
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        at, ab = self.t.T @ b, self.b.T @ b
+        return np.asarray(self.inner.solve(b) - self.t @ (ab - self.c @ at) - self.b @ at)
+
+    def carried(self, matrix: sparray) -> np.ndarray:
+        return np.asarray(matrix @ self.solve(matrix.T.toarray()))
+
     def diagonal(self) -> np.ndarray:
         low_rank = 2.0 * np.sum(self.t * self.b, axis=1) - np.einsum("nd,de,ne->n", self.t, self.c, self.t)
         return self.inner.diagonal() - low_rank
+
+
+@dataclass(frozen=True, eq=False)
+class JointPoints:
+    """The joint covariance of p points, of which only what is asked for is computed.
+
+    q         of all parameters
+    columns   (p, 3) of the points' coordinates
+    """
+
+    q: Covariance
+    columns: np.ndarray
+
+    @staticmethod
+    def of(q: Covariance, columns: np.ndarray) -> "JointPoints":
+        """Of some parameters; a covariance that is whole is cut to them."""
+        if not isinstance(q, Dense):
+            return JointPoints(q, columns)
+        return JointPoints(Dense(q.within(columns.ravel())), np.arange(columns.size).reshape(columns.shape))
+
+    def matrix(self) -> np.ndarray:
+        """(3p, 3p), x y z point by point; EstimationError where that is too large."""
+        if self.columns.size > LARGEST_MATRIX:
+            raise EstimationError(
+                f"the full covariance of {len(self.columns)} points takes {8e-9 * self.columns.size**2:.0f} GB "
+                f"(limit {LARGEST_MATRIX // 3} points); ask for the blocks of single points"
+            )
+        return self.block(np.arange(len(self.columns)))
+
+    def block(self, rows: np.ndarray) -> np.ndarray:
+        """(3k, 3k) of some points."""
+        return self.q.within(self.columns[rows].ravel())
+
+    def across(self, rows: np.ndarray) -> np.ndarray:
+        """(3p, 3k) of all points with some."""
+        return self.q.across(self.columns[rows].ravel())[self.columns.ravel()]
+
+    @cached_property
+    def blocks(self) -> np.ndarray:
+        """(p, 3, 3) of each point."""
+        return self.q.blocks(self.columns[:, 0])
+
+    @property
+    def u(self) -> np.ndarray:
+        """(p, 3) standard uncertainties of the coordinates."""
+        return np.asarray(np.sqrt(np.maximum(np.diagonal(self.blocks, axis1=1, axis2=2), 0.0)))
+
+    def along(self, rows: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """(k, k) of some points' components along directions (k, 3)."""
+        k = len(rows)
+        if isinstance(self.q, Dense):
+            blocks = self.block(rows).reshape(k, 3, k, 3)
+            return np.asarray(np.einsum("ki,kimj,mj->km", directions, blocks, directions, optimize=True))
+        at = (np.repeat(np.arange(k), 3), self.columns[rows].ravel())
+        return self.q.carried(csr_array((np.ravel(directions), at), shape=(k, len(self.q.diagonal()))))

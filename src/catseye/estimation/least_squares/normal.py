@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import cho_solve, lapack
 from scipy.sparse import csc_array, csr_array
 
+from catseye.estimation.least_squares.bordered import Border, BorderedCovariance, Eliminated
 from catseye.estimation.least_squares.covariance import Covariance, Dense, Sparse
 from catseye.estimation.least_squares.rows import ActiveRows
 
@@ -30,22 +31,34 @@ class NormalEquations:
     moving   (k,) indices of the parameters that are not held
     size     n of all parameters
     sparse   form
+    border   of a third form, or None
     """
 
     rows: Sequence[ActiveRows]
     moving: np.ndarray
     size: int
     sparse: bool
+    border: Border | None = None
     _jacobians: list[np.ndarray] = field(default_factory=list)
     _factor: tuple[Any, ...] = ()
     _scale: np.ndarray = field(default_factory=lambda: np.zeros(0))
     _floating: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     _order: tuple[np.ndarray, ...] = ()
     _pattern: csc_array | None = None
+    _eliminated: Eliminated | None = None
 
     @classmethod
-    def of(cls, rows: Sequence[ActiveRows], moving: np.ndarray, size: int, sparse: bool | None) -> "NormalEquations":
-        """Sparse when asked, or when large and no group ties most parameters together."""
+    def of(
+        cls,
+        rows: Sequence[ActiveRows],
+        moving: np.ndarray,
+        size: int,
+        sparse: bool | None,
+        border: Border | None = None,
+    ) -> "NormalEquations":
+        """With a border where one is given; sparse when asked, or when large and no group ties most parameters."""
+        if border is not None and len(moving):
+            return cls(rows, moving, size, False, border)
         if sparse is None:
             sparse = len(moving) > LARGEST_DENSE and all(r.columns.shape[-1] < len(moving) / 3 for r in rows)
         return cls(rows, moving, size, sparse)
@@ -66,7 +79,9 @@ class NormalEquations:
                 right += np.bincount(np.maximum(at, 0).ravel(), np.where(at < 0, 0.0, pull).ravel(), self.size)
         step = np.zeros(self.size)
         self._floating = np.zeros((0, self.size))
-        if self.sparse:
+        if self.border is not None:
+            self._factorise_bordered(self.border)
+        elif self.sparse:
             self._factorise_sparse()
         else:
             self._factorise_dense()
@@ -80,6 +95,8 @@ class NormalEquations:
 
     def covariance(self) -> Covariance:
         """Inverse of N at the x of the last step."""
+        if self._eliminated is not None:
+            return BorderedCovariance(self.size, self._eliminated)
         if self.sparse:
             order, place, *_ = self._order
             return Sparse(self.size, place, self._scale[order], *self._factor)
@@ -93,6 +110,10 @@ class NormalEquations:
     def _solve(self, right: np.ndarray) -> np.ndarray:
         if not len(right):
             return right
+        if self._eliminated is not None:
+            whole = np.zeros(self.size)
+            whole[self.moving] = right
+            return self._eliminated.solve(whole)[self.moving]
         if not self.sparse:
             return self._scale * cho_solve((self._factor[0], True), self._scale * right, check_finite=False)
         from catseye.estimation.least_squares.sparse_kernel import solve
@@ -123,6 +144,9 @@ class NormalEquations:
         return turned[::-1].T, squares[::-1]
 
     def _factorise_dense(self) -> None:
+        if not len(self.moving):
+            self._scale = np.zeros(0)
+            return
         normal = np.zeros((self.size, self.size))
         for r, j in zip(self.rows, self._jacobians, strict=True):
             if r.columns.ndim == 1:
@@ -140,8 +164,6 @@ class NormalEquations:
             self._set_floating(np.eye(len(normal))[:, unheld])
             return
         scaled = normal * self._scale[:, None] * self._scale
-        if not len(scaled):
-            return
         factor, failed = lapack.dpotrf(scaled, lower=1)
         self._factor = (factor,)
         condition = 0.0 if failed else lapack.dpocon(factor, np.abs(scaled).sum(axis=0).max(), uplo="L")[0]
@@ -153,6 +175,46 @@ class NormalEquations:
             if none.any() or failed:
                 self._set_floating(weak @ turned[:, none if none.any() else slice(1)])
 
+    def _factorise_bordered(self, border: Border) -> None:
+        blocks = border.blocks(self.rows, self.moving, self.size)
+        values = blocks.values(self._jacobians)
+        diagonal = np.bincount(blocks.parameter, values**2, self.size)[self.moving]
+        unheld = diagonal <= 0.0
+        if unheld.any():
+            self._scale = 1.0 / np.sqrt(np.where(unheld, 1.0, diagonal))
+            self._set_unheld(unheld)
+            return
+        scale = np.zeros(self.size)
+        scale[self.moving] = 1.0 / np.sqrt(diagonal)
+        eliminated, new = border.eliminated(blocks, values, scale)
+        if not eliminated.held:  # the sparse form says what floats
+            self.border, self._eliminated, self.sparse = None, None, True
+            self._factorise_sparse()
+            return
+        self._eliminated, self._scale = eliminated, eliminated.scale[self.moving]
+        if not new:
+            return
+        every = np.zeros((self.size, LOOKED_FOR))
+        every[self.moving] = np.random.default_rng(0).standard_normal((len(self.moving), LOOKED_FOR))
+        for _ in range(2):
+            every[self.moving] = np.linalg.qr(every[self.moving])[0]
+            every[self.moving] /= self._scale[:, None]
+            every = eliminated.solve(every)
+            every[self.moving] /= self._scale[:, None]
+        probe = every[self.moving]
+        if 1.0 / np.linalg.norm(probe, axis=0).max() < DOUBTFUL:
+            directions = np.linalg.qr(probe)[0]
+            turned, squares = self._energy(directions)
+            none = squares < FLOATS
+            if none.any():
+                self._set_floating(directions @ turned[:, none])
+
+    def _set_unheld(self, unheld: np.ndarray) -> None:
+        """Some of the parameters that no row depends on float."""
+        unit = np.zeros((len(unheld), min(int(unheld.sum()), LOOKED_FOR)))
+        unit[np.flatnonzero(unheld)[: unit.shape[1]], np.arange(unit.shape[1])] = 1.0
+        self._set_floating(unit)
+
     def _factorise_sparse(self) -> None:
         from catseye.estimation.least_squares.sparse_kernel import numeric, solve, symbolic
 
@@ -161,9 +223,7 @@ class NormalEquations:
         unheld = diagonal <= 0.0
         self._scale = 1.0 / np.sqrt(np.where(unheld, 1.0, diagonal))
         if unheld.any():
-            unit = np.zeros((len(diagonal), min(int(unheld.sum()), LOOKED_FOR)))
-            unit[np.flatnonzero(unheld)[: unit.shape[1]], np.arange(unit.shape[1])] = 1.0
-            self._set_floating(unit)
+            self._set_unheld(unheld)
             return
         if not self._order:
             self._order = _ordering(normal, self.moving, self.size)

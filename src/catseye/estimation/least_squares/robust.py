@@ -13,7 +13,16 @@ from catseye.estimation.least_squares.adjustment import (
     SolverSettings,
     adjust,
 )
-from catseye.estimation.least_squares.conflict import LARGEST_SEARCH, MOST_AT_ONE_POINT, at_point, search, touched
+from catseye.estimation.least_squares.bordered import Border
+from catseye.estimation.least_squares.conflict import (
+    LARGEST_SEARCH,
+    MOST_AT_ONE_POINT,
+    Meeting,
+    at_point,
+    search,
+    touched,
+)
+from catseye.estimation.least_squares.influence import Influence
 from catseye.estimation.observations.kinds import ObservationGroup
 
 UNDECIDED = "rejection undecided after {rounds} rounds: some observations contradict each other and none stands out"
@@ -56,6 +65,7 @@ def adjust_robustly(
     free: np.ndarray | None = None,
     active: Sequence[np.ndarray] | None = None,
     names: Sequence[str] | None = None,
+    border: Border | None = None,
 ) -> LeastSquaresSolution:
     """An adjustment without the observations that do not belong to it; the fits say which (`active`).
 
@@ -66,12 +76,14 @@ def adjust_robustly(
     free        (n,) bool, as for `adjust`
     active      one (m,) bool array a group: start from this selection instead of searching for one
     names       (n,) what the parameters are called
+    border      of a large system, see `bordered`
 
     Three steps. A reweighted fit (Cauchy weights of the residual) keeps an observation that is wrong by a thousand
     sigmas from dragging others along. Where few observations meet in a point such a fit can share the blame between
     innocent ones; so every point in conflict is searched for the smallest set whose absence makes the rest agree.
     At last Baarda's test with correlations, over everything: out with the worst, one by one, and back in with those
-    that pass.
+    that pass. What all other tests are without the worst follows from one adjustment (`Influence`); a new one is made
+    when none is left to go.
 
     Source: [BAARDA68] (data snooping); [FOERSTNER16] chapter 4 (robust estimation and outlier detection); [HUBER09]
     (reweighting). The search for the smallest conflict is ours.
@@ -79,43 +91,63 @@ def adjust_robustly(
     careful = None  # what to try instead, should a selection leave too little to hold every parameter
     if active is None:
         careful = [np.ones(len(g.observed), dtype=bool) for g in groups]
-        solution = _reweighted(x0, groups, removable, free, names)
+        solution = _reweighted(x0, groups, removable, free, names, border)
         large = [may & (np.abs(f.residual) > 3.0 * f.sigma) for f, may in zip(solution.fits, removable, strict=True)]
         active = [~may | (np.abs(f.residual) < 10.0 * f.sigma) for f, may in zip(solution.fits, removable, strict=True)]
     else:
         solution = adjust(x0, groups, free=np.zeros(len(x0), dtype=bool), solver=SolverSettings(tests=False))
         large = [may & ~a for may, a in zip(removable, active, strict=True)] if outliers.advice else []
     active = _searched(solution, groups, removable, outliers, large, active)
-    x = solution.x
+    x, solver = solution.x, SolverSettings(border=border)
     returns = [np.zeros(len(g.observed), dtype=int) for g in groups]
     for _ in range(outliers.rounds):
-        solution = adjust(x, groups, free=free, active=active, names=names)
+        solution = adjust(x, groups, free=free, active=active, names=names, solver=solver)
         if not solution.solved:
             if careful is None:
                 return solution
             active, careful = careful, None
             continue
         x, careful = solution.x, None
+        left = _without_worst(solution, groups, removable, outliers.critical)
+        if left is not None:
+            active = left
+            continue
         tests = [
             np.where(may & _checked(f), np.abs(f.standardised), 0.0)
             for f, may in zip(solution.fits, removable, strict=True)
         ]
-        worst, group = max(
-            (float(t[a].max(initial=0.0)), i) for i, (t, a) in enumerate(zip(tests, active, strict=True))
-        )
-        if worst > outliers.critical:  # one at a time: neighbours at a point with few checks look wrong together
-            active = [a.copy() for a in active]
-            active[group][np.argmax(np.where(active[group], tests[group], -1.0))] = False
-            continue
         back = [
             ~a & (t < BACK * outliers.critical) & (n < MOST_RETURNS)
             for t, a, n in zip(tests, active, returns, strict=True)
         ]
         if not any(b.any() for b in back):
-            return _without_undecided(solution, groups, removable, outliers, free, names)
+            return _without_undecided(solution, groups, removable, outliers, free, names, solver)
         active = [a | b for a, b in zip(active, back, strict=True)]
         returns = [n + b for n, b in zip(returns, back, strict=True)]
     return replace(solution, status=UNDECIDED.format(rounds=outliers.rounds))
+
+
+def _without_worst(
+    solution: LeastSquaresSolution,
+    groups: Sequence[ObservationGroup],
+    removable: Sequence[np.ndarray],
+    critical: float,
+) -> list[np.ndarray] | None:
+    """The selection without the worst, the worst of the rest, and so on; None where nothing is worse than the limit.
+
+    One at a time: neighbours at a point with few checks look wrong together.
+    """
+    may = np.concatenate([may & f.active & _checked(f) for f, may in zip(solution.fits, removable, strict=True)])
+    if not np.any(may & (np.concatenate([np.abs(f.standardised) for f in solution.fits]) > critical)):
+        return None
+    may = np.concatenate([m & f.active for f, m in zip(solution.fits, removable, strict=True)])
+    tests = Influence(groups, solution)
+    while True:
+        w = np.where(may & tests.active & (tests.detectable < CHECKED * tests.sigma), np.abs(tests.standardised), 0.0)
+        worst = int(np.argmax(w))
+        if w[worst] <= critical:
+            return [a.copy() for a in np.split(tests.active, tests.first[1:-1])]
+        tests.leave_out(worst, np.argsort(-w)[: np.count_nonzero(w > critical)])
 
 
 def _checked(fit: GroupFit) -> np.ndarray:
@@ -134,6 +166,7 @@ def _without_undecided(
     outliers: OutlierSearch,
     free: np.ndarray | None,
     names: Sequence[str] | None,
+    solver: SolverSettings,
 ) -> LeastSquaresSolution:
     """The solution without observations that might be the wrong ones just as well as those rejected.
 
@@ -142,12 +175,12 @@ def _without_undecided(
     """
     active = [f.active.copy() for f in solution.fits]
     checked = [_checked(f) for f in solution.fits]
-    jacobians = [g.predict(solution.x)[1] for g in groups]
     rejected = [may & ~f.active for f, may in zip(solution.fits, removable, strict=True)]
-    for columns in touched(outliers.points, groups, jacobians, chosen=rejected):
-        local = at_point(
-            columns, groups, jacobians, removable=removable, solution=solution, advice=outliers.advice, slack=1.0
-        )
+    if not any(r.any() for r in rejected):
+        return solution
+    meeting = Meeting.of(groups, solution, removable, outliers.advice)
+    for columns in touched(outliers.points, meeting, chosen=rejected):
+        local = at_point(columns, meeting, slack=1.0)
         out = [index for index, (i, k) in enumerate(local.rows) if not solution.fits[i].active[k]]
         grave = [
             index
@@ -168,7 +201,7 @@ def _without_undecided(
             active[i][k] &= index not in doubtful
     if all(np.array_equal(a, f.active) for a, f in zip(active, solution.fits, strict=True)):
         return solution
-    final = adjust(solution.x, groups, free=free, active=active, names=names)
+    final = adjust(solution.x, groups, free=free, active=active, names=names, solver=solver)
     if not final.solved:
         return replace(final, status=UNHELD.format(status=final.status))
     return final
@@ -180,10 +213,14 @@ def _reweighted(
     removable: Sequence[np.ndarray],
     free: np.ndarray | None,
     names: Sequence[str] | None,
+    border: Border | None,
 ) -> LeastSquaresSolution:
     """A fit in which every observation that may be wrong weighs by its own residual."""
     extra = [np.zeros(len(g.observed)) for g in groups]
-    solution = adjust(x0, groups, free=free, names=names, solver=SolverSettings(iterations=1, tests=False))
+    if border is not None:  # without details
+        free = ~border.fine if free is None else free & ~border.fine
+    rough = SolverSettings(iterations=1, tests=False, border=border)
+    solution = adjust(x0, groups, free=free, names=names, solver=rough)
     for _ in range(8):
         if not solution.solved:
             break
@@ -195,7 +232,7 @@ def _reweighted(
             free=free,
             extra_variance=extra,
             names=names,
-            solver=SolverSettings(iterations=1, tests=False),
+            solver=rough,
         )
     return solution
 
@@ -212,11 +249,11 @@ def _searched(
     active = [a.copy() for a in active]
     if not solution.solved:
         return [np.ones(len(g.observed), dtype=bool) for g in groups]
-    jacobians = [g.predict(solution.x)[1] for g in groups]
-    for columns in touched(outliers.points, groups, jacobians, chosen=suspects) if suspects else ():
-        local, wrong = search(
-            columns, groups, jacobians, removable=removable, solution=solution, advice=outliers.advice
-        )
+    if not any(s.any() for s in suspects):
+        return active
+    meeting = Meeting.of(groups, solution, removable, outliers.advice)
+    for columns in touched(outliers.points, meeting, chosen=suspects):
+        local, wrong = search(columns, meeting)
         if wrong is not None:
             for index, (i, k) in enumerate(local.rows):
                 active[i][k] = index not in wrong

@@ -15,8 +15,8 @@ class Linear(ObservationKind):
     name         what the group is, for reports
     observed     (m,)
     covariance   of the observed values, see `ObservationGroup`
-    columns      (k,) indices of parameters, without repeats
-    matrix       (m, k)
+    columns      (k,) indices of parameters, without repeats; or (m, w), each row its own
+    matrix       (m, k) or (m, w)
     """
 
     kind: ClassVar[str] = "linear"
@@ -28,10 +28,12 @@ class Linear(ObservationKind):
     matrix: np.ndarray
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values (m,) and Jacobian (m, k) at the parameters x.
+        """Values (m,) and Jacobian, (m, k) or (m, w), at the parameters x.
 
         >>> rod = Linear("rod", np.array([2.0]), np.eye(1), np.array([0, 3]), np.array([[-1.0, 1.0]]))
         >>> rod.predict(np.array([1.0, 0.0, 0.0, 3.5]))[0]
         array([2.5])
         """
+        if self.columns.ndim == 2:
+            return np.sum(self.matrix * x[self.columns], axis=1), self.matrix
         return self.matrix @ x[self.columns], self.matrix

@@ -1,6 +1,6 @@
 """The paraboloid that fits points best: where it stands, its focal length, how far each point lies off it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -12,6 +12,7 @@ from catseye.geometry.frames.rotation import from_vector, skew
 
 Free = Literal["vertex", "axis", "focal-length"]
 Measure = Literal["normal", "half-path"]
+AlongNormals = Callable[[np.ndarray], np.ndarray]
 PARAMETERS: dict[str, int] = {"vertex": 3, "axis": 2, "focal-length": 1}
 POSE: tuple[Free, ...] = ("vertex", "axis")  # a turn about its own axis leaves a paraboloid unchanged
 CONVERGED_STEP = 1e-10  # m and rad: a tenth of a nanometre at a metre's arm
@@ -77,7 +78,7 @@ class ParaboloidFit:
 
 def fit_paraboloid(
     points: np.ndarray,
-    covariance: np.ndarray,
+    covariance: np.ndarray | AlongNormals,
     nominal: Transform,
     *,
     focal_length: float,
@@ -88,7 +89,8 @@ def fit_paraboloid(
     """Least squares of deviations over what is free of vertex, axis and focal length.
 
     points         (k, 3) m, in the frame `nominal.to`, at least as many as parameters
-    covariance     (3k, 3k) or, points independent of each other, (k, 3, 3) m^2; does not weigh, is carried through
+    covariance     (3k, 3k) or, points independent of each other, (k, 3, 3) m^2, or a function from unit vectors (k, 3)
+                   to the covariance (k, k) along them; does not weigh, is carried through
     nominal        outer frame from the nominal paraboloid's: vertex at its origin, axis along its z
     focal_length   m, held, or where the search begins
     free           of "vertex" (its three coordinates), "axis" (two tilts), "focal-length"; the rest is held as nominal
@@ -169,13 +171,15 @@ def cosine(local: np.ndarray, focal_length: float) -> np.ndarray:
     return 1.0 / np.sqrt(1.0 + np.sum(local[:, :2] ** 2, axis=1) / (2.0 * focal_length) ** 2)
 
 
-def covariance_along(covariance: np.ndarray, normal: np.ndarray) -> np.ndarray:
+def covariance_along(covariance: np.ndarray | AlongNormals, normal: np.ndarray) -> np.ndarray:
     """(k, k) m^2 of the points' components along unit vectors.
 
-    covariance   (3k, 3k) or (k, 3, 3) m^2
+    covariance   (3k, 3k) or (k, 3, 3) m^2, or a function that gives it
     normal       (k, 3)
     """
     k = len(normal)
+    if callable(covariance):
+        return covariance(normal)
     if covariance.shape == (k, 3, 3):
         return np.diag(np.einsum("ki,kij,kj->k", normal, covariance, normal))
     blocks = covariance.reshape(k, 3, k, 3)

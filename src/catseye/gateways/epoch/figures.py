@@ -43,9 +43,7 @@ def figures(reduction: Reduction) -> dict[str, Figure]:
 def _view(reduction: Reduction, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 2) and covariances (n, 2, 2) seen along a direction; `axes` (2, 3) are the page's."""
     coordinates = reduction.coordinates
-    n = len(coordinates.points)
-    blocks = coordinates.covariance.reshape(n, 3, n, 3)[np.arange(n), :, np.arange(n)]
-    return coordinates.x @ axes.T, axes @ blocks @ axes.T
+    return coordinates.x @ axes.T, axes @ coordinates.joint.blocks @ axes.T
 
 
 def _draw_network(ax, reduction: Reduction, axes: np.ndarray, rows: Sequence[int], share: float) -> None:
@@ -164,7 +162,7 @@ def _feed_arm(reduction: Reduction) -> Figure | None:
             names[row], reduction.coordinates.x[row, :2], xytext=(0, 17), textcoords="offset points", ha="center",
             va="bottom", fontsize=8, color=COLOURS["feed-arm ranger"],
         )  # fmt: skip
-    u = np.sqrt(np.diag(reduction.coordinates.covariance)).reshape(-1, 3)[rows] / MILLIMETRE
+    u = reduction.coordinates.u[rows] / MILLIMETRE
     at = np.arange(len(rows))
     for i, label in enumerate(("x, east", "y, north", "z, up")):
         right.barh(at + 0.25 * (i - 1), u[:, i], 0.22, color=SERIES[i], label=label)

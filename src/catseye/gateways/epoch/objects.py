@@ -25,8 +25,7 @@ def reduction_object(reduction: "Reduction") -> dict[str, Any]:
     points = {}
     for row, name in enumerate(coordinates.points):
         x, y, z = coordinates.x[row]
-        at = slice(3 * row, 3 * row + 3)
-        covariance = coordinates.covariance[at, at]
+        covariance = coordinates.joint.blocks[row]
         points[name] = {"x": x, "y": y, "z": z, "covariance": covariance, "shots": coordinates.shots[row]}
     total, used, rejected = len(reduction.status), reduction.status.count("used"), len(reduction.rejected)
     return {

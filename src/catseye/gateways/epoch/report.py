@@ -347,7 +347,7 @@ def _air(reduction: Reduction, drawn: dict[str, str]) -> str:
 
 def _points(reduction: Reduction) -> str:
     coordinates = reduction.coordinates
-    u = np.sqrt(np.diag(coordinates.covariance)).reshape(-1, 3) / MILLIMETRE
+    u = coordinates.u / MILLIMETRE
     rows = [
         (
             name,

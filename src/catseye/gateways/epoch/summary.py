@@ -67,7 +67,7 @@ def passages(reduction: Reduction) -> list[Passage]:
 def feed_arm_rows(reduction: Reduction) -> list[tuple[str, np.ndarray, np.ndarray]]:
     """Name, coordinates (m) and standard uncertainties (mm) of each feed-arm ranger."""
     coordinates = reduction.coordinates
-    u = np.sqrt(np.diag(coordinates.covariance)).reshape(-1, 3) / MILLIMETRE
+    u = coordinates.u / MILLIMETRE
     return [
         (name, coordinates.x[row], u[row])
         for row, name in enumerate(coordinates.points)

@@ -123,8 +123,7 @@ def coordinates_csv(reduction: Reduction) -> str:
     coordinates = reduction.coordinates
     rows = []
     for row, name in enumerate(coordinates.points):
-        at = slice(3 * row, 3 * row + 3)
-        covariance = coordinates.covariance[at, at] / MILLIMETRE**2
+        covariance = coordinates.joint.blocks[row] / MILLIMETRE**2
         u = np.sqrt(np.diag(covariance))
         moved = np.linalg.norm(coordinates.x[row] - coordinates.start[row])
         rows.append(

@@ -7,7 +7,14 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.least_squares.adjustment import CONVERGED, GroupFit, LeastSquaresSolution, adjust
+from catseye.estimation.least_squares.adjustment import (
+    CONVERGED,
+    GroupFit,
+    LeastSquaresSolution,
+    SolverSettings,
+    adjust,
+)
+from catseye.estimation.least_squares.covariance import JointPoints
 from catseye.estimation.least_squares.robust import CHECKED, OutlierSearch, adjust_robustly
 from catseye.estimation.observations.kinds import Linear, ObservationGroup
 from catseye.records.night.campaign import ObservedSite
@@ -95,7 +102,7 @@ class AdjustedCoordinates:
 
     points       names in order; places their records where they can be ranged to (fixed points are no places)
     x            (points, 3) m, ground frame
-    covariance   (3 points, 3 points) m^2, order x y z of each point
+    joint        their joint covariance, m^2
     start        (points, 3) m, where the adjustment began
     shots        used shots at each point, fired there or from there
     ranges       every shot with a phase
@@ -114,7 +121,7 @@ class AdjustedCoordinates:
     points: tuple[str, ...]
     places: dict[str, RangedPoint]
     x: np.ndarray
-    covariance: np.ndarray
+    joint: JointPoints
     start: np.ndarray
     shots: np.ndarray
     ranges: RangeShots
@@ -135,10 +142,24 @@ class AdjustedCoordinates:
         """Row of a point by its name."""
         return self.points.index(name)
 
+    def rows(self, names: Sequence[str]) -> np.ndarray:
+        """Rows of some points, (k,)."""
+        at = {name: row for row, name in enumerate(self.points)}
+        return np.array([at[name] for name in names], dtype=int)
+
     def block(self, names: Sequence[str]) -> np.ndarray:
         """Covariance (3k, 3k) of some points, in the order given."""
-        columns = (3 * np.array([self.index(n) for n in names], dtype=int)[:, None] + np.arange(3)).ravel()
-        return self.covariance[np.ix_(columns, columns)]
+        return self.joint.block(self.rows(names))
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """(3 points, 3 points) m^2, order x y z of each point; EstimationError where there are too many."""
+        return self.joint.matrix()
+
+    @property
+    def u(self) -> np.ndarray:
+        """(points, 3) m, standard uncertainties."""
+        return self.joint.u
 
 
 def adjust_coordinates(
@@ -196,6 +217,7 @@ def settle_network(
     coordinates = np.concatenate(points)
     active, solution = None, None
     advice: list[Linear] = []
+    solver = SolverSettings(border=network.border)
     for turn in range(PASSES):
         if progress is not None:
             progress("adjustment", turn, PASSES)
@@ -207,7 +229,7 @@ def settle_network(
         ]
         before = x
         if predicted and turn < TESTED and (active is None or all(a.all() for a in active)):
-            solution = adjust(x, groups, free=free, names=layout.names)
+            solution = adjust(x, groups, free=free, names=layout.names, solver=solver)
             predicted = _unsuspicious(solution, removable, settings.critical)
             active = None
         if turn < TESTED and not predicted:
@@ -219,15 +241,16 @@ def settle_network(
                 free=free,
                 active=active,
                 names=layout.names,
+                border=network.border,
             )
         elif turn >= TESTED:
-            solution = adjust(x, groups, free=free, active=active, names=layout.names)
+            solution = adjust(x, groups, free=free, active=active, names=layout.names, solver=solver)
         assert solution is not None
         x, active = solution.require_converged().x, [f.active for f in solution.fits]
         if not turn:
-            advice = dish_advice(network, x, solution.covariance)
+            advice = dish_advice(network, x, solution.q)
         moved = np.abs(x - before)[coordinates]
-        u = np.sqrt(np.diag(solution.covariance)[coordinates])
+        u = np.sqrt(solution.q.diagonal()[coordinates])
         if turn and np.all(moved < np.maximum(SETTLED + keep, SETTLED_U * u)):
             break
     else:
@@ -268,7 +291,7 @@ def coordinates_of(
     """
     layout, campaign = network.layout, network.campaign
     names = sorted([*network.places, *(str(Parameter(ParameterKind.FIXED_POINT, m)) for m in campaign.monuments)])
-    columns = np.concatenate([layout.columns(n) for n in names])
+    columns = np.array([layout.columns(n) for n in names])
     ranges = _ranges(network, solution, shots)
     count = dict.fromkeys(names, 0)
     for ranger, target, used in zip(ranges.ranger, ranges.target, ranges.used, strict=True):
@@ -277,8 +300,10 @@ def coordinates_of(
     judged = [f.name for f in solution.fits if f.name != APPROXIMATE]
     factor, degrees = solution.variance_factor(judged)
 
+    variance = solution.q.diagonal()
+
     def estimate(column: int) -> tuple[float, float]:
-        return float(solution.x[column]), float(np.sqrt(solution.covariance[column, column]))
+        return float(solution.x[column]), float(np.sqrt(variance[column]))
 
     every = {n: estimate(int(k)) for k, n in zip(layout.air, network.field.names, strict=True)}
     sound = {line.name: every[line.name] for line in network.field.lines}
@@ -288,9 +313,9 @@ def coordinates_of(
     return AdjustedCoordinates(
         points=tuple(names),
         places=network.places,
-        x=solution.x[columns].reshape(-1, 3),
-        covariance=solution.covariance[np.ix_(columns, columns)],
-        start=np.array(layout.start)[columns].reshape(-1, 3),
+        x=solution.x[columns],
+        joint=JointPoints.of(solution.q, columns),
+        start=np.array(layout.start)[columns],
         shots=np.array([count[n] for n in names]),
         ranges=ranges,
         heads={
@@ -324,7 +349,7 @@ def _ranges(
 ) -> RangeShots:
     x, layout, parts = solution.x, network.layout, [p for _, p in shots]
     fits = solution.fits[: len(parts)]
-    zero, leakage, glass, range_, u_range, residual, detectable, thin = [], [], [], [], [], [], [], []
+    zero, leakage, glass, range_, u_range, residual, detectable, thin, redundancy = [], [], [], [], [], [], [], [], []
     quarter = 0.25 * SPEED_OF_LIGHT / network.campaign.site.ranging.modulation_hz  # of the optical length, as the fits
     for (group, part), fit in zip(shots, fits, strict=True):
         n = 1.0 + part.refractivity
@@ -336,9 +361,11 @@ def _ranges(
         constants = [Parameter(ParameterKind.GLASS, t) for t in part.target]
         rest = [x[layout.at[c]] if c in layout.at else 0.0 for c in constants]
         glass.append(part.glass + np.array(rest))
-        residual.append(fit.residual / n)
-        range_.append(np.linalg.norm(to - at, axis=1) + fit.residual / n)
-        u_range.append(fit.sigma / n)
+        own = fit.residual + part.shared_error(x)
+        residual.append(own / n)
+        range_.append(np.linalg.norm(to - at, axis=1) + own / n)
+        u_range.append(np.sqrt(part.variance) / n)
+        redundancy.append(_redundancy(group, part, fit, solution))
         detectable.append(fit.detectable_error / n)
         error, u = line_errors(group, part.target, fit, solution=solution)
         thin.append(np.abs(error) + KEPT * u >= quarter)
@@ -362,11 +389,27 @@ def _ranges(
         u_range=join(u_range),
         residual=join(residual),
         standardised=join([f.standardised for f in fits]),
-        redundancy=join([f.redundancy for f in fits]),
+        redundancy=join(redundancy),
         detectable=join(detectable),
         used=join([f.active for f in fits]),
         thin=join(thin),
     )
+
+
+def _redundancy(group: ShotGroup, part: ShotParts, fit: GroupFit, solution: LeastSquaresSolution) -> np.ndarray:
+    """(m,) redundancy numbers of ranges, what they share with others counted as theirs.
+
+    With the shared errors B z as parameters, C = D + B S B' and P_v as it is without them, P_v C = P_v D + D^-1 A Q B':
+    so 1 - a Q (a - b)' / D.
+    """
+    columns, _ = part.shared
+    if not columns.shape[1]:
+        return fit.redundancy
+    jacobian = group.predict(solution.x)[1]
+    without = jacobian.copy()
+    without[:, -columns.shape[1] :] = 0.0
+    spread = np.sum(solution.q.products(group.columns, jacobian) * without, axis=1)
+    return np.where(fit.active, 1.0 - spread / group.covariance, 1.0)
 
 
 def _thin_notes(ranges: RangeShots) -> list[str]:

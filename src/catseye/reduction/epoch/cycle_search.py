@@ -120,9 +120,10 @@ def _problem(scene: CycleScene, name: str, rows: list[tuple[int, int]], x: np.nd
     start = 0
     for i in groups:
         end = start + len(at[i])
-        noise[start:end, start:end] = scene.groups[i].covariance[np.ix_(at[i], at[i])]
+        given = scene.groups[i].covariance
+        noise[start:end, start:end] = given[np.ix_(at[i], at[i])] if given.ndim == 2 else np.diag(given[at[i]])
         start = end
-    covariance = noise / np.outer(n, n) + slopes @ solution.covariance @ slopes.T
+    covariance = noise / np.outer(n, n) + slopes @ solution.q.solve(slopes.T)
     misses = np.concatenate([(scene.groups[i].observed - scene.groups[i].predict(x)[0])[at[i]] for i in groups]) / n
     stations = np.array([other_ends(scene.groups[i], r, int(own[0]), x=x) for i, r in order])
     distance = np.linalg.norm(stations - x[own], axis=1)
@@ -138,7 +139,7 @@ def _problem(scene: CycleScene, name: str, rows: list[tuple[int, int]], x: np.nd
 def spread(scene: CycleScene, name: str) -> np.ndarray:
     """Covariance (3, 3) m^2 of a point before its waiting shots."""
     own = scene.network.layout.columns(name)
-    covariance = scene.solution.covariance[np.ix_(own, own)]
+    covariance = scene.solution.q.within(own)
     in_unit = any(name in t.targets for t in scene.network.campaign.triplets.values())
     return 3.0 * covariance if in_unit else covariance  # one typed position stands for three points: no averaging
 

@@ -7,13 +7,19 @@ say of the others may make those safe. Points that are still known too badly are
 what only these have seen.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT
 from catseye.estimation.ambiguity.search import AmbiguityStatus, Located
-from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit, LeastSquaresSolution, adjust
+from catseye.estimation.least_squares.adjustment import (
+    NONCENTRALITY,
+    GroupFit,
+    LeastSquaresSolution,
+    SolverSettings,
+    adjust,
+)
 from catseye.estimation.least_squares.robust import OutlierSearch, adjust_robustly
 from catseye.estimation.least_squares.rows import full_jacobian
 from catseye.estimation.observations.kinds import ObservationGroup
@@ -130,13 +136,7 @@ def without_shots(electronics: dict[str, ElectronicsPhase], out: set[int]) -> di
     left = {}
     for name, e in electronics.items():
         keep = np.array([int(k) not in out for k in e.shots], dtype=bool)
-        left[name] = replace(
-            e,
-            shots=e.shots[keep],
-            phase=e.phase[keep],
-            covariance=e.covariance[np.ix_(keep, keep)],
-            reference=e.reference[keep],
-        )
+        left[name] = e.of(keep)
     return left
 
 
@@ -150,17 +150,46 @@ def line_errors(
     """
     error, u = fit.estimated_error.copy(), fit.detectable_error / NONCENTRALITY
     on = np.flatnonzero(fit.active)
-    lines = {name: np.array([targets[k] == name for k in on], dtype=bool) for name in {targets[k] for k in on}}
-    repeated = [mine for mine in lines.values() if mine.sum() > 1]
-    if repeated:
-        weight = np.linalg.inv(group.covariance[np.ix_(on, on)])
-        weighed = weight @ full_jacobian(group, solution.x)[on]
-        rest = weight @ fit.residual[on]
-        for mine in repeated:
-            own, seen = weight[np.ix_(mine, mine)].sum(), weighed[mine].sum(axis=0)
-            visible = max(own - seen @ solution.covariance @ seen, 1e-12 * own)
-            error[on[mine]], u[on[mine]] = rest[mine].sum() / visible, visible**-0.5
+    line = np.unique(np.array(targets)[on], return_inverse=True)[1] if len(on) else on
+    repeats = np.bincount(line) if len(on) else on
+    if not (repeats > 1).any():
+        return error, u
+    if group.covariance.ndim == 1:
+        _apart_line_errors(group, on[np.argsort(line, kind="stable")], repeats, fit, solution, error=error, u=u)
+        return error, u
+    weight = np.linalg.inv(group.covariance[np.ix_(on, on)])
+    weighed = weight @ full_jacobian(group, solution.x)[on]
+    rest = weight @ fit.residual[on]
+    for one in np.flatnonzero(repeats > 1):
+        mine = line == one
+        own, seen = weight[np.ix_(mine, mine)].sum(), weighed[mine].sum(axis=0)
+        visible = max(own - seen @ solution.covariance @ seen, 1e-12 * own)
+        error[on[mine]], u[on[mine]] = rest[mine].sum() / visible, visible**-0.5
     return error, u
+
+
+def _apart_line_errors(
+    group: ShotGroup,
+    rows: np.ndarray,
+    repeats: np.ndarray,
+    fit: GroupFit,
+    solution: LeastSquaresSolution,
+    *,
+    error: np.ndarray,
+    u: np.ndarray,
+) -> None:
+    """`line_errors` of independent rows, line by line, so many of each; errors and u are changed in place."""
+    jacobian = group.predict(solution.x)[1]
+    first = np.cumsum(repeats) - repeats
+    for count in np.unique(repeats[repeats > 1]):
+        mine = rows[first[repeats == count][:, None] + np.arange(count)]
+        weight = 1.0 / group.covariance[mine]
+        columns = group.columns[mine].reshape(len(mine), -1)
+        seen = (jacobian[mine] * weight[..., None]).reshape(len(mine), -1)
+        own = weight.sum(axis=1)
+        visible = np.maximum(own - np.sum(solution.q.products(columns, seen) * seen, axis=1), 1e-12 * own)
+        error[mine] = (np.sum(weight * fit.residual[mine], axis=1) / visible)[:, None]
+        u[mine] = visible[:, None] ** -0.5
 
 
 def _too_wide(network: CampaignNetwork, covariance: np.ndarray) -> bool:
@@ -194,6 +223,7 @@ def _adjusted(network: CampaignNetwork, x: np.ndarray, waiting: set[int]) -> Cyc
             ),
             free=np.array(part.layout.free),
             names=part.layout.names,
+            border=part.border,
         ).require_converged()
         x = x.copy()
         x[at] = solution.x
@@ -212,6 +242,7 @@ def _adjusted(network: CampaignNetwork, x: np.ndarray, waiting: set[int]) -> Cyc
         free=np.array(network.layout.free),
         active=active,
         names=network.layout.names,
+        solver=SolverSettings(border=network.border),
     ).require_converged()
     pairs = [shot_group(network, name, whole.x) for name in network.rangers]
     return CycleScene(network, [g for g, _ in pairs], [p for _, p in pairs], whole)

@@ -4,6 +4,7 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
+from catseye.estimation.least_squares.covariance import Covariance
 from catseye.estimation.observations.kinds import Linear
 from catseye.estimation.shapes.paraboloid import fit_paraboloid
 from catseye.records.night.campaign import ObservedSite
@@ -23,11 +24,11 @@ def dish_prisms(campaign: ObservedSite) -> list[str]:
     return sorted(n for n, t in campaign.targets.items() if t.type == "prism" and t.frame == "reflector")
 
 
-def dish_advice(network: CampaignNetwork, x: np.ndarray, covariance: np.ndarray) -> list[Linear]:
+def dish_advice(network: CampaignNetwork, x: np.ndarray, covariance: Covariance) -> list[Linear]:
     """For each dish prism the plane of the dish at its typed place, as an observation that may judge but not shape.
 
     x            (n,) parameters of an adjustment
-    covariance   (n, n)
+    covariance   of the parameters
 
     The dish is the paraboloid through the well-known prisms without those that stand out, because a prism whose place
     was decided by a foreign return is well known and wrong. Too few of them give no advice.
@@ -37,7 +38,7 @@ def dish_advice(network: CampaignNetwork, x: np.ndarray, covariance: np.ndarray)
     if not len(names):
         return []
     columns = np.array([layout.columns(n) for n in names])
-    known = np.sqrt(np.diag(covariance)[columns].max(axis=1)) < WELL_KNOWN
+    known = np.sqrt(covariance.diagonal()[columns].max(axis=1)) < WELL_KNOWN
     nominal = nominal_frame(campaign)
     focal_length = campaign.site.paraboloid.focal_length_mm * MILLIMETRE
     for _ in range(ROUNDS):
@@ -45,9 +46,7 @@ def dish_advice(network: CampaignNetwork, x: np.ndarray, covariance: np.ndarray)
         if count < FEWEST:
             return []
         try:
-            fit = fit_paraboloid(
-                x[columns[known]], np.zeros((3 * count, 3 * count)), nominal, focal_length=focal_length
-            )
+            fit = fit_paraboloid(x[columns[known]], np.zeros((count, 3, 3)), nominal, focal_length=focal_length)
         except EstimationError:
             return []
         off = np.abs(fit.deviation - np.median(fit.deviation))

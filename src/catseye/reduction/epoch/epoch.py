@@ -55,7 +55,7 @@ def reduce_epoch(
     settings = settings or ReductionSettings()
     phases = measure_phases(campaign, settings, progress)
     with threadpool_limits(limits=1, user_api="blas"):  # spinning pools make small matrices many times slower
-        electronics, wrong = follow_electronics(campaign, phases)
+        electronics, wrong = follow_electronics(campaign, phases, settings.dense_shots)
         coordinates = adjust_coordinates(campaign, phases, electronics, settings=settings, progress=progress)
         surface, missing = fit_surface(campaign, coordinates)
     reasons = {k: reason for k, reason in enumerate(phases.reason) if reason} | wrong | coordinates.unresolved

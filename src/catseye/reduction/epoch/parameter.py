@@ -19,9 +19,12 @@ class ParameterKind(Enum):
     AXES = "axes {of} {part}"  # how far the sheet's four offsets of the mirror's axes and the beam are off
     AMPLITUDE = "amplitude {of}"
     CYCLIC = "cyclic {of} {part}"
+    BODY = "body {of} {part}"  # how the dish or the arm as a whole stands off the nominal posture
     NORMAL = "normal {of} {part}"  # tilts of a prism's face or of a triplet's plate
     GLASS = "glass {of}"
     PATH = "path {of} {part}"  # what lasts of a line's index, ppm: of a ranger, to a target
+    REPEATS = "repeats {of} {part}"  # the same of what shots on one line share in a campaign, ppm
+    ELECTRONICS = "electronics {of} {part}"  # errors that a ranger's shots share between reference shots
     THERMOMETER = "the air {of}"  # of a weather station
     PROFILE = "the air {part}"  # "bend" or "gradient"
     SOUND = "the air {of} - {part}"  # of a line whose temperature sound measured: from, to

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,8 @@ from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.signal.cycles.whole import fraction
 from catseye.signal.detection.buffers import BufferStatus, inspect_buffers
 from catseye.signal.detection.cycle_scatter import FEWEST_FOR_BATCHES, CycleScatter
-from catseye.signal.drift.reference import drift_at, reference_surprise
+from catseye.signal.drift.reference import drift_along, drift_at, reference_surprise
+from catseye.signal.drift.states import DriftStates, drift_states
 from catseye.signal.drift.walk import estimate_walk, walk_test
 from catseye.signal.systematics.leakage import subtract_leakage
 
@@ -101,15 +102,55 @@ class ElectronicsPhase:
 
     shots        (m,) indices into the campaign's shots
     phase        (m,) rad
-    covariance   (m, m) rad^2, from the noise of the references and the walk between them
+    covariance   (m, m) rad^2, from the noise of the references and the walk between them; with `walk` its diagonal
     reference    (m,) V, complex: the reference phasor that the leakage acts on; its magnitude, the cube's return at
                  that instant, is what amplitude-to-phase coupling counts from
+    walk         how the errors are correlated, of a campaign too large for a matrix
     """
 
     shots: np.ndarray
     phase: np.ndarray
     covariance: np.ndarray
     reference: np.ndarray
+    walk: "ReferenceWalk | None" = None
+
+    def of(self, keep: np.ndarray) -> "ElectronicsPhase":
+        """The same at some of the shots, (m,) bool."""
+        whole = self.covariance.ndim == 2
+        return ElectronicsPhase(
+            self.shots[keep],
+            self.phase[keep],
+            self.covariance[np.ix_(keep, keep)] if whole else self.covariance[keep],
+            self.reference[keep],
+            None if self.walk is None else replace(self.walk, seconds=self.walk.seconds[keep]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceWalk:
+    """What the errors of a ranger's electronics follow from.
+
+    seconds              (m,) s, of the shots
+    reference_seconds    (r,) s, and
+    reference_variance   (r,) rad^2, of the reference shots
+    random_walk          rad per root second
+    """
+
+    seconds: np.ndarray
+    reference_seconds: np.ndarray
+    reference_variance: np.ndarray
+    random_walk: float
+
+    def states(self, noise: np.ndarray, left: float) -> DriftStates:
+        """The errors as hidden parameters; noise (m,) rad^2 and `left` as in `drift_states`."""
+        return drift_states(
+            self.reference_seconds,
+            self.reference_variance,
+            time=self.seconds,
+            random_walk=self.random_walk,
+            noise=noise,
+            left=left,
+        )
 
 
 def measure_phases(campaign: Campaign, settings: ReductionSettings, progress: Progress | None = None) -> Phases:
@@ -315,8 +356,12 @@ def _usual_amplitude(campaign: ObservedSite, amplitude: np.ndarray) -> np.ndarra
     return usual
 
 
-def follow_electronics(campaign: ObservedSite, phases: Phases) -> tuple[dict[str, ElectronicsPhase], dict[int, Reason]]:
+def follow_electronics(
+    campaign: ObservedSite, phases: Phases, dense_shots: int = ReductionSettings.dense_shots
+) -> tuple[dict[str, ElectronicsPhase], dict[int, Reason]]:
     """Phase of each ranger's electronics at its target shots, and what was rejected on the way (index: reason).
+
+    dense_shots   usable target shots of all rangers up to which the errors' covariances are matrices
 
     References that miss what the others predict, or whose amplitude is not that of the cube alone, are left out; a
     ranger without any good reference cannot range.
@@ -331,6 +376,7 @@ def follow_electronics(campaign: ObservedSite, phases: Phases) -> tuple[dict[str
     variance = np.where(usable, phases.u_phase, 0.0) ** 2
     rejected: dict[int, Reason] = {}
     electronics: dict[str, ElectronicsPhase] = {}
+    large = np.count_nonzero(usable & (target != REFERENCE)) > dense_shots
     for name in campaign.rangers:
         mine = ranger == name
         lit = np.flatnonzero(mine & usable & (target != REFERENCE))
@@ -344,11 +390,15 @@ def follow_electronics(campaign: ObservedSite, phases: Phases) -> tuple[dict[str
             rejected.update({int(k): Reason(ShotStatus.NO_REFERENCE, text) for k in lit})
             continue
         unwrapped = np.unwrap(np.angle(phases.phasor[references]))
-        phase, covariance = drift_at(
-            seconds[references], unwrapped, variance[references], time=seconds[lit], random_walk=walk
-        )
+        known = seconds[references], unwrapped, variance[references]
         level = np.interp(seconds[lit], seconds[references], phases.amplitude[references])
-        electronics[name] = ElectronicsPhase(lit, phase, covariance, level * np.exp(1j * phase))
+        if large:
+            phase, u = drift_along(*known, time=seconds[lit], random_walk=walk)
+            between = ReferenceWalk(seconds[lit], known[0], known[2], walk)
+            electronics[name] = ElectronicsPhase(lit, phase, u**2, level * np.exp(1j * phase), between)
+        else:
+            phase, covariance = drift_at(*known, time=seconds[lit], random_walk=walk)
+            electronics[name] = ElectronicsPhase(lit, phase, covariance, level * np.exp(1j * phase))
     return electronics, rejected
 
 

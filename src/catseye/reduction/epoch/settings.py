@@ -22,6 +22,10 @@ class ReductionSettings:
     u_surface               m, along the normal, of a dish prism off the best paraboloid: some tenths of a millimetre;
                             it only helps to judge shots that contradict each other
     u_position              m, each coordinate, of a typed approximate position: some 15 mm in space
+    dense_shots             usable target shots up to which the errors that a ranger's shots share are one covariance;
+                            of more they are parameters, see `signal.drift.states`
+    neglected               of a campaign with more: variance over a shot's noise of the walk's modes between two
+                            reference shots whose correlation is neglected; 0 neglects nothing
     """
 
     air_model: str = "rueger1990"
@@ -35,3 +39,5 @@ class ReductionSettings:
     u_plate_normal: float = 0.3 * DEGREE
     u_surface: float = 0.001
     u_position: float = 0.010
+    dense_shots: int = 1500
+    neglected: float = 0.3

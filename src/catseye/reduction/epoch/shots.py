@@ -11,8 +11,7 @@ from catseye.optics.retroreflector.prism import obliquity_correction, obliquity_
 from catseye.reduction.epoch.head import HeadCorrections, head_corrections
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import ElectronicsPhase
-from catseye.reduction.epoch.unknowns import CampaignNetwork
-from catseye.reduction.site.places import unit
+from catseye.reduction.epoch.unknowns import CampaignNetwork, path_ppm
 from catseye.signal.cycles.whole import fraction, unwrapped_length, whole_cycles
 
 ShotGroup = Distances | MovingDistances
@@ -31,6 +30,9 @@ class ShotParts:
     glass, obliquity   Pc and dPc, m
     leakage_slope      (m, 2) m/V, of the observed optical length by the rest of leakage
     head               what the ranger's head asks to add to the range: `head.at(x)` with the estimated parameters
+    variance           m^2, of the optical length, with all that it shares with other shots
+    shared             parameters that stand for what it shares, -1 for none; and the derivatives of the optical length
+                       by them, m: of a large campaign, else none
     """
 
     name: str
@@ -45,6 +47,13 @@ class ShotParts:
     obliquity: np.ndarray
     leakage_slope: np.ndarray
     head: HeadCorrections
+    variance: np.ndarray
+    shared: tuple[np.ndarray, np.ndarray]
+
+    def shared_error(self, x: np.ndarray) -> np.ndarray:
+        """(m,) m, of the optical lengths, as the parameters x have it."""
+        columns, slopes = self.shared
+        return np.asarray(np.sum(np.where(columns < 0, 0.0, x[columns]) * slopes, axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +137,9 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
     cycles, margin = whole_cycles(coarse, phase, half)
     observed = unwrapped_length(cycles, phase, half)
     per_radian = -half / TWO_PI
+    jitter = np.zeros(len(n)) if network.motion is None else n**2 * network.motion.jitter(name, targets)
+    shared = _shared(network, name, targets, distance=distance, per_radian=per_radian)
+    covariance, variance = _covariance(network, name, targets, distance, per_radian)
     parts = ShotParts(
         name=name,
         electronics=electronics,
@@ -141,6 +153,8 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
         obliquity=obliquity,
         leakage_slope=_leakage_slope(per_radian, lit, cube),
         head=head,
+        variance=variance + jitter,
+        shared=shared,
     )
     offset = (
         -n * (glass + obliquity + d0 + head.value)
@@ -148,7 +162,7 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
         + n * np.sum(normal_slopes * x[normal_columns], axis=1)
     )
     nuisance, coefficient = _nuisance(network, parts, distance, air.slopes, (normal_columns, normal_slopes))
-    covariance = _covariance(network, parts, distance, per_radian)
+    covariance += jitter if covariance.ndim == 1 else np.diag(jitter)
     origin, target = sights.origin, sights.target
     if sights.turns is None:
         return Distances(name, observed, covariance, origin, target, n, offset, nuisance, coefficient), parts
@@ -167,20 +181,43 @@ def _leakage_slope(per_radian: float, lit: np.ndarray, cube: np.ndarray) -> np.n
     return per_radian * np.stack([t[0] - t[1] for t in turn], axis=1)
 
 
-def _covariance(network: CampaignNetwork, parts: ShotParts, distance: np.ndarray, per_radian: float) -> np.ndarray:
-    """(m, m) m^2 of the optical lengths: noise, the electronics' walk, the path's fluctuation, the structure's."""
-    electronics, motion = parts.electronics, network.motion
-    noise = network.phases.u_phase[electronics.shots]
-    covariance = np.diag((per_radian * noise) ** 2) + per_radian**2 * electronics.covariance
-    lasting = 0.0 if motion is None else motion.lasting
-    ppm = network.campaign.site.ranging.path_index_fluctuation_ppm
-    path = ppm * PPM * distance * np.sqrt(1.0 - lasting**2)
-    same = np.array(parts.target)[:, None] == np.array(parts.target)
+def _covariance(
+    network: CampaignNetwork,
+    name: str,
+    targets: tuple[str, ...],
+    distance: np.ndarray,
+    per_radian: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Covariance m^2 of the optical lengths, and its diagonal: noise, the electronics' walk, the path's fluctuation.
+
+    (m, m), or of a large campaign the variances (m,) of what shots have by themselves.
+    """
+    electronics = network.electronics[name]
+    noise = (per_radian * network.phases.u_phase[electronics.shots]) ** 2
+    path = path_ppm(network) * PPM * distance
+    if electronics.walk is not None:
+        alone = np.array([Parameter(ParameterKind.REPEATS, name, t) not in network.layout.at for t in targets])
+        own = noise + per_radian**2 * network.states[name].own + np.where(alone, path**2, 0.0)
+        return own, noise + per_radian**2 * electronics.covariance + path**2
+    covariance = np.diag(noise) + per_radian**2 * electronics.covariance
+    same = np.array(targets)[:, None] == np.array(targets)
     covariance += same * np.outer(path, path)
-    if motion is not None:
-        index = 1.0 + parts.refractivity
-        covariance += np.diag(index**2 * motion.jitter(parts.name, parts.target))
-    return covariance
+    return covariance, np.diag(covariance).copy()
+
+
+def _shared(
+    network: CampaignNetwork, name: str, targets: tuple[str, ...], *, distance: np.ndarray, per_radian: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Parameters (m, w), -1 for none, of what one ranger's shots share with others, and derivatives by them, m."""
+    m = len(targets)
+    if name not in network.states:
+        return np.zeros((m, 0), dtype=int), np.zeros((m, 0))
+    states, at = network.states[name], network.layout.at
+    first = at[Parameter(ParameterKind.ELECTRONICS, name)]
+    lines = np.array([at.get(Parameter(ParameterKind.REPEATS, name, t), -1) for t in targets])
+    columns = np.concatenate([np.where(states.columns < 0, -1, first + states.columns), lines[:, None]], axis=1)
+    slopes = np.concatenate([per_radian * states.slopes, (PPM * distance * (lines >= 0))[:, None]], axis=1)
+    return columns, slopes
 
 
 def _nuisance(
@@ -209,6 +246,7 @@ def _nuisance(
         normals[0],
         rest[:, None],
         parts.head.columns,
+        parts.shared[0],
     ]
     slopes = [
         PPM * distance[:, None] * (paths >= 0),
@@ -218,6 +256,7 @@ def _nuisance(
         -n[:, None] * normals[1],
         (-n * has_rest)[:, None],
         -n[:, None] * parts.head.slopes,
+        parts.shared[1],
     ]
     return np.concatenate(columns, axis=1), np.concatenate(slopes, axis=1)
 
@@ -248,23 +287,24 @@ def _obliquity(
     ratio, bends = ranging.bk7_to_air_group_index_ratio, ranging.bk7_to_air_phase_index_ratio
     incidence, correction, slopes = np.zeros(m), np.zeros(m), np.zeros((m, 2))
     columns = np.zeros((m, 2), dtype=int)
-    for k, target in enumerate(targets):
-        place = network.places[target]
-        if place.normal is None:
-            continue
-        columns[k] = network.layout.columns(Parameter(ParameterKind.NORMAL, place.group), 2)
-        normal, across = _tilted(place.normal, x[columns[k]])
-        incidence[k] = np.arccos(np.clip(normal @ towards[k], -1.0, 1.0))
-        # From behind the face nothing returns: such a shot is judged as grazing, and fails on its range.
-        cosine = np.cos(min(incidence[k], 0.5 * np.pi))
-        correction[k] = obliquity_correction(place.height, ratio, cosine, phase=bends)
-        if incidence[k] > 1e-6:  # at normal incidence the correction is flat
-            by_angle = obliquity_slope(place.height, ratio, cosine, phase=bends)
-            slopes[k] = -by_angle * (across @ towards[k]) / np.sin(incidence[k])
+    at = np.array([k for k, t in enumerate(targets) if network.places[t].normal is not None], dtype=int)
+    if not len(at):
+        return incidence, correction, columns, slopes
+    prisms = [network.places[targets[k]] for k in at]
+    height = np.array([p.height for p in prisms])
+    first = np.array([network.layout.at[Parameter(ParameterKind.NORMAL, p.group)] for p in prisms])
+    columns[at] = first[:, None] + np.arange(2)
+    across = np.array([p.across for p in prisms])
+    normal = np.array([p.normal for p in prisms]) + np.einsum("mi,mij->mj", x[columns[at]], across)
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    angle = np.arccos(np.clip(np.sum(normal * towards[at], axis=1), -1.0, 1.0))
+    # From behind the face nothing returns: such a shot is judged as grazing, and fails on its range.
+    cosine = np.cos(np.minimum(angle, 0.5 * np.pi))
+    incidence[at] = angle
+    correction[at] = obliquity_correction(height, ratio, cosine, phase=bends)
+    by_angle = obliquity_slope(height, ratio, cosine, phase=bends)
+    oblique = angle > 1e-6  # at normal incidence the correction is flat
+    sine = np.where(oblique, np.sin(angle), 1.0)
+    turned = -by_angle * oblique / sine
+    slopes[at] = turned[:, None] * np.einsum("mij,mj->mi", across, towards[at])
     return incidence, correction, columns, slopes
-
-
-def _tilted(normal: np.ndarray, tilt: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The normal tilted by two small angles (rad) along two directions of the face, and those directions (2, 3)."""
-    across = np.linalg.svd(normal[None])[2][1:]
-    return unit(normal + tilt @ across), across

@@ -80,16 +80,18 @@ def fit_surface(campaign: ObservedSite, coordinates: AdjustedCoordinates) -> tup
 
     A prism takes part with three used shots or more; with fewer its place along the surface's normal is a guess.
     """
-    names = tuple(
-        name
-        for name in dish_prisms(campaign)
-        if name in coordinates.points and coordinates.shots[coordinates.index(name)] >= FEWEST_CHECKS
-    )
+    shots = dict(zip(coordinates.points, coordinates.shots.tolist(), strict=True))
+    names = tuple(name for name in dish_prisms(campaign) if shots.get(name, 0) >= FEWEST_CHECKS)
     nominal = nominal_frame(campaign)
     focal_length = campaign.site.paraboloid.focal_length_mm * MILLIMETRE
-    rows = [coordinates.index(n) for n in names]
+    rows = coordinates.rows(names)
     try:
-        fit = fit_paraboloid(coordinates.x[rows], coordinates.block(names), nominal, focal_length=focal_length)
+        fit = fit_paraboloid(
+            coordinates.x[rows],
+            lambda normals: coordinates.joint.along(rows, normals),
+            nominal,
+            focal_length=focal_length,
+        )
     except EstimationError as problem:
         return None, f"no paraboloid: {problem}"
     return DishFit(names, fit, focal_length, nominal.translation), ""

@@ -1,14 +1,18 @@
 """The network of a campaign: its unknowns, and what the records say of them before a shot is fired."""
 
+from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from catseye.constants import MILLIMETRE
+from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import InputError
+from catseye.estimation.least_squares.bordered import Border
 from catseye.estimation.observations.kinds import Distances, Linear, ObservationGroup
+from catseye.geometry.frames.rotation import skew
 from catseye.records.night.campaign import REFERENCE, ObservedSite
 from catseye.records.site.triplet import TripletRecord
 from catseye.reduction.epoch.air import AirField
@@ -18,6 +22,7 @@ from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.site.motion import CarriedMotion
 from catseye.reduction.site.places import RangedPoint, places_of, unit
+from catseye.signal.drift.states import DriftStates
 
 APPROXIMATE = "approximate positions"
 THERMOMETERS = "thermometers"
@@ -25,6 +30,14 @@ SOUND = "path temperatures"
 ZEROS = "ranger zeros"
 HEADS = "head effects"
 PATHS = "lasting paths"
+POSTURE = "bodies off their posture"
+REPEATS = "repeated paths"
+ELECTRONICS = "electronics between references"
+MANY_OF_A_BODY = 150  # typed points from which a body's own place is a parameter
+APART = 600  # parameters known one by one from which each is a row of its own, not of a matrix
+BLOCK_KINDS = (ParameterKind.NORMAL, ParameterKind.GLASS, ParameterKind.REPEATS)
+U_BODY, U_BODY_TURN = 0.03, 5e-4  # m and rad: more than a telescope stands off, so that shots alone say it
+LONGEST_TIE = 30  # parameters of one prior: those of a longer one are no block
 
 
 @dataclass
@@ -73,7 +86,10 @@ class UnknownsLayout:
 
 @dataclass(frozen=True, eq=False)
 class CampaignNetwork:
-    """The fixed part of the problem: what is unknown, what is known beforehand, which shots see what."""
+    """The fixed part of the problem: what is unknown, what is known beforehand, which shots see what.
+
+    states   of a large campaign: ranger's errors between its reference shots as parameters
+    """
 
     campaign: ObservedSite
     settings: ReductionSettings
@@ -84,6 +100,31 @@ class CampaignNetwork:
     field: AirField
     priors: list[ObservationGroup]
     motion: CarriedMotion | None = None
+    states: dict[str, DriftStates] = field(default_factory=dict)
+
+    @cached_property
+    def border(self) -> Border | None:
+        """What the elimination of a large network leaves; None for one that is solved densely.
+
+        A target that was fired at with its normal, glass and repeated paths is a block, triplets as wholes.
+        """
+        if not self.states:
+            return None
+        shooting = set(self.rangers)
+        on_border = np.array(
+            [
+                not (p.kind in BLOCK_KINDS or (p.kind is ParameterKind.POINT and p.of not in shooting))
+                for p in self.layout.parameters
+            ]
+        )
+        for prior in self.priors:
+            if prior.columns.ndim == 1 and len(prior.columns) > LONGEST_TIE:
+                on_border[prior.columns] = True
+        fine = np.zeros(len(on_border), dtype=bool)
+        for name, states in self.states.items():
+            at = self.layout.at[Parameter(ParameterKind.ELECTRONICS, name)]
+            fine[at + np.unique(states.columns[:, 2:])[1:]] = True  # the bridges' modes; the first is -1, none
+        return Border(on_border, fine)
 
     @property
     def rangers(self) -> list[str]:
@@ -109,11 +150,13 @@ def build_network(
     settings: ReductionSettings,
     motion: CarriedMotion | None = None,
     also: Collection[str] = (),
+    known: Collection[str] = (),
 ) -> CampaignNetwork:
     """The unknowns and priors of a campaign.
 
     motion   where the telescope moves between the shots; its points are then those of the motion's epoch
     also     rangers and targets that take part as if they had fired or been fired at
+    known    points whose typed positions have been used before
 
     Unknown are the points that were fired at or from (all of a triplet when one of it was), the monuments' fixed
     points, each firing ranger's zero and rest of leakage and what else its sheet knows of its head, the air's offsets
@@ -138,6 +181,10 @@ def build_network(
         layout.add(Parameter(ParameterKind.LEAKAGE, name), ["real", "imaginary"], [0.0, 0.0])
         for unknown in head_unknowns(campaign, name):
             layout.add(unknown.quantity, unknown.parts, np.zeros(len(unknown.parts)))
+    typed = {n: p for n, p in seen.items() if p.typed and n not in known}
+    for body, count in sorted(Counter(p.body for p in typed.values() if p.body).items()):
+        if count >= MANY_OF_A_BODY:
+            layout.add(Parameter(ParameterKind.BODY, body), (*XYZ, *(f"about {a}" for a in XYZ)), np.zeros(6))
     air = AirField.of(campaign, settings)
     for parameter in air.parameters:
         layout.add(parameter, [""], [0.0])
@@ -153,23 +200,76 @@ def build_network(
     lines = sorted(fired_lines, key=str) if u_path > 0.0 else []
     for line in lines:
         layout.add(line, [""], [0.0])
-    priors = _priors(campaign, settings, seen, layout, air)
+    priors = [*_priors(campaign, settings, seen, layout, air), *_typed(settings, typed, layout)]
     if lines:
         columns = [layout.at[line] for line in lines]
         priors.append(_independent(PATHS, columns, np.zeros(len(lines)), np.full(len(lines), u_path)))
-    return CampaignNetwork(campaign, settings, phases, electronics, seen, layout, air, priors, motion)
+    network = CampaignNetwork(campaign, settings, phases, electronics, seen, layout, air, priors, motion)
+    if any(e.walk is not None for e in electronics.values()):
+        network.priors[:] = [_apart(prior) for prior in priors]
+        _share_by_states(network)
+    return network
+
+
+def path_ppm(network: CampaignNetwork) -> float:
+    """ppm of a path's length by which its index fluctuates from one campaign, or epoch, to the next."""
+    lasting = 0.0 if network.motion is None else network.motion.lasting
+    return float(network.campaign.site.ranging.path_index_fluctuation_ppm * np.sqrt(1.0 - lasting**2))
+
+
+def _share_by_states(network: CampaignNetwork) -> None:
+    """Parameters for the errors that shots share: the electronics' walk, and the index of repeated lines; in place."""
+    layout, targets, settings = network.layout, network.campaign.shots.target, network.settings
+    per_radian = 0.5 * SPEED_OF_LIGHT / network.campaign.site.ranging.modulation_hz / TWO_PI
+    ppm = path_ppm(network)
+    repeated = []
+    for name in network.rangers:
+        electronics = network.electronics[name]
+        assert electronics.walk is not None
+        ends = np.array([network.places[targets[k]].start for k in electronics.shots])
+        path = ppm * PPM * np.linalg.norm(ends - network.places[name].start, axis=1)
+        noise = network.phases.u_phase[electronics.shots] ** 2 + (path / per_radian) ** 2
+        states = electronics.walk.states(noise, settings.neglected)
+        network.states[name] = states
+        layout.add(
+            Parameter(ParameterKind.ELECTRONICS, name), [str(k) for k in range(states.count)], np.zeros(states.count)
+        )
+        first = layout.at[Parameter(ParameterKind.ELECTRONICS, name)]
+        columns = np.where(states.prior_columns < 0, -1, first + states.prior_columns)
+        network.priors.append(
+            Linear(ELECTRONICS, np.zeros(len(columns)), np.ones(len(columns)), columns, states.prior_slopes)
+        )
+        count = Counter(targets[k] for k in electronics.shots)
+        repeated += [Parameter(ParameterKind.REPEATS, name, t) for t, n in sorted(count.items()) if n > 1]
+    if ppm > 0.0 and repeated:
+        for line in repeated:
+            layout.add(line, [""], [0.0])
+        columns = np.array([layout.at[line] for line in repeated])
+        zero = np.zeros(len(repeated))
+        network.priors.append(_apart(_independent(REPEATS, columns, zero, np.full(len(repeated), ppm))))
 
 
 def _independent(name: str, columns: ArrayLike, observed: ArrayLike, sigma: ArrayLike) -> Linear:
     """Parameters known beforehand, one by one."""
-    count = np.size(columns)
+    at, count = np.asarray(columns), np.size(columns)
+    apart = count > APART
     return Linear(
         name,
         np.asarray(observed, dtype=float),
         np.asarray(sigma, dtype=float) ** 2,
-        np.asarray(columns),
-        np.eye(count),
+        at[:, None] if apart else at,
+        np.ones((count, 1)) if apart else np.eye(count),
     )
+
+
+def _apart(prior: ObservationGroup) -> ObservationGroup:
+    """A prior of independent single parameters with each a row of its own, so that it ties none together; or itself."""
+    if not isinstance(prior, Linear) or prior.columns.ndim == 2 or prior.covariance.ndim != 1:
+        return prior
+    m, k = prior.matrix.shape
+    if m != k or np.count_nonzero(prior.matrix - np.diag(np.diag(prior.matrix))):
+        return prior
+    return replace(prior, columns=prior.columns[:, None], matrix=np.diag(prior.matrix)[:, None].copy())
 
 
 def _priors(
@@ -190,12 +290,6 @@ def _priors(
         *_directions(campaign, settings, layout),
         *_glass(seen, layout),
     ]
-    typed = [n for n, p in sorted(seen.items()) if p.typed]
-    if typed:
-        columns = np.concatenate([layout.columns(n) for n in typed])
-        where = np.concatenate([seen[n].start for n in typed])
-        u_start = np.repeat([seen[n].u_typed(settings.u_position) for n in typed], 3)
-        priors.append(_independent(APPROXIMATE, columns, where, u_start))
     for triplet in campaign.triplets.values():
         if triplet.ball.target in seen:
             priors.extend(_triplet(triplet, seen, layout, settings))
@@ -212,6 +306,38 @@ def _sound(air: AirField, columns: np.ndarray) -> list[ObservationGroup]:
     if not air.lines:
         return []
     return [_independent(SOUND, columns, np.zeros(len(columns)), [line.sigma for line in air.lines])]
+
+
+def _typed(
+    settings: ReductionSettings, places: dict[str, RangedPoint], layout: UnknownsLayout
+) -> list[ObservationGroup]:
+    """Typed positions: against the ground, or against the body that carries the point, wherever that stands.
+
+    Each is off by its own error; by how the dish stands off its nominal posture all on it are off together. Were they
+    taken as independent, two thousand would claim to know that to a fifth of a millimetre. Of few points the sum says
+    nothing beside the shots: night-01's points would move by 6 um.
+    """
+    bodies = {q.of: layout.columns(q, 6) for q in layout.at if q.kind is ParameterKind.BODY}
+    typed = sorted(places)
+    if not typed:
+        return []
+    middle = {b: np.mean([p.start for p in places.values() if p.body == b], axis=0) for b in bodies}
+    columns, matrix = np.full((len(typed), 3, 7), -1), np.zeros((len(typed), 3, 7))
+    for i, name in enumerate(typed):
+        columns[i, :, 0], matrix[i, :, 0] = layout.columns(name), 1.0
+        body = places[name].body
+        if body in bodies:
+            columns[i, :, 1:] = bodies[body]
+            matrix[i, :, 1:4], matrix[i, :, 4:] = -np.eye(3), skew(places[name].start - middle[body])
+    where = np.concatenate([places[n].start for n in typed])
+    u_start = np.repeat([places[n].u_typed(settings.u_position) for n in typed], 3)
+    if not bodies:
+        return [_independent(APPROXIMATE, columns[:, :, 0].ravel(), where, u_start)]
+    u = np.repeat([U_BODY, U_BODY_TURN], 3)
+    return [
+        Linear(APPROXIMATE, where, u_start**2, columns.reshape(-1, 7), matrix.reshape(-1, 7)),
+        *(_independent(POSTURE, at, np.zeros(6), u) for at in bodies.values()),
+    ]
 
 
 def _survey(campaign: ObservedSite, seen: dict[str, RangedPoint], layout: UnknownsLayout) -> list[ObservationGroup]:

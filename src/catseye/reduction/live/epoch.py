@@ -121,13 +121,14 @@ def solve_epoch(
     """
     phases = Phases.of([row.phase for row in rows])
     reasons = {k: reason for k, reason in enumerate(phases.reason) if reason}
-    electronics, wrong = follow_electronics(observed, phases)
+    electronics, wrong = follow_electronics(observed, phases, settings.dense_shots)
     reasons |= wrong
     resolved = Resolved({}, {}, ())
     if carried is None:
         resolved = resolve_cycles(observed, phases, electronics, settings=settings, motion=motion)
         electronics = without_shots(electronics, set(resolved.rejected))
-    network = build_network(observed, phases, electronics, settings=settings, motion=motion, also=lasting)
+    known = () if carried is None else carried.points()
+    network = build_network(observed, phases, electronics, settings=settings, motion=motion, also=lasting, known=known)
     if not network.rangers:
         raise InputError("no shot of this epoch can be used (expected a phase, a reference and a place for one)")
     frames = frames_at(network, motion)
@@ -143,7 +144,7 @@ def solve_epoch(
     seen = from_ground(
         tuple(layout.parameters[i] for i in lasts),
         solution.x[lasts],
-        solution.covariance[np.ix_(lasts, lasts)],
+        solution.q.within(lasts),
         frames=frames,
         ticks=ticks,
         elevation=float(motion.track.at(motion.epoch)[1]),

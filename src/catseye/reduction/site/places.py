@@ -1,7 +1,8 @@
 """What can be ranged to or from, at its approximate place in the ground frame."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from catseye.optics.retroreflector import cats_eye, prism
 from catseye.records.site.folder import SiteFolder
 from catseye.records.site.target import TargetRow
 from catseye.records.site.triplet import TripletRecord
+from catseye.reduction.site.bodies import bodies_of
 
 MISTYPED_MM = 0.02  # ten times what rounding and the dimensions' uncertainty explain
 
@@ -31,6 +33,7 @@ class RangedPoint:
     group      what its normal's error is shared with: its own name, or its triplet's; "" for none
     typed      its start is an approximate position that somebody typed
     u_start    m, each coordinate of the start, as its record says; None: `ReductionSettings.u_position` counts
+    body       "dish", "arm" or "alidade", with which it moves; "" on the ground
     """
 
     name: str
@@ -43,6 +46,13 @@ class RangedPoint:
     group: str = ""
     typed: bool = True
     u_start: float | None = None
+    body: str = ""
+
+    @cached_property
+    def across(self) -> np.ndarray:
+        """Two unit vectors (2, 3) across the normal, by which it may tilt."""
+        assert self.normal is not None
+        return np.asarray(np.linalg.svd(self.normal[None])[2][1:])
 
     def u_typed(self, usual: float) -> float:
         """Standard uncertainty of each coordinate of the start, m: the record's, else the usual one."""
@@ -94,7 +104,8 @@ def places_of(campaign: SiteFolder) -> dict[str, RangedPoint]:
     for triplet in campaign.triplets.values():
         for point in _triplet(triplet, to_ground[triplet.frame], n):
             places[point.name] = point
-    return places
+    bodies = bodies_of(campaign, {target.name: target.frame for target in campaign.targets.values()})
+    return {name: replace(place, body=bodies.get(name, "")) for name, place in places.items()}
 
 
 def _target(target: TargetRow, frame: Transform, n: float) -> RangedPoint:

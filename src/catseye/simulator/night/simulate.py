@@ -66,7 +66,7 @@ class SimulatedTelescope:
 
     azimuth_deg     clockwise from north
     elevation_deg   5 to 90
-    dish_prisms     0 to 999
+    dish_prisms     0 to 9999
     triplets        0 to 99
 
     Raises ValidityError beyond these.
@@ -80,8 +80,10 @@ class SimulatedTelescope:
     def __post_init__(self) -> None:
         if not 5.0 <= self.elevation_deg <= 90.0:
             raise ValidityError(f"elevation {self.elevation_deg} deg is outside 5-90 deg, where the telescope moves")
-        if not (0 <= self.dish_prisms <= 999 and 0 <= self.triplets <= 99):
-            raise ValidityError(f"{self.dish_prisms} dish prisms and {self.triplets} triplets: expected 0-999 and 0-99")
+        if not (0 <= self.dish_prisms <= 9999 and 0 <= self.triplets <= 99):
+            raise ValidityError(
+                f"{self.dish_prisms} dish prisms and {self.triplets} triplets: expected 0-9999 and 0-99"
+            )
 
 
 @dataclass(frozen=True)

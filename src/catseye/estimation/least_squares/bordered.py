@@ -1,0 +1,361 @@
+"""Large systems of blocks and a border: each block's parameters are eliminated, what many share is solved densely.
+
+A night of a whole dish has blocks of a score of parameters (a prism's place, normal, glass), which meet no other
+block's in any observation, and a border of thousands (rangers, electronics, air). N = [V B; B' C] gives the border's
+S = C - B' V^-1 B, its covariance Z = S^-1, and with W = V^-1 B the blocks' V^-1 + W Z W' and -W Z.
+
+Source: elimination of parameters by blocks, [FOERSTNER16] chapter 15 (bundle adjustment).
+"""
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import lapack
+from scipy.sparse import csr_array, sparray
+from threadpoolctl import threadpool_limits
+
+from catseye.errors import EstimationError
+from catseye.estimation.least_squares.covariance import LARGEST_MATRIX
+from catseye.estimation.least_squares.rows import ActiveRows
+
+WIDE = 1000  # parameters of the border from which one more core is worth waking
+SAME = 1e-6  # relative change of the Jacobian up to which an earlier elimination serves
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """How the parameters of one system fall into blocks and a border, and where each entry of its rows stands.
+
+    moving         (k,) parameters that are not held
+    columns        of the groups, as the layout was made for
+    block, place   (n,) block of each parameter (-1: border, -2: held) and its place there
+    inner, outer   parameters of all blocks, block by block, and of the border, in order
+    own            (c,) parameters of each block
+    border, border_first   border's indices of each block, sorted, and where they begin (c + 1,)
+    inside_first, reach_first   (c + 1,) see `bordered_kernel`
+    take           (e,) entries of all groups' Jacobians, one after the other, in the kernel's order
+    parameter      (e,) of each
+    rows_of, row_pointers, at   see `bordered_kernel.eliminate`
+    """
+
+    moving: np.ndarray
+    columns: tuple[np.ndarray, ...]
+    block: np.ndarray
+    place: np.ndarray
+    inner: np.ndarray
+    outer: np.ndarray
+    own: np.ndarray
+    border: np.ndarray
+    border_first: np.ndarray
+    inside_first: np.ndarray
+    reach_first: np.ndarray
+    take: np.ndarray
+    parameter: np.ndarray
+    rows_of: np.ndarray
+    row_pointers: np.ndarray
+    at: np.ndarray
+
+    @staticmethod
+    def of(rows: Sequence[ActiveRows], moving: np.ndarray, size: int, on_border: np.ndarray) -> "Blocks":
+        """The blocks of groups of rows: parameters off the border that meet in a row belong together.
+
+        moving      (k,) parameters that are not held
+        size        n
+        on_border   (n,) bool
+        """
+        from scipy.sparse.csgraph import connected_components
+
+        columns = tuple(np.ascontiguousarray(r.row_columns()) for r in rows)
+        counts = np.concatenate([np.full(len(c), c.shape[1]) for c in columns])
+        flat = np.concatenate([c.ravel() for c in columns])
+        of_row = np.repeat(np.arange(len(counts)), counts)
+        free = np.zeros(size + 1, dtype=bool)
+        free[moving] = True
+        take = np.flatnonzero(free[flat])  # -1 is the last, which is not free
+        flat, of_row = flat[take], of_row[take]
+        local = np.zeros(size, dtype=bool)
+        local[moving] = ~on_border[moving]
+        inner, outer = np.flatnonzero(local), moving[on_border[moving]]
+        mine = local[flat]
+        graph = csr_array((np.ones(mine.sum(), dtype=np.int8), (of_row[mine], flat[mine])), shape=(len(counts), size))
+        shape = len(counts) + size
+        joined = csr_array((graph.data, graph.indices + len(counts), _long(graph.indptr, size)), shape=(shape, shape))
+        label = connected_components(joined, directed=False)[1]
+        labels, block_of_inner = np.unique(label[len(counts) + inner], return_inverse=True)
+        inner = inner[np.argsort(block_of_inner, kind="stable")]
+        own = np.bincount(block_of_inner, minlength=len(labels))
+        block, place = np.full(size, -2), np.zeros(size, dtype=np.int64)
+        block[inner] = np.repeat(np.arange(len(own)), own)
+        place[inner] = np.arange(len(inner)) - np.repeat(np.cumsum(own) - own, own)
+        block[outer], place[outer] = -1, np.arange(len(outer))
+        block_of_row = np.full(len(counts), len(own))
+        block_of_row[of_row[mine]] = block[flat[mine]]
+        order = np.argsort(block_of_row[of_row], kind="stable")
+        take, flat, of_row = take[order], flat[order], of_row[order]
+        at, mine = place[flat], local[flat]
+        pairs = block_of_row[of_row[~mine]] * (len(outer) + 1) + place[flat[~mine]]
+        met = np.unique(pairs[block_of_row[of_row[~mine]] < len(own)])
+        border_first = np.searchsorted(met, np.arange(len(own) + 1) * (len(outer) + 1))
+        c = block_of_row[of_row]
+        reaching = ~mine & (c < len(own))
+        at[reaching] = (
+            np.searchsorted(met, c[reaching] * (len(outer) + 1) + at[reaching]) - border_first[c[reaching]]
+        ) + own[c[reaching]]
+        firsts = np.flatnonzero(np.diff(of_row, prepend=-1))
+        row_pointers = np.append(firsts, len(of_row))
+        rows_of = np.append(np.searchsorted(c[firsts], np.arange(len(own) + 1)), len(firsts))
+        wide = np.diff(border_first)
+        return Blocks(
+            moving,
+            columns,
+            block,
+            place,
+            inner,
+            outer,
+            own,
+            met % (len(outer) + 1),
+            border_first,
+            np.append(0, np.cumsum(own * own)),
+            np.append(0, np.cumsum(own * wide)),
+            take,
+            flat,
+            rows_of,
+            row_pointers,
+            at,
+        )
+
+    def values(self, jacobians: Sequence[np.ndarray]) -> np.ndarray:
+        """(e,) entries of whitened Jacobians, one a group, in the kernel's order."""
+        return np.concatenate([j.ravel() for j in jacobians])[self.take]
+
+    def fits(self, rows: Sequence[ActiveRows], moving: np.ndarray) -> bool:
+        """Whether these blocks are those of the rows."""
+        return (
+            np.array_equal(moving, self.moving)
+            and len(rows) == len(self.columns)
+            and all(np.array_equal(r.row_columns(), c) for r, c in zip(rows, self.columns, strict=True))
+        )
+
+    @cached_property
+    def reach_pattern(self) -> tuple[np.ndarray, np.ndarray]:
+        """Indices and pointers of W, (i, g) with a row an inner parameter, as compressed rows."""
+        wide = np.diff(self.border_first)
+        starts = np.repeat(self.border_first[:-1], self.own)
+        lengths = np.repeat(wide, self.own)
+        pointers = np.append(0, np.cumsum(lengths))
+        shift = np.arange(pointers[-1]) - np.repeat(pointers[:-1], lengths)
+        return self.border[np.repeat(starts, lengths) + shift], pointers
+
+    @cached_property
+    def inside_pattern(self) -> tuple[np.ndarray, np.ndarray]:
+        """The same of V^-1, (i, i)."""
+        lengths = np.repeat(self.own, self.own)
+        first = np.repeat(np.cumsum(self.own) - self.own, self.own)
+        pointers = np.append(0, np.cumsum(lengths))
+        shift = np.arange(pointers[-1]) - np.repeat(pointers[:-1], lengths)
+        return np.repeat(first, lengths) + shift, pointers
+
+
+def _long(pointers: np.ndarray, size: int) -> np.ndarray:
+    return np.concatenate([pointers, np.full(size, pointers[-1])])
+
+
+@dataclass(frozen=True, eq=False)
+class Eliminated:
+    """The blocks of N eliminated, with what is left factorised or, once a covariance was asked for, inverted.
+
+    scale    (n,) of the matrix scaled to a unit diagonal
+    values   (e,) of the scaled rows, in the kernel's order
+    inside, reach   V^-1 (i, i) and W (i, g), sparse
+    """
+
+    blocks: Blocks
+    scale: np.ndarray
+    values: np.ndarray
+    inside: csr_array
+    reach: csr_array
+    held: bool
+    _left: list[np.ndarray] = field(default_factory=list)  # factor or inverse
+    _inverse: list[bool] = field(default_factory=lambda: [False])
+
+    @staticmethod
+    def of(blocks: Blocks, scale: np.ndarray, values: np.ndarray) -> "Eliminated":
+        """Blocks eliminated from the rows of `values`."""
+        from catseye.estimation.least_squares.bordered_kernel import eliminate
+
+        b = blocks
+        inside, reach, s, loose = eliminate(
+            b.row_pointers,
+            b.rows_of,
+            b.at,
+            values,
+            b.own,
+            np.cumsum(b.own) - b.own,
+            b.border,
+            b.border_first,
+            b.inside_first,
+            b.reach_first,
+            len(b.outer),
+        )
+        i = len(b.inner)
+        indices, pointers = b.inside_pattern
+        inverse = csr_array((inside, indices, pointers), shape=(i, i))
+        indices, pointers = b.reach_pattern
+        w = csr_array((reach, indices, pointers), shape=(i, len(b.outer)))
+        factor, failed = _on_cores(
+            len(s), lambda: lapack.dpotrf(s.T, lower=0, overwrite_a=1)
+        )  # s.T: its upper triangle
+        return Eliminated(blocks, scale, values, inverse, w, not (loose or failed), [factor])
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """N^-1 right of all parameters, (n,) or (n, k); held ones stay zero."""
+        b = self.blocks
+        scale = self.scale if right.ndim == 1 else self.scale[:, None]
+        scaled = scale * right
+        inner = self.inside @ scaled[b.inner]
+        rest = scaled[b.outer] - self.reach.T @ scaled[b.inner]
+        outer = self._border(rest)
+        result = np.zeros_like(scaled)
+        result[b.outer] = outer
+        result[b.inner] = inner - self.reach @ outer
+        return result * scale
+
+    def _border(self, right: np.ndarray) -> np.ndarray:
+        if not len(right):
+            return right
+        if self._inverse[0]:
+            return self._left[0] @ right
+        return lapack.dpotrs(self._left[0], right, lower=0)[0].reshape(right.shape)
+
+    def inverse(self) -> np.ndarray:
+        """Z (g, g), scaled."""
+        if not self._inverse[0]:
+            from catseye.estimation.least_squares.bordered_kernel import mirrored
+
+            if len(self._left[0]):
+                z = _on_cores(len(self._left[0]), lambda: lapack.dpotri(self._left[0], lower=0, overwrite_c=1))[0].T
+                mirrored(z)
+                self._left[0] = z
+            self._inverse[0] = True
+        return self._left[0]
+
+
+def _on_cores(size: int, work: Callable):
+    """A factorisation on all cores where it is large: bound pools make small ones quick, and large ones slow."""
+    if size < WIDE:
+        return work()
+    with threadpool_limits(limits=len(os.sched_getaffinity(0)), user_api="blas"):
+        return work()
+
+
+@dataclass(eq=False)
+class Border:
+    """Which parameters are not eliminated, and what the last solves of the same shape left behind.
+
+    columns   (n,) bool
+    fine      (n,) bool, details that the search for a robust start can hold at their start values
+    """
+
+    columns: np.ndarray
+    fine: np.ndarray
+    _blocks: list[Blocks] = field(default_factory=list)
+    _last: Eliminated | None = None
+
+    def blocks(self, rows: Sequence[ActiveRows], moving: np.ndarray, size: int) -> Blocks:
+        """The blocks of some rows, remembered."""
+        known = next((b for b in self._blocks if b.fits(rows, moving)), None)
+        if known is None:
+            known = Blocks.of(rows, moving, size, self.columns)
+            self._blocks = [known, *self._blocks[:1]]
+        return known
+
+    def eliminated(self, blocks: Blocks, values: np.ndarray, scale: np.ndarray) -> tuple[Eliminated, bool]:
+        """The blocks eliminated, and whether it was done now: an earlier elimination of nearly the same rows serves.
+
+        values   (e,) see `Blocks.values`
+        scale    (n,) of a unit diagonal
+        """
+        last = self._last
+        if last is not None and last.blocks is blocks and last.held:
+            change = values * last.scale[blocks.parameter] - last.values
+            if change @ change <= SAME**2 * (last.values @ last.values):
+                return last, False
+        self._last = None  # its memory first
+        self._last = Eliminated.of(blocks, scale, values * scale[blocks.parameter])
+        return self._last, True
+
+
+@dataclass(frozen=True, eq=False)
+class BorderedCovariance:
+    """The inverse of N after an elimination: what is asked for is computed; see `covariance.Covariance`."""
+
+    size: int
+    eliminated: Eliminated
+
+    @cached_property
+    def _selected(self) -> tuple[np.ndarray, np.ndarray]:
+        from catseye.estimation.least_squares.bordered_kernel import selected
+
+        e, b = self.eliminated, self.eliminated.blocks
+        return selected(
+            b.own,
+            b.border_first,
+            b.border,
+            b.inside_first,
+            b.reach_first,
+            e.inside.data,
+            e.reach.data,
+            e.inverse(),
+        )
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """Covariance times right, (n,) or (n, k)."""
+        return self.eliminated.solve(right)
+
+    def matrix(self) -> np.ndarray:
+        if self.size > LARGEST_MATRIX:
+            raise EstimationError(
+                f"the full covariance of {self.size} parameters takes {8e-9 * self.size**2:.0f} GB "
+                f"(limit {LARGEST_MATRIX} parameters); ask for the blocks of single points"
+            )
+        return self.across(np.arange(self.size))
+
+    def across(self, columns: np.ndarray) -> np.ndarray:
+        unit = np.zeros((self.size, len(columns)))
+        unit[columns, np.arange(len(columns))] = 1.0
+        return self.solve(unit)
+
+    def carried(self, matrix: sparray) -> np.ndarray:
+        """(k, k) covariance of k combinations of parameters, the rows of a sparse matrix (k, n)."""
+        e, b = self.eliminated, self.eliminated.blocks
+        rows = csr_array(matrix * self.eliminated.scale)
+        inner, outer = rows[:, b.inner], rows[:, b.outer]
+        reach = csr_array(outer - inner @ e.reach)
+        crossed = reach @ e.inverse()
+        return np.asarray(reach @ crossed.T + (inner @ e.inside @ inner.T).toarray())
+
+    def within(self, columns: np.ndarray) -> np.ndarray:
+        k = len(columns)
+        return self.carried(csr_array((np.ones(k), (np.arange(k), columns)), shape=(k, self.size)))
+
+    def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
+        from catseye.estimation.least_squares.bordered_kernel import products
+
+        e, b = self.eliminated, self.eliminated.blocks
+        none = columns < 0
+        block, place = np.where(none, -2, b.block[columns]), b.place[columns]
+        scale = np.where(none, 0.0, e.scale[columns])
+        arrays = b.own, b.border_first, b.border, b.inside_first, b.reach_first
+        return scale * products(block, place, a * scale, *arrays, *self._selected, e.inverse())
+
+    def blocks(self, first: np.ndarray) -> np.ndarray:
+        at = first[:, None] + np.arange(3)
+        units = [np.tile(row, (len(at), 1)) for row in np.eye(3)]
+        return np.stack([self.products(at, unit) for unit in units], axis=2)
+
+    def diagonal(self) -> np.ndarray:
+        every = np.arange(self.size)[:, None]
+        return self.products(every, np.ones((self.size, 1)))[:, 0]

@@ -1,0 +1,152 @@
+"""The electronics' walk between reference shots as hidden parameters, so that errors that shots share become columns.
+
+`drift_at` says how the walk's errors at m shots are correlated: a full matrix. Here the same errors are sums of a few
+parameters each, and a rest that is a shot's own: the walk at the reference shots on either side, and the strongest
+modes of the bridge between them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class DriftStates:
+    """Errors of a phase at m shots: sum of slopes * states[columns] and an independent rest.
+
+    columns         (m, w) states of each shot, -1 for none
+    slopes          (m, w) rad a unit
+    own             (m,) rad^2, variance of the rest
+    prior_columns   (s, 2), -1 for none, and
+    prior_slopes    (s, 2): s independent combinations of the states with mean 0 and variance 1, which say all that is
+                    known of them
+    neglected       largest variance of a mode that was left to the rest, over the shots' noise
+    """
+
+    columns: np.ndarray
+    slopes: np.ndarray
+    own: np.ndarray
+    prior_columns: np.ndarray
+    prior_slopes: np.ndarray
+    neglected: float
+
+    @property
+    def count(self) -> int:
+        """Number s of states."""
+        return len(self.prior_columns)
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """(m, m) rad^2 of the errors, for some thousands of shots at most."""
+        s, m = self.count, len(self.own)
+        prior, design = np.zeros((s, s + 1)), np.zeros((m, s + 1))
+        np.add.at(prior, (np.arange(s)[:, None], self.prior_columns), self.prior_slopes)
+        np.add.at(design, (np.arange(m)[:, None], self.columns), self.slopes)
+        root = np.linalg.solve(prior[:, :s], np.eye(s))
+        spread = design[:, :s] @ root
+        return np.diag(self.own) + spread @ spread.T
+
+
+def drift_states(
+    reference_time: np.ndarray,
+    reference_variance: np.ndarray,
+    *,
+    time: np.ndarray,
+    random_walk: float,
+    noise: np.ndarray,
+    left: float = 0.0,
+) -> DriftStates:
+    """The errors of `drift_at`'s phases as states.
+
+    reference_time      (r,) s, any order, at least one
+    reference_variance  (r,) rad^2, of the reference phases themselves
+    time                (m,) s
+    random_walk         growth of the drift, rad per square root of a second
+    noise               (m,) rad^2, above 0, of everything that a shot has by itself
+    left                modes of a bridge stay parameters down to this variance over the noise; the others' correlation
+                        is neglected, their variance is not. 0 keeps all, and is exact
+
+    Given its two ends, a walk between them is a straight line and a bridge, independent of all other bridges: variance
+    q (t - a)(b - t) / (b - a), which falls off with the square of a mode's number. Before the first reference and after
+    the last it is a walk from that. The ends given the references are a chain of states with a tridiagonal precision,
+    here the two diagonals of its Cholesky factor.
+
+    Source: conditioning of a Wiener process, as `drift_at`; Karhunen-Loeve expansion of the bridge, taken numerically
+    on the shots there are.
+
+    >>> one = drift_states(np.array([0.0, 100.0]), np.full(2, 1e-12), time=np.array([50.0]), random_walk=1e-4,
+    ...                    noise=np.ones(1))
+    >>> f"{one.covariance[0, 0]:.3e}"
+    '2.500e-07'
+    """
+    knot, variance = _knots(np.asarray(reference_time, float), np.asarray(reference_variance, float), random_walk)
+    t, noise, q = np.asarray(time, dtype=float), np.asarray(noise, dtype=float), random_walk**2
+    r, m = len(knot), len(t)
+    prior_columns, prior_slopes = _chain(knot, variance, q)
+    behind = np.searchsorted(knot, t, side="right") - 1
+    before, after = np.maximum(behind, 0), np.minimum(behind + 1, r - 1)
+    span = np.where(after > before, knot[after] - knot[before], 1.0)
+    share = np.where(after > before, (t - knot[before]) / span, 0.0)
+    columns = [np.stack([before, np.where((after > before) & (share > 0.0), after, -1)], axis=1)]
+    slopes = [np.stack([1.0 - share, share], axis=1)]
+    own, neglected, states = np.zeros(m), 0.0, r
+    modes: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    order = np.argsort(behind, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(behind[order])) + 1) if m else []:
+        at = int(behind[rows[0]])
+        bridge = q * _bridge(t[rows], knot, at)
+        root = np.sqrt(noise[rows])
+        values, vectors = np.linalg.eigh(bridge / root[:, None] / root)
+        kept = values > max(left, 1e-12 * values[-1])
+        loading = root[:, None] * vectors[:, kept] * np.sqrt(values[kept])
+        own[rows] = np.maximum(np.diag(bridge) - np.sum(loading**2, axis=1), 0.0)
+        neglected = max(neglected, float(values[~kept].max(initial=0.0)))
+        modes.append((rows, states + np.arange(kept.sum()), loading))
+        states += int(kept.sum())
+    width = max((len(own_columns) for _, own_columns, _ in modes), default=0)
+    mode_columns, mode_slopes = np.full((m, width), -1), np.zeros((m, width))
+    for rows, own_columns, loading in modes:
+        mode_columns[rows[:, None], np.arange(len(own_columns))] = own_columns
+        mode_slopes[rows[:, None], np.arange(len(own_columns))] = loading
+    fresh = np.arange(r, states)
+    return DriftStates(
+        np.concatenate([*columns, mode_columns], axis=1),
+        np.concatenate([*slopes, mode_slopes], axis=1),
+        own,
+        np.concatenate([prior_columns, np.stack([fresh, np.full(len(fresh), -1)], axis=1)]),
+        np.concatenate([prior_slopes, np.stack([np.ones(len(fresh)), np.zeros(len(fresh))], axis=1)]),
+        neglected,
+    )
+
+
+def _knots(time: np.ndarray, variance: np.ndarray, random_walk: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times of the references in order, each once, and their variances with the floor of `drift_at`."""
+    scale = float(np.mean(variance + random_walk**2 * (time - time.min())))
+    weight = 1.0 / (variance + 1e-12 * max(scale, random_walk**2, 1e-30))
+    knot, which = np.unique(time, return_inverse=True)
+    return knot, 1.0 / np.bincount(which, weight)
+
+
+def _chain(knot: np.ndarray, variance: np.ndarray, q: float) -> tuple[np.ndarray, np.ndarray]:
+    """Columns and slopes (r, 2) of independent combinations of the walk at the references, given these."""
+    r = len(knot)
+    step = np.maximum(q * np.diff(knot), 1e-6 * variance.min())  # without a walk the ends are as good as one
+    diagonal = 1.0 / variance
+    diagonal[:-1] += 1.0 / step
+    diagonal[1:] += 1.0 / step
+    factor, below = np.empty(r), np.zeros(r)
+    for k in range(r):
+        factor[k] = np.sqrt(diagonal[k] - (below[k - 1] ** 2 if k else 0.0))
+        if k < r - 1:
+            below[k] = -1.0 / step[k] / factor[k]
+    following = np.append(np.arange(1, r), -1)
+    return np.stack([np.arange(r), following], axis=1), np.stack([factor, below], axis=1)
+
+
+def _bridge(t: np.ndarray, knot: np.ndarray, at: int) -> np.ndarray:
+    """(g, g) s: covariance over q of the walk at times t beyond knot `at`, its ends given; -1 is before the first."""
+    if at < 0:
+        return np.minimum(knot[0] - t[:, None], knot[0] - t)
+    s = t - knot[at]
+    free = np.minimum(s[:, None], s)
+    return free if at == len(knot) - 1 else free - np.outer(s, s) / (knot[at + 1] - knot[at])
