@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.linalg import lapack
-from scipy.sparse import csr_array, sparray
+from scipy.sparse import csr_array, sparray, vstack
 from threadpoolctl import threadpool_limits
 
 from catseye.errors import EstimationError
@@ -22,7 +22,10 @@ from catseye.estimation.least_squares.covariance import LARGEST_MATRIX
 from catseye.estimation.least_squares.rows import ActiveRows
 
 WIDE = 1000  # parameters of the border from which one more core is worth waking
-SAME = 1e-6  # relative change of the Jacobian up to which an earlier elimination serves
+SAME = 1e-4  # relative change of a row up to which an earlier elimination serves: of the Jacobian, by its geometry
+MOST_CHANGED = 1000  # rows that came or went since, beyond which a new elimination is quicker
+FEW = 30  # parameters whose joint covariance is looked up, not multiplied out
+LEAST_LEFT = 1e-7  # of a row that goes: what the others say of it, over its own variance
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +143,11 @@ class Blocks:
         )
 
     @cached_property
+    def row_of_entry(self) -> np.ndarray:
+        """(e,) row of each entry, counted in the kernel's order."""
+        return np.repeat(np.arange(len(self.row_pointers) - 1), np.diff(self.row_pointers))
+
+    @cached_property
     def reach_pattern(self) -> tuple[np.ndarray, np.ndarray]:
         """Indices and pointers of W, (i, g) with a row an inner parameter, as compressed rows."""
         wide = np.diff(self.border_first)
@@ -210,18 +218,15 @@ class Eliminated:
         )  # s.T: its upper triangle
         return Eliminated(blocks, scale, values, inverse, w, not (loose or failed), [factor])
 
-    def solve(self, right: np.ndarray) -> np.ndarray:
-        """N^-1 right of all parameters, (n,) or (n, k); held ones stay zero."""
+    def solve_scaled(self, right: np.ndarray) -> np.ndarray:
+        """N^-1 right of all parameters, both scaled, (n,) or (n, k); held ones are zero."""
         b = self.blocks
-        scale = self.scale if right.ndim == 1 else self.scale[:, None]
-        scaled = scale * right
-        inner = self.inside @ scaled[b.inner]
-        rest = scaled[b.outer] - self.reach.T @ scaled[b.inner]
-        outer = self._border(rest)
-        result = np.zeros_like(scaled)
+        inner = right[b.inner]
+        outer = self._border(right[b.outer] - self.reach.T @ inner)
+        result = np.zeros_like(right)
         result[b.outer] = outer
-        result[b.inner] = inner - self.reach @ outer
-        return result * scale
+        result[b.inner] = self.inside @ inner - self.reach @ outer
+        return result
 
     def _border(self, right: np.ndarray) -> np.ndarray:
         if not len(right):
@@ -241,6 +246,15 @@ class Eliminated:
                 self._left[0] = z
             self._inverse[0] = True
         return self._left[0]
+
+    @cached_property
+    def selected(self) -> tuple[np.ndarray, np.ndarray]:
+        """Covariance of each block with itself, and with its part of the border, scaled; see `bordered_kernel`."""
+        from catseye.estimation.least_squares.bordered_kernel import selected
+
+        b = self.blocks
+        arrays = b.own, b.border_first, b.border, b.inside_first, b.reach_first
+        return selected(*arrays, self.inside.data, self.reach.data, self.inverse())
 
 
 def _on_cores(size: int, work: Callable):
@@ -263,6 +277,8 @@ class Border:
     fine: np.ndarray
     _blocks: list[Blocks] = field(default_factory=list)
     _last: Eliminated | None = None
+    _since: "BorderedCovariance | None" = None  # the last elimination with what came and went after it,
+    _changed: np.ndarray = field(default_factory=lambda: np.zeros(0))  # and the entries that this was
 
     def blocks(self, rows: Sequence[ActiveRows], moving: np.ndarray, size: int) -> Blocks:
         """The blocks of some rows, remembered."""
@@ -272,48 +288,76 @@ class Border:
             self._blocks = [known, *self._blocks[:1]]
         return known
 
-    def eliminated(self, blocks: Blocks, values: np.ndarray, scale: np.ndarray) -> tuple[Eliminated, bool]:
-        """The blocks eliminated, and whether it was done now: an earlier elimination of nearly the same rows serves.
+    def solved(self, blocks: Blocks, values: np.ndarray, scale: np.ndarray) -> tuple["BorderedCovariance", bool]:
+        """The covariance, and whether the blocks were eliminated now.
 
         values   (e,) see `Blocks.values`
         scale    (n,) of a unit diagonal
+
+        An earlier elimination serves where few rows have come or gone since, and the others are nearly the same.
         """
         last = self._last
         if last is not None and last.blocks is blocks and last.held:
-            change = values * last.scale[blocks.parameter] - last.values
-            if change @ change <= SAME**2 * (last.values @ last.values):
-                return last, False
-        self._last = None  # its memory first
+            updated = self._updated(last, values * last.scale[blocks.parameter])
+            if updated is not None:
+                return updated, False
+        self._last, self._since = None, None  # their memory first
         self._last = Eliminated.of(blocks, scale, values * scale[blocks.parameter])
-        return self._last, True
+        return BorderedCovariance(len(scale), self._last), True
+
+    def _updated(self, last: Eliminated, values: np.ndarray) -> "BorderedCovariance | None":
+        """The covariance by what has changed since an elimination; None where that is too much."""
+        blocks, size = last.blocks, len(last.scale)
+        change, row = values - last.values, blocks.row_of_entry
+        moved = np.sqrt(np.bincount(row, change**2))
+        large = moved > SAME * np.sqrt(np.bincount(row, np.maximum(values**2, last.values**2)))
+        if not large.any():
+            return BorderedCovariance(size, last)
+        if np.count_nonzero(large) > min(MOST_CHANGED, len(blocks.outer) // 4):
+            return None
+        entries = large[row]
+        changed = np.concatenate([np.flatnonzero(entries), values[entries]])
+        same = self._since is not None and len(changed) == len(self._changed)
+        if same and np.abs(changed - self._changed).max() <= SAME * np.abs(values[entries]).max():
+            return self._since
+        number = (np.cumsum(large) - 1)[row[entries]]
+        count = int(large.sum())
+        both = [
+            csr_array((part[entries], (number, blocks.parameter[entries])), shape=(count, size))
+            for part in (last.values, values)
+        ]
+        kept = [np.flatnonzero(np.bincount(number, part[entries] ** 2, count) > 0.0) for part in (last.values, values)]
+        rows = vstack([both[0][kept[0]], both[1][kept[1]]], format="csr")  # those that go, those that come
+        reach = last.solve_scaled(rows.T.toarray())
+        middle = rows @ reach + np.diag(np.repeat([-1.0, 1.0], [len(k) for k in kept]))
+        values_of, vectors = np.linalg.eigh(0.5 * (middle + middle.T))
+        if np.abs(values_of).min() < LEAST_LEFT:
+            return None  # something is hardly held any more
+        inverse = (vectors / values_of) @ vectors.T
+        self._since = BorderedCovariance(size, last, reach * last.scale[:, None], inverse)
+        self._changed = changed
+        return self._since
 
 
 @dataclass(frozen=True, eq=False)
 class BorderedCovariance:
-    """The inverse of N after an elimination: what is asked for is computed; see `covariance.Covariance`."""
+    """The inverse of N after an elimination: what is asked for is computed; see `covariance.Covariance`.
+
+    reach, middle   (n, r) and (r, r): rows that came and went since take reach middle reach' off it
+    """
 
     size: int
     eliminated: Eliminated
-
-    @cached_property
-    def _selected(self) -> tuple[np.ndarray, np.ndarray]:
-        from catseye.estimation.least_squares.bordered_kernel import selected
-
-        e, b = self.eliminated, self.eliminated.blocks
-        return selected(
-            b.own,
-            b.border_first,
-            b.border,
-            b.inside_first,
-            b.reach_first,
-            e.inside.data,
-            e.reach.data,
-            e.inverse(),
-        )
+    reach: np.ndarray | None = None
+    middle: np.ndarray | None = None
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Covariance times right, (n,) or (n, k)."""
-        return self.eliminated.solve(right)
+        scale = self.eliminated.scale if right.ndim == 1 else self.eliminated.scale[:, None]
+        answer = scale * self.eliminated.solve_scaled(scale * right)
+        if self.reach is not None:
+            answer -= self.reach @ (self.middle @ (self.reach.T @ right))
+        return np.asarray(answer)
 
     def matrix(self) -> np.ndarray:
         if self.size > LARGEST_MATRIX:
@@ -334,22 +378,35 @@ class BorderedCovariance:
         rows = csr_array(matrix * self.eliminated.scale)
         inner, outer = rows[:, b.inner], rows[:, b.outer]
         reach = csr_array(outer - inner @ e.reach)
-        crossed = reach @ e.inverse()
-        return np.asarray(reach @ crossed.T + (inner @ e.inside @ inner.T).toarray())
+        answer = np.asarray(reach @ (reach @ e.inverse()).T + (inner @ e.inside @ inner.T).toarray())
+        if self.reach is not None:
+            moved = matrix @ self.reach
+            answer -= moved @ self.middle @ moved.T
+        return answer
 
     def within(self, columns: np.ndarray) -> np.ndarray:
-        k = len(columns)
+        k, block = len(columns), self.eliminated.blocks.block[columns]
+        if k <= FEW and len(np.unique(block[block >= 0])) <= 1:
+            return self.products(np.tile(columns, (k, 1)), np.eye(k)).T
         return self.carried(csr_array((np.ones(k), (np.arange(k), columns)), shape=(k, self.size)))
 
     def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
-        from catseye.estimation.least_squares.bordered_kernel import products
+        from catseye.estimation.least_squares.bordered_kernel import low_rank_products, products
 
         e, b = self.eliminated, self.eliminated.blocks
         none = columns < 0
         block, place = np.where(none, -2, b.block[columns]), b.place[columns]
         scale = np.where(none, 0.0, e.scale[columns])
         arrays = b.own, b.border_first, b.border, b.inside_first, b.reach_first
-        return scale * products(block, place, a * scale, *arrays, *self._selected, e.inverse())
+        answer = scale * products(block, place, a * scale, *arrays, *e.selected, e.reach.data, e.inverse())
+        if self.reach is not None:
+            low_rank_products(np.where(none, -1, columns), a, self.reach, self._weighed, answer)
+        return np.asarray(answer)
+
+    @cached_property
+    def _weighed(self) -> np.ndarray:
+        assert self.reach is not None
+        return np.asarray(self.reach @ self.middle)
 
     def blocks(self, first: np.ndarray) -> np.ndarray:
         at = first[:, None] + np.arange(3)
@@ -357,5 +414,9 @@ class BorderedCovariance:
         return np.stack([self.products(at, unit) for unit in units], axis=2)
 
     def diagonal(self) -> np.ndarray:
+        return self._diagonal.copy()
+
+    @cached_property
+    def _diagonal(self) -> np.ndarray:
         every = np.arange(self.size)[:, None]
         return self.products(every, np.ones((self.size, 1)))[:, 0]

@@ -148,8 +148,8 @@ def selected(own, border_first, border, inside_first, reach_first, inside, reach
 
 
 @njit(cache=True, error_model="numpy")
-def products(block, place, a, own, border_first, border, inside_first, reach_first, with_itself, with_border, z):
-    """Sum over j of Q_ij a_j for each row of parameters that meet in one observation.
+def products(block, place, a, own, border_first, border, inside_first, reach_first, with_itself, with_border, reach, z):
+    """Sum over j of Q_ij a_j for each row of parameters, of one block at most beside those of the border.
 
     block, place   (m, w) block of each parameter (-1: border, -2: none) and its place there
     a              (m, w)
@@ -175,7 +175,7 @@ def products(block, place, a, own, border_first, border, inside_first, reach_fir
                             low = middle + 1
                         else:
                             high = middle
-                    inner[i] = low
+                    inner[i] = low if low < b and border[first + low] == place[row, i] else -1
         for i in range(w):
             if block[row, i] == -2:
                 continue
@@ -183,15 +183,47 @@ def products(block, place, a, own, border_first, border, inside_first, reach_fir
             for j in range(w):
                 if block[row, j] == -2 or a[row, j] == 0.0:
                     continue
-                if block[row, i] == -1:
-                    if block[row, j] == -1:
-                        q = z[place[row, i], place[row, j]]
-                    else:
-                        q = with_border[reach_first[c] + place[row, j] * b + inner[i]]
-                elif block[row, j] == -1:
-                    q = with_border[reach_first[c] + place[row, i] * b + inner[j]]
+                if block[row, i] == -1 and block[row, j] == -1:
+                    value += z[place[row, i], place[row, j]] * a[row, j]
+                    continue
+                if block[row, i] == -1 or block[row, j] == -1:
+                    x, k, far = (place[row, j], inner[i], place[row, i])
+                    if block[row, i] != -1:
+                        x, k, far = (place[row, i], inner[j], place[row, j])
+                    at = reach_first[c] + x * b
+                    if k >= 0:
+                        q = with_border[at + k]
+                    else:  # they meet in no observation
+                        q = 0.0
+                        for p in range(b):
+                            q -= reach[at + p] * z[border[first + p], far]
                 else:
                     q = with_itself[inside_first[c] + place[row, i] * n + place[row, j]]
                 value += q * a[row, j]
             result[row, i] = value
     return result
+
+
+@njit(cache=True, error_model="numpy")
+def low_rank_products(columns, a, reach, weighed, result):
+    """Take sum over j of (reach middle reach')_ij a_j off each row; in place.
+
+    columns, a       (m, w), -1 for none
+    reach, weighed   (n, r), and times middle (r, r)
+    result           (m, w)
+    """
+    m, w = columns.shape
+    r = reach.shape[1]
+    along = np.empty(r)
+    for row in range(m):
+        along[:] = 0.0
+        for j in range(w):
+            if columns[row, j] >= 0 and a[row, j] != 0.0:
+                for k in range(r):
+                    along[k] += weighed[columns[row, j], k] * a[row, j]
+        for i in range(w):
+            if columns[row, i] >= 0:
+                value = 0.0
+                for k in range(r):
+                    value += reach[columns[row, i], k] * along[k]
+                result[row, i] -= value

@@ -86,7 +86,7 @@ class Meeting:
     x                   (n,) parameters
     residual, sigma     one (m,) a group, at x
     jacobians           one a group, at x
-    by_column           one a group: columns in order and the rows that they stand in, for groups with rows of their own
+    by_column           columns in order, and group and row of the entries that stand in them
     advice_at           column of a point: index of an advice
     """
 
@@ -97,7 +97,7 @@ class Meeting:
     residual: Sequence[np.ndarray]
     sigma: Sequence[np.ndarray]
     jacobians: Sequence[np.ndarray]
-    by_column: Sequence[tuple[np.ndarray, np.ndarray]]
+    by_column: tuple[np.ndarray, np.ndarray, np.ndarray]
     advice_at: Mapping[int, Sequence[int]]
 
     @staticmethod
@@ -112,6 +112,7 @@ class Meeting:
         for i, one in enumerate(advice):
             for column in np.unique(one.columns).tolist():
                 advice_at.setdefault(column, []).append(i)
+        jacobians = [g.predict(solution.x)[1] for g in groups]
         return Meeting(
             groups,
             removable,
@@ -119,29 +120,24 @@ class Meeting:
             solution.x,
             [f.residual for f in solution.fits],
             [f.sigma for f in solution.fits],
-            [g.predict(solution.x)[1] for g in groups],
-            [_by_column(g.columns) for g in groups],
+            jacobians,
+            _by_column(groups, jacobians),
             advice_at,
         )
 
-    def rows(self, i: int, columns: np.ndarray) -> np.ndarray:
-        """Rows of a group that depend on some columns."""
-        group, (order, rows) = self.groups[i], self.by_column[i]
-        if group.columns.ndim == 1:
-            here = np.isin(group.columns, columns)
-            return np.flatnonzero(np.any(self.jacobians[i][:, here] != 0.0, axis=1)) if here.any() else rows[:0]
+    def rows(self, columns: np.ndarray) -> list[tuple[int, np.ndarray]]:
+        """Groups, and their rows, that depend on some columns."""
+        order, group, row = self.by_column
         ends = np.searchsorted(order, columns), np.searchsorted(order, columns, side="right")
-        near = np.unique(np.concatenate([rows[low:high] for low, high in zip(*ends, strict=True)]))
-        here = np.isin(group.columns[near], columns)
-        return near[np.any(here & (self.jacobians[i][near] != 0.0), axis=1)]
+        near = np.concatenate([np.arange(low, high) for low, high in zip(*ends, strict=True)])
+        of = group[near]
+        return [(int(i), np.unique(row[near[of == i]])) for i in np.unique(of)]
 
     def at(self, x: np.ndarray, columns: np.ndarray) -> "Meeting":
         """The same at other parameters, as far as some columns reach; elsewhere it is not to be asked."""
         residual, jacobians = list(self.residual), list(self.jacobians)
-        for i, group in enumerate(self.groups):
-            near = self.rows(i, columns)
-            if not len(near):
-                continue
+        for i, near in self.rows(columns):
+            group = self.groups[i]
             part = _part(group, near)
             values, slopes = part.predict(x)
             residual[i], jacobians[i] = residual[i].copy(), jacobians[i].copy()
@@ -152,12 +148,19 @@ class Meeting:
         return replace(self, x=x, residual=residual, jacobians=jacobians)
 
 
-def _by_column(columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    if columns.ndim == 1:
-        return columns[:0], columns[:0]
-    flat = columns.ravel()
-    order = np.argsort(flat, kind="stable")
-    return flat[order], order // columns.shape[1]
+def _by_column(
+    groups: Sequence[ObservationGroup], jacobians: Sequence[np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Every entry of the Jacobians that is not zero, by its column: column, group, row."""
+    columns, of, rows = [], [], []
+    for i, (group, jacobian) in enumerate(zip(groups, jacobians, strict=True)):
+        row, place = np.nonzero(jacobian)
+        columns.append(group.columns[place] if group.columns.ndim == 1 else group.columns[row, place])
+        of.append(np.full(len(row), i))
+        rows.append(row)
+    column = np.concatenate(columns)
+    order = np.argsort(column, kind="stable")
+    return column[order], np.concatenate(of)[order], np.concatenate(rows)[order]
 
 
 def _part(group: ObservationGroup, rows: np.ndarray) -> ObservationGroup:
@@ -197,11 +200,8 @@ def at_point(columns: np.ndarray, meeting: Meeting, *, slack: float) -> LocalCon
     rows: list[tuple[int, int]] = []
     doubted: list[tuple[float, np.ndarray]] = []
     prior: list[tuple[float, np.ndarray]] = []
-    for i, group in enumerate(meeting.groups):
-        near = meeting.rows(i, columns)
-        if not len(near):
-            continue
-        slope, alone = _slopes(columns, group.columns, meeting.jacobians[i], near)
+    for i, near in meeting.rows(columns):
+        slope, alone = _slopes(columns, meeting.groups[i].columns, meeting.jacobians[i], near)
         residual, sigma, may = meeting.residual[i][near], meeting.sigma[i][near], meeting.removable[i][near]
         for k in np.flatnonzero(may):
             doubted.append((residual[k] / (slack * sigma[k]), slope[k] / (slack * sigma[k])))

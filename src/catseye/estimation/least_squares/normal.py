@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import cho_solve, lapack
 from scipy.sparse import csc_array, csr_array
 
-from catseye.estimation.least_squares.bordered import Border, BorderedCovariance, Eliminated
+from catseye.estimation.least_squares.bordered import Border, BorderedCovariance
 from catseye.estimation.least_squares.covariance import Covariance, Dense, Sparse
 from catseye.estimation.least_squares.rows import ActiveRows
 
@@ -45,7 +45,7 @@ class NormalEquations:
     _floating: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     _order: tuple[np.ndarray, ...] = ()
     _pattern: csc_array | None = None
-    _eliminated: Eliminated | None = None
+    _solved: BorderedCovariance | None = None
 
     @classmethod
     def of(
@@ -95,8 +95,8 @@ class NormalEquations:
 
     def covariance(self) -> Covariance:
         """Inverse of N at the x of the last step."""
-        if self._eliminated is not None:
-            return BorderedCovariance(self.size, self._eliminated)
+        if self._solved is not None:
+            return self._solved
         if self.sparse:
             order, place, *_ = self._order
             return Sparse(self.size, place, self._scale[order], *self._factor)
@@ -110,10 +110,10 @@ class NormalEquations:
     def _solve(self, right: np.ndarray) -> np.ndarray:
         if not len(right):
             return right
-        if self._eliminated is not None:
+        if self._solved is not None:
             whole = np.zeros(self.size)
             whole[self.moving] = right
-            return self._eliminated.solve(whole)[self.moving]
+            return self._solved.solve(whole)[self.moving]
         if not self.sparse:
             return self._scale * cho_solve((self._factor[0], True), self._scale * right, check_finite=False)
         from catseye.estimation.least_squares.sparse_kernel import solve
@@ -186,12 +186,12 @@ class NormalEquations:
             return
         scale = np.zeros(self.size)
         scale[self.moving] = 1.0 / np.sqrt(diagonal)
-        eliminated, new = border.eliminated(blocks, values, scale)
-        if not eliminated.held:  # the sparse form says what floats
-            self.border, self._eliminated, self.sparse = None, None, True
+        solved, new = border.solved(blocks, values, scale)
+        if not solved.eliminated.held:  # the sparse form says what floats
+            self.border, self._solved, self.sparse = None, None, True
             self._factorise_sparse()
             return
-        self._eliminated, self._scale = eliminated, eliminated.scale[self.moving]
+        self._solved, self._scale = solved, scale[self.moving]
         if not new:
             return
         every = np.zeros((self.size, LOOKED_FOR))
@@ -199,7 +199,7 @@ class NormalEquations:
         for _ in range(2):
             every[self.moving] = np.linalg.qr(every[self.moving])[0]
             every[self.moving] /= self._scale[:, None]
-            every = eliminated.solve(every)
+            every = solved.solve(every)
             every[self.moving] /= self._scale[:, None]
         probe = every[self.moving]
         if 1.0 / np.linalg.norm(probe, axis=0).max() < DOUBTFUL:

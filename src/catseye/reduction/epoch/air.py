@@ -5,7 +5,7 @@ index of the line's shots near in time; pressure and vapour stay the stations'.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ Profile = Callable[[np.ndarray], np.ndarray]
 SOUND_NEAR = 600.0  # s from a shot to its line's nearest sounding, beyond which the thermometers count again
 SMOOTHING = 300.0  # s, Gaussian half-width in time: noise of a reading every 30 s falls to a sixth
 DISTINCT_HEIGHTS = 5.0  # m, stations closer in height than this show no gradient
+MOST_KEPT = 64  # sets of times whose smoothed readings are kept: one a ranger, and more
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +128,7 @@ class AirField:
     model: str
     lines: tuple[SoundedLine, ...] = ()
     sounded: np.ndarray | None = None
+    _smooth: dict[bytes, np.ndarray] = field(default_factory=dict)  # times: what `smoothed` gave
 
     @classmethod
     def of(cls, campaign: ObservedSite, settings: ReductionSettings) -> "AirField":
@@ -200,12 +202,18 @@ class AirField:
 
         Humidity stays within 0 to 100 %: a line through readings near an end, or rounding in fog, leads beyond.
         """
-        t = (np.asarray(mjd_utc, dtype=float) - self.start_mjd) * SECONDS_PER_DAY
-        state = np.stack(
-            [_local_line(when, values, t) for when, values in zip(self.seconds, self.readings, strict=True)], axis=1
-        )
-        state[..., 2] = np.clip(state[..., 2], 0.0, 100.0)
-        return state
+        times = np.asarray(mjd_utc, dtype=float)
+        asked = times.tobytes()  # pass after pass
+        if asked not in self._smooth:
+            t = (times - self.start_mjd) * SECONDS_PER_DAY
+            state = np.stack(
+                [_local_line(when, values, t) for when, values in zip(self.seconds, self.readings, strict=True)], axis=1
+            )
+            state[..., 2] = np.clip(state[..., 2], 0.0, 100.0)
+            if len(self._smooth) >= MOST_KEPT:
+                self._smooth.clear()
+            self._smooth[asked] = state
+        return self._smooth[asked]
 
     def along(self, mjd_utc: np.ndarray, a: np.ndarray, b: np.ndarray, parameters: np.ndarray) -> PathAir:
         """Mean group refractivity of straight paths, by Gauss-Legendre quadrature along them.

@@ -180,8 +180,10 @@ def adjust_coordinates(
     Source: [PARKER04] eq. 5.18 and 5.19 for the range, in optical metres: N c/2f - phase c/(4 pi f) =
     n_path D - n (Pc + dPc + D0 + zero); [GOLDMAN00] eq. B.1 for dPc. The priors are the records' uncertainties.
     """
-    resolved = resolve_cycles(campaign, phases, electronics, settings=settings, progress=progress)
-    network = build_network(campaign, phases, without_shots(electronics, set(resolved.rejected)), settings=settings)
+    network = build_network(campaign, phases, electronics, settings=settings)
+    resolved = resolve_cycles(network, progress)
+    if resolved.rejected:
+        network = build_network(campaign, phases, without_shots(electronics, set(resolved.rejected)), settings=settings)
     if not network.rangers:
         why = next(iter(resolved.rejected.values()), "no shot on any target has a usable phase and reference")
         raise InputError(f"shots.csv: {why}; nothing to adjust")
@@ -217,7 +219,7 @@ def settle_network(
     coordinates = np.concatenate(points)
     active, solution = None, None
     advice: list[Linear] = []
-    solver = SolverSettings(border=network.border)
+    solver, names = SolverSettings(border=network.border), layout.names
     for turn in range(PASSES):
         if progress is not None:
             progress("adjustment", turn, PASSES)
@@ -229,7 +231,7 @@ def settle_network(
         ]
         before = x
         if predicted and turn < TESTED and (active is None or all(a.all() for a in active)):
-            solution = adjust(x, groups, free=free, names=layout.names, solver=solver)
+            solution = adjust(x, groups, free=free, names=names, solver=solver)
             predicted = _unsuspicious(solution, removable, settings.critical)
             active = None
         if turn < TESTED and not predicted:
@@ -240,11 +242,11 @@ def settle_network(
                 outliers=OutlierSearch(points=points, advice=advice, critical=settings.critical),
                 free=free,
                 active=active,
-                names=layout.names,
+                names=names,
                 border=network.border,
             )
         elif turn >= TESTED:
-            solution = adjust(x, groups, free=free, active=active, names=layout.names, solver=solver)
+            solution = adjust(x, groups, free=free, active=active, names=names, solver=solver)
         assert solution is not None
         x, active = solution.require_converged().x, [f.active for f in solution.fits]
         if not turn:

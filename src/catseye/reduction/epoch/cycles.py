@@ -23,14 +23,12 @@ from catseye.estimation.least_squares.adjustment import (
 from catseye.estimation.least_squares.robust import OutlierSearch, adjust_robustly
 from catseye.estimation.least_squares.rows import full_jacobian
 from catseye.estimation.observations.kinds import ObservationGroup
-from catseye.records.night.campaign import ObservedSite
 from catseye.reduction.epoch.cycle_search import CycleScene, search, spread
-from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases, Progress
+from catseye.reduction.epoch.ranges import ElectronicsPhase, Progress
 from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.shots import ShotGroup, shot_group
 from catseye.reduction.epoch.unknowns import THERMOMETERS, ZEROS, CampaignNetwork, build_network
-from catseye.reduction.site.motion import CarriedMotion
 
 KEPT = 5.0  # standard uncertainties of misfit that the margin must be worth
 ROUNDED = 1.01  # the layout's 15 mm in space are 8.7 mm a coordinate; its rounded 10 mm pass, being 1 in 1000 too large
@@ -52,28 +50,22 @@ class Resolved:
     notes: tuple[str, ...]
 
 
-def resolve_cycles(
-    campaign: ObservedSite,
-    phases: Phases,
-    electronics: dict[str, ElectronicsPhase],
-    *,
-    settings: ReductionSettings,
-    progress: Progress | None = None,
-    motion: CarriedMotion | None = None,
-) -> Resolved:
+def resolve_cycles(network: CampaignNetwork, progress: Progress | None = None) -> Resolved:
     """Better starts for points typed to decimetres, and the shots on them whose whole cycles stay unknown.
 
-    campaign, phases, electronics, settings, motion   as for `adjust_coordinates`
-    progress                                  called with (what, done, of how many)
+    network    of all shots that have a phase
+    progress   called with (what, done, of how many)
 
     Nothing happens where every typed position keeps five standard uncertainties within a quarter wavelength.
     Raises EstimationError where the safe shots alone find no answer.
 
     Source: the law of `signal.cycles.whole`; search by [TEUNISSEN95], see `estimation.ambiguity.search`.
     """
-    network = build_network(campaign, phases, electronics, settings=settings, motion=motion)
+    settings, targets = network.settings, network.campaign.shots.target
     doubtful = doubtful_points(network)
-    ends = {int(k): {name, campaign.shots.target[k]} for name, e in electronics.items() for k in e.shots}
+    if not doubtful:
+        return Resolved({}, {}, ())
+    ends = {int(k): {name, targets[k]} for name, e in network.electronics.items() for k in e.shots}
     waiting = {k for k, both in ends.items() if both & doubtful}
     if not waiting:
         return Resolved({}, {}, ())

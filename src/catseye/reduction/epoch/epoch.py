@@ -104,9 +104,10 @@ def _misfit(coordinates: AdjustedCoordinates, row: int, settings: ReductionSetti
 def _weak_rangers(campaign: Campaign, phases: Phases) -> list[str]:
     """Rangers whose returns are a small part of what the others get."""
     usual: dict[str, float] = {}
+    amplitude = phases.amplitude
     for name in campaign.rangers:
         lit = sorted(
-            float(phases.amplitude[k])
+            float(amplitude[k])
             for k, (ranger, target) in enumerate(zip(campaign.shots.ranger, campaign.shots.target, strict=True))
             if ranger == name and target != REFERENCE and not phases.reason[k]
         )

@@ -81,7 +81,7 @@ class UnknownsLayout:
     @property
     def air(self) -> np.ndarray:
         """Indices of the air's parameters, those of `AirField.parameters`."""
-        return np.array([k for k, p in enumerate(self.parameters) if p.kind in AIR_KINDS], dtype=int)
+        return np.array([first for quantity, first in self.at.items() if quantity.kind in AIR_KINDS], dtype=int)
 
 
 @dataclass(frozen=True, eq=False)

@@ -125,7 +125,7 @@ def solve_epoch(
     reasons |= wrong
     resolved = Resolved({}, {}, ())
     if carried is None:
-        resolved = resolve_cycles(observed, phases, electronics, settings=settings, motion=motion)
+        resolved = resolve_cycles(build_network(observed, phases, electronics, settings=settings, motion=motion))
         electronics = without_shots(electronics, set(resolved.rejected))
     known = () if carried is None else carried.points()
     network = build_network(observed, phases, electronics, settings=settings, motion=motion, also=lasting, known=known)
