@@ -20,6 +20,8 @@ COLOURS = {
     "benchmark": "#b08a1e",
 }
 MARKERS = {"ground ranger": "^", "feed-arm ranger": "s", "structure": "D", "benchmark": "o"}
+CROWD = 300  # points, or prisms, from which colour alone tells of each: no name, number or ellipsoid
+PIXELS = 2000  # marks or lines from which they are drawn as pixels: a page of lines would take megabytes
 LOOSE = 1.0 * MILLIMETRE  # u of a coordinate beyond which the ranges do not hold it and no ellipsoid is drawn
 
 
@@ -55,19 +57,25 @@ def _draw_network(ax, reduction: Reduction, axes: np.ndarray, rows: Sequence[int
     sigma = np.sqrt(np.maximum(values, 0.0))
     held = np.array([r for r in rows if sigma[r, 1] < LOOSE], dtype=int)
     loose = np.array([r for r in rows if sigma[r, 1] >= LOOSE], dtype=int)
+    crowd = len(rows) > CROWD
     extent = float(np.max(np.ptp(where[list(rows)], axis=0)))
     for kind, colour in COLOURS.items():
         of_kind = [r for r in held if kinds[r] == kind]
         if of_kind:
             marker = MARKERS.get(kind, "o")
-            size = 22 if kind in MARKERS else 9
-            ax.scatter(*where[of_kind].T, s=size, c=colour, marker=marker, lw=0, zorder=3, label=kind)
+            size = 22 if kind in MARKERS else 9 if len(of_kind) <= CROWD else 4
+            pixels = len(of_kind) > PIXELS
+            ax.scatter(
+                *where[of_kind].T, s=size, c=colour, marker=marker, lw=0, zorder=3, label=kind, rasterized=pixels
+            )
     if len(loose):
         ax.scatter(
             *where[loose].T, s=22, facecolors="white", edgecolors=COLOURS["benchmark"], lw=1.2, zorder=3,
             label=f"u above {LOOSE / MILLIMETRE:g} mm: no ellipsoid",
         )  # fmt: skip
     ax.set_aspect("equal")
+    if crowd:  # the many are dots
+        held = np.array([r for r in held if kinds[r] != "dish prism"], dtype=int)
     if not len(held):
         return
     usual = float(np.median(sigma[held, 1]))
@@ -95,7 +103,13 @@ def _beams(ax, reduction: Reduction, axes: np.ndarray) -> None:
     pairs = {(r, t) for r, t, used in zip(ranges.ranger, ranges.target, ranges.used, strict=True) if used}
     flat = coordinates.x @ axes.T
     lines = [flat[[index[r], index[t]]] for r, t in sorted(pairs)]
-    ax.add_collection(LineCollection(lines, colors=FAINT, linewidths=0.35, alpha=0.18, zorder=1))
+    many = len(lines) > PIXELS
+    ax.add_collection(
+        LineCollection(
+            lines, colors=FAINT, linewidths=0.35, alpha=0.18 * (PIXELS / len(lines) if many else 1.0), zorder=1,
+            rasterized=many,
+        )
+    )  # fmt: skip
     ax.plot([], [], color=FAINT, lw=0.8, label="used ranges")
 
 
@@ -187,7 +201,11 @@ def _residuals(reduction: Reduction) -> Figure:
     ground = np.array([name in reduction.campaign.monuments for name in ranges.ranger])
     for mine, kind in ((ground, "ground ranger"), (~ground, "feed-arm ranger")):
         mine = mine & ranges.used
-        left.scatter(minutes[mine], residual[mine], s=8, c=COLOURS[kind], lw=0, alpha=0.75, label=f"{kind}s")
+        many = bool(mine.sum() > PIXELS)
+        left.scatter(
+            minutes[mine], residual[mine], s=2 if many else 8, c=COLOURS[kind], lw=0, alpha=0.4 if many else 0.75,
+            label=f"{kind}s", rasterized=many,
+        )  # fmt: skip
     span = 1.35 * float(np.max(np.abs(residual[ranges.used]), initial=1e-3))
     out = ~ranges.used
     for up, marker in ((True, "^"), (False, "v")):
@@ -222,11 +240,13 @@ def _dish(reduction: Reduction) -> Figure:
     ax = figure.add_subplot()
     deviation = surface.fit.deviation / MILLIMETRE
     limit = float(np.max(np.abs(deviation)))
+    crowd = len(deviation) > CROWD
     dots = ax.scatter(
-        surface.fit.local[:, 0], surface.fit.local[:, 1], s=260, c=deviation, cmap="RdBu_r", vmin=-limit, vmax=limit,
-        edgecolors=FAINT, linewidths=0.6, zorder=3,
+        surface.fit.local[:, 0], surface.fit.local[:, 1], s=max(260 * 60 / max(len(deviation), 60), 6), c=deviation,
+        cmap="RdBu_r", vmin=-limit, vmax=limit, edgecolors=FAINT, linewidths=0.0 if crowd else 0.6, zorder=3,
     )  # fmt: skip
-    for name, (x, y, _), value in zip(surface.names, surface.fit.local, deviation, strict=True):
+    named = () if crowd else zip(surface.names, surface.fit.local, deviation, strict=True)
+    for name, (x, y, _), value in named:
         ax.annotate(
             f"{name}\n{value:+.2f}", (x, y), xytext=(0, -11), textcoords="offset points", ha="center", va="top",
             fontsize=6.5, color=INK, zorder=4, linespacing=1.05,
@@ -273,8 +293,9 @@ def _refractivity(reduction: Reduction) -> Figure | None:
     height = np.array([0.5 * (z[index[r]] + z[index[t]]) for r, t in zip(ranges.ranger, ranges.target, strict=True)])
     minutes = _minutes(reduction, shots.mjd_utc[ranges.shot])
     dots = ax.scatter(
-        minutes[used], ranges.refractivity[used] / PPM, s=9, c=height[used], cmap="viridis", lw=0, alpha=0.9
-    )
+        minutes[used], ranges.refractivity[used] / PPM, s=9, c=height[used], cmap="viridis", lw=0, alpha=0.9,
+        rasterized=bool(used.sum() > PIXELS),
+    )  # fmt: skip
     ax.axhline(reduction.coordinates.refractivity_ppm, color=INK, lw=0.9, ls="--")
     ax.annotate(
         f"mean {reduction.coordinates.refractivity_ppm:.2f} ppm", (1.0, reduction.coordinates.refractivity_ppm),
@@ -300,8 +321,8 @@ def _weather(reduction: Reduction) -> Figure:
         for i, each in enumerate(site.weather_station):
             there = station == each.name
             ax.plot(
-                minutes[there], values[there], ".-", ms=2.5, lw=0.7, color=SERIES[i % len(SERIES)],
-                label=f"{each.name}, {each.elevation_m:.0f} m above sea level",
+                minutes[there], values[there], "-" if there.sum() > PIXELS / 4 else ".-", ms=2.5, lw=0.7,
+                color=SERIES[i % len(SERIES)], label=f"{each.name}, {each.elevation_m:.0f} m above sea level",
             )  # fmt: skip
         ax.set_ylabel(label)
         ax.ticklabel_format(useOffset=False)

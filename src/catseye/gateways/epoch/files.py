@@ -1,15 +1,34 @@
 """All files of a reduction, written into a directory."""
 
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
-from catseye.gateways.epoch.objects import coordinates_object, pose_object, provenance_object
+import numpy as np
+
+from catseye.gateways.epoch.objects import COVARIANCE, MOST_INSIDE, coordinates_object, pose_object, provenance_object
 from catseye.gateways.epoch.report import report
 from catseye.gateways.epoch.tables import coordinates_csv, ranges_csv, surface_csv
+from catseye.gateways.writers.matrix_fits import matrix_pages
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.written import Files, write_files
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.epoch.ranges import Progress
+
+AT_ONCE = 150  # points whose rows are computed together
+
+
+def _covariance(reduction: Reduction) -> Iterator[bytes]:
+    """The full covariance of coordinates.json."""
+    coordinates = reduction.coordinates
+    count = len(coordinates.points)
+    cards = {
+        "BUNIT": ("m2", "ground frame; x, y, z point by point"),
+        "CAMPAIGN": (reduction.campaign.site.campaign.name, ""),
+        "ORDER": ("covariance_order", "of coordinates.json beside it"),
+    }
+    parts = (coordinates.joint.across(np.arange(k, min(k + AT_ONCE, count))).T for k in range(0, count, AT_ONCE))
+    return matrix_pages(parts, 3 * count, cards)
 
 
 def write_reduction(reduction: Reduction, directory: Path, progress: Progress | None = None) -> None:
@@ -20,6 +39,7 @@ def write_reduction(reduction: Reduction, directory: Path, progress: Progress | 
         "coordinates.csv": lambda: coordinates_csv(reduction),
         "surface.csv": lambda: surface_csv(reduction),
         "coordinates.json": lambda: json_page(coordinates_object(reduction)),
+        **({COVARIANCE: lambda: _covariance(reduction)} if len(reduction.coordinates.points) > MOST_INSIDE else {}),
         "pose.json": lambda: json_page(pose_object(reduction)),
         "report.html": lambda: report(reduction, when),
     }

@@ -10,12 +10,15 @@ from catseye.constants import PPM
 from catseye.gateways.epoch.summary import verdict
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.output import FORMAT
+from catseye.records.files.covariance_file import KEY
 
 if TYPE_CHECKING:
     from catseye.records.night.campaign import Campaign
     from catseye.reduction.air.group_index import BenchmarkSeries
     from catseye.reduction.epoch.epoch import Reduction
 
+MOST_INSIDE = 500  # points whose full covariance is written as text: some 40 MB
+COVARIANCE = "covariance.fits"
 CERTIFICATE = ("serial", "measured_on", "valid_until", "by", "report")
 
 
@@ -105,13 +108,18 @@ def surface_object(reduction: "Reduction") -> dict[str, Any] | None:
 
 
 def coordinates_object(reduction: "Reduction") -> dict[str, Any]:
-    """The `--json` object and the full covariance, m², rows and columns in the order stated."""
+    """The `--json` object and the full covariance, m², rows and columns in the order stated.
+
+    Of more points than MOST_INSIDE the matrix is in a file beside it, which is named; their own blocks stay.
+    """
     coordinates = reduction.coordinates
+    inside = len(coordinates.points) <= MOST_INSIDE
     return {
         "format": FORMAT,
         **reduction_object(reduction),
         "covariance_order": [f"{name} {axis}" for name in coordinates.points for axis in "xyz"],
-        "covariance": coordinates.covariance,
+        "covariance": coordinates.covariance if inside else None,
+        **({} if inside else {KEY: COVARIANCE}),
     }
 
 

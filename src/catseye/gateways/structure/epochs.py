@@ -15,6 +15,7 @@ from catseye.coordinator.journal.entries import EpochSolution
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
 from catseye.records.files.columns import columns_of
+from catseye.records.files.covariance_file import stored_covariance
 from catseye.records.night.live import TICKS_PER_DAY, LiveWeather
 from catseye.reduction.structure.group import PlacesEpoch
 from catseye.reduction.structure.vibration import RangeSeries
@@ -133,19 +134,20 @@ def _object(place: Path, inputs: dict[str, str]) -> dict[str, Any]:
 
 def _places(document: Mapping[str, Any], place: Path) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
     """Names, coordinates and covariance of a coordinates.json."""
-    points, order, covariance = (document.get(key) for key in ("points", "covariance_order", "covariance"))
-    if not isinstance(points, dict) or not isinstance(order, list) or not isinstance(covariance, list):
+    points, order = document.get("points"), document.get("covariance_order")
+    covariance = stored_covariance(document, place.parent, len(order) if isinstance(order, list) else 0)
+    if not isinstance(points, dict) or not isinstance(order, list) or covariance is None:
         raise InputError(f"{place}: points, covariance_order or covariance is missing (expected `catseye reduce`'s)")
     names = tuple(points)
     try:
         x = np.array([[points[name][axis] for axis in "xyz"] for name in names], dtype=float)
-        whole = np.array(covariance, dtype=float)
+        whole = covariance if isinstance(covariance, np.ndarray) else np.array(covariance, dtype=float)
         at = [order.index(f"{name} {axis}") for name in names for axis in "xyz"]
     except (KeyError, TypeError, ValueError) as problem:
         raise InputError(f"{place}: points and covariance do not fit: {problem} (expected three each)") from problem
     if whole.shape != (len(order), len(order)) or not np.isfinite(whole).all() or not np.isfinite(x).all():
         raise InputError(f"{place}: covariance {whole.shape} of {len(order)} rows (expected a finite square)")
-    return names, x, whole[np.ix_(at, at)]
+    return names, x, np.array(whole[np.ix_(at, at)], dtype=float)
 
 
 def read_journal_epochs(journal: str, *, run: int | str | None = None, every_s: float = 0.0) -> ReadEpochs:

@@ -12,6 +12,7 @@ from catseye.errors import InputError
 from catseye.geometry.antenna.frames import ground_from_reflector
 from catseye.geometry.frames.frame import Transform
 from catseye.records.files.columns import TextColumns, columns_of
+from catseye.records.files.covariance_file import stored_covariance
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import refusal, shown
 from catseye.records.site.folder import SiteFolder
@@ -109,7 +110,8 @@ def _reduced(
         points = np.array([[answer["points"][name][axis] for axis in AXES] for name in names], dtype=float)
         at = {label: row for row, label in enumerate(answer["covariance_order"])}
         rows = [at[f"{name} {axis}"] for name in names for axis in AXES]
-        covariance = np.array(answer["covariance"], dtype=float)[np.ix_(rows, rows)]
+        whole = stored_covariance(answer, folder.directory, len(at))
+        covariance = np.array(np.asarray(whole)[np.ix_(rows, rows)], dtype=float)
         posture = pose["nominal_posture"]
         azimuth, elevation = float(posture["azimuth_deg"]), float(posture["elevation_deg"])
         focal = float(surface["focal_length"])

@@ -12,7 +12,7 @@ from typing import Any
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.output import PROVENANCE
 
-Files = Mapping[str, Callable[[], str | Iterable[str]]]
+Files = Mapping[str, Callable[[], str | Iterable[str] | Iterable[bytes]]]
 Progress = Callable[[str, int, int], None]
 
 
@@ -28,7 +28,7 @@ def origin(when: datetime, inputs: Mapping[str, str]) -> dict[str, Any]:
 def write_files(
     files: Files, directory: Path, provenance: Mapping[str, Any], *, progress: Progress | None = None
 ) -> None:
-    """Each file as text or piece by piece, so that a large one needs no more memory than its columns.
+    """Each file as text or piece by piece, text or bytes, so that a large one needs no more memory than its columns.
 
     files        name -> what gives its text, in the order of writing
     directory    exists, and is ours to fill: see `output.whole_directory`
@@ -43,7 +43,7 @@ def write_files(
         text = page()
         with (directory / name).open("wb") as stream:
             for piece in (text,) if isinstance(text, str) else text:
-                raw = piece.encode("utf-8")
+                raw = piece if isinstance(piece, bytes) else piece.encode("utf-8")
                 digest.update(raw)
                 stream.write(raw)
         outputs[name] = digest.hexdigest()

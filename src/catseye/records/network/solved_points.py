@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import DEGREE
+from catseye.records.files.covariance_file import stored_covariance
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import refusal, shown
 
@@ -26,7 +27,7 @@ class SolvedPoints:
     campaign     name
     names        n
     x            (n, 3) m
-    covariance   (3n, 3n) m^2
+    covariance   (3n, 3n) m^2; of many points mapped from a file
     posture      azimuth and elevation, rad, if pose.json beside it says
     hashes       SHA-256 of the files read, by their names
     """
@@ -49,7 +50,7 @@ class SolvedPoints:
 
     def between(self, names: Sequence[str], others: Sequence[str]) -> np.ndarray:
         """(3k, 3m) m^2, covariance of some points with others."""
-        return np.asarray(self.covariance[np.ix_(self._rows(names), self._rows(others))])
+        return np.array(self.covariance[np.ix_(self._rows(names), self._rows(others))], dtype=float)
 
     def places(self, names: Sequence[str]) -> np.ndarray:
         """(k, 3) m, of some points in this order."""
@@ -80,7 +81,7 @@ def read_solved_points(path: Path | str) -> SolvedPoints:
     if document.get("frame") != "ground":
         raise refusal(name, f"frame = {shown(document.get('frame'))} (expected 'ground')")
     x = np.array([[_number(name, n, points[n], axis) for axis in "xyz"] for n in names])
-    covariance = _covariance(name, document.get("covariance"), len(order))
+    covariance = _covariance(name, stored_covariance(document, folder.directory, len(order)), len(order))
     beside = folder.directory / BESIDE
     posture = _posture(_object(folder, BESIDE)) if beside.is_file() else None
     hashes = {f"{path.name}/{f}" if path.is_dir() else f: digest for f, digest in folder.hashes.items()}
@@ -107,6 +108,10 @@ def _number(file: str, point: str, row: Any, axis: str) -> float:
 
 
 def _covariance(file: str, rows: Any, size: int) -> np.ndarray:
+    if isinstance(rows, np.ndarray):  # mapped: looked at where it is used
+        if not np.all(np.diag(rows) >= 0.0):
+            raise refusal(file, "its covariance file has a negative variance (expected a covariance, m^2)")
+        return rows
     try:
         q = np.array(rows, dtype=float)
     except (TypeError, ValueError) as problem:

@@ -242,7 +242,7 @@ def _series(reduction: "Reduction", benchmark: "BenchmarkRow", rows: np.ndarray)
     per_metre = half / TWO_PI / certified  # refractivity per radian
     rest = np.abs(1.0 / reduction.phases.phasor[shots] - 1.0 / electronics.reference[at])
     leakage = per_metre * sheet.u_leakage_volt * rest
-    noise = np.diag(reduction.phases.u_phase[shots] ** 2) + electronics.covariance[np.ix_(at, at)]
+    noise = np.diag(reduction.phases.u_phase[shots] ** 2) + electronics.joint(at)
     noise = per_metre**2 * noise
     u_length = np.hypot(benchmark.u_mm, sheet.u_d0_mm) * MILLIMETRE / certified
     u_common = float(np.hypot(u_length, leakage.mean()))

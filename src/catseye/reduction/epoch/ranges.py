@@ -114,6 +114,18 @@ class ElectronicsPhase:
     reference: np.ndarray
     walk: "ReferenceWalk | None" = None
 
+    def joint(self, rows: np.ndarray) -> np.ndarray:
+        """(k, k) rad^2, covariance of some of the shots."""
+        if self.walk is None:
+            return self.covariance[np.ix_(rows, rows)]
+        return drift_at(
+            self.walk.reference_seconds,
+            np.zeros(len(self.walk.reference_seconds)),
+            self.walk.reference_variance,
+            time=self.walk.seconds[rows],
+            random_walk=self.walk.random_walk,
+        )[1]
+
     def of(self, keep: np.ndarray) -> "ElectronicsPhase":
         """The same at some of the shots, (m,) bool."""
         whole = self.covariance.ndim == 2
@@ -141,15 +153,14 @@ class ReferenceWalk:
     reference_variance: np.ndarray
     random_walk: float
 
-    def states(self, noise: np.ndarray, left: float) -> DriftStates:
-        """The errors as hidden parameters; noise (m,) rad^2 and `left` as in `drift_states`."""
+    def states(self, noise: np.ndarray) -> DriftStates:
+        """The errors as hidden parameters; noise (m,) rad^2 as in `drift_states`."""
         return drift_states(
             self.reference_seconds,
             self.reference_variance,
             time=self.seconds,
             random_walk=self.random_walk,
             noise=noise,
-            left=left,
         )
 
 

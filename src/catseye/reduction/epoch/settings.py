@@ -24,8 +24,8 @@ class ReductionSettings:
     u_position              m, each coordinate, of a typed approximate position: some 15 mm in space
     dense_shots             usable target shots up to which the errors that a ranger's shots share are one covariance;
                             of more they are parameters, see `signal.drift.states`
-    neglected               of a campaign with more: variance over a shot's noise of the walk's modes between two
-                            reference shots whose correlation is neglected; 0 neglects nothing
+    most_states             such parameters of the electronics at most, as long as the reference shots themselves are
+                            fewer; the weakest modes beyond count as the shots' own errors
     """
 
     air_model: str = "rueger1990"
@@ -40,4 +40,4 @@ class ReductionSettings:
     u_surface: float = 0.001
     u_position: float = 0.010
     dense_shots: int = 1500
-    neglected: float = 0.5
+    most_states: int = 4500

@@ -123,7 +123,7 @@ class CampaignNetwork:
         fine = np.zeros(len(on_border), dtype=bool)
         for name, states in self.states.items():
             at = self.layout.at[Parameter(ParameterKind.ELECTRONICS, name)]
-            fine[at + np.unique(states.columns[:, 2:])[1:]] = True  # the bridges' modes; the first is -1, none
+            fine[at + np.arange(states.count - len(states.strength), states.count)] = True  # the bridges' modes
         return Border(on_border, fine)
 
     @property
@@ -222,14 +222,21 @@ def _share_by_states(network: CampaignNetwork) -> None:
     layout, targets, settings = network.layout, network.campaign.shots.target, network.settings
     per_radian = 0.5 * SPEED_OF_LIGHT / network.campaign.site.ranging.modulation_hz / TWO_PI
     ppm = path_ppm(network)
-    repeated = []
+    every: dict[str, DriftStates] = {}
     for name in network.rangers:
         electronics = network.electronics[name]
         assert electronics.walk is not None
         ends = np.array([network.places[targets[k]].start for k in electronics.shots])
         path = ppm * PPM * np.linalg.norm(ends - network.places[name].start, axis=1)
         noise = network.phases.u_phase[electronics.shots] ** 2 + (path / per_radian) ** 2
-        states = electronics.walk.states(noise, settings.neglected)
+        every[name] = electronics.walk.states(noise)
+    strongest = np.sort(np.concatenate([s.strength for s in every.values()]))[::-1]
+    room = max(settings.most_states - sum(s.count - len(s.strength) for s in every.values()), 0)
+    left = strongest[room] if room < len(strongest) else 0.0
+    repeated = []
+    for name in network.rangers:
+        electronics = network.electronics[name]
+        states = every[name].without(float(left))
         network.states[name] = states
         layout.add(
             Parameter(ParameterKind.ELECTRONICS, name), [str(k) for k in range(states.count)], np.zeros(states.count)

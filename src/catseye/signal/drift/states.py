@@ -20,7 +20,8 @@ class DriftStates:
     prior_columns   (s, 2), -1 for none, and
     prior_slopes    (s, 2): s independent combinations of the states with mean 0 and variance 1, which say all that is
                     known of them
-    neglected       largest variance of a mode that was left to the rest, over the shots' noise
+    strength        of the last states, the bridges' modes: variance over the shots' noise
+    neglected       strength of the strongest mode that is left to the rest
     """
 
     columns: np.ndarray
@@ -28,12 +29,38 @@ class DriftStates:
     own: np.ndarray
     prior_columns: np.ndarray
     prior_slopes: np.ndarray
-    neglected: float
+    strength: np.ndarray
+    neglected: float = 0.0
 
     @property
     def count(self) -> int:
         """Number s of states."""
         return len(self.prior_columns)
+
+    def without(self, weak: float) -> "DriftStates":
+        """Modes of this strength and less left to the shots' own errors: their variance counts, their correlation not.
+
+        weak   0 leaves all
+        """
+        first = self.count - len(self.strength)
+        kept = np.concatenate([np.ones(first, dtype=bool), self.strength > weak])
+        if kept.all():
+            return self
+        number = np.append(np.where(kept, np.cumsum(kept) - 1, -1), -1)
+        gone = (self.columns >= 0) & ~np.append(kept, True)[self.columns]
+        columns = number[self.columns]
+        order = np.argsort(columns[:, 2:] < 0, axis=1, kind="stable") + 2  # what is left stands first
+        width = int((columns[:, 2:] >= 0).sum(axis=1).max(initial=0))
+        order = np.concatenate([np.broadcast_to([0, 1], (len(columns), 2)), order[:, :width]], axis=1)
+        return DriftStates(
+            np.take_along_axis(columns, order, axis=1),
+            np.take_along_axis(np.where(gone, 0.0, self.slopes), order, axis=1),
+            self.own + np.sum(np.where(gone, self.slopes, 0.0) ** 2, axis=1),
+            np.where(self.prior_columns < 0, -1, number[self.prior_columns])[kept],
+            self.prior_slopes[kept],
+            self.strength[kept[first:]],
+            float(self.strength[~kept[first:]].max()),
+        )
 
     @property
     def covariance(self) -> np.ndarray:
@@ -54,17 +81,14 @@ def drift_states(
     time: np.ndarray,
     random_walk: float,
     noise: np.ndarray,
-    left: float = 0.0,
 ) -> DriftStates:
-    """The errors of `drift_at`'s phases as states.
+    """The errors of `drift_at`'s phases as states. Exact; `DriftStates.without` makes them fewer.
 
     reference_time      (r,) s, any order, at least one
     reference_variance  (r,) rad^2, of the reference phases themselves
     time                (m,) s
     random_walk         growth of the drift, rad per square root of a second
     noise               (m,) rad^2, above 0, of everything that a shot has by itself
-    left                modes of a bridge stay parameters down to this variance over the noise; the others' correlation
-                        is neglected, their variance is not. 0 keeps all, and is exact
 
     Given its two ends, a walk between them is a straight line and a bridge, independent of all other bridges: variance
     q (t - a)(b - t) / (b - a), which falls off with the square of a mode's number. Before the first reference and after
@@ -89,7 +113,8 @@ def drift_states(
     share = np.where(after > before, (t - knot[before]) / span, 0.0)
     columns = [np.stack([before, np.where((after > before) & (share > 0.0), after, -1)], axis=1)]
     slopes = [np.stack([1.0 - share, share], axis=1)]
-    own, neglected, states = np.zeros(m), 0.0, r
+    states = r
+    strength: list[np.ndarray] = []
     modes: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     order = np.argsort(behind, kind="stable")
     for rows in np.split(order, np.flatnonzero(np.diff(behind[order])) + 1) if m else []:
@@ -97,10 +122,9 @@ def drift_states(
         bridge = q * _bridge(t[rows], knot, at)
         root = np.sqrt(noise[rows])
         values, vectors = np.linalg.eigh(bridge / root[:, None] / root)
-        kept = values > max(left, 1e-12 * values[-1])
-        loading = root[:, None] * vectors[:, kept] * np.sqrt(values[kept])
-        own[rows] = np.maximum(np.diag(bridge) - np.sum(loading**2, axis=1), 0.0)
-        neglected = max(neglected, float(values[~kept].max(initial=0.0)))
+        kept = values > 1e-12 * values[-1]
+        loading = (root[:, None] * vectors[:, kept] * np.sqrt(values[kept]))[:, ::-1]
+        strength.append(values[kept][::-1])
         modes.append((rows, states + np.arange(kept.sum()), loading))
         states += int(kept.sum())
     width = max((len(own_columns) for _, own_columns, _ in modes), default=0)
@@ -112,10 +136,10 @@ def drift_states(
     return DriftStates(
         np.concatenate([*columns, mode_columns], axis=1),
         np.concatenate([*slopes, mode_slopes], axis=1),
-        own,
+        np.zeros(m),
         np.concatenate([prior_columns, np.stack([fresh, np.full(len(fresh), -1)], axis=1)]),
         np.concatenate([prior_slopes, np.stack([np.ones(len(fresh)), np.zeros(len(fresh))], axis=1)]),
-        neglected,
+        np.concatenate([np.zeros(0), *strength]),
     )
 
 

@@ -24,6 +24,7 @@ class Schedule:
     ball_rangers      ground rangers that shoot one ball, at most
     ball_angle_deg    largest angle from the axis of a ball
     weak_share        share of the dish prisms that the weak ranger shoots
+    again             how often a ranger of the feed arm shoots each dish prism once more; a fraction is a share of them
     """
 
     interval_s: float = 14.0
@@ -33,6 +34,7 @@ class Schedule:
     ball_rangers: int = 5
     ball_angle_deg: float = 79.0
     weak_share: float = 2.0 / 3.0
+    again: float = 0.0
     ground_repeats: int = 2
     certified_repeats: int = 4
     neighbour_repeats: int = 2
@@ -85,12 +87,15 @@ def ground_targets(
 def feed_arm_targets(
     ranger: str, rule: Schedule, telescope: Structure, *, faults: Faults, streams: Streams
 ) -> list[str]:
-    """What a ranger of the feed arm shoots once: its fellows, the triplets' prisms, nearly all dish prisms."""
+    """What a ranger of the feed arm shoots: its fellows and the triplets' prisms once, nearly all dish prisms."""
     others = [r for r in FEED_ARM_RANGERS if r != ranger]
     prisms = [t.name for unit_ in telescope.triplets for t in unit_.targets if t.kind == "prism"]
     share = rule.weak_share if ranger == faults.weak_ranger else 0.99
     drawn = streams(f"prisms/{ranger}").uniform(size=len(telescope.dish))
-    return others + prisms + [t.name for t, u in zip(telescope.dish, drawn, strict=True) if u < share]
+    dish = [t.name for t, u in zip(telescope.dish, drawn, strict=True) if u < share]
+    more = streams(f"again/{ranger}").uniform(size=len(dish)) < rule.again % 1.0 if rule.again else np.zeros(len(dish))
+    repeats = [name for name, once in zip(dish, more, strict=True) for _ in range(int(rule.again) + int(once))]
+    return others + prisms + dish + repeats
 
 
 def with_references(targets: list[str], every: int) -> list[str]:
