@@ -23,7 +23,7 @@ from catseye.estimation.least_squares.rows import ActiveRows
 
 WIDE = 1000  # parameters of the border from which one more core is worth waking
 SAME = 1e-4  # relative change of a row up to which an earlier elimination serves: of the Jacobian, by its geometry
-MOST_CHANGED = 1000  # rows that came or went since, beyond which a new elimination is quicker
+MOST_CHANGED = 400  # rows that came or went since, beyond which a new elimination is quicker
 FEW = 30  # parameters whose joint covariance is looked up, not multiplied out
 LEAST_LEFT = 1e-7  # of a row that goes: what the others say of it, over its own variance
 

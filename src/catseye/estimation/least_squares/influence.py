@@ -40,12 +40,17 @@ class Influence:
         self.weighed = np.concatenate([f.standardised for f in fits]) * np.sqrt(self.visible)
         self._least = 1e-9 * self.visible
         self._columns: dict[int, np.ndarray] = {}
-        self._out: list[np.ndarray] = []  # columns over the roots of their own element, in the order of leaving
+        self._out = np.zeros((0, len(self.active)))  # columns over the roots of their own element, as they left
 
     @property
     def standardised(self) -> np.ndarray:
         """w of every row."""
         return self.weighed / np.sqrt(self.visible)
+
+    @property
+    def left_out(self) -> int:
+        """How many rows are left out beyond the solution's own."""
+        return len(self._out)
 
     @property
     def detectable(self) -> np.ndarray:
@@ -60,14 +65,12 @@ class Influence:
         if k not in self._columns:
             wanted = [k, *(int(j) for j in likely if j != k and j not in self._columns)][:AT_ONCE]
             self._columns.update(zip(wanted, self._of(np.array(wanted)), strict=True))
-        column = self._columns.pop(k)
-        for before in self._out:
-            column = column - before * before[k]
+        column = self._columns.pop(k) - self._out[:, k] @ self._out
         root = np.sqrt(max(column[k], self._least[k]))
         self.weighed = self.weighed - column * (self.weighed[k] / root**2)
         self.visible = np.maximum(self.visible - (column / root) ** 2, self._least)
         self.active[k] = False
-        self._out.append(column / root)
+        self._out = np.concatenate([self._out, (column / root)[None]])
 
     def _of(self, wanted: np.ndarray) -> np.ndarray:
         """Columns of P_v of the solution itself, a row each."""

@@ -32,6 +32,7 @@ GRAVE = 6.0  # |w| of a rejected observation from which it matters whether the r
 UNCHECKED = 0.05  # share of sigma^2 / variance of the estimated error below which nothing else speaks for or against
 CHECKED = NONCENTRALITY / UNCHECKED**0.5  # detectable error over sigma up to which an observation is checked
 BACK = 0.9  # of `critical`: what is out comes back below it; between the two it stays as it is, or rounds would not end
+MOST_AT_ONCE = 200  # observations left out between two adjustments
 MOST_RETURNS = 2  # of one observation; so the rounds end
 
 
@@ -145,7 +146,7 @@ def _without_worst(
     while True:
         w = np.where(may & tests.active & (tests.detectable < CHECKED * tests.sigma), np.abs(tests.standardised), 0.0)
         worst = int(np.argmax(w))
-        if w[worst] <= critical:
+        if w[worst] <= critical or tests.left_out >= MOST_AT_ONCE:
             return [a.copy() for a in np.split(tests.active, tests.first[1:-1])]
         tests.leave_out(worst, np.argsort(-w)[: np.count_nonzero(w > critical)])
 

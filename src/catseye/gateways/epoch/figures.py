@@ -102,14 +102,11 @@ def _beams(ax, reduction: Reduction, axes: np.ndarray) -> None:
     index = {name: row for row, name in enumerate(coordinates.points)}
     pairs = {(r, t) for r, t, used in zip(ranges.ranger, ranges.target, ranges.used, strict=True) if used}
     flat = coordinates.x @ axes.T
-    lines = [flat[[index[r], index[t]]] for r, t in sorted(pairs)]
-    many = len(lines) > PIXELS
-    ax.add_collection(
-        LineCollection(
-            lines, colors=FAINT, linewidths=0.35, alpha=0.18 * (PIXELS / len(lines) if many else 1.0), zorder=1,
-            rasterized=many,
-        )
-    )  # fmt: skip
+    ground = reduction.campaign.monuments
+    for mine in (sorted(p for p in pairs if p[0] in ground), sorted(p for p in pairs if p[0] not in ground)):
+        lines, many = [flat[[index[r], index[t]]] for r, t in mine], len(mine) > PIXELS
+        alpha = 0.18 * (PIXELS / len(mine) if many else 1.0)
+        ax.add_collection(LineCollection(lines, colors=FAINT, linewidths=0.35, alpha=alpha, zorder=1, rasterized=many))
     ax.plot([], [], color=FAINT, lw=0.8, label="used ranges")
 
 
@@ -242,7 +239,7 @@ def _dish(reduction: Reduction) -> Figure:
     limit = float(np.max(np.abs(deviation)))
     crowd = len(deviation) > CROWD
     dots = ax.scatter(
-        surface.fit.local[:, 0], surface.fit.local[:, 1], s=max(260 * 60 / max(len(deviation), 60), 6), c=deviation,
+        surface.fit.local[:, 0], surface.fit.local[:, 1], s=700 * 60 / len(deviation) if crowd else 260, c=deviation,
         cmap="RdBu_r", vmin=-limit, vmax=limit, edgecolors=FAINT, linewidths=0.0 if crowd else 0.6, zorder=3,
     )  # fmt: skip
     named = () if crowd else zip(surface.names, surface.fit.local, deviation, strict=True)

@@ -237,7 +237,7 @@ def _nuisance(
     paths = np.array([[layout.at.get(Parameter(ParameterKind.PATH, parts.name, t), -1)] for t in targets])  # -1: none
     constants = [Parameter(ParameterKind.GLASS, t) for t in targets]
     has_rest = np.array([c in layout.at for c in constants])
-    rest = np.array([layout.at.get(c, 0) for c in constants])  # column 0 with derivative 0: none
+    rest = np.array([layout.at.get(c, -1) for c in constants])
     columns = [
         paths,
         np.full((m, 1), layout.at[Parameter(ParameterKind.ZERO, parts.name)]),
@@ -280,13 +280,13 @@ def _obliquity(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Incidence and dPc at the estimated normals, and the derivatives of dPc by each normal's two tilts.
 
-    A shot on anything but a prism gets the first parameter's column with a zero derivative.
+    A shot on anything but a prism gets column -1, none, with a zero derivative.
     """
     m = len(targets)
     ranging = network.campaign.site.ranging
     ratio, bends = ranging.bk7_to_air_group_index_ratio, ranging.bk7_to_air_phase_index_ratio
     incidence, correction, slopes = np.zeros(m), np.zeros(m), np.zeros((m, 2))
-    columns = np.zeros((m, 2), dtype=int)
+    columns = np.full((m, 2), -1)
     at = np.array([k for k, t in enumerate(targets) if network.places[t].normal is not None], dtype=int)
     if not len(at):
         return incidence, correction, columns, slopes

@@ -35,7 +35,8 @@ REPEATS = "repeated paths"
 ELECTRONICS = "electronics between references"
 MANY_OF_A_BODY = 150  # typed points from which a body's own place is a parameter
 APART = 600  # parameters known one by one from which each is a row of its own, not of a matrix
-BLOCK_KINDS = (ParameterKind.NORMAL, ParameterKind.GLASS, ParameterKind.REPEATS)
+BLOCK_KINDS = (ParameterKind.POINT, ParameterKind.NORMAL, ParameterKind.GLASS)
+BUSY = 40  # shots on a target, beyond which it is no block
 U_BODY, U_BODY_TURN = 0.03, 5e-4  # m and rad: more than a telescope stands off, so that shots alone say it
 LONGEST_TIE = 30  # parameters of one prior: those of a longer one are no block
 
@@ -106,14 +107,20 @@ class CampaignNetwork:
     def border(self) -> Border | None:
         """What the elimination of a large network leaves; None for one that is solved densely.
 
-        A target that was fired at with its normal, glass and repeated paths is a block, triplets as wholes.
+        A target that was fired at with its normal, glass and repeated paths is a block, triplets as wholes; one that was
+        fired at so often that it meets most of the border is part of that.
         """
         if not self.states:
             return None
-        shooting = set(self.rangers)
+        targets = self.campaign.shots.target
+        fired = Counter(targets[k] for e in self.electronics.values() for k in e.shots)
+        busy = {n for n, count in fired.items() if count > BUSY} | set(self.rangers)
+        for triplet in self.campaign.triplets.values():
+            if busy & set(triplet.targets):
+                busy |= {triplet.triplet, *triplet.targets}
         on_border = np.array(
             [
-                not (p.kind in BLOCK_KINDS or (p.kind is ParameterKind.POINT and p.of not in shooting))
+                p.kind is not ParameterKind.REPEATS and not (p.kind in BLOCK_KINDS and p.of not in busy)
                 for p in self.layout.parameters
             ]
         )
