@@ -22,9 +22,9 @@ from catseye.estimation.least_squares.covariance import LARGEST_MATRIX
 from catseye.estimation.least_squares.rows import ActiveRows
 
 WIDE = 1000  # parameters of the border from which one more core is worth waking
-SAME = 1e-4  # relative change of a row up to which an earlier elimination serves: of the Jacobian, by its geometry
+SAME = 2e-6  # relative change of a row up to which an earlier elimination serves; tests take differences of such
 MOST_CHANGED = 400  # rows that came or went since, beyond which a new elimination is quicker
-FEW = 30  # parameters whose joint covariance is looked up, not multiplied out
+FEW = 30  # parameters whose joint covariance is looked up, not multiplied out; rows that may change in any system
 LEAST_LEFT = 1e-7  # of a row that goes: what the others say of it, over its own variance
 
 
@@ -313,7 +313,7 @@ class Border:
         large = moved > SAME * np.sqrt(np.bincount(row, np.maximum(values**2, last.values**2)))
         if not large.any():
             return BorderedCovariance(size, last)
-        if np.count_nonzero(large) > min(MOST_CHANGED, len(blocks.outer) // 4):
+        if np.count_nonzero(large) > min(MOST_CHANGED, max(FEW, len(blocks.outer) // 4)):
             return None
         entries = large[row]
         changed = np.concatenate([np.flatnonzero(entries), values[entries]])

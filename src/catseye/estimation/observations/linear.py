@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import ObservationKind
+from catseye.estimation.observations.kind import ObservationKind, value
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,7 +15,7 @@ class Linear(ObservationKind):
     name         what the group is, for reports
     observed     (m,)
     covariance   of the observed values, see `ObservationGroup`
-    columns      (k,) indices of parameters, without repeats; or (m, w), each row its own
+    columns      (k,) indices of parameters, without repeats; or (m, w), each row its own, -1 for none
     matrix       (m, k) or (m, w)
     """
 
@@ -35,5 +35,5 @@ class Linear(ObservationKind):
         array([2.5])
         """
         if self.columns.ndim == 2:
-            return np.sum(self.matrix * x[self.columns], axis=1), self.matrix
+            return np.sum(self.matrix * value(x, self.columns), axis=1), np.where(self.columns < 0, 0.0, self.matrix)
         return self.matrix @ x[self.columns], self.matrix

@@ -18,7 +18,7 @@ from catseye.estimation.least_squares.covariance import JointPoints
 from catseye.estimation.least_squares.robust import CHECKED, OutlierSearch, adjust_robustly
 from catseye.estimation.observations.kinds import Linear, ObservationGroup
 from catseye.records.night.campaign import ObservedSite
-from catseye.reduction.epoch.cycles import KEPT, Resolved, line_errors, resolve_cycles, without_shots
+from catseye.reduction.epoch.cycles import KEPT, MANY, Resolved, line_errors, resolve_cycles, without_shots
 from catseye.reduction.epoch.dish import dish_advice
 from catseye.reduction.epoch.head import head_unknowns
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
@@ -38,6 +38,7 @@ from catseye.reduction.epoch.unknowns import (
 from catseye.reduction.site.places import RangedPoint
 
 PASSES = 6  # cap of passes in which cycles, incidence and air are renewed from the adjusted coordinates
+FIRST = 3  # passes that the first takes as long as, more
 TESTED = 2  # passes that search for wrong shots; later ones keep the choice, so that it cannot swing to and fro
 SETTLED = 1e-6  # m, no coordinate moves further in the last pass,
 SETTLED_U = 0.01  # or than this share of its standard uncertainty
@@ -222,14 +223,14 @@ def settle_network(
     solver, names = SolverSettings(border=network.border), layout.names
     for turn in range(PASSES):
         if progress is not None:
-            progress("adjustment", turn, PASSES)
+            progress("adjustment", min(turn + FIRST * (turn > 0), PASSES - 1), PASSES)
         shots = [shot_group(network.seen_from(name), name, x) for name in network.rangers]
         groups: list[ObservationGroup] = [group for group, _ in shots] + network.priors
         removable = [
             np.full(len(g.observed), i < len(shots) or g.name in (THERMOMETERS, ZEROS, SOUND))
             for i, g in enumerate(groups)
         ]
-        before = x
+        before, solution = x, None  # its covariance is large
         if predicted and turn < TESTED and (active is None or all(a.all() for a in active)):
             solution = adjust(x, groups, free=free, names=names, solver=solver)
             predicted = _unsuspicious(solution, removable, settings.critical)
@@ -416,36 +417,57 @@ def _redundancy(group: ShotGroup, part: ShotParts, fit: GroupFit, solution: Leas
 
 def _thin_notes(ranges: RangeShots) -> list[str]:
     """Points on which the whole cycles of used shots hang on little."""
-    target = np.array(ranges.target)
-    notes = []
-    for name in sorted(set(ranges.target)):
-        mine = (target == name) & ranges.used
-        doubtful = mine & ranges.thin
-        if doubtful.any():
-            notes.append(
-                f"{name}: the whole cycles of {doubtful.sum()} of its {mine.sum()} shots are not beyond doubt: without "
+    thin = {}
+    for name, rows in _by_target(ranges):
+        used = ranges.used[rows]
+        doubtful = int((used & ranges.thin[rows]).sum())
+        if doubtful:
+            thin[name] = (
+                f"{name}: the whole cycles of {doubtful} of its {used.sum()} shots are not beyond doubt: without "
                 "each, position and other shots do not say its range to a quarter wavelength at five sigma"
             )
-    return notes
+    what = "points have shots whose whole cycles are not beyond doubt without them, to a quarter wavelength at 5 sigma"
+    return _together(thin, what)
+
+
+def _by_target(ranges: RangeShots) -> list[tuple[str, np.ndarray]]:
+    """Each target with its rows, sorted by name."""
+    names, number = np.unique(np.array(ranges.target), return_inverse=True)
+    rows = np.split(np.argsort(number, kind="stable"), np.cumsum(np.bincount(number))[:-1])
+    return list(zip(names.tolist(), rows, strict=True))
+
+
+def _together(notes: Mapping[str, str], what: str) -> list[str]:
+    """A note a point; of many one line for all."""
+    if len(notes) <= MANY:
+        return list(notes.values())
+    return [f"{len(notes)} {what}: {', '.join(list(notes)[:MANY])} ..."]
 
 
 def _losses(ranges: RangeShots) -> list[str]:
     """Targets that lost all shots, or hang on one that no other checks; rangers that lost most of theirs."""
-    notes = []
-    target = np.array(ranges.target)
-    for name in sorted(set(ranges.target)):
-        mine = target == name
-        lost, alone = mine & ~ranges.used, mine & ranges.used & (ranges.detectable >= CHECKED * ranges.u_range)
-        if not (mine & ranges.used).any():
-            notes.append(
-                f"{name}: none of its {mine.sum()} shots fits the others and its typed position: its coordinates here "
+    unmeasured, unchecked = {}, {}
+    for name, mine in _by_target(ranges):
+        used = ranges.used[mine]
+        alone = used & (ranges.detectable[mine] >= CHECKED * ranges.u_range[mine])
+        if not used.any():
+            unmeasured[name] = (
+                f"{name}: none of its {len(mine)} shots fits the others and its typed position: its coordinates here "
                 "are not measured; check its typed position or say how bad it is (u_position_mm)"
             )
-        elif lost.any() and alone.any():
-            notes.append(
-                f"{name}: {lost.sum()} of its {mine.sum()} shots contradict the rest and nothing checks {alone.sum()} "
-                "of those left: it may be further off than its uncertainty says; range it again"
+        elif not used.all() and alone.any():
+            unchecked[name] = (
+                f"{name}: {(~used).sum()} of its {len(mine)} shots contradict the rest and nothing checks "
+                f"{alone.sum()} of those left: it may be further off than its uncertainty says; range it again"
             )
+    notes = [
+        *_together(unmeasured, "points have no shot that fits the others and their typed positions: not measured here"),
+        *_together(
+            unchecked,
+            "points lost shots that contradict the rest, and nothing checks those left: they may be further off than "
+            "their uncertainties say; range them again",
+        ),
+    ]
     ranger = np.array(ranges.ranger)
     for name in sorted(set(ranges.ranger)):
         mine = ranger == name

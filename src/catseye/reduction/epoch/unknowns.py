@@ -107,8 +107,8 @@ class CampaignNetwork:
     def border(self) -> Border | None:
         """What the elimination of a large network leaves; None for one that is solved densely.
 
-        A target that was fired at with its normal, glass and repeated paths is a block, triplets as wholes; one that was
-        fired at so often that it meets most of the border is part of that.
+        A target that was fired at with its normal, glass and repeated paths is a block, triplets as wholes; one that
+        was fired at so often that it meets most of the border is part of that.
         """
         if not self.states:
             return None
