@@ -1,4 +1,4 @@
-"""`reduce` and `explain`: a night of samples to coordinates, and one of its shots down to every input."""
+"""`reduce`, `explain` and `night`: samples to coordinates, a shot down to every input, and a simulated night."""
 
 import os
 from dataclasses import dataclass
@@ -29,7 +29,6 @@ class NightResult(Result):
 
     names                of the points
     x                    (n, 3) m
-    covariance           (3n, 3n) m², x, y, z of each point in turn
     u                    (n, 3) m, standard uncertainties
     shots                (n,) int, used shots that each point had part in
     variance_factor      [pvv] / degrees of freedom, expectation 1
@@ -43,7 +42,6 @@ class NightResult(Result):
 
     names: tuple[str, ...]
     x: np.ndarray
-    covariance: np.ndarray
     u: np.ndarray
     shots: np.ndarray
     variance_factor: float
@@ -53,6 +51,11 @@ class NightResult(Result):
     pose: dict[str, Any] | None
     notes: tuple[str, ...]
     reduction: "Reduction"
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """(3n, 3n) m², x, y, z of each point in turn; of two thousand points it takes seconds and 0.4 GB."""
+        return self.reduction.coordinates.covariance
 
     def passages(self) -> "Sequence[Passage]":
         """The night, the shots, the feed arm, the dish, the air, and how far to trust it all."""
@@ -152,7 +155,6 @@ def reduce(
         verdict(reduction),
         tuple(coordinates.points),
         coordinates.x,
-        coordinates.covariance,
         coordinates.u,
         np.array([coordinates.shots[k] for k in range(len(coordinates.points))]),
         coordinates.variance_factor,
@@ -285,3 +287,51 @@ def campaign_of(source: "str | os.PathLike[str] | Campaign") -> "Campaign":
     from catseye.records.night.campaign import Campaign, read_campaign
 
     return source if isinstance(source, Campaign) else read_campaign(place_of(source))
+
+
+def night(
+    directory: "str | os.PathLike[str]",
+    *,
+    seed: int = 2209,
+    dish_prisms: int = 2209,
+    azimuth_deg: float = 145.3,
+    elevation_deg: float = 30.0,
+    interval_s: float = 8.0,
+    again: float = 0.43,
+) -> Path:
+    """A simulated night as a campaign that `reduce` reads, and beside it `truth.json`, which `reduce` does not read.
+
+    directory      new or empty
+    seed           of every draw: the same night each time
+    dish_prisms    0 to 9999; the telescope has 2209
+    azimuth_deg, elevation_deg   of the telescope
+    interval_s     between two shots of a ranger, s
+    again          how often each ranger of the feed arm shoots each prism once more; 0.43 makes some 20 000 shots
+
+    Raises InputError where the directory holds something and ValidityError for numbers beyond these.
+    """
+    from catseye.errors import ValidityError
+    from catseye.gateways.writers.objects import json_page
+    from catseye.simulator.night.schedule import Schedule
+    from catseye.simulator.night.sheets import write_night
+    from catseye.simulator.night.simulate import SimulatedTelescope, simulate_night
+
+    for name, value in (("interval_s", interval_s), ("again", again)):
+        if not 0.0 <= value <= 1000.0 or (name == "interval_s" and value == 0.0):
+            raise ValidityError(f"{name} = {value:g} (expected above 0 to 1000, 0 for again)")
+    made = simulate_night(
+        seed,
+        telescope=SimulatedTelescope(azimuth_deg, elevation_deg, dish_prisms),
+        schedule=Schedule(interval_s=interval_s, again=again),
+    )
+    where = write_night(made, Path(directory))
+    truth = made.truth
+    page = {
+        "what": "the truth behind a simulated night: metres in the ground frame, status of each shot",
+        "seed": seed,
+        "points": {name: {axis: x[k] for k, axis in enumerate("xyz")} for name, x in truth.points.items()},
+        "surface_deviations": truth.paraboloid.deviations,
+        "shots": truth.shot_status,
+    }
+    (where / "truth.json").write_text(json_page(page), encoding="utf-8")
+    return where

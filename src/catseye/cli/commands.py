@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 
 ROOMS = (
     *("air.air", "air.sound", "air.refractometer", "air.acoustic", "networks", "explain", "calibrate", "certificate"),
-    *("baseline", "optics.link", "point", "triplet", "optics.glass", "optics.beam", "optics.safety", "plot"),
+    *("baseline", "night", "optics.link", "point", "triplet", "optics.glass", "optics.beam", "optics.safety", "plot"),
     *("live.zy", "live.ziy", "live.simulate", "live.serve", "live.replay", "live.export"),
     *("telescope.pose", "telescope.surface", "telescope.pointing", "telescope.structure", "telescope.panels"),
 )
 SUBJECTS = {  # as `catseye --help` groups the commands
     "Begin here": ("demo", "examples"),
-    "A night of ranges": ("reduce", "explain"),
+    "A night of ranges": ("reduce", "explain", "night"),
     "Networks": ("adjust", "plan", "baseline"),
     "The telescope": ("pose", "surface", "pointing", "structure", "panels"),
     "Laboratory": ("calibrate", "certificate", "triplet"),

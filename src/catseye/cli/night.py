@@ -1,0 +1,46 @@
+"""The command of a simulated night."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from catseye.cli.commands import Json, app
+from catseye.cli.terminal import say
+
+
+@app.command(
+    epilog="\b\nExample: catseye night whole-dish\n"
+    "Then: catseye reduce whole-dish --out whole-dish-report\n"
+    "A small one: catseye night small --dish-prisms 60 --interval-s 14 --again 0"
+)
+def night(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Where the campaign goes: new or empty.")],
+    seed: Annotated[int, typer.Option(help="Of every draw: the same night each time.")] = 2209,
+    dish_prisms: Annotated[int, typer.Option(help="Prisms on the dish; the telescope has 2209.")] = 2209,
+    azimuth_deg: Annotated[float, typer.Option(help="Of the telescope.")] = 145.3,
+    elevation_deg: Annotated[float, typer.Option(help="Of the telescope, 5 to 90.")] = 30.0,
+    interval_s: Annotated[float, typer.Option(help="Between two shots of a ranger, s.")] = 8.0,
+    again: Annotated[
+        float, typer.Option(help="How often each feed-arm ranger shoots each prism once more; a fraction is a share.")
+    ] = 0.43,
+    json: Json = False,
+) -> None:
+    """A simulated night of the whole telescope as a campaign: 18 rangers, 2209 prisms, 20 000 shots."""
+    from catseye.api.night import night as make
+    from catseye.gateways.writers.objects import json_line
+
+    where = make(
+        directory,
+        seed=seed,
+        dish_prisms=dish_prisms,
+        azimuth_deg=azimuth_deg,
+        elevation_deg=elevation_deg,
+        interval_s=interval_s,
+        again=again,
+    )
+    if json:
+        say(json_line({"written": str(where), "seed": seed, "truth": str(where / "truth.json")}))
+    else:
+        say(f"Written: {where}/, a campaign; its truth is in truth.json, which no reduction reads")
+        say(f"Next:    catseye reduce {where} --out {where}-report")
