@@ -3,8 +3,12 @@
 python benchmarks/bench_reduce.py
 """
 
+import json
+import os
 import statistics
+import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -120,7 +124,112 @@ def whole() -> None:
     show([(ours, seconds(lambda: reduce_epoch(read_campaign(EXAMPLE))))], ours)
 
 
+SIZES = (60, 120, 250, 500, 1000, 2209)
+SPARSE_AT = 500  # prisms at which a general sparse solver is tried beside; at 2209 it takes minutes
+
+
+def whole_dish() -> None:
+    """Nights of more and more prisms, each in a process of its own: seconds and memory from samples to coordinates."""
+    sys.stdout.write(
+        "The whole dish: 18 rangers, each prism from all six of the feed arm, 64 x 128 samples a shot\n"
+        "  prisms  shots    read   samples to  of which          memory  border  beside one read\n"
+        "                 samples  coordinates  adjustment, rejection          of the samples\n"
+    )
+    told = []
+    with tempfile.TemporaryDirectory() as directory:
+        for prisms in (*SIZES, -2209):  # the last: 20 000 shots
+            place = Path(directory) / "night"
+            run = subprocess.run(
+                [sys.executable, __file__, "--one", str(prisms), str(place)],
+                check=True, capture_output=True, text=True, env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+            )  # fmt: skip
+            told.append(json.loads(run.stdout.splitlines()[-1]))
+            one = told[-1]
+            sys.stdout.write(
+                f"  {abs(prisms):6d} {one['shots']:6d} {one['read']:7.2f} s {one['whole']:9.2f} s {one['settle']:9.2f} s"
+                f" {one['gb']:13.2f} GB {one['border']:7d} {one['whole'] / one['read']:8.0f} x\n"
+            )
+            if prisms == SPARSE_AT:
+                sys.stdout.write(
+                    f"         one step of it by scipy.sparse (splu of the same normal equations) "
+                    f"{one['splu']:.2f} s, {one['splu'] / one['step']:.1f} x our {one['step']:.2f} s\n"
+                )
+    size, seconds_, memory = (np.log([t[k] for t in told[: len(SIZES)]]) for k in ("prisms", "whole", "gb"))
+    sys.stdout.write(
+        f"  exponent against prisms from {SIZES[0]} to {SIZES[-1]}: time {np.polyfit(size, seconds_, 1)[0]:.2f}, "
+        f"memory {np.polyfit(size, memory, 1)[0]:.2f}\n\n"
+    )
+
+
+def one_night(prisms: int, place: Path) -> None:
+    """One size of `whole_dish`; prints a JSON line."""
+    import resource
+
+    import catseye.reduction.epoch.coordinates as coordinates
+    from catseye.api.night import night
+    from catseye.reduction.epoch.epoch import reduce_epoch as reduced
+
+    if prisms != SIZES[0] or not place.exists():
+        import shutil
+
+        shutil.rmtree(place, ignore_errors=True)
+        night(place, dish_prisms=abs(prisms), again=0.43 if prisms < 0 else 0.0)
+    took = {}
+    settle = coordinates.settle_network
+
+    def timed(*given, **options):
+        begun = time.perf_counter()
+        answer = settle(*given, **options)
+        took["settle"] = time.perf_counter() - begun
+        return answer
+
+    coordinates.settle_network = timed
+    campaign = read_campaign(place)
+    reduced(read_campaign(EXAMPLE), ReductionSettings(dense_shots=0))  # kernels loaded
+    before = time.perf_counter()
+    reduction = reduced(campaign)
+    took["whole"] = time.perf_counter() - before
+    took["gb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    q = reduction.coordinates.joint.q
+    took["border"] = len(q.eliminated.blocks.outer) if hasattr(q, "eliminated") else 0
+    frames = np.load(place / "frames.npy", mmap_mode="r")
+    before = time.perf_counter()
+    frames.max()
+    took |= {"read": time.perf_counter() - before, "prisms": abs(prisms), "shots": len(campaign.shots.shot)}
+    if prisms == SPARSE_AT:
+        took |= one_step(campaign, reduction)
+    sys.stdout.write(json.dumps(took) + "\n")
+
+
+def one_step(campaign, reduction) -> dict[str, float]:
+    """One Gauss-Newton step of the same system: eliminated by blocks, and by a general sparse factorisation."""
+    from scipy.sparse import csc_array
+    from scipy.sparse.linalg import splu
+
+    from catseye.estimation.least_squares.adjustment import SolverSettings
+    from catseye.estimation.least_squares.normal import _gram
+    from catseye.estimation.least_squares.rows import ActiveRows
+
+    settings = ReductionSettings(dense_shots=0)
+    electronics, _ = follow_electronics(campaign, reduction.phases, 0)
+    network = build_network(campaign, reduction.phases, electronics, settings=settings)
+    x, free = np.array(network.layout.start), np.array(network.layout.free)
+    groups = [shot_group(network, name, x)[0] for name in network.rangers] + network.priors
+    rows = [ActiveRows.of(g) for g in groups]
+    solver = SolverSettings(iterations=1, tests=False, border=network.border)
+    ours = seconds(lambda: (network.border.forget(), adjust(x, groups, free=free, solver=solver)))
+    before = time.perf_counter()
+    normal = sum((_gram(r, r.linear(x)[1], len(x)) for r in rows), start=csc_array((len(x), len(x))))
+    moving = np.flatnonzero(free)
+    splu(csc_array(normal)[:, moving][:, :][moving], permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    return {"step": ours, "splu": time.perf_counter() - before}
+
+
 if __name__ == "__main__":
+    if sys.argv[1:2] == ["--one"]:
+        one_night(int(sys.argv[2]), Path(sys.argv[3]))
+        sys.exit()
     detection()
     adjustment()
     whole()
+    whole_dish()

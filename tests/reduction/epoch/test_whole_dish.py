@@ -107,7 +107,9 @@ def test_a_large_night_is_reduced_by_states_and_its_claims_hold(many, reduced_ma
     dish = [n for n in coordinates.points if n.startswith("DP")]
     rows = coordinates.rows(dish)
     error = coordinates.x[rows] - np.array([truth.points[n] for n in dish])
-    assert chi2.ppf(1e-4, 12) < 12 * np.mean((error / coordinates.u[rows]) ** 2) < chi2.ppf(1 - 1e-4, 12)  # tied together
+    assert (
+        chi2.ppf(1e-4, 12) < 12 * np.mean((error / coordinates.u[rows]) ** 2) < chi2.ppf(1 - 1e-4, 12)
+    )  # tied together
     deviation = np.array([truth.paraboloid.deviations[n] for n in reduced_many.surface.names])
     off = (reduced_many.surface.fit.deviation - deviation) / reduced_many.surface.u_deviation
     assert np.mean(off**2) == pytest.approx(1.0, abs=0.3)

@@ -288,6 +288,10 @@ class Border:
             self._blocks = [known, *self._blocks[:1]]
         return known
 
+    def forget(self) -> None:
+        """Let the last elimination go, and its memory."""
+        self._last, self._since = None, None
+
     def solved(self, blocks: Blocks, values: np.ndarray, scale: np.ndarray) -> tuple["BorderedCovariance", bool]:
         """The covariance, and whether the blocks were eliminated now.
 
@@ -301,7 +305,7 @@ class Border:
             updated = self._updated(last, values * last.scale[blocks.parameter])
             if updated is not None:
                 return updated, False
-        self._last, self._since = None, None  # their memory first
+        self.forget()
         self._last = Eliminated.of(blocks, scale, values * scale[blocks.parameter])
         return BorderedCovariance(len(scale), self._last), True
 

@@ -7,8 +7,9 @@ from itertools import combinations
 import numpy as np
 from scipy.special import chdtri
 
-from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
+from catseye.estimation.least_squares.adjustment import GroupFit, LeastSquaresSolution
 from catseye.estimation.least_squares.rows import variances
+from catseye.estimation.observations.kind import value
 from catseye.estimation.observations.kinds import Distances, MovingDistances, ObservationGroup
 
 MOST_AT_ONE_POINT = 2  # wrong observations searched for at one point, exhaustively
@@ -78,6 +79,39 @@ class LocalConflict:
 
 
 @dataclass(frozen=True, eq=False)
+class SharedErrors:
+    """Errors that m observations share with others, where these are parameters of the adjustment.
+
+    columns    (m, w) of the parameters, -1 for none
+    slopes     (m, w) derivatives of the observed values by them
+    variance   (m,) of the observed values, with all that they share
+
+    An observation that contradicts its neighbours at a point is judged with all its errors, and not after these
+    parameters have taken up what they could: they were found with it.
+    """
+
+    columns: np.ndarray
+    slopes: np.ndarray
+    variance: np.ndarray
+
+    def whole(self, residual: np.ndarray, x: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
+        """Residuals of some rows (all if None) as if nothing were known of what they share."""
+        columns, slopes = (self.columns, self.slopes) if rows is None else (self.columns[rows], self.slopes[rows])
+        return np.asarray(residual + np.sum(slopes * value(x, columns), axis=1))
+
+
+def whole_residuals(
+    fits: Sequence[GroupFit], x: np.ndarray, shared: Sequence[SharedErrors | None]
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Residual and sigma of each group's observations with all their errors."""
+    every = [*shared, *[None] * (len(fits) - len(shared))]
+    return [
+        (f.residual, f.sigma) if s is None else (s.whole(f.residual, x), np.sqrt(s.variance))
+        for f, s in zip(fits, every, strict=True)
+    ]
+
+
+@dataclass(frozen=True, eq=False)
 class Meeting:
     """Where observations and what is known besides stand, so that those that meet in a point are quickly found.
 
@@ -88,6 +122,7 @@ class Meeting:
     jacobians           one a group, at x
     by_column           columns in order, and group and row of the entries that stand in them
     advice_at           column of a point: index of an advice
+    shared              of the first groups
     """
 
     groups: Sequence[ObservationGroup]
@@ -99,6 +134,7 @@ class Meeting:
     jacobians: Sequence[np.ndarray]
     by_column: tuple[np.ndarray, np.ndarray, np.ndarray]
     advice_at: Mapping[int, Sequence[int]]
+    shared: Sequence[SharedErrors | None]
 
     @staticmethod
     def of(
@@ -106,6 +142,7 @@ class Meeting:
         solution: LeastSquaresSolution,
         removable: Sequence[np.ndarray],
         advice: Sequence[ObservationGroup],
+        shared: Sequence[SharedErrors | None] = (),
     ) -> "Meeting":
         """Of a solution of the groups."""
         advice_at: dict[int, list[int]] = {}
@@ -113,16 +150,18 @@ class Meeting:
             for column in np.unique(one.columns).tolist():
                 advice_at.setdefault(column, []).append(i)
         jacobians = [g.predict(solution.x)[1] for g in groups]
+        whole = whole_residuals(solution.fits, solution.x, shared)
         return Meeting(
             groups,
             removable,
             advice,
             solution.x,
-            [f.residual for f in solution.fits],
-            [f.sigma for f in solution.fits],
+            [residual for residual, _ in whole],
+            [sigma for _, sigma in whole],
             jacobians,
             _by_column(groups, jacobians),
             advice_at,
+            shared,
         )
 
     def rows(self, columns: np.ndarray) -> list[tuple[int, np.ndarray]]:
@@ -144,7 +183,10 @@ class Meeting:
             if part is group:
                 residual[i], jacobians[i] = group.observed - values, slopes
             else:
-                residual[i][near], jacobians[i][near] = part.observed - values, slopes
+                one = self.shared[i] if i < len(self.shared) else None
+                left = part.observed - values
+                residual[i][near] = left if one is None else one.whole(left, x, near)
+                jacobians[i][near] = slopes
         return replace(self, x=x, residual=residual, jacobians=jacobians)
 
 

@@ -18,9 +18,11 @@ from catseye.estimation.least_squares.conflict import (
     LARGEST_SEARCH,
     MOST_AT_ONE_POINT,
     Meeting,
+    SharedErrors,
     at_point,
     search,
     touched,
+    whole_residuals,
 )
 from catseye.estimation.least_squares.influence import Influence
 from catseye.estimation.observations.kinds import ObservationGroup
@@ -46,12 +48,14 @@ class OutlierSearch:
     critical   |w| above which an observation is left out, and below nine tenths of which it comes back; 3.5 leaves out
                one good observation in 2000
     rounds     cap of removal rounds; if they do not end, the status says so
+    shared     what the observations of the first groups share, where that is parameters
     """
 
     points: Sequence[np.ndarray] = ()
     advice: Sequence[ObservationGroup] = ()
     critical: float = 3.5
     rounds: int = 100
+    shared: Sequence[SharedErrors | None] = ()
 
 
 TESTS_ALONE = OutlierSearch()
@@ -93,8 +97,9 @@ def adjust_robustly(
     if active is None:
         careful = [np.ones(len(g.observed), dtype=bool) for g in groups]
         solution = _reweighted(x0, groups, removable, free, names, border)
-        large = [may & (np.abs(f.residual) > 3.0 * f.sigma) for f, may in zip(solution.fits, removable, strict=True)]
-        active = [~may | (np.abs(f.residual) < 10.0 * f.sigma) for f, may in zip(solution.fits, removable, strict=True)]
+        whole = whole_residuals(solution.fits, solution.x, outliers.shared)
+        large = [may & (np.abs(v) > 3.0 * sigma) for (v, sigma), may in zip(whole, removable, strict=True)]
+        active = [~may | (np.abs(v) < 10.0 * sigma) for (v, sigma), may in zip(whole, removable, strict=True)]
     else:
         solution = adjust(x0, groups, free=np.zeros(len(x0), dtype=bool), solver=SolverSettings(tests=False))
         large = [may & ~a for may, a in zip(removable, active, strict=True)] if outliers.advice else []
@@ -179,7 +184,7 @@ def _without_undecided(
     rejected = [may & ~f.active for f, may in zip(solution.fits, removable, strict=True)]
     if not any(r.any() for r in rejected):
         return solution
-    meeting = Meeting.of(groups, solution, removable, outliers.advice)
+    meeting = Meeting.of(groups, solution, removable, outliers.advice, outliers.shared)
     for columns in touched(outliers.points, meeting, chosen=rejected):
         local = at_point(columns, meeting, slack=1.0)
         out = [index for index, (i, k) in enumerate(local.rows) if not solution.fits[i].active[k]]
@@ -252,7 +257,7 @@ def _searched(
         return [np.ones(len(g.observed), dtype=bool) for g in groups]
     if not any(s.any() for s in suspects):
         return active
-    meeting = Meeting.of(groups, solution, removable, outliers.advice)
+    meeting = Meeting.of(groups, solution, removable, outliers.advice, outliers.shared)
     for columns in touched(outliers.points, meeting, chosen=suspects):
         local, wrong = search(columns, meeting)
         if wrong is not None:

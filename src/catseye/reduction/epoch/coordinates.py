@@ -240,7 +240,12 @@ def settle_network(
                 x,
                 groups,
                 removable,
-                outliers=OutlierSearch(points=points, advice=advice, critical=settings.critical),
+                outliers=OutlierSearch(
+                    points=points,
+                    advice=advice,
+                    critical=settings.critical,
+                    shared=[part.shared_errors for _, part in shots],
+                ),
                 free=free,
                 active=active,
                 names=names,

@@ -212,6 +212,7 @@ def _adjusted(network: CampaignNetwork, x: np.ndarray, waiting: set[int]) -> Cyc
             outliers=OutlierSearch(
                 points=[part.layout.columns(n) for n in part.places if n in part.layout.points],
                 critical=network.settings.critical,
+                shared=[p.shared_errors for _, p in pairs],
             ),
             free=np.array(part.layout.free),
             names=part.layout.names,

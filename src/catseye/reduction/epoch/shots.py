@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
+from catseye.estimation.least_squares.conflict import SharedErrors
 from catseye.estimation.observations.kinds import Distances, MovingDistances
 from catseye.optics.retroreflector.prism import obliquity_correction, obliquity_slope
 from catseye.reduction.epoch.head import HeadCorrections, head_corrections
@@ -49,6 +50,12 @@ class ShotParts:
     head: HeadCorrections
     variance: np.ndarray
     shared: tuple[np.ndarray, np.ndarray]
+
+    @property
+    def shared_errors(self) -> SharedErrors | None:
+        """What the shots share as parameters; None where their covariance has it."""
+        columns, slopes = self.shared
+        return SharedErrors(columns, slopes, self.variance) if columns.shape[1] else None
 
     def shared_error(self, x: np.ndarray) -> np.ndarray:
         """(m,) m, of the optical lengths, as the parameters x have it."""

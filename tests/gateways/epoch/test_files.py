@@ -1,0 +1,118 @@
+"""The files of a reduction of many points: the covariance beside, figures without labels, notes in one line."""
+
+import json
+
+import numpy as np
+import pytest
+from astropy.io import fits
+
+import catseye.gateways.epoch.figures as figures_module
+import catseye.gateways.epoch.files as files_module
+import catseye.gateways.epoch.objects as objects_module
+from catseye.errors import InputError
+from catseye.gateways.epoch.figures import figures
+from catseye.gateways.epoch.files import write_reduction
+from catseye.gateways.writers.drawing import svg
+from catseye.gateways.writers.matrix_fits import BLOCK
+from catseye.gateways.writers.objects import plain
+from catseye.records.network.solved_points import read_solved_points
+from kept_scene import reduction_of_example
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Night-01 as if its 130 points were many."""
+    directory = tmp_path_factory.mktemp("many")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(objects_module, "MOST_INSIDE", 100)
+        patch.setattr(files_module, "MOST_INSIDE", 100)
+        patch.setattr(files_module, "AT_ONCE", 37)
+        write_reduction(reduction_of_example(), directory)
+    return directory
+
+
+def test_the_matrix_beside_coordinates_json_is_the_full_covariance(written):
+    expected = reduction_of_example().coordinates.covariance
+    told = json.loads((written / "coordinates.json").read_text())
+    assert told["covariance"] is None
+    assert told["covariance_file"] == "covariance.fits"
+    with fits.open(written / "covariance.fits") as pages:
+        pages.verify("exception")
+        assert pages[0].header["BUNIT"] == "m2"
+        np.testing.assert_allclose(pages[0].data, expected, rtol=1e-14)
+    path = written / "covariance.fits"
+    assert path.stat().st_size % BLOCK == 0
+    offset = (path.read_bytes().index(b"END".ljust(80)) // BLOCK + 1) * BLOCK  # as its reader's docstring says
+    np.testing.assert_allclose(np.memmap(path, ">f8", "r", offset, expected.shape), expected, rtol=1e-14)
+    assert "covariance.fits" in json.loads((written / "provenance.json").read_text())["outputs"]
+    own = told["points"]["DP007"]["covariance"]
+    at = 3 * list(told["points"]).index("DP007")
+    np.testing.assert_array_equal(own, expected[at : at + 3, at : at + 3])
+
+
+def test_solved_points_are_read_with_it(written):
+    expected = reduction_of_example().coordinates
+    points = read_solved_points(written)
+    names = ["DP031", "ZY116", "TR03-B"]
+    np.testing.assert_allclose(points.block(names), expected.block(names), rtol=1e-14)
+    assert points.block(names).dtype == float
+    np.testing.assert_array_equal(points.places(names), expected.x[expected.rows(names)])
+
+
+def test_surface_and_pose_say_the_same_from_either_file(written, tmp_path):
+    from catseye.api.telescope import pose, surface
+
+    inside = tmp_path / "inside"
+    inside.mkdir()
+    write_reduction(reduction_of_example(), inside)
+    for job in (surface, pose):
+        one, other = (
+            json.dumps(plain(rounded(job(place, site="night-01").to_object()))) for place in (inside, written)
+        )
+        assert other.replace(str(written), str(inside)) == one
+
+
+def rounded(value):
+    """The value with ten digits of each number: a matrix may differ from its transpose by rounding."""
+    if isinstance(value, dict):
+        return {k: rounded(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [rounded(v) for v in value]
+    if isinstance(value, np.ndarray | float):
+        return np.vectorize(lambda v: float(f"{v:.10g}") + 0.0)(value).tolist()
+    return value
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("../covariance.fits", "expected the name of a file beside it"),
+        ("gone.fits", "is no FITS image"),
+        (7, "expected"),
+    ],
+)
+def test_a_file_that_is_not_beside_it_is_refused(written, tmp_path, name, said):
+    told = json.loads((written / "coordinates.json").read_text())
+    (tmp_path / "coordinates.json").write_text(json.dumps({**told, "covariance_file": name}))
+    with pytest.raises(InputError, match=said):
+        read_solved_points(tmp_path)
+
+
+def test_a_matrix_of_another_night_is_refused(written, tmp_path):
+    (tmp_path / "coordinates.json").write_bytes((written / "coordinates.json").read_bytes())
+    fits.PrimaryHDU(np.eye(6)).writeto(tmp_path / "covariance.fits")
+    with pytest.raises(InputError, match=r"has shape \(6, 6\) \(expected doubles, \(390, 390\)\)"):
+        read_solved_points(tmp_path)
+
+
+def test_figures_of_many_points_are_maps_of_pixels_without_labels(monkeypatch):
+    reduction = reduction_of_example()
+    labelled = svg(figures(reduction)["dish"])
+    assert labelled.count("DP0") > 50
+    for name, value in (("CROWD", 20), ("PIXELS", 20)):
+        monkeypatch.setattr(figures_module, name, value)
+    drawn = figures(reduction)
+    assert "DP0" not in svg(drawn["dish"])
+    assert "<image" in svg(drawn["plan"])
+    assert "<image" in svg(drawn["residuals"])
+    assert len(svg(drawn["plan"])) < 300_000
