@@ -87,3 +87,10 @@ def ranging_network():
         return ObservationNetwork(NetworkPoints(names, given, np.zeros_like(datum), datum), (), (ranges,)), true
 
     return made
+
+
+def pytest_terminal_summary(terminalreporter):
+    """Say plainly that browsers were not tried."""
+    skipped = [r for r in terminalreporter.stats.get("skipped", []) if "browser tests: " in str(r.longrepr)]
+    if skipped:
+        terminalreporter.write_line(f"{len(skipped)} browser tests SKIPPED: no chromium (expected Debian's)")

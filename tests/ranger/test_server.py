@@ -317,6 +317,7 @@ def fuzz(lines, seed):
                     heard.extend(data)
 
             task = asyncio.ensure_future(listen())
+            writer.write(b"VER\n")  # a first line that cannot be read would end the connection
             for k in range(lines):
                 writer.write(fuzzed(rng))
                 site.now += 0.02
@@ -390,6 +391,47 @@ def test_serve_turns_until_it_is_cancelled():
             with pytest.raises(asyncio.CancelledError):
                 await task
             client.close()
+
+    run(story)
+
+
+@pytest.mark.parametrize("first", [b"POST / HTTP/1.1\r\nHost: a\r\n\r\n", b"\x16\x03\x01\n", b"what? ever\n"])
+def test_no_line_behind_a_bad_first_one_is_looked_at(first, caplog):
+    async def story():
+        async with Site() as site:
+            reader, writer = await site.typed()
+            for _ in range(3):
+                await site.answered(reader.readline())
+            writer.write(first + b"PS 0\nD0 999\n")
+            try:
+                rest = await site.answered(reader.read())
+            except ConnectionResetError:
+                rest = b""
+            await site.turns(20)
+            assert (b"LINE 0, " in rest) == first.startswith(b"what")
+            assert b"D0" not in rest
+            assert site.head.laser_on()
+            assert site.ranger.d0_mm == 181.2
+            assert "closed" in caplog.text
+            writer.close()
+
+    run(story)
+
+
+def test_empty_lines_before_the_first_cost_no_memory_and_a_bad_later_line_closes_nothing():
+    async def story():
+        async with Site() as site:
+            reader, writer = await site.typed()
+            for _ in range(3):
+                await site.answered(reader.readline())
+            writer.write(b"\r\n" * 5000)
+            await site.turns(20)
+            assert len(site.server.connections[0].unread) == 0
+            writer.write(b"VER\nwhat? ever\nVER\n")
+            said = [(await site.answered(reader.readline())).decode() for _ in range(3)]
+            assert sum("VER 1, ZY101" in line for line in said) == 2
+            assert sum("LINE 0, " in line for line in said) == 1
+            writer.close()
 
     run(story)
 

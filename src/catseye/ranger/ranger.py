@@ -86,7 +86,7 @@ class Ranger(RangerState):
             if len(self._waiting) >= MOST_QUEUED:
                 raise InputError(f"{MOST_QUEUED} commands wait already (expected fewer: send slower)")
         except InputError as problem:
-            return [Outgoing(Reply("LINE", False, (_plain(str(problem)),), 0, self.now_ticks()), client)]
+            return [Outgoing(Reply("LINE", False, (plain_text(str(problem)),), 0, self.now_ticks()), client)]
         self._waiting.append((client, request))
         return []
 
@@ -209,7 +209,7 @@ class Ranger(RangerState):
         return Outgoing(self._reply(request, True, values), client if private else None)
 
     def _refused(self, request: Request, text: str) -> Outgoing:
-        return Outgoing(self._reply(request, False, (_plain(text.removeprefix(f"{request.command}: ")),)))
+        return Outgoing(self._reply(request, False, (plain_text(text.removeprefix(f"{request.command}: ")),)))
 
     def _reply(self, request: Request, ok: bool, values: Values) -> Reply:
         reply = Reply(request.command, ok, values, request.tid)
@@ -270,6 +270,6 @@ class Ranger(RangerState):
         return outgoing
 
 
-def _plain(text: str) -> str:
+def plain_text(text: str) -> str:
     """Printable ASCII in one line."""
     return "".join(c if " " <= c <= "~" else "?" for c in text)[:500]

@@ -13,9 +13,10 @@ from dataclasses import replace
 from functools import partial
 
 from catseye.errors import InputError
+from catseye.ranger.first_line import BLANK, opening_of, peer_of
 from catseye.ranger.line import LONGEST_REQUEST, Reply, format_reply
 from catseye.ranger.network import ConnectionMaker, Listener, Sockets
-from catseye.ranger.ranger import Ranger
+from catseye.ranger.ranger import Ranger, plain_text
 from catseye.ranger.state import Outgoing
 
 PORTS = (5240, 5241)
@@ -36,6 +37,7 @@ class ClientConnection(asyncio.Protocol):
         self.transport: asyncio.Transport | None = None
         self.unread = bytearray()
         self.lines_left, self.paused = MOST_AT_ONCE, False
+        self.opened = False  # its first line was one of the language
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
@@ -46,9 +48,27 @@ class ClientConnection(asyncio.Protocol):
         self.server.left(self)
 
     def data_received(self, data: bytes) -> None:
+        if self.transport is None or self.transport.is_closing():
+            return  # turned away: what else it sends is not looked at
         self.unread += data
-        self.read_on()
+        if self.opened or self._opens():
+            self.read_on()
         self.server.wake()
+
+    def _opens(self) -> bool:
+        """Whether the first line is one of the language; a connection that begins with anything else is closed."""
+        opening, problem = opening_of(bytes(self.unread))
+        self.opened = opening == "read"
+        if opening == "waiting":
+            self.unread = self.unread.lstrip(BLANK)
+        if opening in ("foreign", "unreadable"):
+            LOG.warning("%s: port %d: %s %s: closed", *self._named(), peer_of(self.transport), plain_text(problem))
+        if opening == "foreign" and self.transport is not None:
+            self.unread.clear()
+            self.transport.abort()
+        elif opening == "unreadable":
+            self.refuse(plain_text(problem))
+        return self.opened
 
     def read_on(self) -> None:
         """Hand over whole lines as far as rate and queue allow; otherwise stop reading from the peer."""
@@ -168,7 +188,7 @@ class ZyServer:
         gained, self._last_rate = (now - self._last_rate) * LINES_A_SECOND, now
         for connection in list(self.connections.values()):
             connection.lines_left = min(MOST_AT_ONCE, connection.lines_left + gained)
-            if connection.unread:
+            if connection.unread and connection.opened:
                 connection.read_on()
         self.send(self.ranger.turn())
         if now - self._last_keep_alive >= KEEP_ALIVE:
@@ -193,6 +213,8 @@ class ZyServer:
         """A connection begins; a second one on a port is turned away."""
         port = self.ports[connection.number]
         if connection.number in self.connections:
+            who = peer_of(connection.transport)
+            LOG.warning("%s: port %d: %s turned away: the port is taken", self.ranger.name, port, who)
             connection.tell(
                 Reply(
                     "CONNECT", False, (f"port {port} is taken (expected the other port)",), 0, self.ranger.now_ticks()

@@ -15,6 +15,7 @@ from catseye.coordinator.journal.entries import Entry
 from catseye.coordinator.parts import ticks_now
 from catseye.coordinator.ziy import Coordinator
 from catseye.errors import CatseyeError, InputError
+from catseye.ranger.first_line import BLANK, opening_of, peer_of
 from catseye.ranger.line import LONGEST_REQUEST, Request, parse_request, stamp_text
 from catseye.ranger.network import ConnectionMaker, Listener, Sockets
 
@@ -39,6 +40,7 @@ class Client(asyncio.Protocol):
         self.transport: asyncio.Transport | None = None
         self.wants: set[str] = set()
         self._unread = bytearray()
+        self._opened = False  # its first line was one of the language
         self._left, self._since = MOST_AT_ONCE, asyncio.get_running_loop().time()
         self._timer: asyncio.TimerHandle | None = None
 
@@ -53,8 +55,27 @@ class Client(asyncio.Protocol):
         self.server.left(self)
 
     def data_received(self, data: bytes) -> None:
+        if self.transport is None or self.transport.is_closing():
+            return  # turned away: what else it sends is not looked at
         self._unread += data
-        self._read_on()
+        if self._opened or self._opens():
+            self._read_on()
+
+    def _opens(self) -> bool:
+        """Whether the first line is one of the language; a connection that begins with anything else is closed."""
+        opening, problem = opening_of(bytes(self._unread))
+        self._opened = opening == "read"
+        if opening == "waiting":
+            self._unread = self._unread.lstrip(BLANK)
+        if opening in ("foreign", "unreadable") and self.transport is not None:
+            LOG.warning("ZIY: port %d: %s %s: closed", self.server.port, peer_of(self.transport), plain(problem))
+            self._unread.clear()
+            if opening == "foreign":
+                self.transport.abort()
+            else:
+                self.tell(0, f"LINE 0, {plain(problem)}")
+                self.transport.close()
+        return self._opened
 
     def _read_on(self) -> None:
         """Answer whole lines as far as the rate allows; otherwise stop reading from the peer for a while."""

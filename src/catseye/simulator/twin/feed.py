@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from catseye.constants import DEGREE
 from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import PER_SECOND
+from catseye.ranger.first_line import BLANK, opening_of, peer_of
 from catseye.ranger.line import LONGEST_REQUEST, TICK_NS, Reply, format_reply, nanoseconds_to_ticks
 from catseye.ranger.network import ConnectionMaker, Listener, Sockets
 from catseye.records.night.live import LiveWeather
@@ -158,6 +159,7 @@ class FeedConnection(asyncio.Protocol):
         self._feed = feed
         self._transport: asyncio.Transport | None = None
         self._unread = b""
+        self._opened = False  # its first line was one of the language
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
@@ -175,6 +177,10 @@ class FeedConnection(asyncio.Protocol):
         self._feed.clients.discard(self)
 
     def data_received(self, data: bytes) -> None:
+        if self._transport is None or self._transport.is_closing():
+            return
+        if not self._opened and not self._opens(data):
+            return
         *lines, rest = (self._unread + data).split(b"\n")
         words = [line.strip().upper().decode("ascii", "replace") for line in lines]
         for word in words:
@@ -183,6 +189,23 @@ class FeedConnection(asyncio.Protocol):
         if "BYE" in words:
             self.close()
         self._unread = rest[-LONGEST_REQUEST:]
+
+    def _opens(self, data: bytes) -> bool:
+        """Whether the first line is one of the language; a connection that begins with anything else is closed."""
+        opening, problem = opening_of(self._unread + data)
+        self._opened = opening == "read"
+        if opening == "waiting":
+            self._unread = (self._unread + data).lstrip(BLANK)
+        elif opening != "read" and self._transport is not None:
+            LOG.warning("feed: port %d: %s %s: closed", self._feed.port, peer_of(self._transport), problem)
+            if opening == "foreign":
+                self._transport.abort()
+            else:
+                ticks = nanoseconds_to_ticks(self._feed.clock.now_ns())
+                text = "".join(c if " " <= c <= "~" else "?" for c in problem)
+                self.write(_line(Reply("LINE", False, (text,), 0, ticks)))
+                self.close()
+        return self._opened
 
     def write(self, data: bytes) -> None:
         """Send; who does not take it is cut off."""
