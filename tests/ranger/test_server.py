@@ -12,7 +12,7 @@ from catseye.ranger.client import SECOND_CLIENT_TID, ZyClient
 from catseye.ranger.commands import COMMANDS
 from catseye.ranger.line import LAST_TID, LONGEST_REPLY, LONGEST_REQUEST, parse_reply
 from catseye.ranger.ranger import Ranger
-from catseye.ranger.server import LOOPBACK, MOST_AT_ONCE, MOST_UNSENT, MOST_WAITING, ClientConnection, ZyServer
+from catseye.ranger.server import LOOPBACK, MOST_AT_ONCE, MOST_UNSENT, MOST_WAITING, MUTE, ClientConnection, ZyServer
 from catseye.simulator.clock.virtual_time import MemoryNetwork, VirtualClock, VirtualLoop
 from ranger.clocked_head import ClockedHead
 from ranger.ranger_scene import READY, REFERENCE_PHASE, ready
@@ -432,6 +432,31 @@ def test_empty_lines_before_the_first_cost_no_memory_and_a_bad_later_line_closes
             assert sum("VER 1, ZY101" in line for line in said) == 2
             assert sum("LINE 0, " in line for line in said) == 1
             writer.close()
+
+    run(story)
+
+
+def test_two_sockets_that_say_nothing_give_their_places_to_who_speaks():
+    async def story():
+        async with Site() as site:
+            mute = [await site.typed(0), await site.typed(1)]
+            await site.until(lambda: len(site.server.connections) == 2)
+            site.now = MUTE - 0.1
+            reader, writer = await site.typed(0)
+            assert b"is taken" in await site.answered(reader.read())
+            writer.close()
+            site.now = MUTE
+            clients = [await site.client(0), await site.client(1, first_tid=SECOND_CLIENT_TID)]
+            for client, (reader, writer) in zip(clients, mute, strict=True):
+                assert (await site.answered(client.ask("VER"))).ok
+                assert b"LINE 0, nothing was said for 10 s" in await site.answered(reader.read())
+                writer.close()
+            site.now = 10 * MUTE
+            reader, writer = await site.typed(0)
+            assert b"is taken" in await site.answered(reader.read())  # who has spoken keeps its place
+            writer.close()
+            for client in clients:
+                client.close()
 
     run(story)
 

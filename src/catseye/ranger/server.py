@@ -22,6 +22,7 @@ from catseye.ranger.state import Outgoing
 PORTS = (5240, 5241)
 LOOPBACK = "127.0.0.1"
 KEEP_ALIVE = 60.0  # s
+MUTE = 10.0  # s, after which a connection that never said a line gives its place to another
 LINES_A_SECOND = 200.0
 MOST_AT_ONCE = 400.0  # lines
 MOST_WAITING = 64  # commands of one connection
@@ -37,6 +38,7 @@ class ClientConnection(asyncio.Protocol):
         self.transport: asyncio.Transport | None = None
         self.unread = bytearray()
         self.lines_left, self.paused = MOST_AT_ONCE, False
+        self.began = server.clock()
         self.opened = False  # its first line was one of the language
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -212,7 +214,11 @@ class ZyServer:
     def joined(self, connection: ClientConnection) -> None:
         """A connection begins; a second one on a port is turned away."""
         port = self.ports[connection.number]
-        if connection.number in self.connections:
+        holder = self.connections.get(connection.number)
+        if holder is not None and not holder.opened and self.clock() - holder.began >= MUTE:
+            self.give_up(holder)
+            holder = None
+        if holder is not None:
             who = peer_of(connection.transport)
             LOG.warning("%s: port %d: %s turned away: the port is taken", self.ranger.name, port, who)
             connection.tell(
@@ -227,6 +233,12 @@ class ZyServer:
         self.wake()
         for out in self.ranger.greeting(port):
             connection.tell(out.reply)
+
+    def give_up(self, holder: ClientConnection) -> None:
+        """A connection that never said a line is closed: another one wants its place."""
+        LOG.warning("%s: port %d: %s said nothing: closed", *holder._named(), peer_of(holder.transport))
+        holder.refuse(f"nothing was said for {MUTE:g} s, and another wants this port")
+        self.left(holder)
 
     def left(self, connection: ClientConnection) -> None:
         """A connection is over: what it had queued and scheduled is dropped, and its port is free."""
