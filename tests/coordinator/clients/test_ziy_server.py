@@ -139,6 +139,19 @@ def test_a_display_is_pushed_what_it_subscribed_and_no_more():
     run(story)
 
 
+def test_kinds_are_subscribed_with_blanks_between_as_with_commas():
+    async def story():
+        async with Served() as site:
+            one = await site.client()
+            assert (await one.ask("SUBSCRIBE", "weather posture")).text == "POSTURE WEATHER"
+            assert (await one.ask("SUBSCRIBE", "SHOT  EPOCH", "EVENT")).text == "EPOCH EVENT POSTURE SHOT WEATHER"
+            strange = await one.ask("SUBSCRIBE", "SHOT GOSSIP")
+            assert strange.ok is False
+            assert "'GOSSIP' cannot be subscribed" in strange.text
+
+    run(story)
+
+
 def test_only_what_is_durable_is_pushed():
     async def story():
         async with Served() as site:

@@ -223,8 +223,8 @@ class ZiyServer:
             client.tell(request.tid, ", ".join([f"{request.command} 1", *row]))
 
     def _subscribed(self, client: Client, request: Request) -> Iterable[tuple[str, ...]]:
-        """SUBSCRIBE [what ...]: all kinds where none is named; NONE ends it."""
-        asked = [word.upper() for word in request.parameters] or ["SHOT", "EPOCH", "EVENT"]
+        """SUBSCRIBE [what ...], commas or blanks between: the three usual kinds where none is named; NONE ends it."""
+        asked = [word.upper() for part in request.parameters for word in part.split()] or ["SHOT", "EPOCH", "EVENT"]
         strange = [word for word in asked if word not in KINDS and word != "NONE"]
         if strange:
             raise InputError(f"{strange[0][:20]!a} cannot be subscribed (expected {' '.join(KINDS)} or NONE)")
