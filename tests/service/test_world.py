@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import typer
 
+from catseye.cli.live.groups import TwinOptions
 from catseye.errors import InputError
 from catseye.service.world import TwinWords
 from simulator.living_scene import site
@@ -28,6 +29,13 @@ def test_its_options_say_the_same_world_to_another_process(monkeypatch):
     with pytest.raises(InputError, match="enough"):
         typer.main.get_command(app).main(["zy", "gbt", *world.options()])
     assert made == [world]
+
+
+@pytest.mark.parametrize("offset", [None, 0.0, -864_000.0, 1e8])
+def test_without_a_start_a_twins_seconds_begin_now_by_its_own_time(offset):
+    world = TwinOptions().world(offset)
+    assert world.twin(site()).seconds(world.clock().now_ns()) == pytest.approx(0.0, abs=30.0)
+    assert world.offset == pytest.approx(offset or 0.0, abs=30.0)
 
 
 def test_two_of_the_same_words_tell_the_same_truth_and_time():

@@ -71,7 +71,10 @@ class TwinOptions(NamedTuple):
     fault: Faults = None
 
     def world(self, offset: float | None) -> "TwinWords":
-        """The twin in words, its time `offset` s from this machine's; None: it is --start now."""
+        """The twin in words, its time `offset` s from this machine's; None: it is --start now.
+
+        Without --start its seconds begin now by its own time: a fault 30 s after the start comes in 30 s.
+        """
         from catseye.service.world import TwinWords
 
         words: dict[str, Any] = {
@@ -80,7 +83,7 @@ class TwinOptions(NamedTuple):
             "conditions": self.conditions,
             "faults": tuple(self.fault or ()),
         }
-        begins = mjd_start(self.start)
+        begins = mjd_start(self.start, offset=offset or 0.0)
         return TwinWords.starting_now(begins, **words) if offset is None else TwinWords(begins, offset=offset, **words)
 
 

@@ -140,8 +140,8 @@ def site_of(name: str) -> "SiteFolder":
     return read_site(located(name))
 
 
-def mjd_start(text: str | None, usual: float | None = None) -> float:
-    """MJD of --start; without it the usual one, or now."""
+def mjd_start(text: str | None, usual: float | None = None, *, offset: float = 0.0) -> float:
+    """MJD of --start; without it the usual one, or now by a clock that is `offset` s from this machine's."""
     from catseye.geometry.sky.time_tag import mjd_of
 
     if text is not None:
@@ -151,7 +151,7 @@ def mjd_start(text: str | None, usual: float | None = None) -> float:
     from catseye.geometry.sky.time_tag import PER_DAY
     from catseye.simulator.clock.world_clock import SystemClock
 
-    return SystemClock().now_ns() / PER_DAY
+    return SystemClock(offset).now_ns() / PER_DAY
 
 
 def orders_of(*, drop: list[str] | None, **given: Any) -> "Orders":
