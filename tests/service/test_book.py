@@ -16,7 +16,9 @@ from catseye.service.book import LiveBook
 from catseye.service.comparison import EpochComparison
 from catseye.service.objects import epoch_line, simulation_object, summary
 from catseye.service.screen import LinesView, ScreenView
+from catseye.service.simulation import Simulation
 from catseye.service.world import TwinWords
+from simulator.living_scene import site
 
 NAN3 = np.full(3, math.nan)
 
@@ -53,12 +55,12 @@ def shot(number, ranger="ZY101", status="used", range_=100.0):
     return AnsweredShot(taken, status, "", range_, 3e-5, 0.0)
 
 
-def epoch(number, **rejected):
+def epoch(number, *, used=(1, 2), of=None, **rejected):
     answer = {
         "number": number,
         "names": ["A"] * 30,
-        "used": [1, 2],
-        "rejected": {str(k): v for k, v in enumerate(rejected.values())},
+        "used": list(used),
+        "rejected": of or {str(k): v for k, v in enumerate(rejected.values(), 1)},
     }
     return EpochSolution(number, answer)
 
@@ -98,9 +100,9 @@ def test_it_counts_what_comes():
 def test_programs_get_numbers_and_null_for_what_is_not_known():
     book, _ = filled()
     world = TwinWords(60635.125, faults=("dead-ranger ZY104 1 2",))
-    text = json_line(simulation_object(book, world, "night.db", seconds=60.0, rangers=18))
+    text = json_line(simulation_object(book, world, "night.db", seconds=60.0, rangers=18, told=3))
     told = json.loads(text, parse_constant=lambda name: pytest.fail(name))
-    assert (told["shots"], told["acknowledged"], told["used"], told["journal"]) == (3, 3, 2, "night.db")
+    assert (told["shots"], told["acknowledged"], told["used"], told["journal"]) == (3, 3, 1, "night.db")
     assert told["rejected"] == {"blocked": 1, "reflected": 1}
     assert told["faults"] == ["dead-ranger ZY104 1 2"]
     first = told["epochs"][0]
@@ -110,12 +112,43 @@ def test_programs_get_numbers_and_null_for_what_is_not_known():
 
 def test_people_are_told_first_what_is_of_more_than_one_shot():
     book, _ = filled()
-    passages = dict(summary(book, TwinWords(60635.125), None, seconds=60.0, rangers=18))
+    passages = dict(summary(book, TwinWords(60635.125), None, seconds=60.0, rangers=18, told=3))
     assert passages["Noticed"].startswith("VER was not answered; ZY101 A: blocked (5 times)")
     assert "3 by 18 rangers in 60 s, all acknowledged; 1 blocked, 1 reflected" in passages["Shots"]
     assert "In 1 of 1 epochs" in passages["Truth"]
     assert "none was kept" in passages["Journal"]
-    assert "none was solved" in dict(summary(LiveBook(), TwinWords(60635.125), None, seconds=1.0, rangers=1))["Epochs"]
+    assert (
+        "none was solved"
+        in dict(summary(LiveBook(), TwinWords(60635.125), None, seconds=1.0, rangers=1, told=0))["Epochs"]
+    )
+
+
+def test_a_shot_counts_once_whatever_its_epochs_say_of_it():
+    """1 used, 2 overruled by its epoch, 3 blocked and named by it again, 4 of the next epoch, 5 of none yet."""
+    book = LiveBook()
+    for number, status in ((1, "used"), (2, "used"), (3, "blocked"), (4, "used")):
+        book.entry(shot(number, status=status))
+    book.entry(epoch(1, used=[1], of={"2": "reflected: +1 mm off", "3": "blocked: return 0.001 V"}))
+    assert dict(book.fates) == {"used": 2, "reflected": 1, "blocked": 1}
+    book.entry(shot(5))
+    book.entry(epoch(2, used=[], of={"2": "undecided: again", "4": "undecided: one of two"}))
+    assert dict(book.fates) == {"used": 2, "reflected": 1, "blocked": 1, "undecided": 1}
+    assert sum(book.fates.values()) == book.acknowledged == 5
+
+
+def test_shots_that_were_told_and_not_kept_are_not_said_to_be_acknowledged():
+    book, _ = filled()
+    words = {"seconds": 60.0, "rangers": 18, "told": 5}
+    passages = dict(summary(book, TwinWords(60635.125), None, **words))
+    assert passages["Shots"].startswith("5 by 18 rangers in 60 s, 3 acknowledged, 2 not; ")
+    told = simulation_object(book, TwinWords(60635.125), None, **words)
+    assert (told["shots"], told["acknowledged"]) == (5, 3)
+
+
+def test_rangers_that_were_left_out_are_not_counted():
+    orders = SimpleNamespace(drop=("ZY102", "ZY102"))
+    run = SimpleNamespace(site=site(), orders=orders, seconds=6.0, told=9)
+    assert Simulation.totals.fget(run) == {"seconds": 6.0, "rangers": len(site().rangers) - 1, "told": 9}
 
 
 @pytest.mark.parametrize(

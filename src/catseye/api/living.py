@@ -43,8 +43,7 @@ class SimulationResult(Result):
         from catseye.service.objects import summary
 
         sim = self.simulation
-        rangers = len(sim.site.rangers)
-        told = summary(sim.book, sim.world, sim.orders.journal, seconds=sim.seconds, rangers=rangers)
+        told = summary(sim.book, sim.world, sim.orders.journal, **sim.totals)
         return [Passage(title, text) for title, text in told]
 
     def to_object(self) -> dict[str, Any]:
@@ -52,8 +51,7 @@ class SimulationResult(Result):
         from catseye.service.objects import simulation_object
 
         sim = self.simulation
-        rangers = len(sim.site.rangers)
-        return simulation_object(sim.book, sim.world, sim.orders.journal, seconds=sim.seconds, rangers=rangers)
+        return simulation_object(sim.book, sim.world, sim.orders.journal, **sim.totals)
 
     def tables(self) -> "dict[str, QTable]":
         """`epochs`: a row an epoch; rms from the truth and claimed u, where it was held against it."""

@@ -13,6 +13,7 @@ from catseye.service.logs import epoch_of
 
 UNKNOWN = "unknown"  # to this version
 KEPT_EVENTS, KEPT_EPOCHS = 60, 10_000
+MOST_UNJUDGED = 50_000  # shots kept while nothing is solved
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,8 @@ class LiveBook:
         self.shots: Counter[str] = Counter()  # good ones by ranger
         self.statuses: Counter[str] = Counter()
         self.left_out: Counter[str] = Counter()  # why epochs did not use shots that were good by themselves
+        self._overruled: Counter[str] = Counter()  # the statuses that those shots had
+        self._good: dict[int, str] = {}  # status by number, of good shots that no epoch has judged yet
         self.events: deque[Happening] = deque(maxlen=KEPT_EVENTS)
         self.troubles = Troubles()
         self.epochs: deque[dict[str, Any]] = deque(maxlen=KEPT_EPOCHS)  # number, ticks, points, used, rejected
@@ -76,6 +79,11 @@ class LiveBook:
         return sum(self.statuses.values())
 
     @property
+    def fates(self) -> Counter[str]:
+        """What became of each durable shot, once: what its epoch said of it, or else its own status."""
+        return +(self.statuses - self._overruled + self.left_out)
+
+    @property
     def latest(self) -> EpochComparison | None:
         """The last epoch that was compared."""
         return next(reversed(self.comparisons.values()), None)
@@ -84,6 +92,10 @@ class LiveBook:
         shot = answered.shot
         self.statuses[answered.status] += 1
         self.shots[shot.ranger] += answered.status in GOOD
+        if answered.status in GOOD:
+            self._good[shot.number] = answered.status
+            if len(self._good) > MOST_UNJUDGED:
+                del self._good[next(iter(self._good))]
         self.last[shot.ranger] = LastShot(shot.target, answered.status, answered.range_, answered.u_range)
         if self._comparison is not None:
             self._comparison.shot(answered)
@@ -104,5 +116,11 @@ class LiveBook:
         }
         counts = {key: len(each) for key, each in lists.items()}
         self.epochs.append({"number": answer.get("number"), "ticks": solution.ticks, **counts})
-        for reason in (answer.get("rejected") or {}).values():
-            self.left_out[str(status_of(reason) or UNKNOWN)] += 1
+        rejected = {int(number): reason for number, reason in (answer.get("rejected") or {}).items()}
+        for number, reason in rejected.items():
+            status = self._good.pop(number, None)  # one that was bad by itself is counted already
+            if status is not None:
+                self._overruled[status] += 1
+                self.left_out[str(status_of(reason) or UNKNOWN)] += 1
+        last = max([*rejected, *answer.get("used", ())], default=0)  # what came while it was solved is of the next one
+        self._good = {number: status for number, status in self._good.items() if number > last}

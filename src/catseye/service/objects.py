@@ -34,11 +34,13 @@ def simulation_verdict(book: LiveBook) -> Verdict:
 
 
 def simulation_object(
-    book: LiveBook, world: TwinWords, journal: str | None, *, seconds: float, rangers: int
+    book: LiveBook, world: TwinWords, journal: str | None, *, seconds: float, rangers: int, told: int
 ) -> dict[str, Any]:
     """What `catseye simulate --json` prints.
 
     seconds   of the site's time, from the first round on
+    rangers   that were not left out
+    told      shots that rangers told of; those that are durable are in the book
     """
     return {
         "verdict": simulation_verdict(book).to_object(),
@@ -47,10 +49,10 @@ def simulation_object(
         "motion": world.motion,
         "seconds": seconds,
         "rangers": rangers,
-        "shots": sum(book.statuses.values()),
+        "shots": told,
         "acknowledged": book.acknowledged,
-        "used": sum(book.statuses[status] for status in GOOD),
-        "rejected": {reason: n for reason, n in sorted((book.statuses + book.left_out).items()) if reason not in GOOD},
+        "used": sum(book.fates[status] for status in GOOD),
+        "rejected": {reason: n for reason, n in sorted(book.fates.items()) if reason not in GOOD},
         "epochs": [epoch_object(row, book.comparisons.get(row["number"])) for row in book.epochs],
         "faults": list(world.faults),
         "troubles": [
@@ -110,14 +112,16 @@ def beam_lines(compared: EpochComparison) -> Iterator[str]:
 
 
 def summary(
-    book: LiveBook, world: TwinWords, journal: str | None, *, seconds: float, rangers: int
+    book: LiveBook, world: TwinWords, journal: str | None, *, seconds: float, rangers: int, told: int
 ) -> list[tuple[str, str]]:
-    """Title and text of each passage."""
-    bad = {reason: n for reason, n in sorted((book.statuses + book.left_out).items()) if reason not in GOOD}
+    """Title and text of each passage; arguments as of `simulation_object`."""
+    bad = {reason: n for reason, n in sorted(book.fates.items()) if reason not in GOOD}
+    lost = told - book.acknowledged
+    kept = "all acknowledged" if not lost else f"{book.acknowledged} acknowledged, {lost} not"
     passages = [
         (
             "Shots",
-            f"{sum(book.statuses.values())} by {rangers} rangers in {seconds:.0f} s, all acknowledged; "
+            f"{told} by {rangers} rangers in {seconds:.0f} s, {kept}; "
             + (", ".join(f"{n} {reason}" for reason, n in bad.items()) or "none left out")
             + ".",
         )

@@ -47,7 +47,7 @@ class View(Protocol):
 
 @dataclass
 class Simulation:
-    """One run; what it came to is in `book`, `seconds`, `journal` afterwards.
+    """One run; what it came to is in `book`, `seconds`, `told`, `journal` afterwards.
 
     site, name   its records, and what the user called it
     world        of the twin
@@ -66,10 +66,17 @@ class Simulation:
     port_base: int = PORT_BASE
     warm: bool = True
     seconds: float = 0.0
+    told: int = 0  # shots that rangers told of, durable or not
 
     def __post_init__(self) -> None:
         self._twin = self.world.twin(self.site)
         self.book = LiveBook()
+
+    @property
+    def totals(self) -> dict[str, Any]:
+        """Seconds measured, rangers that were not left out, shots told of: what a summary needs beside the book."""
+        rangers = set(self.site.rangers) - set(self.orders.drop)
+        return {"seconds": self.seconds, "rangers": len(rangers), "told": self.told}
 
     async def run(self) -> None:
         """In real time, the twin in a process of its own; until the minutes are over, or cancelled.
@@ -147,6 +154,7 @@ class Simulation:
             await _first(self._time(running), twin, coordinator)
         finally:
             await _ended(coordinator)
+            self.told = running.ziy.intake.numbered
             self.view.end()
 
     async def _time(self, running: LiveCoordinator) -> None:

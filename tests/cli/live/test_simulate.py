@@ -85,6 +85,7 @@ def test_a_run_in_virtual_time_is_as_true_as_it_claims_and_the_same_each_time(tm
     assert run.stderr == ""
     assert told["shots"] == told["acknowledged"] > 50
     assert told["used"] > 0.7 * told["shots"]
+    assert told["used"] + sum(told["rejected"].values()) == told["shots"]
     assert told["seconds"] == pytest.approx(60.0 * 0.2, abs=0.2)
     assert len(told["epochs"]) == 2
     for epoch in told["epochs"]:

@@ -106,7 +106,7 @@ def _say(simulation: "Simulation", *, json: bool, quiet: bool) -> None:
     from catseye.service.objects import simulation_object, simulation_verdict, summary
 
     book, world, journal = simulation.book, simulation.world, simulation.orders.journal
-    totals: dict[str, Any] = {"seconds": simulation.seconds, "rangers": len(simulation.site.rangers)}
+    totals = simulation.totals
     if json:
         from catseye.gateways.writers.objects import json_line
 
