@@ -146,8 +146,8 @@ def whole_dish() -> None:
             told.append(json.loads(run.stdout.splitlines()[-1]))
             one = told[-1]
             sys.stdout.write(
-                f"  {abs(prisms):6d} {one['shots']:6d} {one['read']:7.2f} s {one['whole']:9.2f} s {one['settle']:9.2f} s"
-                f" {one['gb']:13.2f} GB {one['border']:7d} {one['whole'] / one['read']:8.0f} x\n"
+                f"  {abs(prisms):6d} {one['shots']:6d} {one['read']:7.2f} s {one['whole']:9.2f} s"
+                f" {one['settle']:9.2f} s {one['gb']:13.2f} GB {one['border']:7d} {one['whole'] / one['read']:8.0f} x\n"
             )
             if prisms == SPARSE_AT:
                 sys.stdout.write(

@@ -3,6 +3,8 @@
 A mean squared normalised error of 1 says that the claimed uncertainty is the true one.
 """
 
+from collections import Counter
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
@@ -15,9 +17,10 @@ from catseye.simulator.night.simulate import SimulatedTelescope, simulate_night
 
 SIX = range(2101, 2107)
 MANY = range(2201, 2265)
+LARGE = range(2401, 2441)
 
 
-def any_night(seed):
+def any_night(seed, dish_prisms=60):
     """Weather and posture drawn from the seed: winter to summer, inversion to lapse, horizon to zenith."""
     rng = np.random.default_rng(seed)
     conditions = AirConditions(
@@ -29,7 +32,9 @@ def any_night(seed):
         pressure_hpa=rng.uniform(910.0, 950.0),
     )
     azimuth, elevation = rng.uniform(0.0, 360.0), rng.uniform(10.0, 85.0)
-    return simulate_night(seed, telescope=SimulatedTelescope(azimuth, elevation), conditions=conditions)
+    return simulate_night(
+        seed, telescope=SimulatedTelescope(azimuth, elevation, dish_prisms=dish_prisms), conditions=conditions
+    )
 
 
 def kind_of(name, campaign):
@@ -46,23 +51,31 @@ def kind_of(name, campaign):
     return "benchmark" if name in {b.target for b in campaign.benchmarks} else "struct"
 
 
-def tally(seed, directory):
-    """What one night shows: squared normalised errors by class, fates of shots, variance factor."""
-    night = any_night(seed)
+def tally(seed, directory, dish_prisms=60, least_shots=0):
+    """What one night shows: squared normalised errors by class, fates of shots, variance factor.
+
+    A prism with fewer used shots than `least_shots` is not counted: three shots check nothing.
+    """
+    night = any_night(seed, dish_prisms)
     campaign = read_campaign(write_night(night, directory / f"night-{seed}"))
     reduction = reduce_epoch(campaign)
     coordinates, truth = reduction.coordinates, night.truth
     found = {"squares": {}, "factor": coordinates.variance_factor}
+    ranges = coordinates.ranges
+    used = Counter(target for target, on in zip(ranges.target, ranges.used, strict=True) if on)
     for row, name in enumerate(coordinates.points):
         if name not in coordinates.places:
             continue  # fixed points are nuisance
+        if kind_of(name, campaign) == "dish" and used[name] < least_shots:
+            continue
         error = coordinates.x[row] - truth.points[name]
         u = np.sqrt(np.diag(coordinates.block([name])))
         squares = (error / u) ** 2
         found["squares"].setdefault(kind_of(name, campaign), []).extend(squares)
     surface = reduction.surface
     deviation = np.array([truth.paraboloid.deviations[n] for n in surface.names])
-    found["squares"]["surface"] = list(((surface.fit.deviation - deviation) / surface.u_deviation) ** 2)
+    seen = np.array([used[n] >= least_shots for n in surface.names])
+    found["squares"]["surface"] = list(((surface.fit.deviation - deviation) / surface.u_deviation)[seen] ** 2)
     found["pose"] = pose_distance(reduction, truth)
     found |= fates(reduction, truth, campaign)
     (campaign.directory / "frames.npy").unlink()
@@ -182,6 +195,32 @@ def test_the_variance_factor_of_each_of_many_nights_is_near_one(many):
     assert np.all((factors > 0.65) & (factors < 1.35))
     # 390 degrees of freedom: 7 % a night; the start of a factor below one would be a sigma claimed too large
     assert factors.mean() == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.fixture(scope="module")
+def large(tmp_path_factory):
+    """Nights of 400 prisms, whose shared errors are states and whose prisms are blocks."""
+    return [tally(seed, tmp_path_factory.mktemp("large"), dish_prisms=400, least_shots=4) for seed in LARGE]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", INDEPENDENT)
+def test_claimed_uncertainties_are_those_of_large_nights(large, kind):
+    low, high = expected_interval(INDEPENDENT[kind], len(large))
+    mean, u = summary(large)[kind]
+    assert low < mean < high
+    assert 0.9 - 2.0 * u < mean < 1.1 + 2.0 * u
+
+
+@pytest.mark.slow
+def test_the_poses_covariance_is_that_of_large_nights(large):
+    assert 0.75 < np.mean([n["pose"] for n in large]) / 5.0 < 1.3
+
+
+@pytest.mark.slow
+def test_bad_shots_of_large_nights_are_rejected_for_the_right_reason_and_good_ones_kept(large):
+    judge_shots(large)
+    assert np.mean([n["factor"] for n in large]) == pytest.approx(1.0, abs=0.05)
 
 
 def test_a_point_where_good_shots_lose_against_a_foreign_one_claims_little(tmp_path):

@@ -330,7 +330,7 @@ def night(
         "what": "the truth behind a simulated night: metres in the ground frame, status of each shot",
         "seed": seed,
         "points": {name: {axis: x[k] for k, axis in enumerate("xyz")} for name, x in truth.points.items()},
-        "surface_deviations": truth.paraboloid.deviations,
+        "surface_deviations": None if truth.paraboloid is None else truth.paraboloid.deviations,
         "shots": truth.shot_status,
     }
     (where / "truth.json").write_text(json_page(page), encoding="utf-8")

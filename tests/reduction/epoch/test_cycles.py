@@ -132,7 +132,7 @@ def test_a_whole_night_typed_to_two_centimetres_is_found_step_by_step(night_01, 
 def test_a_certified_distance_is_as_good_as_a_position(few_01, reduced_few_01):
     # one ranger sees ZBM02, at a distance known to some hundredths of a millimetre
     r = reduced_few_01
-    resolved = resolve_cycles(target_off(few_01, "ZBM02"), r.phases, r.electronics, settings=r.settings)
+    resolved = resolve_cycles(build_network(target_off(few_01, "ZBM02"), r.phases, r.electronics, settings=r.settings))
     assert (resolved.rejected, resolved.notes) == ({}, ())
     (certified,) = (b for b in few_01.benchmarks if b.target == "ZBM02")
     ranger = r.coordinates.x[r.coordinates.index(certified.ranger)]
@@ -142,7 +142,7 @@ def test_a_certified_distance_is_as_good_as_a_position(few_01, reduced_few_01):
 
 def test_night_01_itself_needs_no_search(night_01, reduced_night_01):
     r = reduced_night_01
-    resolved = resolve_cycles(night_01, r.phases, r.electronics, settings=r.settings)
+    resolved = resolve_cycles(build_network(night_01, r.phases, r.electronics, settings=r.settings))
     assert (resolved.starts, resolved.rejected, resolved.notes) == ({}, {}, ())
     assert not r.coordinates.unresolved
     assert not r.coordinates.ranges.thin.any()

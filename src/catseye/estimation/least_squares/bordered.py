@@ -29,7 +29,7 @@ LEAST_LEFT = 1e-7  # of a row that goes: what the others say of it, over its own
 
 
 @dataclass(frozen=True, eq=False)
-class Blocks:
+class TargetBlocks:
     """How the parameters of one system fall into blocks and a border, and where each entry of its rows stands.
 
     moving         (k,) parameters that are not held
@@ -62,7 +62,7 @@ class Blocks:
     at: np.ndarray
 
     @staticmethod
-    def of(rows: Sequence[ActiveRows], moving: np.ndarray, size: int, on_border: np.ndarray) -> "Blocks":
+    def of(rows: Sequence[ActiveRows], moving: np.ndarray, size: int, on_border: np.ndarray) -> "TargetBlocks":
         """The blocks of groups of rows: parameters off the border that meet in a row belong together.
 
         moving      (k,) parameters that are not held
@@ -111,7 +111,7 @@ class Blocks:
         row_pointers = np.append(firsts, len(of_row))
         rows_of = np.append(np.searchsorted(c[firsts], np.arange(len(own) + 1)), len(firsts))
         wide = np.diff(border_first)
-        return Blocks(
+        return TargetBlocks(
             moving,
             columns,
             block,
@@ -180,7 +180,7 @@ class Eliminated:
     inside, reach   V^-1 (i, i) and W (i, g), sparse
     """
 
-    blocks: Blocks
+    blocks: TargetBlocks
     scale: np.ndarray
     values: np.ndarray
     inside: csr_array
@@ -190,7 +190,7 @@ class Eliminated:
     _inverse: list[bool] = field(default_factory=lambda: [False])
 
     @staticmethod
-    def of(blocks: Blocks, scale: np.ndarray, values: np.ndarray) -> "Eliminated":
+    def of(blocks: TargetBlocks, scale: np.ndarray, values: np.ndarray) -> "Eliminated":
         """Blocks eliminated from the rows of `values`."""
         from catseye.estimation.least_squares.bordered_kernel import eliminate
 
@@ -236,7 +236,7 @@ class Eliminated:
         return lapack.dpotrs(self._left[0], right, lower=0)[0].reshape(right.shape)
 
     def inverse(self) -> np.ndarray:
-        """Z (g, g), scaled."""
+        """Covariance Z (g, g) of the border, scaled."""
         if not self._inverse[0]:
             from catseye.estimation.least_squares.bordered_kernel import mirrored
 
@@ -275,16 +275,16 @@ class Border:
 
     columns: np.ndarray
     fine: np.ndarray
-    _blocks: list[Blocks] = field(default_factory=list)
+    _blocks: list[TargetBlocks] = field(default_factory=list)
     _last: Eliminated | None = None
     _since: "BorderedCovariance | None" = None  # the last elimination with what came and went after it,
     _changed: np.ndarray = field(default_factory=lambda: np.zeros(0))  # and the entries that this was
 
-    def blocks(self, rows: Sequence[ActiveRows], moving: np.ndarray, size: int) -> Blocks:
+    def blocks(self, rows: Sequence[ActiveRows], moving: np.ndarray, size: int) -> TargetBlocks:
         """The blocks of some rows, remembered."""
         known = next((b for b in self._blocks if b.fits(rows, moving)), None)
         if known is None:
-            known = Blocks.of(rows, moving, size, self.columns)
+            known = TargetBlocks.of(rows, moving, size, self.columns)
             self._blocks = [known, *self._blocks[:1]]
         return known
 
@@ -292,10 +292,10 @@ class Border:
         """Let the last elimination go, and its memory."""
         self._last, self._since = None, None
 
-    def solved(self, blocks: Blocks, values: np.ndarray, scale: np.ndarray) -> tuple["BorderedCovariance", bool]:
+    def solved(self, blocks: TargetBlocks, values: np.ndarray, scale: np.ndarray) -> tuple["BorderedCovariance", bool]:
         """The covariance, and whether the blocks were eliminated now.
 
-        values   (e,) see `Blocks.values`
+        values   (e,) see `TargetBlocks.values`
         scale    (n,) of a unit diagonal
 
         An earlier elimination serves where few rows have come or gone since, and the others are nearly the same.
@@ -381,8 +381,11 @@ class BorderedCovariance:
         e, b = self.eliminated, self.eliminated.blocks
         rows = csr_array(matrix * self.eliminated.scale)
         inner, outer = rows[:, b.inner], rows[:, b.outer]
-        reach = csr_array(outer - inner @ e.reach)
-        answer = np.asarray(reach @ (reach @ e.inverse()).T + (inner @ e.inside @ inner.T).toarray())
+        reach, z = csr_array(outer - inner @ e.reach), e.inverse()
+        met = np.unique(reach.indices)
+        if 4 * len(met) < len(z):
+            reach, z = reach[:, met], z[np.ix_(met, met)]
+        answer = np.asarray(reach @ (reach @ z).T + (inner @ e.inside @ inner.T).toarray())
         if self.reach is not None:
             moved = matrix @ self.reach
             answer -= moved @ self.middle @ moved.T

@@ -112,7 +112,7 @@ def whole_residuals(
 
 
 @dataclass(frozen=True, eq=False)
-class Meeting:
+class MeetingLines:
     """Where observations and what is known besides stand, so that those that meet in a point are quickly found.
 
     groups, removable   as of `adjust_robustly`
@@ -143,7 +143,7 @@ class Meeting:
         removable: Sequence[np.ndarray],
         advice: Sequence[ObservationGroup],
         shared: Sequence[SharedErrors | None] = (),
-    ) -> "Meeting":
+    ) -> "MeetingLines":
         """Of a solution of the groups."""
         advice_at: dict[int, list[int]] = {}
         for i, one in enumerate(advice):
@@ -151,7 +151,7 @@ class Meeting:
                 advice_at.setdefault(column, []).append(i)
         jacobians = [g.predict(solution.x)[1] for g in groups]
         whole = whole_residuals(solution.fits, solution.x, shared)
-        return Meeting(
+        return MeetingLines(
             groups,
             removable,
             advice,
@@ -172,7 +172,7 @@ class Meeting:
         of = group[near]
         return [(int(i), np.unique(row[near[of == i]])) for i in np.unique(of)]
 
-    def at(self, x: np.ndarray, columns: np.ndarray) -> "Meeting":
+    def at(self, x: np.ndarray, columns: np.ndarray) -> "MeetingLines":
         """The same at other parameters, as far as some columns reach; elsewhere it is not to be asked."""
         residual, jacobians = list(self.residual), list(self.jacobians)
         for i, near in self.rows(columns):
@@ -218,7 +218,7 @@ def _part(group: ObservationGroup, rows: np.ndarray) -> ObservationGroup:
     return replace(group, **cut)
 
 
-def search(columns: np.ndarray, meeting: Meeting) -> tuple[LocalConflict, tuple[int, ...] | None]:
+def search(columns: np.ndarray, meeting: MeetingLines) -> tuple[LocalConflict, tuple[int, ...] | None]:
     """The smallest conflict at a point; where there is none, searched again about the place of the best explanation.
 
     A wrong range of half a metre carries its point so far that slopes taken there explain nothing to 25 um.
@@ -237,7 +237,7 @@ def search(columns: np.ndarray, meeting: Meeting) -> tuple[LocalConflict, tuple[
     return local, None
 
 
-def at_point(columns: np.ndarray, meeting: Meeting, *, slack: float) -> LocalConflict:
+def at_point(columns: np.ndarray, meeting: MeetingLines, *, slack: float) -> LocalConflict:
     """What meets in a point: removable observations that depend on it; others, and advice, that depend on it alone."""
     rows: list[tuple[int, int]] = []
     doubted: list[tuple[float, np.ndarray]] = []
@@ -274,7 +274,7 @@ def _slopes(
     return slope, np.any(slope != 0.0, axis=1) & ~np.any(others != 0.0, axis=1)
 
 
-def touched(points: Sequence[np.ndarray], meeting: Meeting, *, chosen: Sequence[np.ndarray]) -> list[np.ndarray]:
+def touched(points: Sequence[np.ndarray], meeting: MeetingLines, *, chosen: Sequence[np.ndarray]) -> list[np.ndarray]:
     """The points that the chosen observations depend on."""
     columns = {
         int(c)

@@ -44,7 +44,7 @@ class Influence:
 
     @property
     def standardised(self) -> np.ndarray:
-        """w of every row."""
+        """Standardised residual w of every row."""
         return self.weighed / np.sqrt(self.visible)
 
     @property

@@ -17,7 +17,7 @@ from catseye.estimation.least_squares.bordered import Border
 from catseye.estimation.least_squares.conflict import (
     LARGEST_SEARCH,
     MOST_AT_ONE_POINT,
-    Meeting,
+    MeetingLines,
     SharedErrors,
     at_point,
     search,
@@ -184,7 +184,7 @@ def _without_undecided(
     rejected = [may & ~f.active for f, may in zip(solution.fits, removable, strict=True)]
     if not any(r.any() for r in rejected):
         return solution
-    meeting = Meeting.of(groups, solution, removable, outliers.advice, outliers.shared)
+    meeting = MeetingLines.of(groups, solution, removable, outliers.advice, outliers.shared)
     for columns in touched(outliers.points, meeting, chosen=rejected):
         local = at_point(columns, meeting, slack=1.0)
         out = [index for index, (i, k) in enumerate(local.rows) if not solution.fits[i].active[k]]
@@ -257,7 +257,7 @@ def _searched(
         return [np.ones(len(g.observed), dtype=bool) for g in groups]
     if not any(s.any() for s in suspects):
         return active
-    meeting = Meeting.of(groups, solution, removable, outliers.advice, outliers.shared)
+    meeting = MeetingLines.of(groups, solution, removable, outliers.advice, outliers.shared)
     for columns in touched(outliers.points, meeting, chosen=suspects):
         local, wrong = search(columns, meeting)
         if wrong is not None:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csc_array, sparray
 
 from catseye.estimation.network.multilateration.solution import Mapped, RangingSolution
 
@@ -66,6 +67,16 @@ class RangingCovariance:
             part = slice(low, low + ROWS)
             result[part] = self.solution.products(everything[at[part]], a[part])
         return result
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        met = np.flatnonzero(np.any(b.reshape(len(b), -1) != 0.0, axis=1))
+        return np.asarray(self.across(met) @ b[met])
+
+    def carried(self, matrix: sparray) -> np.ndarray:
+        by_column = csc_array(matrix)
+        met = np.flatnonzero(np.diff(by_column.indptr))
+        slopes = by_column[:, met]
+        return np.asarray(slopes @ (slopes @ self.within(met)).T)
 
     def blocks(self, first: np.ndarray) -> np.ndarray:
         result = np.empty((len(self.station), 3, 3))

@@ -3,13 +3,15 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
+from scipy.sparse import csr_array
 
 from catseye.constants import SPEED_OF_LIGHT
 from catseye.estimation.ambiguity.search import AmbiguityLimits, AmbiguityStatus, Located, locate
 from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
 from catseye.estimation.least_squares.rows import full_jacobian
 from catseye.optics.retroreflector.prism import obliquity_slope
-from catseye.reduction.epoch.shots import ShotGroup, ShotParts, other_ends, shot_group
+from catseye.reduction.epoch.shots import ShotParts, other_ends, shot_group
 from catseye.reduction.epoch.unknowns import CampaignNetwork
 
 RANGES = 8  # shots a search takes part with at most: more say little new, and bring wrong ones
@@ -21,14 +23,13 @@ SETTLED = 1e-3  # m, by which it may be off: dPc changes by a thousandth of that
 
 @dataclass(frozen=True, eq=False)
 class CycleScene:
-    """The whole network, its parameters and covariance from the safe shots, and every shot as a row.
+    """The whole network, and its parameters and covariance from the safe shots.
 
-    groups, parts   one of each ranger
-    solution        of the safe shots and the records
+    parts      one of each ranger, every shot a row
+    solution   of the safe shots and the records
     """
 
     network: CampaignNetwork
-    groups: list[ShotGroup]
     parts: list[ShotParts]
     solution: LeastSquaresSolution
 
@@ -40,31 +41,27 @@ def search(scene: CycleScene, name: str, shots: set[int]) -> Located:
     name    of the point
     shots   indices into the campaign's shots
     """
-    rows = [(i, r) for i, p in enumerate(scene.parts) for r, k in enumerate(p.electronics.shots) if int(k) in shots]
-    problem = _problem(scene, name, rows)
-    left = np.arange(len(rows))
+    scene = replace(scene, network=scene.network.of_shots(shots))
+    problem = _problem(scene, name, scene.solution.x)
+    left = np.arange(len(problem.lengths))
     answers = []
     for _ in range(TRIES):
         chosen = _best_shots(problem, left)
-        answers.append(_settled(scene, name, rows, chosen, problem.located(chosen, wider=True)))
+        answers.append(_settled(scene, name, chosen, problem.located(chosen, wider=True)))
         left = np.setdiff1d(left, chosen)
         if answers[-1].status is AmbiguityStatus.FOUND or len(left) < 5:
             break
     return next((a for a in answers if a.status is AmbiguityStatus.FOUND), answers[0])
 
 
-def _settled(
-    scene: CycleScene, name: str, rows: list[tuple[int, int]], chosen: np.ndarray, located: Located
-) -> Located:
+def _settled(scene: CycleScene, name: str, chosen: np.ndarray, located: Located) -> Located:
     """The search again with dPc, air and head as they are where the point was found, until it is found there."""
     for _ in range(TURNS):
         if not np.isfinite(located.x).all():
             return located
         x = scene.solution.x.copy()
         x[scene.network.layout.columns(name)] = located.x
-        pairs = [shot_group(scene.network, n, x) for n in scene.network.rangers]
-        there = replace(scene, groups=[g for g, _ in pairs], parts=[p for _, p in pairs])
-        before, located = located, _problem(there, name, rows, x).located(chosen, wider=False)
+        before, located = located, _problem(scene, name, x).located(chosen, wider=False)
         if np.linalg.norm(located.x - before.x) < SETTLED:
             return located
     return (
@@ -105,31 +102,22 @@ class _Problem:
         )
 
 
-def _problem(scene: CycleScene, name: str, rows: list[tuple[int, int]], x: np.ndarray | None = None) -> _Problem:
-    """The search for one point; x are the parameters at which dPc and air were taken, the solution's if None."""
+def _problem(scene: CycleScene, name: str, x: np.ndarray) -> _Problem:
+    """The search for one point by the shots of the network, dPc, air and head being those at the parameters x."""
     network, solution = scene.network, scene.solution
     own = network.layout.columns(name)
-    x = solution.x if x is None else x
-    groups = sorted({i for i, _ in rows})
-    at = {i: np.array([r for j, r in rows if j == i]) for i in groups}
-    order = [(i, int(r)) for i in groups for r in at[i]]
-    n = np.concatenate([1.0 + scene.parts[i].refractivity[at[i]] for i in groups])
-    slopes = np.concatenate([full_jacobian(scene.groups[i], x)[at[i]] for i in groups]) / n[:, None]
+    pairs = [shot_group(network, ranger, x) for ranger in network.rangers]
+    n = 1.0 + np.concatenate([part.refractivity for _, part in pairs])
+    slopes = np.concatenate([full_jacobian(group, x) for group, _ in pairs]) / n[:, None]
     slopes[:, own] = 0.0
-    noise = np.zeros((len(order), len(order)))
-    start = 0
-    for i in groups:
-        end = start + len(at[i])
-        given = scene.groups[i].covariance
-        noise[start:end, start:end] = given[np.ix_(at[i], at[i])] if given.ndim == 2 else np.diag(given[at[i]])
-        start = end
-    covariance = noise / np.outer(n, n) + slopes @ solution.q.solve(slopes.T)
-    misses = np.concatenate([(scene.groups[i].observed - scene.groups[i].predict(x)[0])[at[i]] for i in groups]) / n
-    stations = np.array([other_ends(scene.groups[i], r, int(own[0]), x=x) for i, r in order])
+    noise = block_diag(*(g.covariance if g.covariance.ndim == 2 else np.diag(g.covariance) for g, _ in pairs))
+    covariance = noise / np.outer(n, n) + solution.q.carried(csr_array(slopes))
+    misses = np.concatenate([group.observed - group.predict(x)[0] for group, _ in pairs]) / n
+    stations = np.array([other_ends(g, r, int(own[0]), x=x) for g, _ in pairs for r in range(len(g.observed))])
     distance = np.linalg.norm(stations - x[own], axis=1)
     prior = spread(scene, name)
     u_place = float(np.sqrt(np.linalg.eigvalsh(prior)[-1]))
-    turn = np.array([_by_direction(scene, i, r) for i, r in order])
+    turn = np.concatenate([_by_direction(network, part) for _, part in pairs])
     half = 0.5 * SPEED_OF_LIGHT / network.campaign.site.ranging.modulation_hz
     return _Problem(
         solution.x[own], prior, stations, distance + misses, half / n, covariance, np.abs(turn) * u_place / distance
@@ -144,16 +132,14 @@ def spread(scene: CycleScene, name: str) -> np.ndarray:
     return 3.0 * covariance if in_unit else covariance  # one typed position stands for three points: no averaging
 
 
-def _by_direction(scene: CycleScene, group: int, row: int) -> float:
-    """Derivative of a shot's dPc by its angle of incidence, m/rad; 0 for what is no prism."""
-    part = scene.parts[group]
-    place = scene.network.places[part.target[row]]
-    if place.normal is None:
-        return 0.0
-    ranging = scene.network.campaign.site.ranging
+def _by_direction(network: CampaignNetwork, part: ShotParts) -> np.ndarray:
+    """(m,) derivative of each shot's dPc by its angle of incidence, m/rad; 0 for what is no prism."""
+    ranging = network.campaign.site.ranging
     ratio, bends = ranging.bk7_to_air_group_index_ratio, ranging.bk7_to_air_phase_index_ratio
-    cosine = np.cos(min(float(part.incidence[row]), 0.5 * np.pi))
-    return float(obliquity_slope(place.height, ratio, cosine, phase=bends))
+    places = [network.places[target] for target in part.target]
+    cosine = np.cos(np.minimum(part.incidence, 0.5 * np.pi))
+    slope = obliquity_slope(np.array([p.height for p in places]), ratio, cosine, phase=bends)
+    return np.where([p.normal is not None for p in places], slope, 0.0)
 
 
 def _best_shots(problem: _Problem, left: np.ndarray) -> np.ndarray:

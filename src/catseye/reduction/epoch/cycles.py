@@ -24,6 +24,7 @@ from catseye.estimation.least_squares.robust import OutlierSearch, adjust_robust
 from catseye.estimation.least_squares.rows import full_jacobian
 from catseye.estimation.observations.kinds import ObservationGroup
 from catseye.reduction.epoch.cycle_search import CycleScene, search, spread
+from catseye.reduction.epoch.parameter import ParameterKind
 from catseye.reduction.epoch.ranges import ElectronicsPhase, Progress
 from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
@@ -199,14 +200,16 @@ def _adjusted(network: CampaignNetwork, x: np.ndarray, waiting: set[int]) -> Cyc
     )
     if part.rangers:
         column = {parameter: i for i, parameter in enumerate(network.layout.parameters)}
-        at = np.array([column[parameter] for parameter in part.layout.parameters])
-        pairs = [shot_group(part, name, x[at]) for name in part.rangers]
+        at = np.array([column.get(parameter, -1) for parameter in part.layout.parameters])
+        at[[p.kind is ParameterKind.ELECTRONICS for p in part.layout.parameters]] = -1  # other shots have other states
+        begin = np.where(at < 0, part.layout.start, x[at])
+        pairs = [shot_group(part, name, begin) for name in part.rangers]
         groups: list[ObservationGroup] = [group for group, _ in pairs] + part.priors
         removable = [
             np.full(len(g.observed), i < len(pairs) or g.name in (THERMOMETERS, ZEROS)) for i, g in enumerate(groups)
         ]
         solution = adjust_robustly(
-            x[at],
+            begin,
             groups,
             removable,
             outliers=OutlierSearch(
@@ -219,7 +222,7 @@ def _adjusted(network: CampaignNetwork, x: np.ndarray, waiting: set[int]) -> Cyc
             border=part.border,
         ).require_converged()
         x = x.copy()
-        x[at] = solution.x
+        x[at[at >= 0]] = solution.x[at >= 0]
         used = {
             int(k)
             for fit, (_, p) in zip(solution.fits, pairs, strict=False)
@@ -238,7 +241,7 @@ def _adjusted(network: CampaignNetwork, x: np.ndarray, waiting: set[int]) -> Cyc
         solver=SolverSettings(border=network.border),
     ).require_converged()
     pairs = [shot_group(network, name, whole.x) for name in network.rangers]
-    return CycleScene(network, [g for g, _ in pairs], [p for _, p in pairs], whole)
+    return CycleScene(network, [p for _, p in pairs], whole)
 
 
 def _safe(scene: CycleScene, waiting: set[int]) -> set[int]:

@@ -57,6 +57,7 @@ class UnknownsLayout:
     free: list[bool] = field(default_factory=list)
     at: dict[Parameter, int] = field(default_factory=dict)
     points: dict[str, int] = field(default_factory=dict)
+    of_air: list[int] = field(default_factory=list)
 
     def add(
         self, quantity: Parameter, parts: Sequence[str], start: Iterable[float], free: Sequence[bool] | None = None
@@ -65,6 +66,8 @@ class UnknownsLayout:
         self.at[quantity] = len(self.parameters)
         if quantity.kind in POINT_KINDS:
             self.points[str(quantity)] = len(self.parameters)
+        if quantity.kind in AIR_KINDS:
+            self.of_air.append(len(self.parameters))
         self.parameters.extend(quantity._replace(part=part or quantity.part) for part in parts)
         self.start.extend(float(s) for s in start)
         self.free.extend(free if free is not None else [True] * len(parts))
@@ -82,7 +85,7 @@ class UnknownsLayout:
     @property
     def air(self) -> np.ndarray:
         """Indices of the air's parameters, those of `AirField.parameters`."""
-        return np.array([first for quantity, first in self.at.items() if quantity.kind in AIR_KINDS], dtype=int)
+        return np.array(self.of_air, dtype=int)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,8 +103,8 @@ class CampaignNetwork:
     layout: UnknownsLayout
     field: AirField
     priors: list[ObservationGroup]
-    motion: CarriedMotion | None = None
-    states: dict[str, DriftStates] = field(default_factory=dict)
+    motion: CarriedMotion | None
+    states: dict[str, DriftStates]
 
     @cached_property
     def border(self) -> Border | None:
@@ -139,6 +142,15 @@ class CampaignNetwork:
         return [
             name for name in self.campaign.rangers if name in self.electronics and len(self.electronics[name].shots)
         ]
+
+    def of_shots(self, shots: Collection[int]) -> "CampaignNetwork":
+        """The network with the same unknowns and some of the shots, by their index in the campaign."""
+        kept = {name: np.isin(e.shots, sorted(shots)) for name, e in self.electronics.items()}
+        return replace(
+            self,
+            electronics={name: e.of(kept[name]) for name, e in self.electronics.items()},
+            states={name: states.of(kept[name]) for name, states in self.states.items()},
+        )
 
     def seen_from(self, ranger: str) -> "CampaignNetwork":
         """The network whose air knows the lines of one ranger's usable shots, in their order."""
@@ -211,7 +223,7 @@ def build_network(
     if lines:
         columns = [layout.at[line] for line in lines]
         priors.append(_independent(PATHS, columns, np.zeros(len(lines)), np.full(len(lines), u_path)))
-    network = CampaignNetwork(campaign, settings, phases, electronics, seen, layout, air, priors, motion)
+    network = CampaignNetwork(campaign, settings, phases, electronics, seen, layout, air, priors, motion, {})
     if any(e.walk is not None for e in electronics.values()):
         network.priors[:] = [_apart(prior) for prior in priors]
         _share_by_states(network)

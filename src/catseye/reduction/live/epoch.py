@@ -165,8 +165,13 @@ def frames_of_points(motion: CarriedMotion, names: Sequence[str]) -> dict[str, T
 
 
 def _lasts(parameter: Parameter, lasting: Sequence[str], triplets: Mapping[str, TripletRecord]) -> bool:
-    """Whether a parameter is one of something that stays: the air, a ranger's, a lasting point's."""
+    """Whether a parameter is one of something that stays: the air, a ranger's, a lasting point's.
+
+    Errors that an epoch's shots share do not, nor by how much a body's table is off: its points that last say it.
+    """
     kind, of, part = parameter
+    if kind in (ParameterKind.ELECTRONICS, ParameterKind.REPEATS, ParameterKind.BODY):
+        return False
     if kind in (ParameterKind.POINT, ParameterKind.GLASS):
         return of in lasting
     if kind is ParameterKind.PATH:

@@ -5,7 +5,7 @@ parameters each, and a rest that is a shot's own: the walk at the reference shot
 modes of the bridge between them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,7 +34,7 @@ class DriftStates:
 
     @property
     def count(self) -> int:
-        """Number s of states."""
+        """Number s of states that a ranger has."""
         return len(self.prior_columns)
 
     def without(self, weak: float) -> "DriftStates":
@@ -61,6 +61,10 @@ class DriftStates:
             self.strength[kept[first:]],
             float(self.strength[~kept[first:]].max()),
         )
+
+    def of(self, keep: np.ndarray) -> "DriftStates":
+        """The same states at some of the shots, (m,) bool."""
+        return replace(self, columns=self.columns[keep], slopes=self.slopes[keep], own=self.own[keep])
 
     @property
     def covariance(self) -> np.ndarray:
