@@ -23,7 +23,8 @@ from catseye.estimation.least_squares.rows import ActiveRows
 
 WIDE = 1000  # parameters of the border from which one more core is worth waking
 SAME = 2e-6  # relative change of a row up to which an earlier elimination serves; tests take differences of such
-MOST_CHANGED = 400  # rows that came or went since, beyond which a new elimination is quicker
+NEAR = 1e-2  # the same for a step, which is refined
+MOST_CHANGED, MOST_REFINED = 400, 100  # rows that came or went since, beyond which a new elimination is quicker
 FEW = 30  # parameters whose joint covariance is looked up, not multiplied out; rows that may change in any system
 LEAST_LEFT = 1e-7  # of a row that goes: what the others say of it, over its own variance
 
@@ -300,29 +301,38 @@ class Border:
 
         An earlier elimination serves where few rows have come or gone since, and the others are nearly the same.
         """
+        return self._served(blocks, values, scale, SAME, MOST_CHANGED)
+
+    def near(self, blocks: TargetBlocks, values: np.ndarray, scale: np.ndarray) -> tuple["BorderedCovariance", bool]:
+        """The same where a covariance that is nearly that of the rows is enough: a step is refined with it."""
+        return self._served(blocks, values, scale, NEAR, MOST_REFINED)
+
+    def _served(
+        self, blocks: TargetBlocks, values: np.ndarray, scale: np.ndarray, same: float, most: int
+    ) -> tuple["BorderedCovariance", bool]:
         last = self._last
         if last is not None and last.blocks is blocks and last.held:
-            updated = self._updated(last, values * last.scale[blocks.parameter])
+            updated = self._updated(last, values * last.scale[blocks.parameter], same, most)
             if updated is not None:
                 return updated, False
         self.forget()
         self._last = Eliminated.of(blocks, scale, values * scale[blocks.parameter])
         return BorderedCovariance(len(scale), self._last), True
 
-    def _updated(self, last: Eliminated, values: np.ndarray) -> "BorderedCovariance | None":
-        """The covariance by what has changed since an elimination; None where that is too much."""
+    def _updated(self, last: Eliminated, values: np.ndarray, same: float, most: int) -> "BorderedCovariance | None":
+        """The covariance by what has changed since an elimination, rows by more than `same`; None for too many."""
         blocks, size = last.blocks, len(last.scale)
         change, row = values - last.values, blocks.row_of_entry
         moved = np.sqrt(np.bincount(row, change**2))
-        large = moved > SAME * np.sqrt(np.bincount(row, np.maximum(values**2, last.values**2)))
+        large = moved > same * np.sqrt(np.bincount(row, np.maximum(values**2, last.values**2)))
         if not large.any():
             return BorderedCovariance(size, last)
-        if np.count_nonzero(large) > min(MOST_CHANGED, max(FEW, len(blocks.outer) // 4)):
+        if np.count_nonzero(large) > min(most, max(FEW, len(blocks.outer) // 4)):
             return None
         entries = large[row]
         changed = np.concatenate([np.flatnonzero(entries), values[entries]])
-        same = self._since is not None and len(changed) == len(self._changed)
-        if same and np.abs(changed - self._changed).max() <= SAME * np.abs(values[entries]).max():
+        again = self._since is not None and len(changed) == len(self._changed)
+        if again and np.abs(changed - self._changed).max() <= same * np.abs(values[entries]).max():
             return self._since
         number = (np.cumsum(large) - 1)[row[entries]]
         count = int(large.sum())

@@ -20,6 +20,7 @@ from catseye.estimation.least_squares.rows import ActiveRows
 FLOATS = 1e-15  # |A v|^2 / |v|^2: correlation of one parameter with all others within 5e-16 of 1
 DOUBTFUL = 1e-10  # reciprocal condition of the scaled normal matrix from which directions are examined one by one
 LARGEST_DENSE = 2000  # parameters; beyond it the sparse form is faster and smaller
+REFINED, REFINEMENTS = 1e-8, 20  # of a step in its sigmas, and how often at most
 LOOKED_FOR = 8  # directions that the sparse form looks for at once when something floats
 
 
@@ -46,6 +47,8 @@ class NormalEquations:
     _order: tuple[np.ndarray, ...] = ()
     _pattern: csc_array | None = None
     _solved: BorderedCovariance | None = None
+    _values: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of the rows that are to be solved,
+    _refine: bool = False  # by a covariance that is nearly theirs
 
     @classmethod
     def of(
@@ -95,7 +98,11 @@ class NormalEquations:
 
     def covariance(self) -> Covariance:
         """Inverse of N at the x of the last step."""
-        if self._solved is not None:
+        if self.border is not None and self._solved is not None:
+            scale = np.zeros(self.size)
+            scale[self.moving] = self._scale
+            blocks = self.border.blocks(self.rows, self.moving, self.size)
+            self._solved, self._refine = self.border.solved(blocks, self._values, scale)[0], False
             return self._solved
         if self.sparse:
             order, place, *_ = self._order
@@ -113,7 +120,7 @@ class NormalEquations:
         if self._solved is not None:
             whole = np.zeros(self.size)
             whole[self.moving] = right
-            return self._solved.solve(whole)[self.moving]
+            return (self._refined(whole) if self._refine else self._solved.solve(whole))[self.moving]
         if not self.sparse:
             return self._scale * cho_solve((self._factor[0], True), self._scale * right, check_finite=False)
         from catseye.estimation.least_squares.sparse_kernel import solve
@@ -125,6 +132,28 @@ class NormalEquations:
         result = np.empty_like(right)
         result[order] = inside[:, 0]
         return result * self._scale
+
+    def _refined(self, right: np.ndarray) -> np.ndarray:
+        """N^-1 right (n,) by conjugate gradients, a covariance that is nearly N^-1 being known."""
+        assert self.border is not None
+        assert self._solved is not None
+        blocks = self.border.blocks(self.rows, self.moving, self.size)
+        pointers = blocks.row_pointers
+        rows = csr_array((self._values, blocks.parameter, pointers), shape=(len(pointers) - 1, self.size))
+        x, left = np.zeros(self.size), right.copy()
+        towards = pulled = self._solved.solve(left)
+        power = first = float(left @ pulled)
+        for _ in range(REFINEMENTS):
+            if power <= REFINED**2 * first:
+                return x
+            image = rows @ towards
+            length = power / float(image @ image)
+            x += length * towards
+            left -= length * (rows.T @ image)
+            pulled = self._solved.solve(left)
+            before, power = power, float(left @ pulled)
+            towards = pulled + power / before * towards
+        return self.covariance().solve(right)
 
     def _energy(self, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Of scaled directions (k, d): combinations (d, d), least held first, and their |A v|^2."""
@@ -186,12 +215,13 @@ class NormalEquations:
             return
         scale = np.zeros(self.size)
         scale[self.moving] = 1.0 / np.sqrt(diagonal)
-        solved, new = border.solved(blocks, values, scale)
+        solved, new = border.near(blocks, values, scale)
         if not solved.eliminated.held:  # the sparse form says what floats
             self.border, self._solved, self.sparse = None, None, True
             self._factorise_sparse()
             return
         self._solved, self._scale = solved, scale[self.moving]
+        self._values, self._refine = values, not new
         if not new:
             return
         every = np.zeros((self.size, LOOKED_FOR))
