@@ -10,7 +10,9 @@ from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import CONVERGED, SolverSettings, adjust
 from catseye.estimation.least_squares.bordered import Border, BorderedCovariance
 from catseye.estimation.least_squares.covariance import JointPoints
+from catseye.estimation.least_squares.normal import NormalEquations
 from catseye.estimation.least_squares.robust import OutlierSearch, adjust_robustly
+from catseye.estimation.least_squares.rows import ActiveRows
 from catseye.estimation.observations.kinds import Distances, Linear
 
 STATIONS, TARGETS = 5, 40
@@ -159,6 +161,22 @@ def test_rows_that_go_and_come_back_update_an_elimination(problem):
         for a, b in zip(plain.fits, found.fits, strict=True):
             np.testing.assert_allclose(b.standardised, a.standardised, atol=1e-6)
             np.testing.assert_allclose(b.redundancy, a.redundancy, atol=1e-8)
+
+
+def test_a_step_is_refined_from_an_elimination_that_is_only_nearly_its_own(problem):
+    """A third of a millimetre beside where it was eliminated: the same step as from nothing, and nothing eliminated."""
+    border = problem.bordered()
+    problem.solve(border=border, iterations=1)
+    rows = [ActiveRows.of(g) for g in problem.groups]
+    x = problem.start + 3e-4 * np.random.default_rng(8).standard_normal(len(problem.start))
+    steps, kept = [], border._last
+    for b in (border, problem.bordered()):
+        normal = NormalEquations.of(rows, np.flatnonzero(problem.free), len(x), False, b)
+        steps.append(normal.step(x)[0])
+    assert border._last is kept
+    u = np.sqrt(np.where(problem.free, normal.covariance().diagonal(), 1.0))
+    assert np.abs(steps[1] / u).max() > 1.0
+    assert np.abs((steps[0] - steps[1]) / u).max() < 1e-6 * np.abs(steps[1] / u).max()
 
 
 def test_many_rows_that_go_make_a_new_elimination(problem):

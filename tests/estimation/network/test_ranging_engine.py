@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.sparse import random_array
 
 from catseye.errors import EstimationError
 from catseye.estimation.network.adjustment import adjust_network
@@ -97,6 +98,9 @@ def test_every_part_of_the_joint_covariance(ranging_network, targets_too):
     np.testing.assert_allclose(ranging.q.within(some), full[np.ix_(some, some)], rtol=0, atol=size)
     np.testing.assert_allclose(ranging.q.across(some), full[:, some], rtol=0, atol=size)
     np.testing.assert_allclose(ranging.q.diagonal(), np.diag(full), rtol=0, atol=size)
+    weights = random_array(shape=(5, len(full)), density=0.2, rng=np.random.default_rng(4), format="csr")
+    np.testing.assert_allclose(ranging.q.solve(weights.toarray().T), full @ weights.T, rtol=0, atol=size * len(full))
+    np.testing.assert_allclose(ranging.q.carried(weights), weights @ full @ weights.T, rtol=0, atol=size * len(full))
     names = ["T003", "S02", "T011"]
     np.testing.assert_allclose(ranging.block(names), dense.block(names), rtol=0, atol=size)
     columns = network.groups[0].columns

@@ -1,6 +1,7 @@
 """One epoch: what becomes a campaign, what stays in the state, and that shots only ever add to what was known."""
 
 import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -60,6 +61,8 @@ def test_only_stations_that_speak_take_part():
         ("DP01C x", False),
         ("normal DP01C 2", False),
         ("glass DP01C", False),
+        ("electronics ZY113 4", False),
+        ("body dish x", False),
     ],
 )
 def test_what_lasts_is_known_by_its_name(name, stays):
@@ -134,3 +137,18 @@ def test_an_epoch_solved_elsewhere_is_the_same(second_epoch):
     np.testing.assert_array_equal(first.x, again.x)
     np.testing.assert_array_equal(first.covariance, again.covariance)
     assert first.used == again.used
+
+
+def test_an_epoch_with_states_says_what_a_dense_one_says_and_carries_on_none(second_epoch):
+    """The next one has other states: their numbers are its own."""
+    live = copy.deepcopy(second_epoch[0])
+    job = live.begin(second_epoch[1])
+    dense = job.solve()
+    states = replace(job, rules=replace(job.rules, dense_shots=0)).solve()
+    u = np.where(dense.coordinates.u > 0.0, dense.coordinates.u, 1.0)
+    assert np.abs((states.coordinates.x - dense.coordinates.x) / u).max() < 1e-3
+    np.testing.assert_allclose(states.coordinates.u, dense.coordinates.u, rtol=5e-3, atol=1e-12)
+    assert states.carried.parameters == dense.carried.parameters
+    own = np.sqrt(np.diag(dense.carried.covariance))
+    gap = (states.carried.covariance - dense.carried.covariance) / np.outer(own, own)
+    assert np.abs(gap).max() < 2e-2

@@ -198,8 +198,11 @@ def _with_carried(network: CampaignNetwork, carried: Carried, frames: Mapping[st
 def _without_known(group: ObservationGroup, known: set[int]) -> ObservationGroup | None:
     """A prior without what the carried state has taken in already: rows all of whose parameters are known."""
     columns = np.asarray(group.columns)
-    if columns.ndim == 2:  # a row its own: distances between carried points
-        return None if set(columns[columns >= 0].tolist()) <= known else group
+    if columns.ndim == 2:  # a row its own: distances between carried points, priors of single parameters
+        new = np.array([not set(row[row >= 0].tolist()) <= known for row in columns])
+        if not isinstance(group, Linear) or group.covariance.ndim != 1 or new.all() or not new.any():
+            return group if new.any() else None
+        return Linear(group.name, group.observed[new], group.covariance[new], columns[new], group.matrix[new])
     if set(columns.tolist()) <= known:
         return None
     if not isinstance(group, Linear) or group.matrix.shape != (len(columns), len(columns)):
