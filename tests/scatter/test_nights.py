@@ -77,6 +77,11 @@ def tally(seed, directory, dish_prisms=60, least_shots=0):
     seen = np.array([used[n] >= least_shots for n in surface.names])
     found["squares"]["surface"] = list(((surface.fit.deviation - deviation) / surface.u_deviation)[seen] ** 2)
     found["pose"] = pose_distance(reduction, truth)
+    if least_shots:
+        found["whitened"] = whitened(coordinates, campaign, truth, used, least_shots)
+    found["warned"] = [
+        n for n in coordinates.notes if "nothing checks" in n and n.split(":")[0] in typed_badly(coordinates)
+    ]
     found |= fates(reduction, truth, campaign)
     (campaign.directory / "frames.npy").unlink()
     return found
@@ -92,6 +97,25 @@ def pose_distance(reduction, truth):
     values, vectors = np.linalg.eigh(covariance)
     assert values[0] < 1e-9 * values[-1] < values[1]  # the turn about the axis is not observed, the rest is
     return float(np.sum((vectors[:, 1:].T @ (error * arm)) ** 2 / values[1:]))
+
+
+def whitened(coordinates, campaign, truth, used, least_shots):
+    """Mean e'C^-1 e of each class, all its coordinates together: what they share is one error and counts as one."""
+    members = {}
+    for name in coordinates.points:
+        kind = kind_of(name, campaign) if name in coordinates.places else None
+        if kind and (kind != "dish" or used[name] >= least_shots):
+            members.setdefault(kind, []).append(name)
+    found = {}
+    for kind, names in members.items():
+        error = np.concatenate([coordinates.x[coordinates.index(n)] - truth.points[n] for n in names])
+        found[kind] = float(error @ np.linalg.solve(coordinates.block(names), error) / len(error))
+    return found
+
+
+def typed_badly(coordinates):
+    """Points whose typed positions the notes call wrong."""
+    return {note.split(":")[0] for note in coordinates.notes if "typed position is" in note}
 
 
 def fates(reduction, truth, campaign):
@@ -203,18 +227,39 @@ def large(tmp_path_factory):
     return [tally(seed, tmp_path_factory.mktemp("large"), dish_prisms=400, least_shots=4) for seed in LARGE]
 
 
+@pytest.fixture(scope="module")
+def sound(large):
+    """Those without a prism of which the notes say that nothing checks its shots and that its typed position is off.
+
+    A foreign return among three shots that are left tilts the whole dish with it.
+    """
+    kept = [n for n in large if not n["warned"]]
+    assert len(kept) >= 0.9 * len(large)
+    return kept
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", INDEPENDENT)
-def test_claimed_uncertainties_are_those_of_large_nights(large, kind):
-    low, high = expected_interval(INDEPENDENT[kind], len(large))
-    mean, u = summary(large)[kind]
+def test_claimed_uncertainties_are_those_of_large_nights(sound, kind):
+    low, high = expected_interval(INDEPENDENT[kind], len(sound))
+    mean, _ = summary(sound)[kind]
     assert low < mean < high
-    assert 0.9 - 2.0 * u < mean < 1.1 + 2.0 * u
 
 
 @pytest.mark.slow
-def test_the_poses_covariance_is_that_of_large_nights(large):
-    assert 0.75 < np.mean([n["pose"] for n in large]) / 5.0 < 1.3
+@pytest.mark.parametrize("kind", [k for k in INDEPENDENT if k != "surface"])
+def test_joint_covariances_are_those_of_large_nights(sound, kind):
+    """Single coordinates hang on the datum's few errors; together, each error counts once."""
+    means = [n["whitened"][kind] for n in sound]
+    u = np.std(means, ddof=1) / np.sqrt(len(means))
+    assert 0.9 - 2.0 * u < np.mean(means) < 1.1 + 2.0 * u
+
+
+@pytest.mark.slow
+def test_the_surface_and_the_poses_covariance_are_those_of_large_nights(sound):
+    assert 0.9 < summary(sound)["surface"][0] < 1.1
+    low, high = expected_interval(5, len(sound))
+    assert low < np.mean([n["pose"] for n in sound]) / 5.0 < high
 
 
 @pytest.mark.slow
