@@ -104,14 +104,14 @@ class Coordinator:
         self.clock = clock = environment.clock
         self._live, self._planner, self._guard, self._journal = parts.live, parts.planner, parts.guard, parts.journal
         self.listeners: list[Callable[[Entry], None]] = []
-        self._event_log = EventLog("coordinator", clock, self._happened)
+        self._event_log = EventLog("coordinator", clock, self.tell)
         self._stations: dict[str, EventLog] = {}
         self.intake = Intake(
             parts.live,
             parts.journal,
             judged=lambda answered: self.firing.judged(answered),
             publish=self._publish,
-            event_log=EventLog("journal", clock, self._happened),
+            event_log=EventLog("journal", clock, self.tell),
             doubted=self._doubted,
             solver=parts.solver,
         )
@@ -150,7 +150,7 @@ class Coordinator:
                 preparation=Preparation.of(asked(name), later),
                 guard=self._guard,
                 environment=environment,
-                listeners=LinkListeners(self._happened, self._overheard, self.intake.take),
+                listeners=LinkListeners(self.tell, self._overheard, self.intake.take),
                 wanted=WANTED[self.mode],
                 settings=self.settings.links,
             )
@@ -163,7 +163,7 @@ class Coordinator:
             host,
             port,
             environment=environment,
-            tell=self._happened,
+            tell=self.tell,
             weather=self.intake.take,
             posture=self._posed,
             stations=tuple(station.name for station in self.site.site.weather_station),
@@ -294,7 +294,7 @@ class Coordinator:
 
     def _doubted(self, read: LiveWeather, why: str) -> None:
         """What the reduction thinks of a station's reading."""
-        event_log = self._stations.setdefault(read.station, EventLog(read.station, self.clock, self._happened))
+        event_log = self._stations.setdefault(read.station, EventLog(read.station, self.clock, self.tell))
         event_log.standing("weather-doubted", why or None, over=f"{read.station} is believed again")
 
     def _overheard(self, link: RangerLink, reply: Reply) -> None:
@@ -315,7 +315,8 @@ class Coordinator:
         except InputError as problem:
             self._event_log.tell("bad-shot", f"{link.ranger}: {problem}", "warning", about=link.ranger)
 
-    def _happened(self, happening: Happening) -> None:
+    def tell(self, happening: Happening) -> None:
+        """Journal and publish something that happened."""
         self.intake.take(happening)
 
     def _publish(self, entry: Entry) -> None:

@@ -13,8 +13,12 @@ from typing import Any, Literal
 import numpy as np
 
 from catseye.coordinator.clients.server import ZiyServer
+from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.feed import MotionScript
 from catseye.coordinator.guard.guard import SafetyGuard
+from catseye.coordinator.journal.chain import Head
+from catseye.coordinator.journal.disk import EVERY as DISK_EVERY
+from catseye.coordinator.journal.disk import DiskWatch
 from catseye.coordinator.journal.entries import Run
 from catseye.coordinator.journal.writer import Journal, JournalSettings
 from catseye.coordinator.link.settings import Address
@@ -28,6 +32,7 @@ from catseye.ranger.addresses import COORDINATOR_PORT
 from catseye.ranger.network import ConnectionMaker
 from catseye.ranger.server import LOOPBACK
 from catseye.records.files.reading import read_record
+from catseye.records.night.live import Severity
 from catseye.records.site.folder import SiteFolder
 from catseye.records.site.interlock import Interlocks
 from catseye.records.site.keep_out import KeepOut
@@ -43,6 +48,7 @@ SOLVER_AFTER = 4.0  # s
 SETTLE = 0.35  # s from the end of a planned move to its buffer: a mirror that begins to follow a line swings so long
 Filter = Literal["random_walk", "constant_velocity"]
 Feed = tuple[str, int] | MotionScript | None
+JournalTell = Callable[[str, str, Severity], None]
 
 
 @dataclass(frozen=True)
@@ -55,6 +61,8 @@ class Orders:
     filter         between epochs
     journal        file or URL; None: nothing is kept
     keep_buffers   samples too: only with them a replay is the same bit for bit
+    rotate_gb      size of a file from which the journal goes on in another; 0: never
+    rotate_night   whether it does at noon UTC
     host, port     of its own clients; port 0: any free one
     keep_out, interlocks, solids   files; None: only the Sun is kept clear of, nothing stands in the way
     """
@@ -65,6 +73,8 @@ class Orders:
     filter: Filter = "random_walk"
     journal: str | None = None
     keep_buffers: bool = True
+    rotate_gb: float = 0.0
+    rotate_night: bool = False
     host: str = LOOPBACK
     port: int = COORDINATOR_PORT
     keep_out: Path | None = None
@@ -88,6 +98,7 @@ class NoJournal:
     """Nothing is kept: everything is acknowledged at once."""
 
     trouble: str | None = None
+    head: Head | None = None
 
     def append(self, *items: Any) -> "Future[int]":
         done: Future[int] = Future()
@@ -109,6 +120,11 @@ class WaitingJournal:
         """Why nothing is durable at present."""
         return self._journal.trouble
 
+    @property
+    def head(self) -> Head:
+        """The chain's last link that is durable."""
+        return self._journal.head
+
     def append(self, *items: Any) -> "Future[int]":
         done = self._journal.append(*items)
         with suppress(InputError):  # whoever has the future sees why
@@ -125,7 +141,8 @@ class LiveCoordinator:
     peers     rangers and feed
     seed      of a simulated site, for the journal
     virtual   its loop's time is not the machine's; epochs are solved in a thread then, time stands still meanwhile
-    tell      told of the journal's trouble at once, by any thread
+    tell      told of the journal at once, by any thread: its trouble ("journal"), and its chain's head at each epoch
+              and at the end ("journal-head")
 
     Raises InputError: a file or a journal that cannot be used, a ranger that is not there.
     """
@@ -140,7 +157,7 @@ class LiveCoordinator:
         seed: int | None = None,
         network: ConnectionMaker | None = None,
         virtual: bool = False,
-        tell: Callable[[str, bool], None] = lambda text, alarm: None,
+        tell: JournalTell = lambda kind, text, severity: None,
     ):
         strange = sorted(set(orders.drop) - set(peers.rangers))
         if strange:
@@ -177,7 +194,7 @@ class LiveCoordinator:
         self.server = ZiyServer(self.ziy, orders.host, orders.port, network=network)
 
     def _opened(
-        self, clock: Clock, seed: int | None, virtual: bool, tell: Callable[[str, bool], None]
+        self, clock: Clock, seed: int | None, virtual: bool, tell: JournalTell
     ) -> NoJournal | Journal | WaitingJournal:
         if self.orders.journal is None:
             return NoJournal()
@@ -185,9 +202,15 @@ class LiveCoordinator:
             self.orders.journal,
             run=Run(self.site, settings=settings_object(self.settings), seed=seed),
             clock=clock,
-            settings=JournalSettings(group=0.0 if virtual else GROUP, keep_buffers=self.orders.keep_buffers),
-            on_alarm=lambda text: tell(text, True),
-            on_recovery=lambda text: tell(text, False),
+            settings=JournalSettings(
+                group=0.0 if virtual else GROUP,
+                keep_buffers=self.orders.keep_buffers,
+                rotate_bytes=round(self.orders.rotate_gb * 1e9),
+                rotate_nightly=self.orders.rotate_night,
+            ),
+            on_alarm=lambda text: tell("journal", text, "alarm"),
+            on_recovery=lambda text: tell("journal", text, "note"),
+            on_head=lambda head: tell("journal-head", f"head {head} of run {journal.run}", "note"),
         )
         return WaitingJournal(journal) if virtual else journal
 
@@ -195,6 +218,23 @@ class LiveCoordinator:
         """Seconds before the first epoch, but not before the rangers are initialised: it loads for a second or two."""
         await asyncio.sleep(SOLVER_AFTER)
         await asyncio.to_thread(solver.start)
+
+    @property
+    def journal_head(self) -> Head | None:
+        """The head of the journal's chain; None without a journal."""
+        return self._journal.head
+
+    async def _watch_disk(self, journal: Journal) -> None:
+        """Foretell when the journal's disk is full; until cancelled."""
+        watch = DiskWatch(EventLog("journal", self.ziy.clock, self.ziy.tell), journal.hold)
+        loop = asyncio.get_running_loop()
+        while True:
+            path = journal.address.path
+            if path is None:  # a server sees to its own
+                return
+            with suppress(OSError):  # a journal that is gone tells so itself
+                watch.look(path.absolute().parent, loop.time())
+            await asyncio.sleep(DISK_EVERY)
 
     @property
     def solver_pid(self) -> int | None:
@@ -207,16 +247,22 @@ class LiveCoordinator:
         Raises InputError: its own port cannot be had.
         """
         before, loading = sys.getswitchinterval(), None
+        watching = None
         sys.setswitchinterval(SWITCH)
         try:
             await self.server.start()
             started()
+            if isinstance(self._journal, Journal):
+                watching = asyncio.ensure_future(self._watch_disk(self._journal))
             if self._solver is not None:  # beside the loop, while the mirrors go to their first targets
                 loading = asyncio.gather(self._start_solver(self._solver), asyncio.to_thread(_load_kernel))
                 gc.collect()
                 gc.freeze()  # a site of thousands of records is looked through at each full collection: 40 ms
             await self.ziy.run()
         finally:
+            if watching is not None:
+                watching.cancel()
+                await asyncio.gather(watching, return_exceptions=True)
             if loading is not None:
                 loading.cancel()
                 await asyncio.gather(loading, return_exceptions=True)

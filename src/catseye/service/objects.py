@@ -6,6 +6,7 @@ from typing import Any
 
 from catseye.constants import ARCSECOND
 from catseye.coordinator.firing import GOOD, OF_THE_LINE
+from catseye.coordinator.journal.chain import Head
 from catseye.gateways.writers.verdict import Verdict
 from catseye.records.night.live import TICKS_PER_DAY
 from catseye.service.book import LiveBook
@@ -34,7 +35,14 @@ def simulation_verdict(book: LiveBook) -> Verdict:
 
 
 def simulation_object(
-    book: LiveBook, world: TwinWords, journal: str | None, *, seconds: float, rangers: int, told: int
+    book: LiveBook,
+    world: TwinWords,
+    journal: str | None,
+    *,
+    seconds: float,
+    rangers: int,
+    told: int,
+    head: Head | None = None,
 ) -> dict[str, Any]:
     """What `catseye simulate --json` prints.
 
@@ -60,6 +68,7 @@ def simulation_object(
             for (who, kind), n in sorted(book.troubles.counts.items())
         ],
         "journal": journal,
+        "journal_head": None if head is None else str(head),
     }
 
 
@@ -112,7 +121,14 @@ def beam_lines(compared: EpochComparison) -> Iterator[str]:
 
 
 def summary(
-    book: LiveBook, world: TwinWords, journal: str | None, *, seconds: float, rangers: int, told: int
+    book: LiveBook,
+    world: TwinWords,
+    journal: str | None,
+    *,
+    seconds: float,
+    rangers: int,
+    told: int,
+    head: Head | None = None,
 ) -> list[tuple[str, str]]:
     """Title and text of each passage; arguments as of `simulation_object`."""
     bad = {reason: n for reason, n in sorted(book.fates.items()) if reason not in GOOD}
@@ -156,6 +172,11 @@ def summary(
     if world.faults:
         passages.append(("Faults", "on command: " + "; ".join(world.faults) + "."))
     passages.append(
-        ("Journal", f"{journal}: catseye replay {journal}" if journal else "none was kept (--journal FILE keeps it).")
+        (
+            "Journal",
+            f"{journal}, head {head}: catseye replay {journal}"
+            if journal
+            else "none was kept (--journal FILE keeps it).",
+        )
     )
     return passages

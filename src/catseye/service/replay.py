@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import MILLIMETRE
+from catseye.coordinator.journal.check import ChainReport, check_whole
 from catseye.coordinator.journal.entries import EpochSolution
 from catseye.coordinator.journal.reader import JournalReader, StoredRun
 from catseye.coordinator.journal.replay import Replayed, replay
 from catseye.errors import InputError
+from catseye.gateways.journal.chain import chain_object, chain_words
 from catseye.gateways.writers.verdict import Verdict
 from catseye.records.site.folder import SiteFolder, read_site
 from catseye.reduction.live.live import Live
@@ -40,6 +42,9 @@ class ReplayOutcome:
     epochs, shots  fed
     same_epochs    that are the same to the last bit
     same_shots     the same
+    late_shots     of all shots, those behind the last epoch
+    unasked        shots with which no answer is stored: not compared
+    chain          what the journal's chain says of the run
     first          number of the first epoch that differs, and of what
     moved          by point
     lost           points of stored epochs that the new ones do not have
@@ -47,10 +52,13 @@ class ReplayOutcome:
 
     run: StoredRun
     calibrations: Path | None
+    chain: ChainReport
     epochs: int = 0
     shots: int = 0
     same_epochs: int = 0
     same_shots: int = 0
+    late_shots: int = 0
+    unasked: int = 0
     first: str = ""
     moved: dict[str, Moved] = field(default_factory=dict)
     lost: int = 0
@@ -58,7 +66,13 @@ class ReplayOutcome:
     @property
     def same(self) -> bool:
         """Whether all answers are the same to the last bit."""
-        return self.epochs == self.same_epochs and self.shots == self.same_shots
+        return self.epochs == self.same_epochs and self.shots == self.same_shots + self.unasked
+
+    @property
+    def not_compared(self) -> tuple[str, ...]:
+        """What a replay says nothing about."""
+        told = [f"{self.unasked} shots whose answer was not stored"] * bool(self.unasked)
+        return (*told, "commands, happenings and documents, which the reduction does not see")
 
 
 def replayed(journal: str, which: int | str | None, calibrations: Path | None, *, progress: Progress) -> ReplayOutcome:
@@ -74,10 +88,13 @@ def replayed(journal: str, which: int | str | None, calibrations: Path | None, *
         def made(site: SiteFolder, _: StoredRun) -> Live:
             return Live(site if other is None else other, settings)
 
+        chain = check_whole(reader, run.run, progress=progress)
+        if chain.bad:  # what does not check is not fed: the rest says how much hangs on it
+            reader.left_out = {run.run: chain.bad}
         total = sum(1 for _ in reader.solutions(run.run))
         if not total:
             raise InputError(f"journal {reader.place}: run {run.run} holds no epoch (expected one at least)")
-        outcome = ReplayOutcome(run, calibrations)
+        outcome = ReplayOutcome(run, calibrations, chain)
         off: dict[str, list[np.ndarray]] = defaultdict(list)
         for each in replay(reader, run.run, made):
             progress("epochs", outcome.epochs, total)
@@ -88,16 +105,24 @@ def replayed(journal: str, which: int | str | None, calibrations: Path | None, *
 
 
 def _count(outcome: ReplayOutcome, each: Replayed) -> None:
-    outcome.epochs += 1
     outcome.shots += each.shots
-    outcome.same_epochs += each.stored.same(each.new)
-    outcome.same_shots += each.shots - len(each.differing)
-    if not each.same and not outcome.first:
+    outcome.same_shots += each.shots - len(each.differing) - len(each.unasked)
+    outcome.unasked += len(each.unasked)
+    if each.stored is None:
+        outcome.late_shots += each.shots
+        where = f"shots behind the last epoch (event {each.differing[0]})" if each.differing else ""
+    else:
+        outcome.epochs += 1
+        outcome.same_epochs += each.same_solution
         what = "a shot" if each.differing else "its solution"
-        outcome.first = f"epoch {each.stored.answer.get('number')} (event {each.seq}) by {what}"
+        where = f"epoch {each.stored.answer.get('number')} (event {each.seq}) by {what}"
+    if not each.same and not outcome.first:
+        outcome.first = where
 
 
 def _compare(outcome: ReplayOutcome, each: Replayed, off: dict[str, list[np.ndarray]]) -> None:
+    if each.stored is None or each.new is None:
+        return
     before, after = _places(each.stored), _places(each.new)
     outcome.lost += len(set(before) - set(after))
     for name in set(before) & set(after):
@@ -116,8 +141,12 @@ def _moved(rows: np.ndarray) -> Moved:
 
 def replay_verdict(outcome: ReplayOutcome) -> Verdict:
     """Whether the run's own records give its answers again to the last bit; of other records how far they move it."""
+    chain = outcome.chain
+    if chain.count:
+        return Verdict("failed", f"the journal is not as it was written: {chain.problems[0]}")
     if outcome.same:
-        return Verdict("good", "every answer is the same bit for bit")
+        kept = "" if chain.chained else "; an older catseye wrote it, without a chain that could be checked"
+        return Verdict("good", f"every answer is the same bit for bit{kept}")
     if outcome.calibrations is not None:
         furthest = max((m.largest_mm for m in outcome.moved.values()), default=0.0)
         return Verdict("good", f"reduced with other records, which move points by up to {furthest:.3f} mm")
@@ -140,6 +169,9 @@ def replay_object(outcome: ReplayOutcome) -> dict[str, Any]:
         "shots_same": outcome.same_shots,
         "same": outcome.same,
         "first_difference": outcome.first or None,
+        "shots_behind_the_last_epoch": outcome.late_shots,
+        "not_compared": list(outcome.not_compared),
+        "chain": chain_object(outcome.chain),
         "points": {
             name: {"mean_mm": list(m.mean_mm), "largest_mm": m.largest_mm, "epochs": m.epochs}
             for name, m in outcome.moved.items()
@@ -151,9 +183,12 @@ def replay_object(outcome: ReplayOutcome) -> dict[str, Any]:
 def replay_passages(outcome: ReplayOutcome) -> list[tuple[str, str]]:
     """What a replay came to: title and text of each passage."""
     run = outcome.run
-    passages = [("Run", f"{run.run} of {run.site}, catseye {run.versions['catseye']}, {outcome.shots} shots.")]
+    late = f", {outcome.late_shots} of them behind the last epoch" if outcome.late_shots else ""
+    passages = [("Run", f"{run.run} of {run.site}, catseye {run.versions['catseye']}, {outcome.shots} shots{late}.")]
+    passages += [("Chain", text) for text in chain_words(outcome.chain)]
+    passages.append(("Not seen", f"{'; '.join(outcome.not_compared)}."))
     if outcome.same:
-        passages.append(("Epochs", f"{outcome.epochs} the same bit for bit, and all {outcome.shots} shots."))
+        passages.append(("Epochs", f"{outcome.epochs} the same bit for bit, and all {outcome.same_shots} shots."))
         return passages
     passages.append(
         (

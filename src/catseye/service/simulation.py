@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from catseye.coordinator.journal.chain import Head
 from catseye.coordinator.link.settings import Address
 from catseye.errors import InputError
 from catseye.ranger.addresses import PORT_BASE
@@ -67,6 +68,7 @@ class Simulation:
     warm: bool = True
     seconds: float = 0.0
     told: int = 0  # shots that rangers told of, durable or not
+    head: Head | None = None  # of the journal's chain, at the end
 
     def __post_init__(self) -> None:
         self._twin = self.world.twin(self.site)
@@ -76,7 +78,7 @@ class Simulation:
     def totals(self) -> dict[str, Any]:
         """Seconds measured, rangers that were not left out, shots told of: what a summary needs beside the book."""
         rangers = set(self.site.rangers) - set(self.orders.drop)
-        return {"seconds": self.seconds, "rangers": len(rangers), "told": self.told}
+        return {"seconds": self.seconds, "rangers": len(rangers), "told": self.told, "head": self.head}
 
     async def run(self) -> None:
         """In real time, the twin in a process of its own; until the minutes are over, or cancelled.
@@ -143,7 +145,7 @@ class Simulation:
             seed=self.world.seed,
             network=network,
             virtual=network is not None,
-            tell=lambda text, alarm: self.view.tell(text),
+            tell=lambda kind, text, severity: self.view.tell(text) if kind == "journal" else None,
         )
         after = running.settings.reference_after
         self.book = LiveBook(TwinComparison(self.site, self._twin, reference_after=after))
@@ -155,6 +157,7 @@ class Simulation:
         finally:
             await _ended(coordinator)
             self.told = running.ziy.intake.numbered
+            self.head = running.journal_head
             self.view.end()
 
     async def _time(self, running: LiveCoordinator) -> None:

@@ -17,7 +17,7 @@ from catseye.simulator.clock.world_clock import ManualClock
 from journal_scene import MOST_WAIT, START, plainly, scene_answer, scene_entries, scene_run
 from repository import TESTS
 
-FROZEN = TESTS / "vectors" / "formats" / "journal-1.db"
+FROZEN = [TESTS / "vectors" / "formats" / f"journal-{version}.db" for version in (1, 2)]
 
 
 def written(path, entries, **more):
@@ -27,9 +27,10 @@ def written(path, entries, **more):
     return path
 
 
-def test_the_journal_of_version_1_always_loads():
-    """Written by the first release from the entries of the scene, half of them packed."""
-    with JournalReader(FROZEN) as reader:
+@pytest.mark.parametrize("frozen", FROZEN, ids=lambda path: path.stem)
+def test_journals_of_all_versions_always_load(frozen):
+    """Written by the release that made the version from the entries of the scene, half of them packed."""
+    with JournalReader(frozen) as reader:
         raw, packed = reader.runs()
         assert (raw.seed, packed.seed, raw.settings["solve_every"], raw.site) == (1, 2, 0.5, "night-01")
         for run, seed in ((raw, 1), (packed, 2)):
@@ -142,7 +143,7 @@ def test_what_is_no_journal_is_refused_in_one_line(tmp_path):
         "empty.db": "starts with b''",
         "text.db": r"starts with b'hello\\n': no journal",
         "none.db": "holds other tables, such as 'notes'",
-        "newer.db": "version 9 is newer than 1",
+        "newer.db": "version 9 is newer than 2",
         "missing.db": "file is missing",
         ".": "is not a file",
     }

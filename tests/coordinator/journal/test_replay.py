@@ -156,7 +156,9 @@ def test_a_solve_that_gave_nothing_is_fed_again_too(tmp_path):
                 journal.append(begun, EpochSolution.of(shot.ticks, live.solve(shot.ticks)))
     with JournalReader(tmp_path / "j.db") as reader:
         found = list(replay(reader, 1, lambda site, run: Failing(site, 1.1)))
+    *found, rest = found
     assert len(found) == 13
+    assert (rest.stored, rest.new, rest.shots, rest.same) == (None, None, 1, True)
     assert all(replayed.same for replayed in found)
     assert {bool(replayed.new.answer) for replayed in found} == {True, False}
 
@@ -165,7 +167,8 @@ def test_it_ends_where_it_is_told_to(tmp_path):
     path = recorded(tmp_path / "j.db")
     whole = again(path)
     for until in (whole[2].seq, whole[3].seq - 1):
-        assert [replayed.seq for replayed in again(path, until=until)] == [replayed.seq for replayed in whole[:3]]
+        found = [replayed.seq for replayed in again(path, until=until) if replayed.stored is not None]
+        assert found == [replayed.seq for replayed in whole[:3]]
 
 
 def test_the_factory_gets_the_runs_site_and_settings(tmp_path):
@@ -219,5 +222,25 @@ def test_shots_that_came_while_an_epoch_was_solved_belong_to_the_next(tmp_path):
                 journal.append(EpochSolution.of(shot.ticks, live.take_in(job, job.solve())))
     with JournalReader(tmp_path / "j.db") as reader:
         found = list(replay(reader, 1, lambda site, run: Beside(site, 1.1)))
+    *found, rest = found
     assert [replayed.same for replayed in found] == [True] * 3
+    assert (rest.shots, rest.same) == (1, True)
     assert [replayed.new.answer["shots"] for replayed in found] == [5, 10, 10]
+
+
+def test_shots_behind_the_last_epoch_are_compared_and_those_without_an_answer_told(tmp_path):
+    live = OrderedLive(scene_run().site, 1.1)
+    with Journal.open(tmp_path / "j.db", run=scene_run(), clock=ManualClock(START / 1e8)) as journal:
+        for k in range(6):
+            answered = AnsweredShot.of(scene_shot(k), live.shot(scene_shot(k)))
+            if k == 4:
+                answered = AnsweredShot(scene_shot(k))  # nothing was said of it
+            if k == 5:
+                answered = AnsweredShot(scene_shot(k), "used", "", 1.0)  # not what is said now
+            journal.append(answered)
+            if k == 2:
+                journal.append(Document(1, EPOCH_BEGUN, ""), EpochSolution.of(1, live.solve(1)))
+    first, rest = again(tmp_path / "j.db")
+    assert first.same
+    assert (rest.stored, rest.shots, rest.differing, rest.unasked) == (None, 3, (8,), (7,))
+    assert not rest.same

@@ -328,14 +328,14 @@ def test_other_peoples_files_are_refused_and_left_alone(tmp_path):
     made_by_others(
         tmp_path / "newer.db",
         "CREATE TABLE journal (format TEXT, version INT)",
-        "INSERT INTO journal VALUES ('catseye-journal', 2)",
+        "INSERT INTO journal VALUES ('catseye-journal', 3)",
     )
     (tmp_path / "folder.db").mkdir()
     cases = {
         "text.db": "starts with b'shot,mjd_utc",
         "other.db": "holds other tables, such as 'shots'",
         "alike.db": "holds other tables, such as 'journal'",
-        "newer.db": "version 2 is newer than 1",
+        "newer.db": "version 3 is newer than 2",
         "folder.db": "is not a file",
         "no/such.db": "directory .*no is missing",
     }
@@ -363,14 +363,16 @@ def test_an_older_journal_is_carried_to_this_version(tmp_path, monkeypatch):
 
     with opened(tmp_path / "j.db") as journal:
         journal.append(scene_shot(1)).result(MOST_WAIT)
-    monkeypatch.setattr(journal_tables, "VERSION", 2)
+    monkeypatch.setattr(journal_tables, "VERSION", 3)
     step = "CREATE TABLE added (a INTEGER)"
-    monkeypatch.setattr(journal_tables, "STEPS", (lambda connection: connection.exec_driver_sql(step),))
+    monkeypatch.setattr(
+        journal_tables, "STEPS", (*journal_tables.STEPS, lambda connection: connection.exec_driver_sql(step))
+    )
     for _ in range(2):  # the second time there is nothing to carry
         with opened(tmp_path / "j.db"):
             pass
     with sqlite3.connect(tmp_path / "j.db") as connection:
-        assert connection.execute("SELECT version FROM journal").fetchall() == [(2,)]
+        assert connection.execute("SELECT version FROM journal").fetchall() == [(3,)]
         assert connection.execute("SELECT * FROM added").fetchall() == []
     connection.close()
     assert len(stored(tmp_path / "j.db", 1)) == 1

@@ -1,23 +1,38 @@
 """The command that takes a journal to others' formats."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
 from catseye.cli.live.options import time_of
 from catseye.cli.live.replay import JournalArgument, RunName, run_of
+from catseye.cli.option_groups import grouped
 from catseye.cli.terminal import ProgressLine, say, wrapped
 from catseye.cli.vocabularies import EXPORT_FORMATS, one_of
 from catseye.errors import InputError
+
+
+class ExportedPart(NamedTuple):
+    """What of a journal is taken; each field is the option of its name."""
+
+    run: RunName = None
+    since: Annotated[
+        str | None, typer.Option("--from", metavar="TIME", callback=time_of, help="UTC or MJD; from the start if not.")
+    ] = None
+    until: Annotated[
+        str | None, typer.Option("--until", metavar="TIME", callback=time_of, help="Not in it; to the end if not.")
+    ] = None
 
 
 @app.command(
     epilog="\b\nExample: catseye export night.db --to campaign --out night\n"
     "The campaign is for: catseye reduce night --out report"
 )
+@grouped
 def export(
+    *,
     journal: JournalArgument,
     to: Annotated[
         str,
@@ -27,42 +42,53 @@ def export(
         Path,
         typer.Option("--out", metavar="DIR", help="Directory to write: new, empty, or an earlier output of catseye."),
     ],
-    run: RunName = None,
-    since: Annotated[
-        str | None, typer.Option("--from", metavar="TIME", callback=time_of, help="UTC or MJD; from the start if not.")
-    ] = None,
-    until: Annotated[
-        str | None, typer.Option("--until", metavar="TIME", callback=time_of, help="Not in it; to the end if not.")
-    ] = None,
+    which: ExportedPart,
+    damaged: Annotated[
+        bool,
+        typer.Option("--damaged", help="Also of a journal that does not check: what is not as written is left out."),
+    ] = False,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """A run as tables (CSV, FITS), or as a campaign that `catseye reduce` reads."""
+    from catseye.coordinator.journal.check import check_whole
     from catseye.coordinator.journal.reader import JournalReader
     from catseye.gateways.journal.campaign import export_campaign
     from catseye.gateways.journal.export import export_tables
     from catseye.gateways.writers.output import refuse_output
 
-    span = _span(since, until)
+    span = _span(which.since, which.until)
     refuse_output(out, Path(journal))
     progress = ProgressLine(quiet)
     notes: tuple[str, ...] = ()
     with JournalReader(journal) as reader:
-        number = reader.run(run_of(run)).run
+        number = reader.run(run_of(which.run)).run
         try:
+            chain = check_whole(reader, number, progress=progress)
+            if chain.count and not damaged:
+                raise InputError(
+                    f"journal {reader.place}: run {number} is not as it was written: {chain.problems[0]} (expected a "
+                    "journal that checks: take its backup, or --damaged to leave out what does not)"
+                )
             if to == "campaign":
-                written = export_campaign(reader, out, run=number, span=span)
+                written = export_campaign(reader, out, run=number, span=span, chain=chain)
                 counts, notes = {"shots": written.shots, "weather": written.readings}, written.notes
             else:
                 form: Literal["csv", "fits"] = "csv" if to == "csv" else "fits"
-                counts = export_tables(reader, out, runs=[number], forms=[form], span=span, progress=progress)
+                counts = export_tables(
+                    reader, out, runs=[number], forms=[form], span=span, progress=progress, chains=[chain]
+                )
         finally:
             progress.clear()
+    from catseye.gateways.journal.chain import chain_object, chain_words
+
     if json:
         from catseye.gateways.writers.objects import json_line
 
+        word, why = ("doubtful", ", without what is not as it was written") if chain.count else ("good", "")
         summary = {
-            "verdict": {"word": "good", "why": f"{sum(counts.values())} rows written"},
+            "verdict": {"word": word, "why": f"{sum(counts.values())} rows written{why}"},
+            "chain": chain_object(chain),
             "run": number,
             "out": str(out),
             "format": to,
@@ -73,6 +99,8 @@ def export(
     elif not quiet:
         rows = ", ".join(f"{count} {name}" for name, count in counts.items())
         say(wrapped("Written to", f"{out}/: run {number}, {rows}."))
+        for text in chain_words(chain) if chain.count or not chain.chained else ():
+            say(wrapped("Chain", text))
         for note in notes:
             say(wrapped("Note", note))
 

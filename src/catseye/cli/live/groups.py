@@ -20,6 +20,8 @@ from catseye.cli.live.options import (
     MotionText,
     Port,
     PortBase,
+    RotateGb,
+    RotateNight,
     RoundS,
     Seed,
     SolidsFile,
@@ -97,6 +99,8 @@ class CoordinatorOptions(NamedTuple):
     motion_script: MotionScriptText = None
     journal: JournalPlace = None
     keep_buffers: KeepBuffers = True
+    rotate_gb: RotateGb = 0.0
+    rotate_night: RotateNight = False
     mode: Mode = "active"
     drop: Drop = None
     round_s: RoundS = 10.0
@@ -121,6 +125,8 @@ class CoordinatorOptions(NamedTuple):
             filter=self.filter_,
             journal=self.journal,
             keep_buffers=self.keep_buffers,
+            rotate_gb=self.rotate_gb,
+            rotate_night=self.rotate_night,
             keep_out=self.keep_out,
             interlocks=self.interlocks,
             solids=self.solids,

@@ -113,6 +113,15 @@ JournalPlace = Annotated[
 KeepBuffers = Annotated[
     bool, typer.Option("--keep-buffers/--no-buffers", help="Samples too, without which no replay is exact.")
 ]
+RotateGb = Annotated[
+    float,
+    typer.Option(
+        "--rotate-gb",
+        callback=within(0, 1e6, " GB"),
+        help="The journal goes on in another file from this size on (site-2.db, ...); 0: never.",
+    ),
+]
+RotateNight = Annotated[bool, typer.Option("--rotate-night", help="The same at noon UTC.")]
 Mode = Annotated[str, typer.Option("--mode", metavar=MODES, callback=one_of(MODES), help="Fires, listens, or rests.")]
 Drop = Annotated[list[str] | None, typer.Option("--drop", metavar="RANGER", help="Leave a ranger out; may repeat.")]
 RoundS = Annotated[float, typer.Option("--round-s", callback=within(2, 600, " s"), help="Of a round, s.")]

@@ -78,7 +78,7 @@ def run_coordinator(
             peers,
             clock=clock,
             seed=seed,
-            tell=lambda text, alarm: log.tell("journal", "journal", text, "alarm" if alarm else "note"),
+            tell=lambda kind, text, severity: log.tell("journal", kind, text, severity),
         )
         running.ziy.listeners.append(log.entry)
 

@@ -223,3 +223,30 @@ def _same_file(file: int, path: Path) -> bool:
         return False
     ours = os.fstat(file)
     return (ours.st_dev, ours.st_ino) == (there.st_dev, there.st_ino)
+
+
+def bytes_of(place: JournalAddress) -> int:
+    """Size of a journal's file with its log; 0 of a server's."""
+    if place.path is None:
+        return 0
+    size = 0
+    for path in (place.path, Path(f"{place.path}-wal")):
+        with suppress(OSError):
+            size += path.stat().st_size
+    return size
+
+
+def next_place(place: JournalAddress) -> JournalAddress:
+    """The first name beside a file that is free: site.db, site-2.db, site-3.db ...; InputError of a server's."""
+    if place.path is None:
+        raise InputError(f"journal {place.shown}: is a server's (expected a file, where journals shall rotate)")
+    stem, suffix = place.path.stem, place.path.suffix
+    base, _, number = stem.rpartition("-")
+    first = 2
+    if base and number.isdecimal():
+        stem, first = base, int(number) + 1
+    for k in range(first, first + 100_000):
+        path = place.path.with_name(f"{stem}-{k}{suffix}")
+        if not path.exists():
+            return JournalAddress(str(path), path=path)
+    raise InputError(f"journal {place.shown}: no name is free beside it (expected fewer files)")

@@ -1,7 +1,7 @@
 """A journal read: its runs, and what happened in each, in order, a piece at a time; nothing is ever written."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,10 +14,21 @@ from sqlalchemy.exc import SQLAlchemyError
 from catseye.coordinator.journal.entries import AnsweredShot, Entry, EpochSolution
 from catseye.coordinator.journal.place import place_of, reading_engine, refuse_foreign, refused
 from catseye.coordinator.journal.rows import StoredRow, entry_of, unpack
-from catseye.coordinator.journal.tables import BUFFERS, EVENTS, RUN_FILES, RUNS, SHOTS, TEXTS, JournalTable, version_of
+from catseye.coordinator.journal.tables import (
+    BUFFERS,
+    EVENTS,
+    PARTS,
+    RUN_FILES,
+    RUNS,
+    SHOTS,
+    TEXTS,
+    JournalTable,
+    version_of,
+)
 from catseye.errors import InputError
 from catseye.records.site.folder import SiteFolder, read_site
 
+WITH_PARTS = 2  # version
 PIECE = 512  # events read at once: 8 MB where each is a buffer
 Kind = Literal["shots", "weather", "postures", "commands", "happenings", "solutions", "documents"]
 
@@ -62,8 +73,11 @@ class JournalReader:
         refuse_foreign(self._where, fresh=False)
         self._engine: Engine = reading_engine(self._where)
         self._folders: list[TemporaryDirectory[str]] = []
-        with self._reading() as connection:
-            if version_of(connection, self.place) == 0:
+        self._others: dict[str, JournalReader] = {}
+        self.left_out: Mapping[int, Collection[int]] = {}  # by run: events passed over, as they do not check
+        with self.reading() as connection:
+            self.version = version_of(connection, self.place)
+            if self.version == 0:
                 raise InputError(f"journal {self.place}: holds no tables: it is no journal (expected one)")
 
     def __repr__(self) -> str:
@@ -71,7 +85,7 @@ class JournalReader:
 
     def runs(self) -> tuple[StoredRun, ...]:
         """All runs of the journal, oldest first."""
-        with self._reading() as connection:
+        with self.reading() as connection:
             files: dict[int, dict[str, str]] = {}
             for row in connection.execute(select(RUN_FILES).order_by(RUN_FILES.c.path)):
                 files.setdefault(row.run, {})[row.path] = row.sha256
@@ -109,12 +123,23 @@ class JournalReader:
 
         Raises InputError where the journal is damaged, once all before the damage was given.
         """
+        for part in self.parts(run):
+            part.left_out = self.left_out
+            yield from part._own_events(run, after, until, kinds=kinds, buffers=buffers)
+
+    def _own_events(
+        self, run: int, after: int, until: int | None, *, kinds: Sequence[Kind] | None, buffers: bool
+    ) -> Iterator[tuple[int, Entry]]:
+        """Those in this file."""
         tables = [table for table in EVENTS if kinds is None or table.name in kinds]
-        last = self.last(run) if until is None else min(until, self.last(run))
-        while after < last:
-            upto = min(after + PIECE, last)
-            yield from self._piece(run, after, upto, tables, buffers)
-            after = upto
+        last = self._own_last(run) if until is None else min(until, self._own_last(run))
+        stops = [seq for seq in sorted(self.left_out.get(run, ())) if after < seq <= last]
+        for stop in (*stops, last + 1):
+            while after < stop - 1:
+                upto = min(after + PIECE, stop - 1)
+                yield from self._piece(run, after, upto, tables, buffers)
+                after = upto
+            after = stop
 
     def shots(self, run: int, *, buffers: bool = True) -> Iterator[tuple[int, AnsweredShot]]:
         """The shots of a run, with their seq."""
@@ -130,8 +155,37 @@ class JournalReader:
 
     def last(self, run: int) -> int:
         """The seq of a run's last event; 0 of none."""
-        with self._reading() as connection:
+        return max(part._own_last(run) for part in self.parts(run))
+
+    def _own_last(self, run: int) -> int:
+        with self.reading() as connection:
             return _last(connection, run)
+
+    def parts(self, run: int) -> "tuple[JournalReader, ...]":
+        """The files of a run, in order: this one, and those before and behind it into which the run was rotated.
+
+        Raises InputError: one of them is missing.
+        """
+        parts = [self]
+        while (name := parts[0]._beside(run, "follows")) is not None:
+            parts.insert(0, self._part(name))
+        while (name := parts[-1]._beside(run, "followed_by")) is not None:
+            parts.append(self._part(name))
+        return tuple(parts)
+
+    def _beside(self, run: int, which: str) -> str | None:
+        if self.version < WITH_PARTS or self._where.path is None:
+            return None
+        with self.reading() as connection:
+            name = connection.scalar(select(PARTS.c[which]).where(PARTS.c.run == run))
+        if name is not None and (not name or Path(name).name != name):
+            raise InputError(f"journal {self.place}: run {run} goes on in {name!r} (expected a file beside it)")
+        return name
+
+    def _part(self, name: str) -> "JournalReader":
+        if name not in self._others:
+            self._others[name] = JournalReader(Path(str(self._where.path)).with_name(name))
+        return self._others[name]
 
     def files(self, run: int) -> dict[str, str]:
         """The texts of a run's files by relative path."""
@@ -141,7 +195,7 @@ class JournalReader:
             .where(RUN_FILES.c.run == run)
             .order_by(RUN_FILES.c.path)
         )
-        with self._reading() as connection:
+        with self.reading() as connection:
             return {row.path: row.text for row in connection.execute(wanted)}
 
     def site(self, run: int) -> SiteFolder:
@@ -161,6 +215,8 @@ class JournalReader:
 
     def close(self) -> None:
         """Remove the temporary directories."""
+        for other in self._others.values():
+            other.close()
         while self._folders:
             self._folders.pop().cleanup()
 
@@ -171,7 +227,8 @@ class JournalReader:
         self.close()
 
     @contextmanager
-    def _reading(self) -> Iterator[Connection]:
+    def reading(self) -> Iterator[Connection]:
+        """A connection in a transaction, one state of the journal. Raises InputError: what the database refuses."""
         try:
             with self._engine.connect() as connection, connection.begin():
                 yield connection
@@ -183,7 +240,7 @@ class JournalReader:
     ) -> list[tuple[int, Entry]]:
         """The events after a seq and up to another, one state of the journal."""
         events: list[tuple[int, Entry]] = []
-        with self._reading() as connection:
+        with self.reading() as connection:
             samples: dict[int, StoredRow] = {}
             if buffers and SHOTS in tables:
                 samples = {row.seq: row for row in connection.execute(_between(BUFFERS, run, after, upto))}

@@ -15,30 +15,39 @@ LiveFactory = Callable[[SiteFolder, StoredRun], Live]
 
 @dataclass(frozen=True, eq=False)
 class Replayed:
-    """One solution, stored and made again.
+    """One solution, stored and made again; or at the end the shots that no solution is stored for.
 
     seq         in its run
-    new         its answer is empty where nothing could be solved this time
+    stored      None at the end
+    new         its answer is empty where nothing could be solved this time; None at the end
     shots       fed since the solution before
     differing   seqs of those whose answer is not the stored one to the last bit
+    unasked     seqs of those with which no answer is stored: nothing to compare
     """
 
     seq: int
-    stored: EpochSolution
-    new: EpochSolution
+    stored: EpochSolution | None
+    new: EpochSolution | None
     shots: int
     differing: tuple[int, ...]
+    unasked: tuple[int, ...] = ()
+
+    @property
+    def same_solution(self) -> bool:
+        """Whether the solution is as it was, to the last bit."""
+        return self.stored is None or self.stored.same(self.new)
 
     @property
     def same(self) -> bool:
-        """Whether all is as it was, to the last bit."""
-        return self.stored.same(self.new) and not self.differing
+        """Whether all that can be compared is as it was, to the last bit."""
+        return self.same_solution and not self.differing
 
 
 def replay(
     reader: JournalReader, run: int, live_factory: LiveFactory, *, until: int | None = None
 ) -> Iterator[Replayed]:
-    """Each stored solution of a run beside the one that the same shots, weather and posture give now.
+    """Each stored solution of a run beside the one that the same shots, weather and posture give now; then, where shots
+    came behind the last one, those.
 
     live_factory   makes the reduction of a run, with the settings that the run states
     until          seq of the last event fed
@@ -46,14 +55,18 @@ def replay(
     Without stored samples the reduction sees what the rangers made of them, and answers differ.
     """
     live = live_factory(reader.site(run), reader.run(run))
-    shots, differing = 0, []
+    shots, last = 0, 0
+    differing: list[int] = []
+    unasked: list[int] = []
     job: EpochJob | None = None
     kinds: list[Kind] = ["shots", "weather", "postures", "documents", "solutions"]
     for seq, entry in reader.events(run, until=until, kinds=kinds):
         if isinstance(entry, AnsweredShot):
-            shots += 1
+            shots, last = shots + 1, seq
             again = _asked(live, entry.shot)
-            if entry.status and _answer(again) != _answer(entry):
+            if not entry.status:
+                unasked.append(seq)
+            elif _answer(again) != _answer(entry):
                 differing.append(seq)
         elif isinstance(entry, LiveWeather):
             live.weather(entry)
@@ -63,8 +76,10 @@ def replay(
             job = live.begin(entry.ticks)
         elif isinstance(entry, EpochSolution):
             new = EpochSolution.of(entry.ticks, None if job is None else live.take_in(job, job.solve()))
-            yield Replayed(seq, entry, new, shots, tuple(differing))
-            shots, differing, job = 0, [], None
+            yield Replayed(seq, entry, new, shots, tuple(differing), tuple(unasked))
+            shots, differing, unasked, job = 0, [], [], None
+    if shots:
+        yield Replayed(last, None, None, shots, tuple(differing), tuple(unasked))
 
 
 def _asked(live: Live, shot: LiveShot) -> AnsweredShot:

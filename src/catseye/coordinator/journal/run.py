@@ -7,19 +7,20 @@ import socket
 from hashlib import sha256
 
 import numpy as np
-from sqlalchemy import insert, select
+from sqlalchemy import Connection, insert, select
 
+from catseye.coordinator.journal.chain import LinkKind, run_link
 from catseye.coordinator.journal.entries import Run, plain
 from catseye.coordinator.journal.place import JournalAddress, reading_engine, writing_engine
-from catseye.coordinator.journal.tables import RUN_FILES, RUNS, TEXTS, create_or_carry, version_of
+from catseye.coordinator.journal.tables import CHAIN, PARTS, RUN_FILES, RUNS, TEXTS, create_or_carry, version_of
 from catseye.coordinator.parts import Clock, ticks_now
 from catseye.version import __version__
 
 OURS = 4_276_994  # of the server's advisory locks: two hosts may begin at once
 
 
-def begin(place: JournalAddress, run: Run, clock: Clock, *, buffers: bool) -> int:
-    """The tables where there are none, the run's row and its files, in one transaction; the run's number.
+def begin(place: JournalAddress, run: Run, clock: Clock, *, buffers: bool) -> tuple[int, bytes]:
+    """The tables where there are none, the run's row and its files, in one transaction; its number and first link.
 
     buffers   whether samples will be kept
     """
@@ -55,7 +56,9 @@ def begin(place: JournalAddress, run: Run, clock: Clock, *, buffers: bool) -> in
         number = int(done.inserted_primary_key[0])  # type: ignore[index]
         rows = [{"run": number, "path": path, "sha256": digest} for path, (digest, _) in files.items()]
         connection.execute(insert(RUN_FILES), rows)
-    return number
+        link = run_link(connection, number)
+        connection.execute(insert(CHAIN).values(run=number, seq=0, kind=LinkKind.RUN.value, link=link))
+    return number, link
 
 
 def _look_first(place: JournalAddress) -> None:
@@ -63,3 +66,27 @@ def _look_first(place: JournalAddress) -> None:
     if place.path is not None and place.path.exists() and place.path.stat().st_size:
         with reading_engine(place).connect() as connection:
             version_of(connection, place.shown)
+
+
+def go_on(old: Connection, place: JournalAddress, run: int, *, seq: int, link: bytes, follows: str) -> None:
+    """A run's next file: its record and files again, under its number, and the link from which it goes on.
+
+    old         connection to the file so far
+    seq, link   of its last link
+    follows     the file so far
+
+    Raises SQLAlchemyError, InputError: the file cannot be made.
+    """
+    record = dict(old.execute(select(RUNS).where(RUNS.c.run == run)).mappings().one())
+    files = [dict(row) for row in old.execute(select(RUN_FILES).where(RUN_FILES.c.run == run)).mappings()]
+    digests = {file["sha256"] for file in files}
+    texts = [dict(row) for row in old.execute(select(TEXTS).where(TEXTS.c.sha256.in_(digests))).mappings()]
+    with writing_engine(place, create=True).begin() as connection:
+        create_or_carry(connection, place.shown)
+        for table, rows in ((RUNS, [record]), (TEXTS, texts), (RUN_FILES, files)):
+            if rows:
+                connection.execute(insert(table), rows)
+        links = [(0, LinkKind.RUN, run_link(connection, run)), (seq, LinkKind.PART, link)]
+        rows = [{"run": run, "seq": at, "kind": kind.value, "link": each} for at, kind, each in links]
+        connection.execute(insert(CHAIN), rows)
+        connection.execute(insert(PARTS).values(run=run, follows=follows))

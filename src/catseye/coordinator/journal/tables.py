@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 JournalTable: TypeAlias = "Table[ReadOnlyColumnCollection[str, Column[object]]]"
 FORMAT = "catseye-journal"
-VERSION = 1
+VERSION = 2
 APPLICATION_ID = 0x43_41_54_53  # "CATS" in the header of an SQLite file
 
 METADATA = MetaData()
@@ -154,10 +154,26 @@ SOLUTIONS = _events(
     Column("covariance", LargeBinary),
 )
 DOCUMENTS = _events("documents", _whole("ticks"), _text("name"), _text("text"))
+CHAIN = _events("chain", _text("kind"), Column("link", LargeBinary, nullable=False))  # of all of an event's rows
+PARTS = Table(  # of a run whose file became too large, or too old: it goes on in another one beside
+    "parts",
+    METADATA,
+    Column("run", Integer, ForeignKey("runs.run"), primary_key=True, autoincrement=False),
+    Column("follows", Text),
+    Column("followed_by", Text),
+)
 EVENTS = (SHOTS, WEATHER, POSTURES, COMMANDS, HAPPENINGS, SOLUTIONS, DOCUMENTS)
 
 Step = Callable[[Connection], None]
-STEPS: tuple[Step, ...] = ()  # STEPS[n - 1] carries version n to n + 1
+
+
+def _with_chain(connection: Connection) -> None:
+    """Version 2 has a chain, and runs in several files; runs of before have none, and say so when they are checked."""
+    CHAIN.create(connection)
+    PARTS.create(connection)
+
+
+STEPS: tuple[Step, ...] = (_with_chain,)  # STEPS[n - 1] carries version n to n + 1
 
 
 def create_or_carry(connection: Connection, place: str) -> None:

@@ -15,15 +15,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from sqlalchemy import Connection, Engine, update
+from sqlalchemy import Connection, Engine, insert, update
 from sqlalchemy.exc import DataError, IntegrityError, SQLAlchemyError
 
+from catseye.coordinator.journal.chain import Head, LinkKind, event_cells, link_of
 from catseye.coordinator.journal.entries import Item, Run
 from catseye.coordinator.journal.place import (
     JournalAddress,
     WriterLock,
+    bytes_of,
     fold,
     identity,
+    next_place,
     place_of,
     refuse_foreign,
     refused,
@@ -31,19 +34,25 @@ from catseye.coordinator.journal.place import (
 )
 from catseye.coordinator.journal.protocol import NotDurable
 from catseye.coordinator.journal.rows import PACKED, RAW, Row, Rows, pack, rows_of
-from catseye.coordinator.journal.run import begin
-from catseye.coordinator.journal.tables import METADATA, RUNS, insertion
+from catseye.coordinator.journal.run import begin, go_on
+from catseye.coordinator.journal.tables import CHAIN, METADATA, PARTS, RUNS, SOLUTIONS, JournalTable, insertion
 from catseye.coordinator.parts import Clock, ticks_now
 from catseye.errors import InputError
+from catseye.records.night.live import TICKS_PER_DAY
 
 MOST_ROWS = 512  # of one commit
 MOST_WAITING = 20_000  # rows in line
 MOST_BYTES = 256 * 2**20  # of samples in line
 PATIENCE = 2.0  # s of trouble after which futures fail
 FIRST_WAIT, LONGEST_WAIT = 0.05, 2.0  # s between attempts while there is trouble
+LOOK, AGAIN = (
+    1.0,
+    600.0,
+)  # s between two looks at the file's size, and until a file that could not be made is tried again
 LONGEST_DURABLE = 10.0  # s that `durable` waits: a server may hang without a word
 
 Tell = Callable[[str], None]
+_Told = tuple[Tell | None, Tell | None, Callable[[Head], None] | None]  # of an alarm, of its end, of a head
 
 
 @dataclass(frozen=True)
@@ -54,12 +63,16 @@ class JournalSettings:
     keep_buffers   samples too: without them a replay has only what the rangers made of them
     compress       samples in half the space for 0.2 ms each
     patience       s of trouble after which the futures of what waits fail; it stays in line all the same
+    rotate_bytes   size from which the run goes on in another file; 0: none
+    rotate_nightly whether it does at noon UTC
     """
 
     group: float = 0.005
     keep_buffers: bool = True
     compress: bool = False
     patience: float = PATIENCE
+    rotate_bytes: int = 0
+    rotate_nightly: bool = False
 
 
 @dataclass(eq=False)
@@ -70,6 +83,7 @@ class Batch:
     size: int  # bytes of samples
     future: "Future[int]" = field(default_factory=Future)
     last: int = 0  # its last entry's seq
+    refused: InputError | None = None  # what the database said of it: its numbers are chained, nothing else is kept
     since: float = field(default_factory=time.monotonic)
 
     def fail(self, problem: InputError) -> None:
@@ -93,18 +107,18 @@ class Journal:
         place: JournalAddress,
         engine: Engine,
         lock: WriterLock,
-        run: int,
+        begun: tuple[int, bytes],
         *,
         clock: Clock,
         settings: JournalSettings,
-        on_alarm: Tell | None,
-        on_recovery: Tell | None,
+        told: _Told,
     ):
-        self.run, self.place = run, place.shown
+        (self.run, self._link), self.place = begun, place.shown
+        self._linked = 0  # seq of the last link
         self._where, self._engine, self._lock = place, engine, lock
         self._clock, self._settings = clock, settings
         self._packing = PACKED if settings.compress else RAW
-        self._on_alarm, self._on_recovery = on_alarm, on_recovery
+        self._on_alarm, self._on_recovery, self._on_head = told
         self._wake = threading.Condition()
         self._queue: deque[Batch] = deque()
         self._waiting = self._bytes = self._seq = 0
@@ -115,6 +129,8 @@ class Journal:
         self._connection: Connection | None = None
         self._inserts = {table.name: insertion(table, engine.dialect) for table in METADATA.tables.values()}
         self._file = identity(place)
+        self._night, self._look_at = self._night_now(), 0.0
+        self._held: str | None = None
         self._thread = threading.Thread(target=self._work, name="journal", daemon=True)
         self._thread.start()
 
@@ -128,21 +144,26 @@ class Journal:
         settings: JournalSettings | None = None,
         on_alarm: Tell | None = None,
         on_recovery: Tell | None = None,
+        on_head: Callable[[Head], None] | None = None,
     ) -> "Journal":
         """Create, or carry to this version, the journal at a place, and begin a run in it.
 
         url            a file, or postgresql://USER@HOST/DATABASE
         on_alarm       told once, from the journal's thread, that nothing is durable any more and why
         on_recovery    told when it is again
+        on_head        told the chain's head when an epoch's solution is durable, and at the end: kept elsewhere, it
+                       vouches for all before it
 
         Raises InputError: a bad place, another's file or database, a newer journal, one that cannot be written, a file
         that has a writer.
         """
         place, settings = place_of(url), settings or JournalSettings()
         refuse_foreign(place, fresh=True)
+        if settings.rotate_bytes or settings.rotate_nightly:
+            next_place(place)  # a server's is refused
         lock = WriterLock(place)
         try:
-            number = begin(place, run, clock, buffers=settings.keep_buffers)
+            begun = begin(place, run, clock, buffers=settings.keep_buffers)
             engine = writing_engine(place)
         except SQLAlchemyError as problem:
             lock.release()
@@ -154,20 +175,35 @@ class Journal:
             place,
             engine,
             lock,
-            number,
+            begun,
             clock=clock,
             settings=settings,
-            on_alarm=on_alarm,
-            on_recovery=on_recovery,
+            told=(on_alarm, on_recovery, on_head),
         )
+
+    @property
+    def head(self) -> Head:
+        """The chain's last link that is durable."""
+        return Head.of(self._linked, self._link)
 
     @property
     def trouble(self) -> str | None:
         """Why nothing is durable at present; None where all is well. No shot should be fired meanwhile."""
         since = self._busy_since
+        if self._trouble is None and self._held is not None:
+            return self._held
         if self._trouble is None and since is not None and time.monotonic() - since > self._settings.patience:
             return f"journal {self.place}: no answer for {time.monotonic() - since:.0f} s"
         return self._trouble
+
+    @property
+    def address(self) -> JournalAddress:
+        """Where it is written at this moment."""
+        return self._where
+
+    def hold(self, why: str | None) -> None:
+        """Ask for no more measurements, with the reason, or for more again (None); what comes is written still."""
+        self._held = why
 
     def append(self, *items: Item) -> "Future[int]":
         """Put entries in line, in order; done, with the last one's seq, when they are durable.
@@ -235,6 +271,7 @@ class Journal:
         try:
             while batches := self._taken():
                 self._persist(batches)
+                self._rotate()
                 with self._wake:
                     self._busy_since = None
             self._end()
@@ -290,12 +327,20 @@ class Journal:
     def _store(self, batches: Sequence[Batch]) -> None:
         """Write some entries in one transaction."""
         rows: dict[str, list[Row]] = defaultdict(list)
+        link, linked = self._link, self._linked
         for batch in batches:
+            events: dict[int, list[tuple[JournalTable, Row]]] = defaultdict(list)
             for table, row in batch.rows:
                 samples, lag = row.get("samples"), row.pop("lag", None)
                 if isinstance(samples, np.ndarray) and isinstance(lag, int):
                     row |= pack(samples, max(1, lag), self._packing)
-                rows[table].append(row)
+                if batch.refused is None:
+                    rows[table].append(row)
+                events[int(str(row["seq"]))].append((METADATA.tables[table], row))
+            kind = LinkKind.EVENT if batch.refused is None else LinkKind.REFUSED
+            for linked, stored in events.items():
+                link = link_of(link, kind, linked, event_cells(stored) if batch.refused is None else ())
+                rows[CHAIN.name].append({"run": self.run, "seq": linked, "kind": kind.value, "link": link})
         if self._connection is None:
             self._connection = self._engine.connect()
         with self._connection.begin():
@@ -303,6 +348,53 @@ class Journal:
                 self._connection.execute(self._inserts[table], rows[table])
         if identity(self._where) != self._file:
             raise InputError(f"journal {self.place}: the file was moved or removed (put it back, or start again)")
+        self._link, self._linked = link, linked
+
+    def _night_now(self) -> int:
+        """The night, which changes at noon UTC."""
+        return int(ticks_now(self._clock) / TICKS_PER_DAY + 0.5)
+
+    def _rotate(self) -> None:
+        """Go on in another file where that is due; in this one still where none can be had, which is told."""
+        rules, now = self._settings, time.monotonic()
+        if not (rules.rotate_bytes or rules.rotate_nightly) or now < self._look_at or self._connection is None:
+            return
+        self._look_at = now + LOOK
+        night = self._night_now()
+        full = rules.rotate_bytes and bytes_of(self._where) >= rules.rotate_bytes
+        if not full and not (rules.rotate_nightly and night != self._night):
+            return
+        old = self._where
+        assert old.path is not None
+        try:
+            new = next_place(old)
+            lock = WriterLock(new)
+            try:
+                with self._connection.begin():
+                    go_on(self._connection, new, self.run, seq=self._linked, link=self._link, follows=old.path.name)
+                    row = {"run": self.run, "follows": None, "followed_by": Path(str(new.path)).name}
+                    done = self._connection.execute(
+                        update(PARTS).where(PARTS.c.run == self.run).values(followed_by=row["followed_by"])
+                    )
+                    if not done.rowcount:
+                        self._connection.execute(insert(PARTS).values(row))
+                engine = writing_engine(new)
+            except (SQLAlchemyError, InputError):
+                lock.release()
+                raise
+        except (SQLAlchemyError, InputError) as problem:
+            self._look_at = now + AGAIN
+            if self._on_alarm is not None:
+                why = problem if isinstance(problem, InputError) else refused(old, problem)
+                self._on_alarm(f"{why}: the journal goes on in {old.shown} (it is tried again in {AGAIN / 60:.0f} min)")
+            return
+        fold(old, self._connection)
+        self._disconnect()
+        self._lock.release()
+        self._where, self.place, self._engine, self._lock = new, new.shown, engine, lock
+        self._file, self._night = identity(new), night
+        if self._on_recovery is not None:
+            self._on_recovery(f"the run goes on in {new.shown}, head {self.head}")
 
     def _sift(self, batches: list[Batch], problem: IntegrityError | DataError) -> None:
         """A group that the database refuses is written one by one; what it refuses then has a failed future."""
@@ -311,8 +403,12 @@ class Journal:
                 self._persist([batch])
             return
         text = f"{refused(self._where, problem)}: refused (expected each shot once: a ranger, a time, a target)"
-        batches[0].fail(InputError(text))
-        self._forget(batches)
+        if batches[0].refused is not None:  # not even its numbers are taken: the run's record is gone
+            batches[0].fail(InputError(text))
+            self._forget(batches)
+            return
+        batches[0].refused = InputError(text)
+        self._persist(batches)
 
     def _acknowledge(self, batches: list[Batch]) -> None:
         self._forget(batches)
@@ -321,7 +417,11 @@ class Journal:
             if self._on_recovery is not None:
                 self._on_recovery(f"journal {self.place}: is back, all that waited is written")
         for batch in batches:
+            if batch.refused is not None:
+                batch.fail(batch.refused)
             batch.done(batch.last if batch.rows else self._seq)
+        if self._on_head is not None and any(t == SOLUTIONS.name for batch in batches for t, _ in batch.rows):
+            self._on_head(self.head)
 
     def _forget(self, batches: list[Batch]) -> None:
         with self._wake:
@@ -352,11 +452,16 @@ class Journal:
         with suppress(SQLAlchemyError):
             if self._connection is None:
                 self._connection = self._engine.connect()
+            ended, seq = ticks_now(self._clock), self._linked + 1
+            link = link_of(self._link, LinkKind.END, seq, [ended])
             with self._connection.begin():
-                self._connection.execute(
-                    update(RUNS).where(RUNS.c.run == self.run).values(ended_ticks=ticks_now(self._clock))
-                )
+                self._connection.execute(update(RUNS).where(RUNS.c.run == self.run).values(ended_ticks=ended))
+                row = {"run": self.run, "seq": seq, "kind": LinkKind.END.value, "link": link}
+                self._connection.execute(self._inserts[CHAIN.name], row)
+            self._link, self._linked = link, seq
             fold(self._where, self._connection)
+            if self._on_head is not None:
+                self._on_head(self.head)
 
     def _disconnect(self) -> None:
         if self._connection is not None:

@@ -16,9 +16,11 @@ import numpy as np
 from pydantic import ValidationError
 
 from catseye.constants import DEGREE
+from catseye.coordinator.journal.check import ChainReport
 from catseye.coordinator.journal.entries import AnsweredShot
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
+from catseye.gateways.journal.chain import chain_object
 from catseye.gateways.journal.export import seal, stamp
 from catseye.gateways.writers.output import whole_directory
 from catseye.gateways.writers.written import origin
@@ -82,17 +84,26 @@ class ExportedShot:
 
 
 def export_campaign(
-    reader: JournalReader, out: Path, *, run: int, span: tuple[int, int] | None = None
+    reader: JournalReader,
+    out: Path,
+    *,
+    run: int,
+    span: tuple[int, int] | None = None,
+    chain: ChainReport | None = None,
 ) -> CampaignExport:
     """A run's shots, samples and weather in the layout of docs/formats/campaign.md, whole or not at all.
 
     run    its number
     span   ticks, the end not in it; all
+    chain  what checking said: events that are not as they were written are left out, and told
 
     Raises InputError: no such run, no shot or weather that a campaign can hold, a directory that is another's.
     """
     stored, site = reader.run(run), reader.site(run)
     left = LeftOut()
+    reader.left_out = {} if chain is None else {run: chain.bad}
+    for seq in sorted(reader.left_out.get(run, ())):
+        left.add("an event that is not as it was written", f"event {seq}")
     readings = _readings(reader, run, span, site, left)
     if not readings:
         raise InputError(f"journal {reader.place}: run {run} has no whole weather reading in the span (expected one)")
@@ -113,7 +124,8 @@ def export_campaign(
         _write_frames(reader, run, chosen, directory / "frames.npy")
         read_campaign(directory)
         provenance = origin(datetime.now(UTC), stored.hashes)
-        seal(directory, reader, {"made_by": "catseye export", **provenance, "run": stored.uuid, "notes": notes})
+        told = {"run": stored.uuid, "notes": notes, "chains": [] if chain is None else [chain_object(chain)]}
+        seal(directory, reader, {"made_by": "catseye export", **provenance, **told})
     return CampaignExport(len(chosen), len(readings), dict(left.counts), tuple(notes))
 
 

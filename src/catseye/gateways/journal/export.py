@@ -17,9 +17,12 @@ from typing import Any, Literal
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE, ZERO_CELSIUS_K
+from catseye.coordinator.journal.check import ChainReport
 from catseye.coordinator.journal.entries import Entry, EpochSolution
 from catseye.coordinator.journal.reader import JournalReader, Kind
 from catseye.errors import InputError
+from catseye.gateways.journal.chain import chain_object
+from catseye.gateways.writers.cells import harmless
 from catseye.gateways.writers.objects import json_page, plain
 from catseye.gateways.writers.output import PROVENANCE, whole_directory
 from catseye.gateways.writers.written import Progress, origin
@@ -186,15 +189,18 @@ def export_tables(
     forms: Sequence[Form] = ("csv", "fits"),
     span: tuple[int, int] | None = None,
     progress: Progress | None = None,
+    chains: Sequence[ChainReport] = (),
 ) -> dict[str, int]:
     """Every quantity of some runs, into a directory that appears whole or not at all; rows by quantity.
 
     runs    numbers
     forms   of file
     span    ticks, the end not in it; all
+    chains  what checking said: events that are not as they were written are left out, and the provenance says so
 
     Raises InputError: no such run, nothing to write, a directory that is another's.
     """
+    reader.left_out = {chain.run: chain.bad for chain in chains}
     if not runs or not forms:
         raise InputError(f"--out {out}: no run or no form was named (expected at least one of each)")
     stored = [reader.run(run) for run in runs]
@@ -208,7 +214,12 @@ def export_tables(
                 writer = _csv if form == "csv" else _fits
                 counts[name] = writer(directory / f"{name}.{form}", name, table, rows)
         inputs = {f"run {run.run}: {path}": digest for run in stored for path, digest in run.hashes.items()}
-        summary = {"runs": {str(run.run): run.uuid for run in stored}, "span_ticks": span, "rows": counts}
+        summary = {
+            "runs": {str(run.run): run.uuid for run in stored},
+            "span_ticks": span,
+            "rows": counts,
+            "chains": [chain_object(chain) for chain in chains],
+        }
         seal(directory, reader, {"made_by": "catseye export", **origin(datetime.now(UTC), inputs), **summary})
     return counts
 
@@ -258,15 +269,24 @@ def seal(directory: Path, reader: JournalReader, provenance: dict[str, Any]) -> 
 
 
 def _csv(path: Path, name: str, table: ExportTable, rows: Iterable[Cells]) -> int:
-    """Numbers as Python writes them, which reads back without the loss of a bit; empty where there is none."""
+    """Numbers as Python writes them, which reads back without the loss of a bit; empty where there is none.
+
+    What rangers and people wrote may begin like a formula, which a spreadsheet would run: an apostrophe goes before it.
+    """
     count = 0
     with path.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow([field.name for field in RUN + table.fields])
         for row in rows:
-            writer.writerow(["" if isinstance(cell, float) and cell != cell else cell for cell in row])
+            writer.writerow([_csv_cell(cell) for cell in row])
             count += 1
     return count
+
+
+def _csv_cell(cell: Any) -> Any:
+    if isinstance(cell, str):
+        return harmless(cell)
+    return "" if isinstance(cell, float) and cell != cell else cell
 
 
 def _fits(path: Path, name: str, table: ExportTable, rows: Iterable[Cells]) -> int:
