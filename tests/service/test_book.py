@@ -147,8 +147,8 @@ def test_shots_that_were_told_and_not_kept_are_not_said_to_be_acknowledged():
 
 def test_rangers_that_were_left_out_are_not_counted():
     orders = SimpleNamespace(drop=("ZY102", "ZY102"))
-    run = SimpleNamespace(site=site(), orders=orders, seconds=6.0, told=9)
-    assert Simulation.totals.fget(run) == {"seconds": 6.0, "rangers": len(site().rangers) - 1, "told": 9}
+    run = SimpleNamespace(site=site(), orders=orders, seconds=6.0, told=9, head=None)
+    assert Simulation.totals.fget(run) == {"seconds": 6.0, "rangers": len(site().rangers) - 1, "told": 9, "head": None}
 
 
 @pytest.mark.parametrize(

@@ -68,6 +68,24 @@ def test_one_that_cannot_start_says_why_in_its_own_words():
     asyncio.run(story())
 
 
+def test_a_patient_keeper_tries_again_what_cannot_start_the_first_time(monkeypatch):
+    """As of a service: leaving would only have it started again at once, for ever."""
+    monkeypatch.setattr("catseye.service.child.FIRST_WAIT", 0.05)
+
+    async def story():
+        warned = []
+        one = child(DIES, warned=warned)
+        task = asyncio.create_task(one.keep(patient=True))
+        while sum("did not start" in line for line in warned) < 3:
+            await asyncio.sleep(0.02)
+        assert not task.done()
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        assert "did not start; started again in 0.05 s" in warned
+
+    asyncio.run(asyncio.wait_for(story(), 30.0))
+
+
 def test_one_that_dies_is_started_again_and_ends_with_its_keeper():
     async def story():
         said, warned = [], []

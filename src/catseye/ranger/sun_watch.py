@@ -128,6 +128,20 @@ def way_out(
     return None
 
 
+def sun_leaves(station: MirrorStation, here: ArrayLike, sun: SunSource, mjd: float) -> float | None:
+    """MJD, to a minute, from which on the Sun is out of the cone of a beam at rest; None where that takes over a day.
+
+    station, here   as for `way_out`
+    sun             where it is, as a ranger knows it
+    """
+    for minute in range(24 * 60 + 1):
+        at = mjd + minute / (24 * 60)
+        direction = sun(at)
+        if direction is None or nearest_sun(station, here, here, suns=[direction], exact=True) >= HALF_ANGLE:
+            return at
+    return None
+
+
 def _angles(station: MirrorStation, looks: NDArray[np.float64], suns: Sequence[ArrayLike]) -> NDArray[np.float64]:
     """(n, suns) rad between beams (n, 3) in the mirror's axes and the Suns."""
     inside: NDArray[np.float64] = np.stack([np.asarray(s, dtype=float) for s in suns])

@@ -9,7 +9,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 
 from catseye.errors import InputError
 from catseye.gateways.writers.interruption import undone_when_interrupted
@@ -81,17 +81,24 @@ class LiveChild:
         why = self._last_warning.removeprefix("catseye: ") or f"it said nothing for {LONGEST_START:g} s"
         raise InputError(f"{self.name}: {why}")
 
-    async def keep(self) -> None:
-        """Start it, and again whenever it ends, until cancelled. Raises InputError: it cannot start the first time."""
+    async def keep(self, *, patient: bool = False) -> None:
+        """Start it, and again whenever it ends, until cancelled.
+
+        patient   also where it cannot start the first time: what stands in its way may go, as a port's holder does
+
+        Raises InputError: it cannot start the first time, unless `patient`.
+        """
         wait, loop = FIRST_WAIT, asyncio.get_running_loop()
         with undone_when_interrupted(self.kill):
             try:
-                await self.start()
+                with suppress(InputError) if patient else nullcontext():  # its own words have been passed on
+                    await self.start()
                 while True:
                     began = loop.time()
                     status = await self._process.wait() if self._process is not None else None
                     wait = FIRST_WAIT if loop.time() - began > LIVED else wait
-                    self._warned(f"ended with status {status}; started again in {wait:g} s")
+                    what = "did not start" if self._process is None else f"ended with status {status}"
+                    self._warned(f"{what}; started again in {wait:g} s")
                     await asyncio.sleep(wait)
                     wait = min(2.0 * wait, LONGEST_WAIT)
                     with suppress(InputError):  # its own words have been passed on

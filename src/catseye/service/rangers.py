@@ -2,6 +2,7 @@
 
 import asyncio
 import importlib
+import logging
 import os
 import sys
 from collections.abc import Callable, Mapping
@@ -13,6 +14,7 @@ from catseye.errors import CatseyeError, InputError
 from catseye.ranger.addresses import PORT_BASE, Address, Addresses, feed_address
 from catseye.ranger.head import RangerHead
 from catseye.ranger.network import ConnectionMaker, SocketListener, Sockets
+from catseye.ranger.ranger import Ranger
 from catseye.records.site.folder import SiteFolder
 from catseye.service.warm import WarmingClock, warm
 from catseye.simulator.clock.world_clock import Clock
@@ -20,6 +22,8 @@ from catseye.simulator.twin.faults import FaultBoard
 from catseye.simulator.twin.feed import SiteFeed
 from catseye.simulator.twin.servers import TwinSite
 from catseye.simulator.twin.site import Twin
+
+LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -120,6 +124,7 @@ class RangersServed:
         for name, (usual, *both) in list(self._served.addresses.items()):
             first, second = at.ports or both
             self._served.addresses[name] = (at.host or usual, first, second)
+        self.warned: Callable[[str], None] = LOG.warning  # told of rangers that could not be made ready
         self._feed: SiteFeed | None = None
         self._feed_at = feed_address(at.addresses) if at.addresses else (feed_address()[0], 0)
         if at.host is not None:
@@ -128,12 +133,19 @@ class RangersServed:
             stations = tuple(station.name for station in site.site.weather_station)
             self._feed = SiteFeed(site.site.campaign.name, stations, twin, clock, network=network)
 
+    @property
+    def rangers(self) -> Mapping[str, Ranger]:
+        """Those that are served, by name."""
+        return self._served.rangers
+
     async def serve(self, listening: Callable[[Listening], None]) -> None:
         """Listen, say where, and serve until cancelled. Raises InputError: a port or a folder that cannot be had."""
         try:
             await self._served.start()
             if self._warming is not None and self._twin is not None:
-                await warm(self._site, self._served.rangers, self._warming, posture=self._twin.live_posture)
+                posture = self._twin.live_posture
+                for text in await warm(self._site, self._served.rangers, self._warming, posture=posture):
+                    self.warned(text)
             if self._late is not None:
                 await self._late.open()
             at = None

@@ -11,10 +11,11 @@ from dataclasses import replace
 from catseye.coordinator.guard.guard import SafetyGuard
 from catseye.coordinator.link.preparation import Preparation
 from catseye.errors import InputError
-from catseye.geometry.sky.time_tag import PER_SECOND
+from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND, utc_text
 from catseye.ranger.initialisation import cubes_commands, head_commands, monument_commands
 from catseye.ranger.line import FIRST_CLIENT_TID, Reply, Request, format_request, nanoseconds_to_ticks
 from catseye.ranger.ranger import Ranger
+from catseye.ranger.sun_watch import sun_leaves
 from catseye.records.night.live import LivePosture
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.site.places import places_of
@@ -23,6 +24,7 @@ from catseye.simulator.clock.world_clock import Clock
 BEFORE = 300.0  # s before the start, when the rangers are powered on
 STEP = 0.05  # s between two looks at a ranger that is busy
 HOMING_TIMEOUT = 35.0  # s an axis: a ZY gives up after 30
+LEAVING = 20.0  # s: a quarter turn of either axis, and the look at the Sun behind it
 HOMING = (  # amplifiers, then the indices with the laser off, then the laser
     *(("AXIS", "0", "1"), ("AXIS", "1", "1"), ("PS", "0"), ("FHM", "0"), ("FHM", "1"), ("PS", "1")),
 )
@@ -66,33 +68,68 @@ def initialising_commands(site: SiteFolder) -> Callable[[str], list[Request]]:
 
 async def warm(
     site: SiteFolder, rangers: Mapping[str, Ranger], clock: WarmingClock, *, posture: Callable[[int], LivePosture]
-) -> None:
+) -> list[str]:
     """Make rangers that nobody is connected to ready, as a coordinator would that left a moment ago.
 
     clock     of their heads; released at the end
     posture   what the telescope tells at ticks: with it each ranger is told where the Sun is
 
-    Raises InputError: a command, or the search for an index, is refused.
+    One that cannot be made ready is left dark, and said here in a line each: its mirror looks at the Sun and no way out
+    is free, or an index is not found. The others serve; whoever commands it makes it ready when that can be.
+
+    Raises InputError: a command of the records is refused.
     """
-    commands = initialising_commands(site)
+    commands, guard = initialising_commands(site), SafetyGuard(site)
+    left: list[str] = []
     for name, ranger in rangers.items():
         for request in Preparation.of(commands(name)).requests:
             answer = ranger.work_of(CLIENT, request)
             if not isinstance(answer, tuple):
                 raise InputError(f"{name}: {request.command} takes time (expected what is done at once)")
-        ask = _Asked(ranger, clock).reply
-        for command, *parameters in HOMING:
-            reply = await ask(Request(command, tuple(parameters)), HOMING_TIMEOUT)
-            if reply.ok is not True:
-                raise InputError(f"{name}: {command} {', '.join(parameters)} was refused: {reply.text[:120]}")
+        _tell_sun(guard, name, ranger, clock, posture)
+        problem = await _homed_and_lit(name, ranger, clock)
+        if problem is not None:
+            ranger.work_of(CLIENT, Request("PS", ("0",)))
+            left.append(problem)
         ranger.disconnect(CLIENT)
         await asyncio.sleep(0.0)
     clock.release()
-    now, guard = nanoseconds_to_ticks(clock.now_ns()), SafetyGuard(site)
-    guard.telescope(posture(now))
     for name, ranger in rangers.items():
-        sun = tuple(f"{v:.7f}" for v in guard.sun_vector(name, now))
-        ranger.work_of(CLIENT, Request("SUN", sun))
+        _tell_sun(guard, name, ranger, clock, posture)
+    return left
+
+
+def _tell_sun(
+    guard: SafetyGuard, name: str, ranger: Ranger, clock: WarmingClock, posture: Callable[[int], LivePosture]
+) -> None:
+    now = nanoseconds_to_ticks(clock.now_ns())
+    guard.telescope(posture(now))
+    ranger.work_of(CLIENT, Request("SUN", tuple(f"{v:.7f}" for v in guard.sun_vector(name, now))))
+
+
+async def _homed_and_lit(name: str, ranger: Ranger, clock: WarmingClock) -> str | None:
+    """Both indices found, and the laser on; why not, in a line.
+
+    An index may look at the Sun: a ranger leaves it by itself, and is lit when it has left.
+    """
+    ask = _Asked(ranger, clock)
+    for command, *parameters in HOMING:
+        reply = await ask.reply(Request(command, tuple(parameters)), HOMING_TIMEOUT)
+        if reply.ok is not True and command == "PS" and ranger.in_sun:
+            await ask.until(lambda: not ranger.in_sun, LEAVING)
+            reply = await ask.reply(Request("PS", ("1",)), HOMING_TIMEOUT)
+        if reply.ok is not True:
+            line = f"{command} {', '.join(parameters)}"
+            return f"{name} stays dark: {line} was refused: {reply.text[:120]}{_lit_from(ranger)}"
+    return None
+
+
+def _lit_from(ranger: Ranger) -> str:
+    """When a ranger whose beam rests in the Sun can be lit, as far as it knows."""
+    if not ranger.in_sun or ranger.sun is None:
+        return ""
+    mjd = sun_leaves(ranger.cubes.station, ranger.here, ranger.sun, ranger.now_ns() / PER_DAY)
+    return "; the Sun does not leave it within a day" if mjd is None else f"; the Sun leaves it at {utc_text(mjd)}"
 
 
 class _Asked:
@@ -115,3 +152,12 @@ class _Asked:
             replies = self._ranger.turn()
             if not replies:
                 self._clock.advance(STEP)
+
+    async def until(self, done: Callable[[], bool], timeout: float) -> None:
+        """Let it work by itself until something is so, or for s of its own time."""
+        for _ in range(round(timeout / STEP)):
+            if done():
+                return
+            self._ranger.turn()
+            self._clock.advance(STEP)
+            await asyncio.sleep(0.0)

@@ -45,7 +45,7 @@ def serve(
             twin_arguments(site, world, asked.port_base),
             said=lambda line: log.tell("twin", "listens", f"{len(peers.rangers)} rangers and the feed listen"),
             warned=lambda line: log.tell("twin", "child", line, "warning"),
-        ).keep()
+        ).keep(patient=True)
 
     run_coordinator(
         records,

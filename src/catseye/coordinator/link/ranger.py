@@ -95,7 +95,7 @@ class RangerLink:
         self._probed_at = 0.0
         self._heard_at = 0.0
         self._was_ready, self._patience = False, self.settings.probe_every
-        self._lit_here = self._left = False
+        self._lit_here = self._left = self._dark = False
 
     @property
     def connected(self) -> bool:
@@ -115,7 +115,7 @@ class RangerLink:
     @property
     def ready(self) -> bool:
         """Whether a shot can begin now."""
-        return self.state == "ready" and not self.busy and self.wanted == "measure"
+        return self.state == "ready" and not self.busy and not self._dark and self.wanted == "measure"
 
     # Connection -----------------------------------------------------------------------------------------------------
 
@@ -224,8 +224,17 @@ class RangerLink:
             if right is not None:
                 await self._ask(Request("STI", (stamp_text(right),)), self.settings.probe_timeout)
             if self.state == "ready" and self.status & StatusWord.LASER_OFF:  # the ranger itself switched it off
-                await self._ask(Request("PS", ("1",)), self.settings.probe_timeout)
+                await self._light()
         return True
+
+    async def _light(self) -> None:
+        """The laser on; where that is refused, from inside the instrument; else it stays dark, and fires nothing."""
+        reply = await self._ask(Request("PS", ("1",)), PATIENCE)
+        if reply.ok is False and self._shooter.aimed != 0 and await self._shooter.park():
+            reply = await self._ask(Request("PS", ("1",)), PATIENCE)
+        self._dark = reply.ok is not True
+        text = f"{self.ranger} stays dark: {reply.text[:160]}" if self._dark else None
+        self._event_log.standing("dark", text, over=f"{self.ranger} is lit again")
 
     async def _make_ready(self, client: ZyClient) -> None:
         """Tell the ranger what it lacks; where that fails, wait, longer each time."""
@@ -240,7 +249,7 @@ class RangerLink:
             self.counts = await counts_of(self._ask)
             if self.status & StatusWord.LASER_OFF:
                 self._lit_here = self._lit_here or was_dark
-                await self.sure(Request("PS", ("1",)), PATIENCE)
+                await self._light()
         except CatseyeError as problem:
             self.state = "connected"
             if self.connected:
