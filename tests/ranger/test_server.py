@@ -10,22 +10,34 @@ import pytest
 from catseye.errors import InputError
 from catseye.ranger.client import SECOND_CLIENT_TID, ZyClient
 from catseye.ranger.commands import COMMANDS
+from catseye.ranger.door import Door
 from catseye.ranger.line import LAST_TID, LONGEST_REPLY, LONGEST_REQUEST, parse_reply
 from catseye.ranger.ranger import Ranger
-from catseye.ranger.server import LOOPBACK, MOST_AT_ONCE, MOST_UNSENT, MOST_WAITING, MUTE, ClientConnection, ZyServer
+from catseye.ranger.server import (
+    LOOPBACK,
+    MOST_AT_ONCE,
+    MOST_UNSENT,
+    MOST_WAITING,
+    MUTE,
+    SILENT,
+    ClientConnection,
+    ZyServer,
+)
 from catseye.simulator.clock.virtual_time import MemoryNetwork, VirtualClock, VirtualLoop
 from ranger.clocked_head import ClockedHead
 from ranger.ranger_scene import READY, REFERENCE_PHASE, ready
+
+OPEN = Door(lease=False)
 
 
 class Site:
     """A served ranger, its head's time and the server's clock."""
 
-    def __init__(self, **options):
+    def __init__(self, door=OPEN, **options):
         self.told = ready(**options)
         self.head, self.ranger = self.told.head, self.told.ranger
         self.now = 0.0
-        self.server = ZyServer(self.ranger, ports=(0, 0), clock=lambda: self.now)
+        self.server = ZyServer(self.ranger, ports=(0, 0), door=door, clock=lambda: self.now)
 
     async def __aenter__(self):
         await self.server.start()
@@ -451,10 +463,14 @@ def test_two_sockets_that_say_nothing_give_their_places_to_who_speaks():
                 assert (await site.answered(client.ask("VER"))).ok
                 assert b"LINE 0, nothing was said for 10 s" in await site.answered(reader.read())
                 writer.close()
-            site.now = 10 * MUTE
+            site.now = MUTE + SILENT - 0.1
             reader, writer = await site.typed(0)
-            assert b"is taken" in await site.answered(reader.read())  # who has spoken keeps its place
+            assert b"is taken" in await site.answered(reader.read())  # who has spoken keeps its place for longer
             writer.close()
+            site.now = MUTE + SILENT
+            clients.append(await site.client(0))
+            await site.until(clients[0].closed.done)
+            assert (await site.answered(clients[2].ask("VER"))).ok
             for client in clients:
                 client.close()
 
@@ -481,7 +497,7 @@ class VirtualSite:
                 return turn()
 
             self.ranger.turn = counted
-            self.server = ZyServer(self.ranger, clock=self.loop.time, network=self.network)
+            self.server = ZyServer(self.ranger, door=OPEN, clock=self.loop.time, network=self.network)
             await self.server.start()
             serving = asyncio.create_task(self.server.serve())
             client = await ZyClient.connect(LOOPBACK, 5240, clock=self.loop.time, network=self.network)
@@ -596,3 +612,195 @@ def test_what_came_too_fast_is_read_at_its_rate_while_the_ranger_sleeps():
         assert 3.0 <= site.loop.time() - begin + 0.02 < 3.1  # 400 at once, then 200 a second
 
     site.run(story)
+
+
+# Lease, dead man, interlock, key --------------------------------------------------------------------------------------
+
+COMMANDING = ("CIL 1", "PS 1", "AXIS 0, 0", "CYC 64", "COO 1, 0, 0, 9000", "AT 0, 1, 0, PS 0", "RST", "INITZY", "SCN 0")
+ASKING = ("VER", "STW", "ACP 0", "COO 1", "PS", "LEASE", "HLP", "RAD")
+
+
+def dark(head):
+    return not head.laser_on() and not head.enabled(0) and not head.enabled(1)
+
+
+async def heard(site, lines, words):
+    """Until a client has heard a line with some words."""
+    await site.until(lambda: any(words in reply.text or words in reply.command for reply in lines))
+    return next(reply for reply in lines if words in reply.text or words in reply.command)
+
+
+@pytest.mark.parametrize("command", COMMANDING)
+def test_what_moves_lights_or_configures_needs_the_lease_and_asking_does_not(command):
+    async def story():
+        async with Site(door=Door()) as site:
+            client = await site.client()
+            name, *parameters = command.replace(",", "").split()
+            reply = await site.answered(client.ask(name, *parameters))
+            assert (reply.ok, reply.text) == (
+                False,
+                f"{name} needs the lease: nobody has it (expected LEASE and a name first)",
+            )
+            for asked in ASKING:
+                word, *rest = asked.split()
+                assert "needs the lease" not in (await site.answered(client.ask(word, *rest))).text
+            client.close()
+
+    run(story)
+
+
+def test_who_takes_the_lease_by_name_commands_and_all_are_told():
+    async def story():
+        async with Site(door=Door()) as site:
+            lines = []
+            first = await site.client(0)
+            second = await site.client(1, first_tid=SECOND_CLIENT_TID, heard=lines.append)
+            assert (await site.answered(first.ask("LEASE", "anna"))).values == ("anna", "1")
+            assert (await heard(site, lines, "LEASE")).values == ("anna", "1")
+            assert (await site.answered(first.ask("CYC", "64"))).ok
+            refused = await site.answered(second.ask("CYC", "32"))
+            assert refused.text == "CYC needs the lease: anna has it (expected LEASE and a name first)"
+            assert (await site.answered(second.ask("LEASE", "none"))).text == "the lease is anna's (expected yours)"
+            assert (await site.answered(second.ask("LEASE", "ben"))).values == ("ben", "2")  # a person may, by name
+            assert not (await site.answered(first.ask("CYC", "16"))).ok
+            assert (await site.answered(second.ask("CYC", "32"))).ok
+            assert (await site.answered(second.ask("LEASE", "none"))).values == ("none",)
+            assert (await site.answered(second.ask("LEASE", "ben"))).ok
+            second.close()
+            await site.until(lambda: len(site.server.connections) == 1)
+            assert (await site.answered(first.ask("LEASE"))).values == ("none",)  # it went with its connection
+            first.close()
+
+    run(story)
+
+
+def test_laser_and_motors_go_off_when_who_has_the_lease_is_silent():
+    async def story():
+        async with Site(door=Door(dead_man=30.0)) as site:
+            lines = []
+            holder = await site.client(0)
+            listener = await site.client(1, first_tid=SECOND_CLIENT_TID, heard=lines.append)
+            assert (await site.answered(holder.ask("LEASE", "anna"))).ok
+            for _ in range(5):  # any line will do
+                site.now += 29.0
+                assert (await site.answered(holder.ask("VER"))).ok
+            assert site.head.laser_on()
+            for _ in range(4):  # the other's do not
+                site.now += 7.4
+                assert (await site.answered(listener.ask("VER"))).ok
+            assert site.head.laser_on()
+            site.now += 0.5
+            said = await heard(site, lines, "SAFE")
+            assert (said.ok, said.tid) == (False, 0)
+            assert said.text == "nothing was heard of anna for 30 s: laser and motors are off"
+            assert dark(site.head)
+            assert (await site.answered(listener.ask("LEASE"))).values == ("none",)
+            assert len([line for line in lines if line.command == "SAFE"]) == 1
+            holder.close()
+            listener.close()
+
+    run(story)
+
+
+@pytest.mark.parametrize("how", ["never taken", "connection lost", "given back", "after a reset"])
+def test_laser_and_motors_go_off_where_nobody_has_the_lease(how):
+    """The table of docs/formats/zy.md: after power-up, reset and loss of the client."""
+
+    async def story():
+        async with Site(door=Door(dead_man=30.0)) as site:
+            if how != "never taken":
+                client = await site.client()
+                assert (await site.answered(client.ask("LEASE", "anna"))).ok
+                if how == "given back":
+                    assert (await site.answered(client.ask("LEASE", "none"))).ok
+                if how == "after a reset":
+                    await site.answered(client.ask("RST"))
+                client.close()
+                await site.until(lambda: not site.server.connections)
+            site.head.switch_laser(True)
+            site.now += 29.0
+            await site.turns(3)
+            assert site.head.laser_on()
+            site.now += 1.5
+            await site.turns(3)
+            assert dark(site.head)
+
+    run(story)
+
+
+def test_an_open_interlock_makes_safe_at_once_and_refuses_light_and_moves():
+    async def story():
+        async with Site(door=Door()) as site:
+            lines, pulled = [], []
+            site.ranger._head_interlock = lambda: pulled[0] if pulled else ""
+            client = await site.client(heard=lines.append)
+            assert (await site.answered(client.ask("LEASE", "anna"))).ok
+            pulled.append("the door of the hut")
+            said = await heard(site, lines, "SAFE")
+            assert said.text == "the interlock is open (the door of the hut): laser and motors are off"
+            assert dark(site.head)
+            for word, *rest in (("PS", 1), ("AXIS", 0, 1), ("CIL", 1), ("TRG",), ("FHM", 0)):
+                reply = await site.answered(client.ask(word, *rest))
+                assert not reply.ok
+                assert "the interlock is open: the door of the hut" in reply.text
+            assert (await site.answered(client.ask("PS", 0))).ok
+            assert (await site.answered(client.ask("LEASE"))).values == ("anna", "1")
+            pulled.clear()
+            assert (await site.answered(client.ask("AXIS", 0, 1))).ok
+            assert (await site.answered(client.ask("PS", 1))).ok
+            client.close()
+
+    run(story)
+
+
+def test_a_connection_that_says_nothing_for_an_hour_is_closed():
+    async def story():
+        async with Site(door=Door(lease=False, idle=3600.0)) as site:
+            client = await site.client()
+            assert (await site.answered(client.ask("VER"))).ok
+            site.now += 3599.0
+            await site.turns(3)
+            assert not client.closed.done()
+            site.now += 2.0
+            await site.until(client.closed.done)
+
+    run(story)
+
+
+KEY = "a-key-of-the-site"
+
+
+def test_a_port_with_a_key_tells_nothing_before_it_was_given():
+    async def story():
+        async with Site(door=Door(key=KEY, lease=False)) as site:
+            with_key = await site.client(0, key=KEY)
+            assert (await site.answered(with_key.ask("VER"))).ok
+            for first in ("VER\n", "KEY wrong-key-of-a-site\n", "KEY\n", f"KEY {KEY}x\nVER\n"):
+                reader, writer = await site.typed(1)
+                writer.write(first.encode())
+                said = (await site.answered(reader.read())).decode()
+                assert said.count("\n") == 1
+                assert "LINE 0, the site's key is expected first" in said
+                writer.close()
+            reader, writer = await site.typed(1)
+            assert (await site.answered(with_key.ask("VER"))).ok  # which a stranger does not hear
+            writer.write(f"KEY {KEY}\nVER\n".encode())
+            lines = [(await site.answered(reader.readline())).decode().split("\t")[2] for _ in range(5)]
+            assert [line.split()[0] for line in lines] == ["KEY", "HELLO", "CONNECT", "STW", "VER"]
+            writer.close()
+            with_key.close()
+
+    run(story)
+
+
+def test_a_port_that_others_reach_is_refused_without_a_key():
+    async def story():
+        site = Site()
+        for host in ("0.0.0.0", "::", "192.0.2.7", ""):
+            with pytest.raises(InputError, match=r"can be reached by other machines \(expected the site's key"):
+                await ZyServer(site.ranger, host, (0, 0)).start()
+        server = ZyServer(site.ranger, "0.0.0.0", (0, 0), door=Door(key=KEY))
+        await server.start()
+        await server.stop()
+
+    run(story)

@@ -74,7 +74,7 @@ class FeedClient:
         self._clock, self._weather, self._posture = clock, weather, posture
         self._tell, self._event_log = tell, EventLog("feed", clock, tell)
         self._rng = random.Random(f"{environment.seed} feed")
-        self._network = environment.network
+        self._network, self._key = environment.network, environment.key
         self._stations = {name: EventLog(name, clock, tell) for name in stations}
         self._telescope = EventLog("telescope", clock, tell)
         self._heard: dict[str, float] = {}  # loop's time of the last good line, by station; "" is the telescope
@@ -103,6 +103,7 @@ class FeedClient:
                             heard=self.hear,
                             clock=asyncio.get_running_loop().time,
                             network=self._network,
+                            key=self._key,
                         )
                 except InputError as problem:
                     why = str(problem).replace("no ranger", "no feed")

@@ -123,11 +123,13 @@ class Environment:
     clock     UTC
     network   where connections are made; None: TCP
     seed      of the jitter of waits
+    key       of the site, said to ports that ask for one; None: there is none
     """
 
     clock: Clock
     network: ConnectionMaker | None = None
     seed: int = 0
+    key: str | None = None
 
 
 def ticks_now(clock: Clock) -> int:

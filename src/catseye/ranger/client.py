@@ -10,6 +10,7 @@ from collections.abc import Callable
 from functools import partial
 
 from catseye.errors import InputError
+from catseye.ranger.door import notice_death
 from catseye.ranger.line import (
     FIRST_CLIENT_TID,
     LAST_TID,
@@ -36,6 +37,7 @@ class ZyClient(asyncio.Protocol):
     first_tid   TID of the first request, 1000 to 4 294 967 295
     heard       called with every line that is no reply to this client: unsolicited, and the other client's
     clock       s, never backwards
+    key         of the site, said first; None: the port is taken to ask for none
 
     `bad_lines` counts lines that could not be read; the last is in `last_bad`.
     """
@@ -46,10 +48,11 @@ class ZyClient(asyncio.Protocol):
         first_tid: int = FIRST_CLIENT_TID,
         heard: Listener | None = None,
         clock: Callable[[], float] = time.monotonic,
+        key: str | None = None,
     ):
         if not FIRST_CLIENT_TID <= first_tid <= LAST_TID:
             raise InputError(f"first TID {first_tid} is outside {FIRST_CLIENT_TID} to {LAST_TID}")
-        self._tid, self._heard, self._clock = first_tid, heard, clock
+        self._tid, self._heard, self._clock, self._key = first_tid, heard, clock, key
         self._outstanding: dict[int, tuple[str, asyncio.Future[Reply], Listener | None]] = {}
         self._transport: asyncio.Transport | None = None
         self._unread = bytearray()
@@ -67,12 +70,13 @@ class ZyClient(asyncio.Protocol):
         heard: Listener | None = None,
         clock: Callable[[], float] = time.monotonic,
         network: ConnectionMaker | None = None,
+        key: str | None = None,
     ) -> "ZyClient":
         """A client that is connected, by sockets unless told otherwise.
 
         Raises InputError where nobody listens there.
         """
-        factory = partial(cls, first_tid=first_tid, heard=heard, clock=clock)
+        factory = partial(cls, first_tid=first_tid, heard=heard, clock=clock, key=key)
         try:
             return await (network or Sockets()).connect(factory, host, port)
         except OSError as problem:
@@ -149,6 +153,9 @@ class ZyClient(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
+        notice_death(transport)
+        if self._key is not None:
+            self._write(f"KEY {self._key}")
 
     def connection_lost(self, exc: Exception | None) -> None:
         self.close("connection lost" if exc is None else f"connection lost: {exc}")

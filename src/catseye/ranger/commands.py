@@ -213,6 +213,14 @@ ROWS = (
         (CUBE, _of("count", 0, 1_000_000)),
         chosen=True,
     ),
+    _row(
+        "LEASE",
+        "who may command; take it by a name, from whoever has it; none gives it back",
+        (),
+        (CommandParameter("holder", "name"),),
+        asks=(0, 1),
+        chosen=True,
+    ),
     _row("LST", "scheduled commands of this connection", asks=(0,), chosen=True),
     _row("CLR", "clear the scheduled commands of this connection", chosen=True),
     _row(

@@ -13,9 +13,10 @@ from pathlib import Path
 from catseye.errors import CatseyeError, InputError
 from catseye.geometry.sky.time_tag import PER_SECOND
 from catseye.ranger.commands import COMMANDS
-from catseye.ranger.handlers.table import HANDLERS, scan_rounds, stream_shots, watch_sun
+from catseye.ranger.handlers.table import HANDLERS, holder_of, scan_rounds, stream_shots, watch_sun
 from catseye.ranger.head import RangerHead
 from catseye.ranger.line import TICK_NS, Reply, Request, nanoseconds_of, nanoseconds_to_ticks, parse_request
+from catseye.ranger.schedule import Scheduler
 from catseye.ranger.state import VERSION, Outgoing, RangerState, Values, Work
 from catseye.ranger.status import StatusWord, word_text
 from catseye.ranger.sun_watch import SunSource
@@ -65,6 +66,7 @@ class Ranger(RangerState):
         self._word: StatusWord | None = None
         self._pushed: dict[tuple[str, ...], Values] = {}
         self._next_update = 0
+        self._told_lease: tuple[int, str] | None = None
 
     # What a transport calls -----------------------------------------------------------------------------------------
 
@@ -87,11 +89,48 @@ class Ranger(RangerState):
                 raise InputError(f"{MOST_QUEUED} commands wait already (expected fewer: send slower)")
         except InputError as problem:
             return [Outgoing(Reply("LINE", False, (plain_text(str(problem)),), 0, self.now_ticks()), client)]
+        stranger = self._stranger(client, request)
+        if stranger is not None:
+            return [replace(self._refused(request, stranger), client=client)]
         self._waiting.append((client, request))
         return []
 
+    def _stranger(self, client: int, request: Request) -> str | None:
+        """Why a connection may not give a command, having no lease; None where it may."""
+        if not self.guarded or request.command == "BYE" or (self.lease is not None and self.lease[0] == client):
+            return None
+        row = COMMANDS.get(request.command)
+        if request.command != "AT" and (row is None or row.only_asks(request)):
+            return None
+        who = "nobody has it" if self.lease is None else f"{self.lease[1]} has it"
+        return f"{request.command} needs the lease: {who} (expected LEASE and a name first)"
+
+    def make_safe(self, why: str, *, free: bool = True) -> list[Outgoing]:
+        """Laser and motors off, nothing under way or scheduled any more; what is to be told.
+
+        free   the lease, too
+
+        Nothing is told where all that was so already.
+        """
+        head = self.head
+        if not (head.laser_on() or head.enabled(0) or head.enabled(1) or (free and self.lease is not None)):
+            return []
+        self._waiting.clear()
+        self._running = None
+        self.scheduler = Scheduler()
+        self.end_scan()
+        self.end_stream()
+        head.switch_laser(False)
+        for axis in (0, 1):
+            head.enable(axis, False)
+        self.aimed = self.heading = None
+        self.lease = None if free else self.lease
+        return [Outgoing(self._reply(Request("SAFE"), False, (plain_text(f"{why}: laser and motors are off"),)))]
+
     def disconnect(self, client: int) -> None:
-        """A connection is gone: its queued and scheduled commands are dropped; a scan goes on."""
+        """A connection is gone, its lease with it: queued and scheduled commands are dropped; a scan goes on."""
+        if self.lease is not None and self.lease[0] == client:
+            self.lease = None
         self._waiting = deque(item for item in self._waiting if item[0] != client)
         self.scheduler.clear(client)
         if self.stream is not None and self.stream.client == client:
@@ -111,6 +150,12 @@ class Ranger(RangerState):
         outgoing += self._scan_step()
         outgoing += self._stream_step()
         outgoing += [Outgoing(self._reply(Request("SUN"), False, (text,))) for text in watch_sun(self)]
+        why = self.interlock()
+        if why:
+            outgoing += self.make_safe(f"the interlock is open ({why})", free=False)
+        if self.lease != self._told_lease:
+            self._told_lease = self.lease
+            outgoing.append(Outgoing(self._reply(Request("LEASE"), True, holder_of(self))))
         outgoing += self._updates()
         word = self.status()
         if word != self._word:

@@ -13,6 +13,7 @@ from dataclasses import replace
 from functools import partial
 
 from catseye.errors import InputError
+from catseye.ranger.door import USUAL_DOOR, Door, notice_death, opens, refuse_open
 from catseye.ranger.first_line import BLANK, opening_of, peer_of
 from catseye.ranger.line import LONGEST_REQUEST, Reply, format_reply
 from catseye.ranger.network import ConnectionMaker, Listener, Sockets
@@ -23,6 +24,7 @@ PORTS = (5240, 5241)
 LOOPBACK = "127.0.0.1"
 KEEP_ALIVE = 60.0  # s
 MUTE = 10.0  # s, after which a connection that never said a line gives its place to another
+SILENT = 60.0  # s, the same of one that once did
 LINES_A_SECOND = 200.0
 MOST_AT_ONCE = 400.0  # lines
 MOST_WAITING = 64  # commands of one connection
@@ -38,12 +40,14 @@ class ClientConnection(asyncio.Protocol):
         self.transport: asyncio.Transport | None = None
         self.unread = bytearray()
         self.lines_left, self.paused = MOST_AT_ONCE, False
-        self.began = server.clock()
+        self.began = self.heard = server.clock()
         self.opened = False  # its first line was one of the language
+        self.admitted = server.door.key is None  # it may hear
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
         self.transport = transport
+        notice_death(transport)
         self.server.joined(self)
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -70,7 +74,22 @@ class ClientConnection(asyncio.Protocol):
             self.transport.abort()
         elif opening == "unreadable":
             self.refuse(plain_text(problem))
-        return self.opened
+        elif self.opened and not self.admitted:
+            self._admit()
+        return self.opened and self.admitted
+
+    def _admit(self) -> None:
+        """Take the first line, which must be the site's key; who has it hears the greeting."""
+        begun = bytes(self.unread.lstrip(BLANK))
+        line, _, rest = begun.partition(b"\n")
+        self.unread = bytearray(rest)
+        self.admitted = opens(line, self.server.door.key or "")
+        if not self.admitted:
+            LOG.warning("%s: port %d: %s does not have the site's key: closed", *self._named(), peer_of(self.transport))
+            self.refuse("the site's key is expected first (KEY and the key)")
+            return
+        self.tell(Reply("KEY", True, (), 0, self.server.ranger.now_ticks()))
+        self.server.greet(self)
 
     def read_on(self) -> None:
         """Hand over whole lines as far as rate and queue allow; otherwise stop reading from the peer."""
@@ -84,6 +103,7 @@ class ClientConnection(asyncio.Protocol):
             line = bytes(self.unread[:end]).removesuffix(b"\r")
             del self.unread[: end + 1]
             self.lines_left -= 1.0
+            self.heard = self.server.clock()
             self.server.send(ranger.receive(self.number, line.decode("ascii", "replace")))
         full = b"\n" in self.unread
         if self.transport is not None and full != self.paused and not self.transport.is_closing():
@@ -117,6 +137,7 @@ class ZyServer:
     """A ranger behind its two ports.
 
     ranger   with its head
+    door     what its ports ask of those who come
     host     address to listen at; only this machine unless told otherwise
     ports    two; 0 takes any free one, `ports` says which after `start`
     clock    s, never backwards; for keep-alive and rates
@@ -129,10 +150,12 @@ class ZyServer:
         host: str = LOOPBACK,
         ports: tuple[int, int] = PORTS,
         *,
+        door: Door = USUAL_DOOR,
         clock: Callable[[], float] = time.monotonic,
         network: ConnectionMaker | None = None,
     ):
-        self.ranger, self.host, self.ports, self.clock = ranger, host, ports, clock
+        self.ranger, self.host, self.ports, self.clock, self.door = ranger, host, ports, clock, door
+        self._commanded = clock()  # when who has the lease was last heard, or there was one
         self.network: ConnectionMaker = network or Sockets()
         self.connections: dict[int, ClientConnection] = {}
         self._listeners: list[Listener] = []
@@ -140,7 +163,9 @@ class ZyServer:
         self._last_keep_alive = self._last_rate = clock()
 
     async def start(self) -> None:
-        """Listen. Raises InputError where a port cannot be had."""
+        """Listen. Raises InputError where a port cannot be had, or would be open to others without a key."""
+        refuse_open(self.ranger.name, self.host, self.door.key)
+        self._commanded = self.clock()
         for number, port in enumerate(self.ports):
             try:
                 self._listeners.append(
@@ -193,10 +218,31 @@ class ZyServer:
             if connection.unread and connection.opened:
                 connection.read_on()
         self.send(self.ranger.turn())
+        self._watch_dead_man(now)
+        for connection in list(self.connections.values()):
+            if now - max(connection.heard, connection.began) > self.door.idle:
+                connection.refuse(f"nothing was said for {self.door.idle:g} s")
         if now - self._last_keep_alive >= KEEP_ALIVE:
             self._last_keep_alive = now
             for connection in list(self.connections.values()):
-                connection.write(b"\n")
+                if connection.admitted:
+                    connection.write(b"\n")
+
+    def _watch_dead_man(self, now: float) -> None:
+        """Laser and motors off where nobody who has the lease is heard for so long."""
+        self.ranger.guarded = self.door.lease
+        if not self.door.lease:
+            return
+        lease = self.ranger.lease
+        holder = None if lease is None else self.connections.get(lease[0])
+        if holder is not None:
+            self._commanded = max(self._commanded, holder.heard)
+        if now - self._commanded > self.door.dead_man:
+            who = "nobody had the lease" if lease is None else f"nothing was heard of {lease[1]}"
+            said = self.ranger.make_safe(f"{who} for {self.door.dead_man:g} s")
+            if said:
+                LOG.warning("%s: %s", self.ranger.name, said[0].reply.text)
+            self.send(said)
 
     def send(self, outgoing: list[Outgoing]) -> None:
         """Give replies to those they are for."""
@@ -206,7 +252,7 @@ class ZyServer:
                 reply = replace(reply, values=(str(self.ports[out.client]), *reply.values))
             line = format_reply(reply).encode("ascii") + b"\n"
             for number, connection in list(self.connections.items()):
-                if out.client in (None, number):
+                if out.client in (None, number) and connection.admitted:
                     connection.write(line)
                     if reply.command == "BYE" and reply.ok and connection.transport is not None:
                         connection.transport.close()
@@ -215,9 +261,11 @@ class ZyServer:
         """A connection begins; a second one on a port is turned away."""
         port = self.ports[connection.number]
         holder = self.connections.get(connection.number)
-        if holder is not None and not holder.opened and self.clock() - holder.began >= MUTE:
-            self.give_up(holder)
-            holder = None
+        if holder is not None:
+            limit = SILENT if holder.admitted and holder.opened else MUTE
+            if self.clock() - holder.heard >= limit:
+                self.give_up(holder, limit)
+                holder = None
         if holder is not None:
             who = peer_of(connection.transport)
             LOG.warning("%s: port %d: %s turned away: the port is taken", self.ranger.name, port, who)
@@ -230,14 +278,20 @@ class ZyServer:
                 connection.transport.close()
             return
         self.connections[connection.number] = connection
+        self.ranger.guarded = self.door.lease
         self.wake()
-        for out in self.ranger.greeting(port):
+        if connection.admitted:
+            self.greet(connection)
+
+    def greet(self, connection: ClientConnection) -> None:
+        """Who this is, that the port is had, the status word, who has the lease."""
+        for out in self.ranger.greeting(self.ports[connection.number]):
             connection.tell(out.reply)
 
-    def give_up(self, holder: ClientConnection) -> None:
-        """A connection that never said a line is closed: another one wants its place."""
+    def give_up(self, holder: ClientConnection, limit: float) -> None:
+        """A connection that says nothing is closed: another one wants its place."""
         LOG.warning("%s: port %d: %s said nothing: closed", *holder._named(), peer_of(holder.transport))
-        holder.refuse(f"nothing was said for {MUTE:g} s, and another wants this port")
+        holder.refuse(f"nothing was said for {limit:g} s, and another wants this port")
         self.left(holder)
 
     def left(self, connection: ClientConnection) -> None:

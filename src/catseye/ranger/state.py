@@ -29,6 +29,7 @@ REFUSED_IN_A_SCAN = (
     *("INI", "INITZY", "CYC", "SFQ", "IFF", "ABP", "ORD", "NUM"),
 )
 REFUSED_IN_A_STREAM = tuple(name for name in REFUSED_IN_A_SCAN if name != "TRK")
+PULLED = frozenset(["PS", "AXIS", "STT", "FHM", "CIL", "CMEAS", "TRG", "TRK", "SCN", "STM"])
 BITS = tuple(int(bit) for bit in StatusWord)  # in the order of `RangerState.status`
 
 
@@ -103,6 +104,9 @@ class RangerState:
         self._scan_work: Generator[Reply | int | None, None, None] | None = None
         self._stream_work: Generator[Outgoing | int | None, None, None] | None = None
         self.tid = 0  # of the command that runs
+        self.guarded = False  # whether commands need the lease
+        self.lease: tuple[int, str] | None = None  # the connection that may command, and the name that it gave
+        self._head_interlock: Callable[[], str] | None = getattr(head, "interlock", None)  # a head may offer it
         self.scheduler = Scheduler()
         self.next_sun_ns = 0
         head_now = getattr(head, "now_ns", None)  # a head may offer it: the same as `now`, cheaper
@@ -138,6 +142,10 @@ class RangerState:
         self.scheduler = Scheduler()
         self.head.reset()
         self._boot()
+
+    def interlock(self) -> str:
+        """Why hardware forbids light and moves at this instant; empty where it does not, or there is none."""
+        return "" if self._head_interlock is None else self._head_interlock()
 
     def now_ns(self) -> int:
         """Nanoseconds since MJD 0."""
@@ -214,6 +222,9 @@ class RangerState:
             return (str(len(self.scheduler.entries)),)
         values = COMMANDS[request.command].read(request)
         if not COMMANDS[request.command].only_asks(request):
+            off = request.command in ("PS", "AXIS", "SCN", "STM") and values[-1:] == (0,)
+            if request.command in PULLED and not off and (why := self.interlock()):
+                raise InputError(f"the interlock is open: {why} (expected it closed first)")
             if self.scanning and request.command in REFUSED_IN_A_SCAN:
                 raise InputError("a scan is under way (expected SCN 0 first)")
             if self.stream is not None and request.command in REFUSED_IN_A_STREAM:

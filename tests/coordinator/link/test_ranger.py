@@ -214,7 +214,7 @@ def test_another_coordinator_takes_a_ranger_over_as_it_is_and_one_with_other_rec
 def test_a_ranger_that_was_changed_by_hand_is_told_everything_again(changed):
     async def story():
         async with Linked() as (served, link):
-            served.ranger.receive(1, changed)
+            served.by_hand(changed)
             await asyncio.sleep(0.1)
             await served.stop()
             await until(lambda: link.state == "down")
@@ -230,7 +230,7 @@ def test_a_ranger_that_was_changed_by_hand_is_told_everything_again(changed):
 def test_a_ranger_that_restarts_under_a_standing_connection_is_noticed_and_made_ready():
     async def story():
         async with Linked() as (served, link):
-            served.ranger.receive(1, "RST")
+            served.by_hand("RST")
             await until(lambda: not link.ready)
             await until(lambda: link.ready)
             assert served.kinds() == ["ready", "restarted", "ready"]

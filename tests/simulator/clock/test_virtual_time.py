@@ -204,8 +204,9 @@ def test_a_port_is_one_listener_s_and_nobody_answers_where_none_is(loop):
 def test_streams_of_a_site_are_the_same_bytes_each_time():
     """Server, client and head in virtual time leave nothing to chance."""
     from catseye.ranger.client import ZyClient
+    from catseye.ranger.door import Door
     from catseye.ranger.ranger import Ranger
-    from catseye.ranger.server import ZyServer
+    from catseye.ranger.server import LOOPBACK, ZyServer
     from ranger.clocked_head import ClockedHead
 
     def once():
@@ -217,13 +218,19 @@ def test_streams_of_a_site_are_the_same_bytes_each_time():
             servers, tasks = [], []
             for k in range(4):
                 ranger = Ranger(f"ZY10{k}", ClockedHead(clock, seed=k), limits=(-30_000, 80_000))
-                servers.append(ZyServer(ranger, "h", (10 * k, 10 * k + 1), clock=loop.time, network=network))
+                servers.append(
+                    ZyServer(
+                        ranger, LOOPBACK, (10 * k, 10 * k + 1), door=Door(lease=False), clock=loop.time, network=network
+                    )
+                )
                 await servers[-1].start()
                 tasks.append(asyncio.create_task(servers[-1].serve()))
             clients = []
             for k in (3, 1, 0, 2):
                 port = servers[k].ports[0]
-                clients.append(await ZyClient.connect("h", port, heard=heard.append, clock=loop.time, network=network))
+                clients.append(
+                    await ZyClient.connect(LOOPBACK, port, heard=heard.append, clock=loop.time, network=network)
+                )
                 clients[-1].request("ACU", 1)
                 clients[-1].request("AT", 0, 20, 0.07, "TRG", then=heard.append)
             await asyncio.sleep(5.0)

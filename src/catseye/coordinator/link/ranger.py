@@ -5,6 +5,7 @@ wait has an end, and a connection that is gone is made again: after 0.2 s, then 
 """
 
 import asyncio
+import os
 import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -32,6 +33,7 @@ from catseye.records.night.live import LiveShot
 State = Literal["down", "connected", "preparing", "ready"]
 LONGEST_KEPT = 200  # characters of a reply, in the journal
 LONGEST_PATIENCE = 60.0  # s between two attempts to make a ranger ready
+HOLDER = f"ziy-{os.getpid() % 10**8}"  # as this coordinator's lease is called: another one's is not its
 MOVERS = frozenset(["CIL", "TRK", "STT", "FHM", "RST", "CMEAS", "INI", "INITZY", "COO", "SCN"])
 
 
@@ -88,7 +90,7 @@ class RangerLink:
         self._status = StatusWatch(ranger, self._event_log, self._restarted)
         self._watch = ClockWatch(clock, self._event_log, self.settings.clock_limit)
         self._rng = random.Random(f"{environment.seed} {ranger}")
-        self._network = environment.network
+        self._network, self._key = environment.network, environment.key
         self._client: ZyClient | None = None
         self._handshake = Handshake()
         self._doubt = asyncio.Event()
@@ -167,6 +169,7 @@ class RangerLink:
                     heard=self._hear,
                     clock=loop.time,
                     network=self._network,
+                    key=self._key,
                 )
         except InputError as problem:
             return str(problem)
@@ -191,6 +194,7 @@ class RangerLink:
                 await self._make_ready(client)
             elif self.wanted != "measure" and self.state == "ready":
                 self.state = "connected"
+                await self._give_back()
             client.check()
             if (not self.busy or self._doubt.is_set()) and not client.closed.done():
                 self._doubt.clear()
@@ -242,6 +246,7 @@ class RangerLink:
         loop = asyncio.get_running_loop()
         began, was_dark = loop.time(), bool(self.status & StatusWord.LASER_OFF)
         try:
+            await self._take_lease()
             self._teach_guard()
             self.told.clear()
             sent = await prepare(self.sure, self.preparation, lambda: self.status)
@@ -263,6 +268,37 @@ class RangerLink:
             self.state, self._was_ready, self._patience = "ready", True, self.settings.probe_every
             what = "made ready" if sent else "was ready still"
             self._event_log.tell("ready", f"{self.ranger} {what} in {loop.time() - began:.1f} s", always=True)
+
+    async def _take_lease(self) -> None:
+        """Take the lease that a ranger's commands need. Raises Refused: somebody else has it.
+
+        One that does not know the word has none, and takes commands from everybody.
+        """
+        held = await self._ask(Request("LEASE"), PATIENCE)
+        if held.ok is not True:
+            return
+        if held.values[:1] not in (("none",), (HOLDER,)):
+            raise Refused("leased", f"{held.values[0]} commands it (expected LEASE none of who has it)")
+        await self._ask(Request("LEASE", (HOLDER,)), PATIENCE)
+        self._event_log.standing("leased", None, over=f"{self.ranger} is the coordinator's again")
+
+    async def _give_back(self) -> None:
+        """Who is not asked to measure commands nothing: others may, or after a while laser and motors go off."""
+        held = await self._ask(Request("LEASE"), PATIENCE)
+        if held.ok is True and held.values[:1] == (HOLDER,):
+            await self._ask(Request("LEASE", ("none",)), PATIENCE)
+
+    def _lease_heard(self, reply: Reply) -> None:
+        """Somebody took the lease, or gave it back."""
+        if self.wanted != "measure" or reply.ok is not True:
+            return
+        who = reply.values[0] if reply.values else "none"
+        if who not in ("none", HOLDER) and self.state in ("ready", "preparing"):
+            self._event_log.standing("leased", f"{self.ranger}: {who} took the lease: nothing is sent that it needs")
+        if who != HOLDER and self.state == "ready":
+            self.state, self._shooter.aimed = "connected", None
+        if who == "none":
+            self._doubt.set()
 
     def _teach_guard(self) -> None:
         """What the ranger knows already the guard must know, too, to understand CIL n."""
@@ -339,6 +375,11 @@ class RangerLink:
         elif reply.command == "SUN" and reply.ok is False:
             self._event_log.tell("sun", f"{self.ranger}: {reply.text[:160]}", "alarm")
             self._shooter.aimed = None
+        elif reply.command == "SAFE":
+            self._event_log.tell("made-safe", f"{self.ranger}: {reply.text[:160]}", "alarm", always=True)
+            self._restarted(f"{self.ranger} must be made ready again")
+        elif reply.command == "LEASE":
+            self._lease_heard(reply)
         elif reply.command in MOVERS:
             self._shooter.aimed = None
         if self._heard_by is not None and reply.command == "CMEAS":

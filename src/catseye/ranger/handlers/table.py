@@ -19,7 +19,7 @@ from catseye.ranger.line import stamp_text as stamp
 from catseye.ranger.state import VERSION, RangerState, Values, Work
 from catseye.ranger.status import word_text
 
-__all__ = ["HANDLERS", "file_names", "replace_file", "scan_rounds", "stream_shots", "watch_sun"]
+__all__ = ["HANDLERS", "file_names", "holder_of", "replace_file", "scan_rounds", "stream_shots", "watch_sun"]
 
 
 def _sti(z: RangerState, _: int, ticks: int | None = None) -> Values:
@@ -53,6 +53,23 @@ def _lst(z: RangerState, client: int) -> Values:
     return str(len(own)), *(
         f"{stamp(nanoseconds_to_ticks(e.due_ns))} {e.repeats} {e.request.command}" for e in own[:24]
     )
+
+
+def _lease(z: RangerState, client: int, name: str | None = None) -> Values:
+    if name is not None and name.lower() == "none":
+        if z.lease is None or z.lease[0] != client:
+            raise InputError(
+                f"the lease is {'free' if z.lease is None else z.lease[1] + chr(39) + 's'} (expected yours)"
+            )
+        z.lease = None
+    elif name is not None:
+        z.lease = client, name
+    return holder_of(z)
+
+
+def holder_of(z: RangerState) -> Values:
+    """Who has the lease, by name, and whether on the first or the second connection; `none` where nobody has."""
+    return ("none",) if z.lease is None else (z.lease[1], str(z.lease[0] + 1))
 
 
 def _clr(z: RangerState, client: int) -> Values:
@@ -157,6 +174,7 @@ HANDLERS: dict[str, Handler] = {
     "RST": _rst,
     "LST": _lst,
     "CLR": _clr,
+    "LEASE": _lease,
     "HLP": _hlp,
     "HELP": _hlp,
     "INITZY": _initzy,

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from catseye.errors import InputError
 from catseye.ranger.addresses import PORT_BASE, Address, Addresses, ranger_addresses
+from catseye.ranger.door import USUAL_DOOR, Door
 from catseye.ranger.handlers.table import file_names, replace_file
 from catseye.ranger.head import RangerHead
 from catseye.ranger.initialisation import RangedPoint, files_of_ranger, places_of
@@ -52,6 +53,7 @@ class TwinSite:
     files          folder in which each ranger has a folder of initialisation files; those that are there are kept.
                    None: a temporary one
     network        sockets unless told otherwise
+    door           what the rangers' ports ask of those who come
     """
 
     def __init__(
@@ -64,6 +66,7 @@ class TwinSite:
         addresses: Addresses = PORT_BASE,
         files: Path | None = None,
         network: ConnectionMaker | None = None,
+        door: Door = USUAL_DOOR,
     ):
         unknown = sorted(set(heads) - set(site.rangers))
         if unknown:
@@ -75,7 +78,7 @@ class TwinSite:
             if addresses == 0
             else {name: at for name, at in ranger_addresses(site, addresses).items() if name in heads}
         )
-        self._folder = files
+        self._folder, self._door = files, door
         self._temporary: tempfile.TemporaryDirectory[str] | None = None
         self._sun: OwnSun = own_sun(site.site.site)
         self.served: dict[str, Served] = {}
@@ -98,9 +101,8 @@ class TwinSite:
                 gate = Gate()
                 ranger = self._ranger(name, head)
                 self._write_files(ranger, places)
-                server = ZyServer(
-                    ranger, host, (ports[0], ports[1]), clock=clock, network=FaultyNetwork(self._network, gate)
-                )
+                network = FaultyNetwork(self._network, gate)
+                server = ZyServer(ranger, host, (ports[0], ports[1]), door=self._door, clock=clock, network=network)
                 await server.start()
                 self.served[name] = Served(server, head, gate)
                 self.addresses[name] = (host, *server.ports)
