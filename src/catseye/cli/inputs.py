@@ -10,7 +10,7 @@ from typing import Any, get_args
 import typer
 
 WRITTEN = frozenset(  # options and arguments whose path is made, not read
-    {"actuators", "blank", "certificate", "directory", "out", "page", "template", "write", "write_stars"}
+    {"actuators", "blank", "certificate", "copy", "directory", "out", "page", "template", "write", "write_stars"}
 )
 
 OUTPUTS = frozenset({"earlier", "epoch", "inputs", "sources"})  # read, and written by a command before

@@ -332,6 +332,10 @@ class Coordinator:
             link.wanted = "hold" if name in self.firing.dropped and mode == "active" else WANTED[mode]
         self._event_log.tell("mode", f"mode is {mode}", always=True)
 
+    def leased(self, before: str, now: str) -> None:
+        """Note that another of its clients may command it."""
+        self._event_log.tell("lease", f"the coordinator's lease goes from {before} to {now}", always=True)
+
     def drop(self, ranger: str) -> None:
         """Leave a ranger out; it stays connected. Raises InputError: no such ranger."""
         self._known(ranger)

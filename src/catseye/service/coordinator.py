@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -29,6 +29,7 @@ from catseye.coordinator.visibility.surroundings import KeepClear
 from catseye.coordinator.ziy import Coordinator, CoordinatorParts
 from catseye.errors import InputError
 from catseye.ranger.addresses import COORDINATOR_PORT
+from catseye.ranger.door import Door
 from catseye.ranger.network import ConnectionMaker
 from catseye.ranger.server import LOOPBACK
 from catseye.records.files.reading import read_record
@@ -64,6 +65,7 @@ class Orders:
     rotate_gb      size of a file from which the journal goes on in another; 0: never
     rotate_night   whether it does at noon UTC
     host, port     of its own clients; port 0: any free one
+    key            of the site, asked for at its own port and said to those of rangers and feed; None: there is none
     keep_out, interlocks, solids   files; None: only the Sun is kept clear of, nothing stands in the way
     """
 
@@ -77,6 +79,7 @@ class Orders:
     rotate_night: bool = False
     host: str = LOOPBACK
     port: int = COORDINATOR_PORT
+    key: str | None = field(default=None, repr=False)
     keep_out: Path | None = None
     interlocks: Path | None = None
     solids: Path | None = None
@@ -183,7 +186,7 @@ class LiveCoordinator:
                 self._journal,
                 None if self._solver is None else self._solver.solve,
             ),
-            environment=Environment(clock, network, seed or 0),
+            environment=Environment(clock, network, seed or 0, orders.key),
             feed=peers.feed,
             mode=orders.mode,
             commands=initialising_commands(site),
@@ -191,7 +194,8 @@ class LiveCoordinator:
         for name in orders.drop:
             self.ziy.firing.dropped.add(name)
             self.ziy.links[name].wanted = "hold"
-        self.server = ZiyServer(self.ziy, orders.host, orders.port, network=network)
+        door = Door(key=orders.key)
+        self.server = ZiyServer(self.ziy, orders.host, orders.port, network=network, door=door)
 
     def _opened(
         self, clock: Clock, seed: int | None, virtual: bool, tell: JournalTell

@@ -12,6 +12,7 @@ from typing import Any
 
 from catseye.errors import CatseyeError, InputError
 from catseye.ranger.addresses import PORT_BASE, Address, Addresses, feed_address
+from catseye.ranger.door import USUAL_DOOR, Door
 from catseye.ranger.head import RangerHead
 from catseye.ranger.network import ConnectionMaker, SocketListener, Sockets
 from catseye.ranger.ranger import Ranger
@@ -74,11 +75,13 @@ class ServedAt:
     addresses   "loopback", a port base, 0 for any free ports
     host        of all ports; None: as `addresses` says
     ports       of the one ranger that is served; None: as `addresses` says
+    door        what all ports ask of those who come
     """
 
     addresses: Addresses = PORT_BASE
     host: str | None = None
     ports: tuple[int, int] | None = None
+    door: Door = USUAL_DOOR
 
 
 USUAL_PORTS = ServedAt()
@@ -120,6 +123,7 @@ class RangersServed:
             addresses=at.addresses,
             files=files,
             network=network,
+            door=at.door,
         )
         for name, (usual, *both) in list(self._served.addresses.items()):
             first, second = at.ports or both
@@ -131,7 +135,7 @@ class RangersServed:
             self._feed_at = (at.host, self._feed_at[1])
         if twin is not None:
             stations = tuple(station.name for station in site.site.weather_station)
-            self._feed = SiteFeed(site.site.campaign.name, stations, twin, clock, network=network)
+            self._feed = SiteFeed(site.site.campaign.name, stations, twin, clock, network=network, door=at.door)
 
     @property
     def rangers(self) -> Mapping[str, Ranger]:

@@ -9,7 +9,9 @@ from catseye.coordinator.clients.board import HELP
 from catseye.coordinator.clients.samplers import COLUMNS, KEPT, Samplers
 from catseye.coordinator.clients.server import KINDS, MOST_CLIENTS, MOST_UNSENT, ZiyServer
 from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
+from catseye.errors import InputError
 from catseye.ranger.client import ZyClient
+from catseye.ranger.door import Door
 from catseye.ranger.line import LONGEST_REQUEST, parse_reply
 from catseye.ranger.server import LOOPBACK
 from catseye.records.night.live import Happening, LivePosture, LiveShot
@@ -174,6 +176,7 @@ def test_parameters_are_checked_then_prepared_then_started():
     async def story():
         async with Served() as site:
             client = await site.client()
+            assert (await client.ask("LEASE", "anna")).ok
             assert (await client.ask("START")).ok is False
             for name, value in (("mode", "lazy"), ("nothing", "1"), ("dropped", "ZY999")):
                 assert (await client.ask("SET", name, value)).ok is False
@@ -199,6 +202,7 @@ def test_commands_of_the_coordinator_itself():
     async def story():
         async with Served() as site:
             client = await site.client()
+            assert (await client.ask("LEASE", "anna")).ok
             assert (await client.ask("MODE")).text == "active"
             assert (await client.ask("MODE", "hold")).text == "hold"
             assert site.ziy.mode == "hold"
@@ -214,6 +218,58 @@ def test_commands_of_the_coordinator_itself():
             assert not site.ziy.firing.streams
             assert (await client.ask("STATUS", 1)).ok is False
             assert (await client.ask("STATUS", ticks=5288900000000)).ok is False
+
+    run(story)
+
+
+def test_who_has_no_lease_asks_and_does_not_command():
+    async def story():
+        async with Served() as site:
+            heard = []
+            anna, ben = await site.client(heard=heard.append), await site.client()
+            for command, *rest in (("MODE", "hold"), ("DROP", "ZY101"), ("SET", "mode", "hold"), ("START",)):
+                refused = await anna.ask(command, *rest)
+                assert refused.ok is False
+                assert refused.text == f"{command} needs the lease: nobody has it (expected LEASE and a name first)"
+            for command in ("MODE", "STATUS", "RANGERS", "PARAMETERS", "LEASE", "VER"):
+                assert (await ben.ask(command)).ok
+            assert site.ziy.mode == "active"
+            assert (await ben.ask("LEASE", "ben")).text == "ben"
+            assert (await anna.ask("LEASE", "none")).ok is False
+            assert (await ben.ask("MODE", "hold")).ok
+            assert (await anna.ask("LEASE", "anna")).text == "anna"  # told to all, and journalled
+            assert (
+                await ben.ask("MODE", "active")
+            ).text == "MODE needs the lease: anna has it (expected LEASE and a name first)"
+            assert [r.text for r in heard if r.command == "LEASE" and r.tid == 0] == ["ben", "anna"]
+            anna.close()
+            await asyncio.sleep(0.1)
+            assert (await ben.ask("LEASE")).text == "none"
+            await until(lambda: site.kinds().count("lease") == 3)
+            for name in ("a b", "1", "x" * 20):
+                assert (await ben.ask("LEASE", name)).ok is False
+
+    run(story)
+
+
+def test_a_key_is_asked_for_first():
+    async def story():
+        async with Served() as site:
+            await site.server.stop()
+            key = "a-key-of-the-site"
+            site.server = ZiyServer(site.ziy, port=0, network=network(), door=Door(key=key))
+            await site.server.start()
+            stranger = await site.raw()
+            await asyncio.sleep(0.05)
+            assert stranger.got == b""
+            stranger.transport.write(b"STATUS\nMODE hold\n")
+            await until(lambda: stranger.gone)
+            assert stranger.got.count(b"\n") == 1
+            assert b"LINE 0, the site's key is expected first" in stranger.got
+            client = await site.client(key=key)
+            assert (await client.ask("STATUS")).ok
+            with pytest.raises(InputError, match="can be reached by other machines"):
+                await ZiyServer(site.ziy, "0.0.0.0", 0, network=network()).start()
 
     run(story)
 

@@ -7,8 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from catseye.coordinator.link.ranger import HOLDER
 from catseye.coordinator.link.settings import Address, LinkSettings
 from catseye.coordinator.parts import ticks_now
+from catseye.ranger.client import SECOND_CLIENT_TID, ZyClient
+from catseye.ranger.door import Door
 from catseye.ranger.line import Request
 from catseye.ranger.server import LOOPBACK
 from coordinator.link_scene import COMMANDS, Free, Linked, LoopClock, Served, network, planned, run, until
@@ -570,3 +573,139 @@ def test_random_bytes_from_a_ranger_do_no_harm():
 @pytest.mark.slow
 def test_a_hundred_thousand_random_lines_from_a_ranger_do_no_harm():
     babble(100_000, 9)
+
+
+# Lease, dead man, interlock -------------------------------------------------------------------------------------------
+
+
+async def person(served, **options):
+    """Somebody on the ranger's second port."""
+    return await ZyClient.connect(
+        served.address.host,
+        served.ports[1],
+        first_tid=SECOND_CLIENT_TID,
+        clock=asyncio.get_running_loop().time,
+        network=network(),
+        **options,
+    )
+
+
+def test_the_coordinator_has_the_lease_of_a_ranger_that_it_measures_with():
+    async def story():
+        async with Linked() as (served, link):
+            assert served.ranger.lease == (0, HOLDER)
+            anna = await person(served)
+            assert (await anna.ask("PS", 0)).ok is False
+            assert (await anna.ask("ACP", 0)).ok
+            link.wanted = "hold"  # left out on purpose: it is nobody's
+            await until(lambda: served.ranger.lease is None)
+            assert link.state == "connected"
+
+    run(story)
+
+
+def test_who_takes_the_lease_has_the_ranger_until_it_is_given_back():
+    async def story():
+        async with Linked() as (served, link):
+            anna = await person(served)
+            assert (await anna.ask("LEASE", "anna")).ok
+            await until(lambda: not link.ready)
+            assert "leased" in link.troubles
+            assert "ZY101: anna took the lease: nothing is sent that it needs" in [h.text for h in served.happenings]
+            for _ in range(20):  # a person who goes on keeps it
+                await asyncio.sleep(5.0)
+                assert (await anna.ask("VER")).ok
+            assert served.ranger.lease == (1, "anna")
+            assert (await anna.ask("LEASE", "none")).ok
+            await until(lambda: link.ready, 5.0)
+            assert served.ranger.lease == (0, HOLDER)
+            assert "leased" not in link.troubles
+            served.light()
+            assert await link.fire(planned("ZG11")) is not None
+
+    run(story)
+
+
+def test_a_person_who_leaves_or_falls_silent_loses_the_lease():
+    async def story():
+        async with Linked() as (served, link):
+            for leaves in (True, False):
+                anna = await person(served)
+                assert (await anna.ask("LEASE", "anna")).ok
+                await until(lambda: not link.ready)
+                if leaves:
+                    anna.close()
+                await until(lambda: link.ready, 100.0)
+            kinds = served.kinds()
+            assert kinds.count("leased") == 2
+            assert kinds.count("made-safe") == 1  # of the one who said nothing any more
+
+    run(story)
+
+
+def test_a_ranger_that_knows_no_lease_is_commanded_as_ever():
+    async def story():
+        served = await Served().start()
+        served.server.door = Door(lease=False)
+        receive = served.ranger.receive
+
+        def old(client, line):
+            if "LEASE" in line:
+                line = line.replace("LEASE", "LEISE")
+            return receive(client, line)
+
+        served.ranger.receive = old
+        link = served.link()
+        task = asyncio.ensure_future(link.run())
+        await until(lambda: link.ready)
+        served.light()
+        assert await link.fire(planned("ZG11")) is not None
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        await served.stop()
+
+    run(story)
+
+
+def test_an_interlock_that_opens_stops_a_ranger_until_it_closes():
+    async def story():
+        async with Linked() as (served, link):
+            pulled = ["the door"]
+            served.ranger._head_interlock = lambda: pulled[0] if pulled else ""
+            await until(lambda: not link.ready, 5.0)
+            assert not served.head.laser_on()
+            assert not served.head.enabled(0)
+            alarms = [h for h in served.happenings if h.kind == "made-safe"]
+            assert [h.severity for h in alarms] == ["alarm"]
+            assert "the interlock is open (the door)" in alarms[0].text
+            await asyncio.sleep(100.0)
+            assert not link.ready
+            assert not served.head.laser_on()
+            pulled.clear()
+            await until(lambda: link.ready, 130.0)
+            await until(served.head.laser_on, 5.0)
+
+    run(story)
+
+
+def test_a_coordinator_that_is_cut_off_for_an_hour_leaves_no_laser_on():
+    """Nobody tells the ranger that the lines are cut: its own clock does."""
+
+    async def story():
+        async with Linked() as (served, link):
+            assert served.head.laser_on()
+            began = asyncio.get_running_loop().time()
+            served.server.connections[0].data_received = lambda data: None  # nothing arrives any more
+            took = served.server.joined
+            served.server.joined = lambda connection: connection.transport.abort()
+            await until(lambda: not served.head.laser_on(), 60.0)
+            assert asyncio.get_running_loop().time() - began < served.server.door.dead_man + 2.0
+            assert not served.head.enabled(0)
+            assert not served.head.enabled(1)
+            await asyncio.sleep(3600.0)
+            assert not served.head.laser_on()
+            served.server.joined = took
+            await until(lambda: link.ready, 60.0)
+            await until(served.head.laser_on, 5.0)
+
+    run(story)

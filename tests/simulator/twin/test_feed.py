@@ -8,6 +8,7 @@ import pytest
 from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND
 from catseye.ranger.line import TICK_NS, parse_reply
+from catseye.ranger.server import LOOPBACK
 from catseye.records.night.live import LiveWeather
 from catseye.simulator.clock.virtual_time import MemoryNetwork, VirtualClock, VirtualLoop
 from catseye.simulator.twin import feed as site_feed
@@ -62,14 +63,14 @@ def run(story, **options):
 
     async def whole():
         feed = SiteFeed("gbt", ["WX1", "WX2"], world, VirtualClock(loop, START), network=network, **options)
-        await feed.start("h", 5250)
+        await feed.start(LOOPBACK, 5250)
         serving = asyncio.create_task(feed.serve())
         await story(feed, world, network)
         serving.cancel()
         await asyncio.gather(serving, return_exceptions=True)
         await feed.stop()
         with pytest.raises(ConnectionRefusedError):
-            await network.connect(Listening, "h", 5250)
+            await network.connect(Listening, LOOPBACK, 5250)
 
     try:
         loop.run_until_complete(whole())
@@ -80,7 +81,7 @@ def run(story, **options):
 def test_each_line_is_the_truth_of_its_stamp():
     async def story(feed, world, network):
         await asyncio.sleep(0.01)
-        client = await network.connect(Listening, "h", 5250)
+        client = await network.connect(Listening, LOOPBACK, 5250)
         await asyncio.sleep(60.0)
         hello, connected = client.lines("HELLO"), client.lines("CONNECT")
         assert [r.text for r in hello] == ["This is SITE gbt ver. 1"]
@@ -110,7 +111,7 @@ def test_each_line_is_the_truth_of_its_stamp():
 def test_who_comes_later_hears_the_weather_of_that_moment():
     async def story(feed, world, network):
         await asyncio.sleep(13.0)
-        client = await network.connect(Listening, "h", 5250)
+        client = await network.connect(Listening, LOOPBACK, 5250)
         await asyncio.sleep(0.0)
         assert [r.values[0] for r in client.lines("WX")] == ["WX1", "WX2"]
         assert world.seconds(client.lines("WX")[0].ticks * TICK_NS) == pytest.approx(13.0, abs=1e-3)
@@ -121,7 +122,7 @@ def test_who_comes_later_hears_the_weather_of_that_moment():
 @pytest.mark.parametrize("word", ["HLP", "help"])
 def test_a_person_who_asks_is_told_what_comes_and_how_to_leave(word):
     async def story(feed, world, network):
-        client = await network.connect(Listening, "h", 5250)
+        client = await network.connect(Listening, LOOPBACK, 5250)
         client.transport.write(f"{word}\r\n".encode())
         await asyncio.sleep(0.1)
         (told,) = client.lines(word.upper())
@@ -139,7 +140,7 @@ def test_a_silent_telescope_and_a_silent_station_have_no_lines():
     async def story(feed, world, network):
         world.faults.add(Fault("silent-telescope", "telescope", 2.0, 5.0))
         world.faults.add(Fault("silent-station", "WX1", 15.0, 35.0))
-        client = await network.connect(Listening, "h", 5250)
+        client = await network.connect(Listening, LOOPBACK, 5250)
         await asyncio.sleep(45.0)
         times = [world.seconds(r.ticks * TICK_NS) for r in client.lines("TEL")]
         assert not [t for t in times if 2.0 <= t < 5.0]
@@ -156,7 +157,7 @@ def test_who_does_not_read_is_cut_off_alone(monkeypatch):
     monkeypatch.setattr(site_feed, "MOST_UNSENT", most)
 
     async def story(feed, world, network):
-        slow, quick, leaving = [await network.connect(Listening, "h", 5250) for _ in range(3)]
+        slow, quick, leaving = [await network.connect(Listening, LOOPBACK, 5250) for _ in range(3)]
         slow.transport.pause_reading()
         leaving.transport.write(b"what\r\n" * 100 + b"x" * 5000 + b"\nBye\r\n")
         await asyncio.sleep(1.0)
@@ -175,8 +176,8 @@ def test_who_does_not_read_is_cut_off_alone(monkeypatch):
 def test_the_32_clients_hear_the_same_and_a_33rd_is_turned_away():
     async def story(feed, world, network):
         await asyncio.sleep(0.05)
-        clients = [await network.connect(Listening, "h", 5250) for _ in range(MOST_CLIENTS)]
-        turned_away = await network.connect(Listening, "h", 5250)
+        clients = [await network.connect(Listening, LOOPBACK, 5250) for _ in range(MOST_CLIENTS)]
+        turned_away = await network.connect(Listening, LOOPBACK, 5250)
         await asyncio.sleep(30.0)
         assert "CONNECT 0, 32 clients" in turned_away.heard.decode()
         assert turned_away.lost
@@ -188,8 +189,8 @@ def test_the_32_clients_hear_the_same_and_a_33rd_is_turned_away():
 
 def test_a_port_that_is_taken_and_a_weather_without_pause_are_refused():
     async def story(feed, world, network):
-        with pytest.raises(InputError, match="feed: h port 5250 cannot be had"):
-            await SiteFeed("gbt", [], world, feed.clock, network=network).start("h", 5250)
+        with pytest.raises(InputError, match=r"feed: 127\.0\.0\.1 port 5250 cannot be had"):
+            await SiteFeed("gbt", [], world, feed.clock, network=network).start(LOOPBACK, 5250)
 
     run(story)
     with pytest.raises(InputError, match="weather every 0 s"):

@@ -8,6 +8,7 @@ import pytest
 
 from catseye.errors import InputError
 from catseye.ranger.client import ZyClient
+from catseye.ranger.door import Door
 from catseye.ranger.line import format_request
 from catseye.ranger.status import StatusWord
 from catseye.records.site.folder import read_site
@@ -30,6 +31,9 @@ def few():
     return replace(site, targets={n: site.targets[n] for n in names if n in site.targets}, benchmarks=())
 
 
+OPEN = Door(lease=False)
+
+
 class Running:
     """A twin site in virtual time."""
 
@@ -45,6 +49,7 @@ class Running:
             world_faults=self.board,
             seconds=self.loop.time,
             network=self.network,
+            door=OPEN,
             **options,
         )
 
@@ -320,6 +325,7 @@ def test_it_serves_on_real_sockets(few):
             world_faults=board,
             seconds=lambda: (clock.now_ns() - begin) * 1e-9,
             addresses=0,
+            door=OPEN,
         )
         await site.start()
         serving = asyncio.create_task(site.serve())

@@ -165,10 +165,11 @@ def mjd_start(text: str | None, usual: float | None = None, *, offset: float = 0
 
 def orders_of(*, drop: list[str] | None, **given: Any) -> "Orders":
     """Of a coordinator, from the options; one that was not given is as `Orders` has it."""
+    from catseye.ranger.door import key_of
     from catseye.service.coordinator import Orders
 
     names = tuple(name.upper() for name in drop or ())
-    return Orders(drop=names, **{key: value for key, value in given.items() if value is not None})
+    return Orders(drop=names, key=key_of(), **{key: value for key, value in given.items() if value is not None})
 
 
 def leave(run: "LiveRun[Any]", *, terminated: int = 143) -> None:

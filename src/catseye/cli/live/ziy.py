@@ -63,6 +63,7 @@ def run_coordinator(
     from catseye.service.coordinator import LiveCoordinator
     from catseye.service.logs import LiveLog
     from catseye.service.running import LiveRun
+    from catseye.service.watchdog import live
     from catseye.simulator.clock.world_clock import SystemClock
 
     clock = SystemClock(offset)
@@ -85,7 +86,7 @@ def run_coordinator(
         def started() -> None:
             log.tell("coordinator", "listens", f"its clients connect to {orders.host} port {running.server.port}")
 
-        parts = [asyncio.ensure_future(running.run(started))]
+        parts = [asyncio.ensure_future(running.run(started)), asyncio.ensure_future(live())]
         if beside is not None:
             parts.append(asyncio.ensure_future(beside(log)))
         try:

@@ -92,11 +92,14 @@ def zy(  # noqa: PLR0913 - its options are its command line
     names = _named(records, rangers or [])
     if ports is not None and len(names) != 1:
         raise InputError(f"--ports: {len(names)} rangers cannot share two ports (expected one ranger, or --port-base)")
+    from catseye.ranger.door import Door, key_of
     from catseye.service.rangers import RangersServed, ServedAt, heads_of
     from catseye.service.running import LiveRun
     from catseye.simulator.clock.world_clock import SystemClock
 
-    at = ServedAt("loopback" if loopback else port_base, host, None if ports is None else _pair(ports))
+    at = ServedAt(
+        "loopback" if loopback else port_base, host, None if ports is None else _pair(ports), Door(key=key_of())
+    )
     if head is not None:
         served = RangersServed(records, heads_of(head, names), clock=SystemClock(), at=at, files=files)
     else:
@@ -138,7 +141,10 @@ async def _served(served: "RangersServed", listening: "Callable[[Listening], Non
     import asyncio
     import os
 
+    from catseye.service.watchdog import live
+
     work = asyncio.ensure_future(served.serve(listening))
+    living = None if with_stdin else asyncio.ensure_future(live())  # who keeps a child speaks for it
     if with_stdin:
         loop = asyncio.get_running_loop()
 
@@ -152,6 +158,8 @@ async def _served(served: "RangersServed", listening: "Callable[[Listening], Non
         await work
     except asyncio.CancelledError:
         work.cancel()
+        if living is not None:
+            living.cancel()
         await asyncio.gather(work, return_exceptions=True)
         task = asyncio.current_task()
         if task is not None and task.cancelling():

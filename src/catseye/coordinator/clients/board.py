@@ -25,6 +25,7 @@ HELP = {
     "DROP": ("DROP ranger", "leave a ranger out; it stays connected"),
     "TAKE": ("TAKE ranger", "use a ranger again"),
     "STREAM": ("STREAM ranger, target | STREAM ranger", "one target again and again; without a target it ends"),
+    "LEASE": ("LEASE | LEASE name | LEASE none", "who may command here; take it by a name; give it back"),
     "VER": ("VER", "name and version; sent behind a command of many lines it ends them"),
     "HLP": ("HLP | HLP command", "commands, or one command's forms; HELP is the same"),
     "BYE": ("BYE", "close this connection"),

@@ -6,6 +6,7 @@ unread), 1 MiB that it does not take (then it is cut off), 64 clients. docs/form
 
 import asyncio
 import logging
+import re
 from collections.abc import Iterable
 from functools import partial
 
@@ -15,6 +16,7 @@ from catseye.coordinator.journal.entries import Entry
 from catseye.coordinator.parts import ticks_now
 from catseye.coordinator.ziy import Coordinator
 from catseye.errors import CatseyeError, InputError
+from catseye.ranger.door import USUAL_DOOR, Door, notice_death, opens, refuse_open
 from catseye.ranger.first_line import BLANK, opening_of, peer_of
 from catseye.ranger.line import LONGEST_REQUEST, Request, parse_request, stamp_text
 from catseye.ranger.network import ConnectionMaker, Listener, Sockets
@@ -29,7 +31,14 @@ MOST_CLIENTS = 64
 AGAIN = 0.1  # s until a client that came too fast is read on
 KINDS = {"SHOT": "RANGES", "EPOCH": "EPOCHS", "EVENT": "EVENTS", "POSTURE": "POSTURE", "WEATHER": "WEATHER"}
 PUSHED = {sampler: kind for kind, sampler in KINDS.items()}
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,15}")
+SETTING = ("SET", "PREPARE", "START", "DROP", "TAKE", "STREAM")
 LOG = logging.getLogger(__name__)
+
+
+def commands(request: Request) -> bool:
+    """Whether a request is more than a question: those need the lease."""
+    return request.command in SETTING or (request.command == "MODE" and bool(request.parameters))
 
 
 class Client(asyncio.Protocol):
@@ -41,12 +50,15 @@ class Client(asyncio.Protocol):
         self.wants: set[str] = set()
         self._unread = bytearray()
         self._opened = False  # its first line was one of the language
+        self.admitted = server.door.key is None  # it may hear
+        self.name = ""  # under which it has the lease
         self._left, self._since = MOST_AT_ONCE, asyncio.get_running_loop().time()
         self._timer: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
         self.transport = transport
+        notice_death(transport)
         self.server.joined(self)
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -75,7 +87,22 @@ class Client(asyncio.Protocol):
             else:
                 self.tell(0, f"LINE 0, {plain(problem)}")
                 self.transport.close()
-        return self._opened
+        elif self._opened and not self.admitted:
+            self._admit()
+        return self._opened and self.admitted
+
+    def _admit(self) -> None:
+        """Take the first line, which must be the site's key; who has it hears the greeting."""
+        line, _, rest = bytes(self._unread.lstrip(BLANK)).partition(b"\n")
+        self._unread = bytearray(rest)
+        self.admitted = opens(line, self.server.door.key or "")
+        if self.admitted:
+            self.tell(0, "KEY 1")
+            self.server.greet(self)
+        elif self.transport is not None:
+            LOG.warning("ZIY: port %d: %s has not the site's key: closed", self.server.port, peer_of(self.transport))
+            self.tell(0, "LINE 0, the site's key is expected first (KEY and the key)")
+            self.transport.close()
 
     def _read_on(self) -> None:
         """Answer whole lines as far as the rate allows; otherwise stop reading from the peer for a while."""
@@ -133,8 +160,10 @@ class ZiyServer:
         port: int = PORT,
         *,
         network: ConnectionMaker | None = None,
+        door: Door = USUAL_DOOR,
     ):
-        self.coordinator, self.host, self.port = coordinator, host, port
+        self.coordinator, self.host, self.port, self.door = coordinator, host, port, door
+        self.holder: Client | None = None  # who may set and command
         self.board = Board(coordinator)
         self.clients: set[Client] = set()
         self._network: ConnectionMaker = network or Sockets()
@@ -142,7 +171,8 @@ class ZiyServer:
         self._keeping: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
-        """Listen. Raises InputError where the port cannot be had."""
+        """Listen. Raises InputError where the port cannot be had, or would be open to others without a key."""
+        refuse_open("ZIY", self.host, self.door.key)
         try:
             self._listener = await self._network.serve(partial(Client, self), self.host, self.port)
         except OSError as problem:
@@ -178,12 +208,19 @@ class ZiyServer:
                 client.transport.close()
             return
         self.clients.add(client)
+        if client.admitted:
+            self.greet(client)
+
+    def greet(self, client: Client) -> None:
+        """Who this is, and that the client is connected."""
         client.tell(0, f"HELLO This is ZIY {plain(self.coordinator.site.site.campaign.name)} ver. {VERSION}")
         client.tell(0, f"CONNECT 1, {self.port}")
 
     def left(self, client: Client) -> None:
-        """Forget a connection that is over."""
+        """Forget a connection that is over; its lease goes with it."""
         self.clients.discard(client)
+        if self.holder is client:
+            self._lease(None, "")
 
     def publish(self, entry: Entry) -> None:
         """Something is durable: kept in the samplers, and pushed to those who want it."""
@@ -212,6 +249,12 @@ class ZiyServer:
         try:
             if request.ticks is not None:
                 raise InputError("commands here take no stamp (expected TID and command alone)")
+            if self.door.lease and self.holder is not client and commands(request):
+                who = "nobody has it" if self.holder is None else f"{self.holder.name} has it"
+                raise InputError(f"{request.command} needs the lease: {who} (expected LEASE and a name first)")
+            if request.command == "LEASE":
+                client.tell(request.tid, f"LEASE 1, {self._leased(client, request)}")
+                return
             rows = self._subscribed(client, request) if request.command == "SUBSCRIBE" else self.board.rows(request)
         except CatseyeError as problem:
             client.tell(request.tid, f"{request.command} 0, {plain(str(problem))}")
@@ -221,6 +264,28 @@ class ZiyServer:
             return
         for row in rows:
             client.tell(request.tid, ", ".join([f"{request.command} 1", *row]))
+
+    def _leased(self, client: Client, request: Request) -> str:
+        """LEASE asks who has it, LEASE name takes it from whoever has, LEASE none gives it back; who has it then."""
+        if len(request.parameters) > 1 or not all(NAME.fullmatch(word) for word in request.parameters):
+            raise InputError("that is no name (expected LEASE, or LEASE and a letter with up to 15 letters and digits)")
+        if request.parameters:
+            name = request.parameters[0]
+            if name.lower() == "none" and self.holder is not client:
+                raise InputError("it is not yours to give back (expected LEASE to see whose)")
+            self._lease(*((None, "") if name.lower() == "none" else (client, name)))
+        return "none" if self.holder is None else self.holder.name
+
+    def _lease(self, client: Client | None, name: str) -> None:
+        """Another one has the lease now: told to all clients, and in the journal."""
+        before = "nobody" if self.holder is None else self.holder.name
+        self.holder = client
+        if client is not None:
+            client.name = name
+        self.coordinator.leased(before, name or "nobody")
+        for each in self.clients:
+            if each.admitted:
+                each.tell(0, f"LEASE 1, {name or 'none'}")
 
     def _subscribed(self, client: Client, request: Request) -> Iterable[tuple[str, ...]]:
         """SUBSCRIBE [what ...], commas or blanks between: the three usual kinds where none is named; NONE ends it."""

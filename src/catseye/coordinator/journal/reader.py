@@ -130,7 +130,7 @@ class JournalReader:
     def _own_events(
         self, run: int, after: int, until: int | None, *, kinds: Sequence[Kind] | None, buffers: bool
     ) -> Iterator[tuple[int, Entry]]:
-        """Those in this file."""
+        """`events`, of those in this file alone."""
         tables = [table for table in EVENTS if kinds is None or table.name in kinds]
         last = self._own_last(run) if until is None else min(until, self._own_last(run))
         stops = [seq for seq in sorted(self.left_out.get(run, ())) if after < seq <= last]

@@ -14,6 +14,7 @@ network-slow     ranger              every line is late                         
 lying-station    station             its thermometer reads too high                          deg C
 silent-station   station             it says nothing
 silent-telescope telescope           no posture is told
+open-interlock   ranger              hardware forbids light and moves
 dew              target or *         the return is weak                                      factor of amplitude
 """
 
@@ -37,6 +38,7 @@ Kind = Literal[
     "lying-station",
     "silent-station",
     "silent-telescope",
+    "open-interlock",
     "dew",
 ]
 SIZES: dict[str, float] = {  # where none is given

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from catseye.constants import DEGREE
 from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import PER_SECOND
+from catseye.ranger.door import USUAL_DOOR, Door, notice_death, opens, refuse_open
 from catseye.ranger.first_line import BLANK, opening_of, peer_of
 from catseye.ranger.line import LONGEST_REQUEST, TICK_NS, Reply, format_reply, nanoseconds_to_ticks
 from catseye.ranger.network import ConnectionMaker, Listener, Sockets
@@ -70,18 +71,21 @@ class SiteFeed:
         *,
         weather_every: float = WEATHER_EVERY,
         network: ConnectionMaker | None = None,
+        door: Door = USUAL_DOOR,
     ):
         if weather_every <= 0.0:
             raise InputError(f"weather every {weather_every:g} s (expected more than 0)")
         self.name, self.stations, self.world, self.clock = name, tuple(stations), world, clock
         self._network: ConnectionMaker = network or Sockets()
+        self.door = door
         self._weather_ns = round(weather_every * PER_SECOND)
         self._listener: Listener | None = None
         self.clients: set[FeedConnection] = set()
         self.port = 0
 
     async def start(self, host: str, port: int) -> None:
-        """Listen. Raises InputError where the port cannot be had."""
+        """Listen. Raises InputError where the port cannot be had, or would be open to others without a key."""
+        refuse_open("feed", host, self.door.key)
         try:
             self._listener = await self._network.serve(self._joining, host, port)
         except OSError as problem:
@@ -129,7 +133,8 @@ class SiteFeed:
 
     def _send(self, data: bytes) -> None:
         for client in tuple(self.clients):
-            client.write(data)
+            if client.admitted:
+                client.write(data)
 
     def _weather(self, ticks: int) -> list[bytes]:
         lines = []
@@ -160,6 +165,7 @@ class FeedConnection(asyncio.Protocol):
         self._transport: asyncio.Transport | None = None
         self._unread = b""
         self._opened = False  # its first line was one of the language
+        self.admitted = feed.door.key is None  # it may hear
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
@@ -170,8 +176,10 @@ class FeedConnection(asyncio.Protocol):
             transport.write(_line(Reply("CONNECT", False, (text,), 0, ticks)))
             transport.close()
             return
+        notice_death(transport)
         self._feed.clients.add(self)
-        self.write(self._feed.greeting())
+        if self.admitted:
+            self.write(self._feed.greeting())
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._feed.clients.discard(self)
@@ -181,6 +189,8 @@ class FeedConnection(asyncio.Protocol):
             return
         if not self._opened and not self._opens(data):
             return
+        if not self.admitted:
+            data = self._admit(data)
         *lines, rest = (self._unread + data).split(b"\n")
         words = [line.strip().upper().decode("ascii", "replace") for line in lines]
         for word in words:
@@ -206,6 +216,20 @@ class FeedConnection(asyncio.Protocol):
                 self.write(_line(Reply("LINE", False, (text,), 0, ticks)))
                 self.close()
         return self._opened
+
+    def _admit(self, data: bytes) -> bytes:
+        """Take the first line, which must be the site's key; what came behind it."""
+        line, _, rest = (self._unread + data).lstrip(BLANK).partition(b"\n")
+        self._unread = b""
+        self.admitted = opens(line, self._feed.door.key or "")
+        ticks = nanoseconds_to_ticks(self._feed.clock.now_ns())
+        if self.admitted:
+            self.write(_line(Reply("KEY", True, (), 0, ticks)) + self._feed.greeting())
+            return rest
+        LOG.warning("feed: port %d: %s has not the site's key: closed", self._feed.port, peer_of(self._transport))
+        self.write(_line(Reply("LINE", False, ("the site's key is expected first (KEY and the key)",), 0, ticks)))
+        self.close()
+        return b""
 
     def write(self, data: bytes) -> None:
         """Send; who does not take it is cut off."""

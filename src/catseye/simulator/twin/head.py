@@ -262,6 +262,13 @@ class TwinHead:
         """The laser's power: counts from the next buffer on."""
         self._laser = on
 
+    def interlock(self) -> str:
+        """Why light and moves are forbidden by hardware; empty where they are not."""
+        if not self._faults.faults:
+            return ""
+        now = self._world.seconds(self._clock.now_ns())
+        return "a door stands open" if self._faults.active("open-interlock", self.ranger, at=now) else ""
+
     def laser_on(self) -> bool:
         """Whether the laser shines."""
         return self._laser

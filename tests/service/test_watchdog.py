@@ -1,0 +1,69 @@
+"""Signs of life to a service manager."""
+
+import asyncio
+import os
+import socket
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from catseye.service.watchdog import live, notify, watchdog_seconds
+
+
+@pytest.fixture
+def manager():
+    """A socket as systemd's, and the environment that names it."""
+    with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock:
+        place = str(Path(folder) / "notify")
+        sock.bind(place)
+        sock.setblocking(False)
+        yield sock, {"NOTIFY_SOCKET": place}
+
+
+def told(sock):
+    found = []
+    while True:
+        try:
+            found.append(sock.recv(100).decode())
+        except BlockingIOError:
+            return found
+
+
+def test_without_a_manager_nothing_is_told():
+    assert not notify("READY=1", {})
+    assert not notify("READY=1", {"NOTIFY_SOCKET": "/none/such"})
+    assert watchdog_seconds({}) is None
+    assert watchdog_seconds({"WATCHDOG_USEC": "0"}) is None
+    assert watchdog_seconds({"WATCHDOG_USEC": "3000000", "WATCHDOG_PID": "1"}) is None
+    assert watchdog_seconds({"WATCHDOG_USEC": "3000000", "WATCHDOG_PID": str(os.getpid())}) == 3.0
+
+
+def test_the_loop_gives_signs_of_life_more_often_than_asked(manager):
+    sock, environment = manager
+
+    async def story():
+        task = asyncio.create_task(live(environment | {"WATCHDOG_USEC": "100000"}))
+        await asyncio.sleep(0.3)
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+    asyncio.run(story())
+    heard = told(sock)
+    assert heard[0] == "READY=1"
+    assert heard[-1] == "STOPPING=1"
+    assert len([text for text in heard if text == "WATCHDOG=1"]) >= 4
+
+
+def test_without_a_watchdog_it_is_ready_and_that_is_all(manager):
+    sock, environment = manager
+
+    async def story():
+        task = asyncio.create_task(live(environment))
+        await asyncio.sleep(0.05)
+        assert told(sock) == ["READY=1"]
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+    asyncio.run(story())
+    assert told(sock) == ["STOPPING=1"]
