@@ -708,4 +708,4 @@ def test_a_coordinator_that_is_cut_off_for_an_hour_leaves_no_laser_on():
             await until(lambda: link.ready, 60.0)
             await until(served.head.laser_on, 5.0)
 
-    run(story)
+    run(story, 4000.0)

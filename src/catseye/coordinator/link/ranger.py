@@ -260,7 +260,10 @@ class RangerLink:
             if self.connected:
                 kind = problem.kind if isinstance(problem, Refused) else "not-initialised"
                 text = f"{self.ranger}: {problem}; again in {self._patience:g} s"
-                self._event_log.tell(kind, text, "warning")
+                if kind == "leased":
+                    self._event_log.standing(kind, text)
+                else:
+                    self._event_log.tell(kind, text, "warning")
                 await first_of(client.closed, self._doubt, self._patience)
                 self._patience = min(2.0 * self._patience, LONGEST_PATIENCE)
             return
