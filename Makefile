@@ -32,7 +32,7 @@ test: style  ## check, and the tests: types beside them, as a core is idle now a
 	$(MAKE) --no-print-directory --jobs 2 types tests
 
 test-all: style  ## the same with the long scatter and fault runs
-	$(MAKE) --no-print-directory --jobs 2 types tests TESTS="-m 'slow or not slow' --hypothesis-profile=explore"
+	$(MAKE) --no-print-directory --jobs 2 types tests TESTS="-m 'slow or not slow' --hypothesis-profile=explore --timeout=7200"
 
 tests: setup
 	$(PYTEST) $(TESTS)

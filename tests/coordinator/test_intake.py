@@ -7,8 +7,11 @@ import pytest
 
 from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.intake import Intake
+from catseye.coordinator.journal.entries import AnsweredShot
 from catseye.coordinator.journal.protocol import NotDurable
-from catseye.records.night.live import Happening, LiveWeather
+from catseye.coordinator.parts import TICKS_PER_SECOND, ticks_now
+from catseye.errors import InputError
+from catseye.records.night.live import Happening, LiveShot, LiveWeather
 from catseye.simulator.clock.world_clock import ManualClock
 
 CLOCK = ManualClock(60_635.125)
@@ -95,5 +98,33 @@ def test_a_mistake_while_what_came_is_handled_ends_the_coordinator_and_is_not_ju
         intake.take(LiveWeather("WX1", 1, 10.0, 930.0, 50.0))
         with pytest.raises(ZeroDivisionError, match="a mistake in the reduction"):
             await asyncio.wait_for(intake.broken, 5.0)
+
+    asyncio.run(story())
+
+
+@pytest.mark.parametrize("off", [-3600.0, -130.0, 1.0, 10.0, 3600.0])
+def test_a_shot_stamped_long_ago_or_of_the_future_is_not_used_and_told_and_spoils_none_after_it(off):
+    """A stamp an hour ahead must not make all that come after it stamps before the last one's."""
+
+    class Refusing:
+        def shot(self, shot):
+            raise InputError("no such line")
+
+    def shot(seconds):
+        ticks = ticks_now(CLOCK) + round(seconds * TICKS_PER_SECOND)
+        return LiveShot("ZY101", "TR01-B", ticks, 128, 64, 1000, 1e-4, None)
+
+    async def story():
+        journal, told, judged = SlowJournal(), [], []
+        log = EventLog("journal", CLOCK, told.append)
+        intake = Intake(Refusing(), journal, judged=judged.append, publish=None, event_log=log, clock=CLOCK)
+        for seconds in (-0.3, off, -0.1):
+            intake.take(shot(seconds))
+        intake.flush()
+        assert [answered.shot.ticks for answered in judged] == [shot(-0.3).ticks, shot(-0.1).ticks]
+        assert [answered.shot.number for answered in judged] == [1, 2]
+        assert all(isinstance(given, AnsweredShot) for given in journal.given)
+        assert [(said.kind, said.severity) for said in told] == [("stamp-off", "alarm")]
+        assert f"ZY101: a shot's stamp is {off:+.1f} s from now" in told[0].text
 
     asyncio.run(story())

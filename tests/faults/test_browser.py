@@ -74,7 +74,11 @@ async def browse(url, profile, done):
         return
     finally:
         browser.send_signal(signal.SIGTERM)
-        await browser.wait()
+        try:
+            await asyncio.wait_for(browser.wait(), 10.0)
+        except TimeoutError:
+            browser.kill()
+            await browser.wait()
 
 
 @pytest.mark.skipif(BROWSER is None, reason="browser tests: no chromium (expected Debian's package chromium)")

@@ -829,3 +829,38 @@ def test_help_is_hlp_at_a_ranger_too():
     assert same.values == listed.values
     assert {"HLP", "HELP", "CMEAS"} <= set(listed.values[0].split())
     assert told.say("HELP ABV")[-1].values == told.say("HLP ABV")[-1].values
+
+
+# Commands with a lease -----------------------------------------------------------------------------------------------
+
+
+def at_once(told, *lines, client=1):
+    """What is answered to lines that come together, as from a pipe."""
+    heard = [out for line in lines for out in told.ranger.receive(client, line)]
+    return [(out.reply.command, out.reply.ok, out.client) for out in heard + told.turns(20)]
+
+
+def test_lines_behind_a_lease_that_come_with_it_are_judged_when_their_turn_comes():
+    told = ready()
+    told.ranger.guarded = True
+    said = at_once(told, "LEASE anna", "CYC 64", "CYC")
+    assert said == [("LEASE", True, None), ("CYC", True, None), ("CYC", True, None)]
+    said = at_once(told, "LEASE none", "CYC 32")
+    assert said == [("LEASE", True, None), ("CYC", False, 1)]
+    assert at_once(told, "CYC 32", "LEASE ben", client=2) == [("CYC", False, 2), ("LEASE", True, None)]
+    assert at_once(told, "LEASE none", "CYC 32", client=1) == [("LEASE", False, None), ("CYC", False, 1)]
+    assert told.one("CYC").text == "64"
+
+
+def test_what_was_scheduled_by_one_who_has_the_lease_no_more_is_refused_when_it_is_due():
+    told = ready()
+    told.ranger.guarded = True
+    soon = stamp_text(told.ranger.now_ticks() + 20_000)
+    assert at_once(told, "LEASE anna", f"AT {soon}, 1, 0, CYC 64")[1] == ("AT", True, None)
+    at_once(told, "LEASE ben", client=2)
+    said = []
+    for _ in range(2000):
+        said += [out.reply for out in told.turns() if out.reply.command == "CYC"]
+    assert [(reply.ok, reply.text) for reply in said] == [
+        (False, "CYC needs the lease: ben has it (expected LEASE and a name first)")
+    ]

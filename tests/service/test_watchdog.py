@@ -41,18 +41,28 @@ def test_without_a_manager_nothing_is_told():
 
 def test_the_loop_gives_signs_of_life_more_often_than_asked(manager):
     sock, environment = manager
+    heard = []
 
     async def story():
         task = asyncio.create_task(live(environment | {"WATCHDOG_USEC": "100000"}))
-        await asyncio.sleep(0.3)
+        for _ in range(30):
+            await asyncio.sleep(0.01)
+            heard.extend(told(sock))
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
+        heard.extend(told(sock))
 
     asyncio.run(story())
-    heard = told(sock)
     assert heard[0] == "READY=1"
     assert heard[-1] == "STOPPING=1"
     assert len([text for text in heard if text == "WATCHDOG=1"]) >= 4
+
+
+def test_a_manager_that_does_not_read_is_not_waited_for(manager):
+    _, environment = manager
+    given = [notify("WATCHDOG=1", environment) for _ in range(2000)]
+    assert given[0]
+    assert not given[-1]  # its queue is full
 
 
 def test_without_a_watchdog_it_is_ready_and_that_is_all(manager):

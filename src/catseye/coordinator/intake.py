@@ -14,6 +14,7 @@ from functools import partial
 from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Document, Entry, EpochSolution, SentCommand
 from catseye.coordinator.journal.protocol import JournalWriter, NotDurable
+from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, ticks_now
 from catseye.errors import CatseyeError, InputError
 from catseye.records.night.live import Happening, LivePosture, LiveShot, LiveWeather
 from catseye.reduction.epoch.reason import ShotStatus
@@ -21,6 +22,7 @@ from catseye.reduction.live.epoch import Epoch
 from catseye.reduction.live.live import EpochAnswer, EpochJob, Live
 
 TOGETHER = 0.001  # s in which what arrives is handled at once: the journal's commit gathers more
+OLDEST, FUTURE = 120.0, 0.5  # s that a shot's stamp may be from now: it comes behind its samples
 RETRY = 0.5  # s between two looks whether the journal is back
 MOST_HELD = 2000  # happenings kept while the journal is away
 Solver = Callable[[EpochJob], Awaitable[Epoch | str]]  # the epoch, or why there is none
@@ -35,6 +37,7 @@ class Intake:
     event_log  says what goes wrong with the journal; that itself is journalled when it can be
     doubted    called with each reading of the weather and why the reduction does not believe it, "" where it does
     solver     solves an epoch beside the loop; None: in a thread
+    clock      UTC: a shot's stamp from now on, or long ago, is not believed; None: all are
 
     `broken` is done when handling what came failed by a mistake of ours: nothing more is measured then.
     """
@@ -49,7 +52,9 @@ class Intake:
         event_log: EventLog,
         doubted: Callable[[LiveWeather, str], None] = lambda read, why: None,
         solver: Solver | None = None,
+        clock: Clock | None = None,
     ):
+        self._clock = clock
         self._solver = solver or _in_a_thread
         self.broken: asyncio.Future[None] | None = None
         self._live, self._journal, self._event_log = live, journal, event_log
@@ -140,6 +145,12 @@ class Intake:
         return item
 
     def _answered(self, shot: LiveShot) -> AnsweredShot | None:
+        if self._clock is not None:
+            off = (shot.ticks - ticks_now(self._clock)) / TICKS_PER_SECOND
+            if not -OLDEST <= off <= FUTURE:
+                text = f"{shot.ranger}: a shot's stamp is {off:+.1f} s from now: its clock, or ours, is wrong: not used"
+                self._event_log.tell("stamp-off", text, "alarm", about=shot.ranger, offset_s=off)
+                return None
         last = self._last.get(shot.ranger, -1)
         if shot.ticks <= last:  # a clock that was set back; a journal has each shot once
             text = f"{shot.ranger}: a shot's stamp is {last - shot.ticks} ticks before the last one's: not used"

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.feed import FeedClient, FeedSettings, MotionScript, play
 from catseye.coordinator.firing import Firing
+from catseye.coordinator.guard.clocks import HostClock
 from catseye.coordinator.guard.watchdog import BeamWatchdog
 from catseye.coordinator.intake import Intake, Solver
 from catseye.coordinator.journal.entries import Entry
@@ -113,9 +114,13 @@ class Coordinator:
             publish=self._publish,
             event_log=EventLog("journal", clock, self.tell),
             doubted=self._doubted,
+            clock=clock,
             solver=parts.solver,
         )
         self.links = self._linked(addresses, commands, environment)
+        self.host_clock = HostClock(self.links, clock, EventLog("coordinator", clock, self.tell))
+        for link in self.links.values():
+            link.host_believed = lambda: self.host_clock.believed
         self.firing = Firing(
             site,
             self.links,
@@ -123,7 +128,7 @@ class Coordinator:
             live=parts.live,
             event_log=self._event_log,
             clock=clock,
-            allowed=lambda: self.mode == "active" and self.intake.trouble is None,
+            allowed=lambda: self.mode == "active" and self.intake.trouble is None and self.host_clock.believed,
             telescope_known=lambda: self.telescope_known,
         )
         self._script = feed if isinstance(feed, MotionScript) else None
@@ -186,6 +191,7 @@ class Coordinator:
         self._spawn(
             BeamWatchdog(self.links, self._guard, clock=self.clock, event_log=self._event_log).run(), "watchdog"
         )
+        self._spawn(self.host_clock.run(), "clocks")
         self._spawn(self._rounds(), "rounds")
         self.firing.broken, self.intake.broken = (asyncio.get_running_loop().create_future() for _ in range(2))
         try:
@@ -225,7 +231,7 @@ class Coordinator:
         while True:
             self.intake.flush()  # the planner shall know how the last shots were
             now = ticks_now(self.clock)
-            stopped = self.mode != "active" or self.intake.trouble is not None
+            stopped = self.mode != "active" or self.intake.trouble is not None or not self.host_clock.believed
             planned = None if stopped else self._planned(now)
             if planned is not None:
                 self.round_number += 1

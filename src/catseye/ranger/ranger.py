@@ -90,7 +90,7 @@ class Ranger(RangerState):
         except InputError as problem:
             return [Outgoing(Reply("LINE", False, (plain_text(str(problem)),), 0, self.now_ticks()), client)]
         stranger = self._stranger(client, request)
-        if stranger is not None:
+        if stranger is not None and (client, "LEASE") not in ((each, queued.command) for each, queued in self._waiting):
             return [replace(self._refused(request, stranger), client=client)]
         self._waiting.append((client, request))
         return []
@@ -155,7 +155,8 @@ class Ranger(RangerState):
             outgoing += self.make_safe(f"the interlock is open ({why})", free=False)
         if self.lease != self._told_lease:
             self._told_lease = self.lease
-            outgoing.append(Outgoing(self._reply(Request("LEASE"), True, holder_of(self))))
+            if not any(each.reply.command == "LEASE" for each in outgoing):  # which all heard
+                outgoing.append(Outgoing(self._reply(Request("LEASE"), True, holder_of(self))))
         outgoing += self._updates()
         word = self.status()
         if word != self._word:
@@ -208,6 +209,9 @@ class Ranger(RangerState):
     # Inside ---------------------------------------------------------------------------------------------------------
 
     def _begin(self, client: int, request: Request) -> list[Outgoing]:
+        stranger = self._stranger(client, request)
+        if stranger is not None:  # behind a LEASE that was refused, or scheduled by one who has it no more
+            return [replace(self._refused(request, stranger), client=client)]
         if request.command != "AT" and request.command not in COMMANDS:
             unknown = Reply("UNKNOWN", None, (f"command {request.command}",), request.tid, self.now_ticks())
             return [Outgoing(unknown)]

@@ -10,7 +10,9 @@ SHARE = 0.3  # of the watchdog's time between two signs of life
 
 
 def notify(text: str, environment: Mapping[str, str] = os.environ) -> bool:
-    """Tell the service manager, as sd_notify(3) has it; whether there is one that listens.
+    """Tell the service manager, as sd_notify(3) has it; whether it was told.
+
+    One that does not read its socket is not waited for: the loop has other things to do.
 
     text   "READY=1", "WATCHDOG=1", "STOPPING=1"
     """
@@ -19,6 +21,7 @@ def notify(text: str, environment: Mapping[str, str] = os.environ) -> bool:
         return False
     address = f"\0{place[1:]}" if place.startswith("@") else place
     with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as sock:
+        sock.setblocking(False)
         sock.sendto(text.encode(), address)
         return True
     return False

@@ -97,7 +97,7 @@ def test_it_serves_people_and_ends_clean(tmp_path, number, status):
                 heard.append(lines.readline())
         assert "HELLO This is ZY102" in heard[0]
         command, *values = heard[-1].split("\t")[2].replace(" ", ",", 1).split(",")
-        assert (command, values[0].strip()) == ("CMEAS", "1")
+        assert (command, values[0].strip()) == ("CMEAS", "1"), heard
         assert 0.1 < float(values[4]) < 10.0  # V: more than the leakage, within the converter
         socket.create_connection(tuple(at["feed"])).close()
         assert ended(process, number) == (status, "", "")

@@ -3,7 +3,7 @@
 import pytest
 
 from catseye.coordinator.event_log import EventLog
-from catseye.coordinator.link.clock_watch import LONGEST_TRIP, ClockWatch
+from catseye.coordinator.link.clock_watch import ClockWatch
 from catseye.coordinator.parts import TICKS_PER_SECOND, ticks_now
 from catseye.simulator.clock.world_clock import ManualClock
 
@@ -24,6 +24,7 @@ def test_what_it_is_set_to_is_right_when_it_arrives(watched):
     """Half a round trip from now: the command is as long on its way as the reply was."""
     watch, clock, happenings = watched
     trip = 0.05
+    assert watch.look(stamp(clock, -0.5 * trip - 0.5), trip) is None  # so far off, it is asked again
     right = watch.look(stamp(clock, -0.5 * trip - 0.5), trip)  # it made its stamp half a trip ago, half a second slow
     assert watch.offset == pytest.approx(-0.5, abs=1.0 / TICKS_PER_SECOND)
     assert right == stamp(clock, 0.5 * trip)
@@ -37,14 +38,46 @@ def test_an_offset_that_the_way_may_have_made_is_none(watched, sign):
     unsure = LIMIT + 0.5 * trip + 0.5 / TICKS_PER_SECOND
     assert watch.look(stamp(clock, -0.5 * trip + sign * (unsure - 0.002)), trip) is None
     assert watch.look(stamp(clock, -0.5 * trip + sign * (unsure + 0.002)), trip) is not None
-    assert watch.look(stamp(clock, 10.0), LONGEST_TRIP + 0.01) is None  # too long a way tells nothing
-    assert [each.kind for each in happenings] == ["clock-off"]
+    assert watch.look(stamp(clock, -0.1), 1.0) is None  # a long way may have made it
+    assert [each.kind for each in happenings] == ["clock-off", "clock-jump"]  # it was right at the same instant
 
 
 def test_a_clock_that_gains_is_told_with_its_rate(watched):
     watch, clock, happenings = watched
-    watch.look(stamp(clock, 0.108), 0.0)  # 125 ticks
-    clock.advance(108.0)
-    watch.look(stamp(clock, 0.108), 0.0)  # 0.108 s in 108 s since it was set right
+    watch.look(stamp(clock, 0.0432), 0.0)  # 50 ticks
+    clock.advance(43.2)
+    watch.look(stamp(clock, 0.0432), 0.0)  # 0.0432 s in 43.2 s since it was set right
     assert [each.kind for each in happenings] == ["clock-off", "clock-off", "clock-drift"]
     assert "+1000 us a second" in happenings[-1].text
+
+
+@pytest.mark.parametrize("trip", [0.01, 0.3, 3.0])
+@pytest.mark.parametrize("jump", [10.0, -10.0, 3600.0, -3600.0])
+def test_a_jump_is_no_drift_and_is_seen_over_a_slow_way_too(watched, jump, trip):
+    watch, clock, happenings = watched
+    for _ in range(3):
+        assert watch.look(stamp(clock, -0.5 * trip), trip) is None
+        clock.advance(2.0)
+    assert watch.look(stamp(clock, jump - 0.5 * trip), trip) is None
+    assert watch.look(stamp(clock, jump - 0.5 * trip), trip) is not None
+    assert [each.kind for each in happenings] == ["clock-off", "clock-jump"]
+    assert happenings[1].severity == "alarm"
+    assert f"jumped by {jump:+.3f} s: shots since" in happenings[1].text
+
+
+@pytest.mark.parametrize("jump", [0.1, -0.1])
+def test_a_jump_of_a_tenth_of_a_second_is_told(watched, jump):
+    watch, clock, happenings = watched
+    assert watch.look(stamp(clock, 0.0), 0.001) is None
+    clock.advance(2.0)
+    assert watch.look(stamp(clock, jump), 0.001) is None
+    assert watch.look(stamp(clock, jump), 0.001) is not None
+    assert [each.kind for each in happenings] == ["clock-off", "clock-jump"]
+
+
+def test_a_clock_that_is_not_to_be_set_by_ours_is_left(watched):
+    _, clock, happenings = watched
+    watch = ClockWatch(clock, EventLog("ZY101", clock, happenings.append), LIMIT, lambda: False)
+    assert watch.look(stamp(clock, 10.0), 0.001) is None
+    assert watch.offset == pytest.approx(10.0, abs=1e-3)
+    assert happenings == []

@@ -1,23 +1,33 @@
-"""Whether a ranger's clock agrees with ours, by its stamps and the round trip."""
+"""Whether a ranger's clock agrees with ours, by its stamps and the round trip; a jump told from a drift."""
+
+from collections.abc import Callable
 
 from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, ticks_now
+from catseye.geometry.sky.time_tag import utc_text
+from catseye.records.night.live import TICKS_PER_DAY
 
-LONGEST_TRIP = 0.1  # s: a reply slower than this says too little
 DRIFT_LIMIT = 1e-5  # s a second: a free quartz clock does ten times better
 SOONEST = 5.0  # s between two settings, or a drift means nothing
+FAR = 0.05  # s: it is set when it is seen to be so far off again, so that all rangers' clocks are heard before
+FASTEST = 5e-3  # s a second: what goes away faster between two looks has jumped
 
 
 class ClockWatch:
     """Compares stamps with UTC.
 
-    limit   s, how far off a clock may be, beside half the round trip and half a stamp's step
+    limit    s, how far off a clock may be, beside half the round trip and half a stamp's step
+    may_set  whether ours is to be believed: where most rangers contradict it, none is set by it
+
+    `offset` is the last one seen, s, and `seen` when, in ticks.
     """
 
-    def __init__(self, clock: Clock, event_log: EventLog, limit: float):
-        self._clock, self._event_log, self._limit = clock, event_log, limit
+    def __init__(self, clock: Clock, event_log: EventLog, limit: float, may_set: Callable[[], bool] = lambda: True):
+        self._clock, self._event_log, self._limit, self._may_set = clock, event_log, limit, may_set
         self._set_at: int | None = None
-        self.offset = float("nan")
+        self._right_at: int | None = None  # when it was last right
+        self._far = False  # when it was last looked at
+        self.offset, self.seen = float("nan"), 0
 
     def look(self, stamp: int, round_trip: float) -> int | None:
         """The stamp to set it to when it is off, None where it is right or cannot be told.
@@ -27,16 +37,30 @@ class ClockWatch:
         """
         now = ticks_now(self._clock)
         middle = now - 0.5 * round_trip * TICKS_PER_SECOND
-        self.offset = (stamp - middle) / TICKS_PER_SECOND
+        self.offset, self.seen = (stamp - middle) / TICKS_PER_SECOND, now
         unsure = 0.5 * round_trip + 0.5 / TICKS_PER_SECOND
-        if round_trip > LONGEST_TRIP or abs(self.offset) <= self._limit + unsure:
+        if abs(self.offset) <= self._limit + unsure:
+            self._right_at, self._far = now, False
             return None
-        text = f"its clock is {self.offset * 1e3:+.1f} ms off (limit {self._limit * 1e3:g} ms); it is set"
-        self._event_log.tell("clock-off", text, "warning", offset_s=self.offset, limit_s=self._limit)
+        far = abs(self.offset) > FAR and not self._far
+        self._far = abs(self.offset) > FAR
+        if far or not self._may_set():
+            return None
+        self._tell(now)
+        self._set_at = self._right_at = now
+        return now + round(0.5 * round_trip * TICKS_PER_SECOND)
+
+    def _tell(self, now: int) -> None:
+        off = self.offset
+        text = f"its clock is {off * 1e3:+.1f} ms off (limit {self._limit * 1e3:g} ms); it is set"
+        self._event_log.tell("clock-off", text, "warning", offset_s=off, limit_s=self._limit)
+        right = None if self._right_at is None else (now - self._right_at) / TICKS_PER_SECOND
         since = 0.0 if self._set_at is None else (now - self._set_at) / TICKS_PER_SECOND
-        if since > SOONEST and abs(self.offset) / since > DRIFT_LIMIT:
-            rate = self.offset / since
+        if self._right_at is not None and right is not None and abs(off) > FASTEST * max(right, 0.0) + self._limit:
+            at = utc_text(self._right_at / TICKS_PER_DAY)
+            text = f"its clock jumped by {off:+.3f} s: shots since {at} may be stamped so much wrong"
+            self._event_log.tell("clock-jump", text, "alarm", always=True, offset_s=off)
+        elif since > SOONEST and abs(off) / since > DRIFT_LIMIT:
+            rate = off / since
             text = f"its clock gains {rate * 1e6:+.0f} us a second (see to its time signal)"
             self._event_log.tell("clock-drift", text, "warning", rate=rate)
-        self._set_at = now
-        return now + round(0.5 * round_trip * TICKS_PER_SECOND)

@@ -88,7 +88,8 @@ class RangerLink:
         self._event_log = EventLog(ranger, clock, listeners.tell)
         self._shooter = Shooter(self, self._event_log, clock)
         self._status = StatusWatch(ranger, self._event_log, self._restarted)
-        self._watch = ClockWatch(clock, self._event_log, self.settings.clock_limit)
+        self.host_believed: Callable[[], bool] = lambda: True
+        self._watch = ClockWatch(clock, self._event_log, self.settings.clock_limit, lambda: self.host_believed())
         self._rng = random.Random(f"{environment.seed} {ranger}")
         self._network, self._key = environment.network, environment.key
         self._client: ZyClient | None = None
@@ -108,6 +109,16 @@ class RangerLink:
     def status(self) -> StatusWord:
         """Its status word as last heard."""
         return self._status.word
+
+    @property
+    def clock_offset(self) -> float:
+        """s by which its clock was ahead of ours when it was last seen; NaN before."""
+        return self._watch.offset
+
+    @property
+    def clock_seen(self) -> int:
+        """Ticks of ours when its clock was last seen; 0 before."""
+        return self._watch.seen
 
     @property
     def troubles(self) -> tuple[str, ...]:
