@@ -1,6 +1,7 @@
 """A coordinator of 18 streaming rangers: its share of a core, the time from a buffer to its durable acknowledgement.
 
 python benchmarks/bench_live.py [--seconds 30] [--rangers 18] [--heads fast|twin] [--postgresql URL] [--json]
+python benchmarks/bench_live.py --seconds 600 --series FILE.csv
 
 The rangers are the twin's, in a process of their own, on sockets; 128 ms buffers back to back. `fast`: their heads have
 the buffers ready (returns of the twin's truth), so that the generator does not take the second core; `twin`: the
@@ -11,6 +12,9 @@ and not in the journal.
 
 Beside it what a user would write instead, on the same rangers: asyncio streams, a phase of each buffer, and sqlite3
 with a commit a shot, samples as JSON or as bytes; no reduction, no guard, no epochs.
+
+`--series` measures catseye alone, and the disk beside it: each second a buffer is written and flushed to the same disk.
+The file has a row a shot and a row a flush: kind, s since the first, ms. `studies/lasting.py` draws it.
 """
 
 import argparse
@@ -21,6 +25,7 @@ import os
 import sqlite3
 import sys
 import tempfile
+import threading
 import time
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
@@ -67,9 +72,14 @@ def result(name: str, late: list[float], cpu: float, wall: float, rangers: int, 
     return Result(name, n / wall / rangers, 100.0 * cpu / wall, 1e3 * cpu / n, *quantiles, n, **counts)
 
 
-async def coordinated(child: LoadChild, site: Any, journal: str, name: str, seconds: float) -> Result:
-    """The coordinator; first a round that gives each ranger a reference and a target, then streams."""
-    late: list[float] = []
+async def coordinated(
+    child: LoadChild, site: Any, journal: str, name: str, seconds: float, late: list[float] | None = None
+) -> Result:
+    """The coordinator; first a round that gives each ranger a reference and a target, then streams.
+
+    late   is filled with s until durable, of each shot in order
+    """
+    late = [] if late is None else late
     targets: dict[str, str] = {}
     before = child.report()["fired"]
     running = LiveCoordinator(
@@ -199,6 +209,52 @@ async def measured(options: argparse.Namespace, folder: Path) -> list[Result]:
     return found
 
 
+class Flushes(threading.Thread):
+    """What the disk takes for a buffer each second, ms, until stopped."""
+
+    def __init__(self, path: Path):
+        super().__init__(daemon=True)
+        self._path, self._stopped, self.ms = path, threading.Event(), []
+
+    def run(self) -> None:
+        """Write and flush; a buffer lies over the one before, so that the file does not grow."""
+        raw = os.urandom(BUFFER_BYTES)
+        with self._path.open("wb", buffering=0) as file:
+            while not self._stopped.wait(1.0):
+                file.seek(0)
+                file.write(raw)
+                began = time.perf_counter()
+                os.fsync(file.fileno())
+                self.ms.append(1e3 * (time.perf_counter() - began))
+
+    def stop(self) -> None:
+        """End it."""
+        self._stopped.set()
+        self.join()
+
+
+async def series(options: argparse.Namespace, folder: Path) -> Result:
+    """A long run, shot by shot, into a table."""
+    late: list[float] = []
+    flushes = Flushes(folder / "flushed")
+    with LoadChild(options.rangers, twin=options.heads == "twin") as child:
+        flushes.start()
+        place, name = str(folder / "night.db"), "catseye, SQLite"
+        found = await coordinated(child, load_site(options.rangers), place, name, options.seconds, late)
+        flushes.stop()
+    rows = [("shot", k * options.seconds / found.shots, 1e3 * each) for k, each in enumerate(late[: found.shots])]
+    rows += [("flush", float(k), each) for k, each in enumerate(flushes.ms)]
+    text = "kind,s,ms\n" + "".join(f"{kind},{at:.3f},{ms:.3f}\n" for kind, at, ms in rows)
+    options.series.write_text(text, encoding="utf-8")
+    p99 = float(np.percentile(flushes.ms, 99))
+    sys.stdout.write(
+        f"{found.shots} shots in {options.seconds:g} s: p50 {found.p50_ms:.1f} ms, p99 {found.p99_ms:.1f}, most "
+        f"{found.max_ms:.1f}; lost {found.lost}, doubled {found.doubled}; a flush p50 "
+        f"{np.median(flushes.ms):.1f} ms, p99 {p99:.1f}; limit max(20, 3 x {p99:.1f}) ms\n"
+    )
+    return found
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--seconds", type=float, default=30.0)
@@ -207,9 +263,13 @@ def main() -> None:
     parser.add_argument("--postgresql", metavar="URL", help="an empty database")
     parser.add_argument("--folder", type=Path, help="where the journals are written and removed again")
     parser.add_argument("--json", action="store_true")
+    parser.add_argument("--series", type=Path, metavar="FILE.csv", help="a row for each shot and each flush")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(dir=options.folder) as name:
         folder = Path(name)
+        if options.series:
+            asyncio.run(series(options, folder))
+            return
         found = asyncio.run(measured(options, folder))
         limits = machine(folder)
     load = os.getloadavg()[0]

@@ -389,6 +389,44 @@ def test_every_column_of_a_campaign_has_the_unit_of_its_name(tmp_path):
     assert_columns((tmp_path / "out" / "weather.csv").read_text(), told, readings)
 
 
+def test_what_live_did_not_believe_goes_along(tmp_path):
+    """A station that reads 5 °C too much for a while, and what an epoch said of three shots."""
+    entries = []
+    for k in range(1, 41):
+        lie = 5.0 * (20 <= k < 30)
+        entries += [
+            full_shot(k),
+            LiveWeather("WX1", START + SECOND * k, 10.0, 930.1, 70.0),
+            LiveWeather("WX2", START + SECOND * k, 10.4 + lie, 930.1, 70.0),
+        ]
+    said = {"3": "reflected: range 3.000 mm too long", "4": "undecided: this and another", "99": "reflected: elsewhere"}
+    entries.append(EpochSolution(START + SECOND * 41, {"number": 1, "rejected": said}))
+    done, campaign = exported(tmp_path, entries)
+    rows = (tmp_path / "out" / "doubts.csv").read_text().splitlines()
+    assert rows[0] == "what,name,mjd_utc,why"
+    lies = [row.split(",")[:3] for row in rows[1:-1]]
+    assert lies == [["weather", "WX2", stamp(START + SECOND * k)] for k in range(20, 30)]
+    assert "WX2 reads 15.4 C, +5.0 C off its last five minutes while the others changed by +0.0 C" in rows[1]
+    assert rows[-1] == f"shot,3,{stamp(START + SECOND * 3)},reflected: range 3.000 mm too long"
+    assert campaign.doubted == {3: "reflected: range 3.000 mm too long"}
+    assert len(campaign.weather) == 70
+    assert campaign.weather.temperature_c.max() == 10.4
+    assert len((tmp_path / "out" / "weather.csv").read_text().splitlines()) == 81  # the record itself is whole
+    assert [note.split(" was not believed")[0] for note in done.notes[:1]] == ["WX2"]
+    assert "named in doubts.csv as not believed by the epochs: 1 of the shots" in done.notes
+
+
+def test_where_no_station_was_believed_the_readings_go_as_they_are(tmp_path):
+    entries = [full_shot(k) for k in range(1, 9)]
+    entries += [LiveWeather("WX1", START + SECOND * k, 10.0, 930.1, 70.0) for k in (-2700, -2690, -2680)]
+    entries += [LiveWeather("WX1", START + SECOND * k, 20.0, 930.1, 70.0) for k in range(1, 9)]
+    done, campaign = exported(tmp_path, entries, span=(START, START + SECOND * 60))
+    assert len(campaign.weather) == 11
+    assert not (tmp_path / "out" / "doubts.csv").exists()
+    assert "no weather station was believed throughout: all readings are exported as they are" in done.notes
+    assert done.shots == 8
+
+
 def test_it_stands_as_the_telescope_stood(tmp_path):
     done, campaign = exported(tmp_path, campaign_entries())
     posture = campaign.site.campaign

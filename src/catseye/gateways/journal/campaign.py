@@ -1,7 +1,8 @@
 """A run of a journal, or a part of it, as a campaign directory that `catseye reduce` reads.
 
 What a campaign cannot hold is left out and told: shots without samples, taken in another way than site.toml says, not
-later than the ranger's last, without weather; readings with a silent sensor. The directory is read before it appears.
+later than the ranger's last, without weather; readings with a silent sensor. What the live reduction did not believe
+goes along in doubts.csv. The directory is read before it appears.
 """
 
 import csv
@@ -25,14 +26,18 @@ from catseye.gateways.journal.export import seal, stamp
 from catseye.gateways.writers.output import whole_directory
 from catseye.gateways.writers.written import origin
 from catseye.records.night.campaign import LONGEST_CAMPAIGN, WEATHER_MARGIN, read_campaign
+from catseye.records.night.doubt import DOUBTS, DoubtRow, believed_samples
 from catseye.records.night.live import TICKS_PER_DAY, LivePosture, LiveWeather
 from catseye.records.night.shot import ShotRow
 from catseye.records.night.weather import WeatherSample
 from catseye.records.site.folder import REFERENCE, SiteFolder, site_files
+from catseye.reduction.epoch.reason import ShotStatus, status_of
+from catseye.reduction.live.weather import StationWatch
 
 STEADY = 0.01 * DEGREE  # rad that the telescope may move before it is told
 MARGIN = round(WEATHER_MARGIN * TICKS_PER_DAY)  # ticks
 MOST_TOLD = 3  # examples of each reason
+LIES = (ShotStatus.REFLECTED, ShotStatus.BAD_REFERENCE)  # what a night's own samples may not show again
 
 
 @dataclass
@@ -104,7 +109,7 @@ def export_campaign(
     reader.left_out = {} if chain is None else {run: chain.bad}
     for seq in sorted(reader.left_out.get(run, ())):
         left.add("an event that is not as it was written", f"event {seq}")
-    readings = _readings(reader, run, span, site, left)
+    readings, why = _readings(reader, run, span, site, left)
     if not readings:
         raise InputError(f"journal {reader.place}: run {run} has no whole weather reading in the span (expected one)")
     chosen = _chosen(reader, run, span, site, left, sorted(reading.ticks for reading in readings))
@@ -112,6 +117,7 @@ def export_campaign(
         reasons = "; ".join(left.notes()) or "no shots in the span"
         raise InputError(f"journal {reader.place}: run {run} has no shot that a campaign can hold: {reasons}")
     notes = left.notes()
+    doubts = _doubts(reader, run, chosen, readings, why, notes)
     site = _as_it_stood(reader, run, site, chosen, readings, notes)
     with whole_directory(out, Path(reader.place)) as directory:
         for path, text in site_files(site).items():
@@ -121,6 +127,8 @@ def export_campaign(
             (directory / name).mkdir(exist_ok=True)
         (directory / "weather.csv").write_text(_weather_csv(readings), encoding="utf-8", newline="")
         (directory / "shots.csv").write_text(_shots_csv(chosen, notes), encoding="utf-8", newline="")
+        if doubts:
+            (directory / DOUBTS).write_text(_doubts_csv(doubts), encoding="utf-8", newline="")
         _write_frames(reader, run, chosen, directory / "frames.npy")
         read_campaign(directory)
         provenance = origin(datetime.now(UTC), stored.hashes)
@@ -131,12 +139,18 @@ def export_campaign(
 
 def _readings(
     reader: JournalReader, run: int, span: tuple[int, int] | None, site: SiteFolder, left: LeftOut
-) -> list[LiveWeather]:
-    """Whole readings of the site's stations, in order of time, an hour longer than the span."""
+) -> tuple[list[LiveWeather], dict[tuple[str, int], str]]:
+    """Whole readings of the site's stations, in order of time, an hour longer than the span; and why which of them,
+    by station and ticks, the live reduction did not believe: its watch is asked again, in the journal's order."""
     readings: list[LiveWeather] = []
+    why: dict[tuple[str, int], str] = {}
+    watch = StationWatch(tuple(station.name for station in site.site.weather_station))
     for _, entry in reader.events(run, kinds=["weather"]):
-        if isinstance(entry, LiveWeather) and (span is None or span[0] - MARGIN <= entry.ticks < span[1] + MARGIN):
-            readings.append(entry)
+        if isinstance(entry, LiveWeather):
+            doubt = watch.add(entry)
+            if span is None or span[0] - MARGIN <= entry.ticks < span[1] + MARGIN:
+                readings.append(entry)
+                why |= {(entry.station, entry.ticks): doubt} if doubt else {}
     stations = {station.name for station in site.site.weather_station}
     kept: list[LiveWeather] = []
     latest: dict[str, int] = {}
@@ -151,7 +165,63 @@ def _readings(
         else:
             latest[read.station] = read.ticks
             kept.append(read)
-    return kept
+    return kept, why
+
+
+def _doubts(
+    reader: JournalReader,
+    run: int,
+    chosen: list[ExportedShot],
+    readings: list[LiveWeather],
+    why: dict[tuple[str, int], str],
+    notes: list[str],
+) -> list[DoubtRow]:
+    """Readings and shots that the live reduction did not believe, of those that are exported."""
+    made = [
+        DoubtRow(what="weather", name=read.station, mjd_utc=float(stamp(read.ticks)), why=why[read.station, read.ticks])
+        for read in readings
+        if (read.station, read.ticks) in why
+    ]
+    if made:
+        times = np.array([float(stamp(shot.ticks)) for shot in chosen])
+        try:
+            told = believed_samples([_sample(read) for read in readings], made, times)[1]
+        except InputError:
+            told, made = ["no weather station was believed throughout: all readings are exported as they are"], []
+        notes += told
+    reasons: dict[int, str] = {}
+    for _, solution in reader.solutions(run):
+        for number, line in (solution.answer.get("rejected") or {}).items():
+            if status_of(line) in LIES:
+                reasons[int(number)] = line
+    names = _names(chosen)
+    shots = [
+        DoubtRow(what="shot", name=str(name), mjd_utc=float(stamp(shot.ticks)), why=reasons[shot.number][:500])
+        for name, shot in zip(names, chosen, strict=True)
+        if shot.number in reasons
+    ]
+    if shots:
+        notes.append(f"named in {DOUBTS} as not believed by the epochs: {len(shots)} of the shots")
+    return made + shots
+
+
+def _doubts_csv(doubts: list[DoubtRow]) -> str:
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(DoubtRow.model_fields)
+    for each in doubts:
+        writer.writerow((each.what, each.name, f"{each.mjd_utc:.8f}", each.why))
+    return text.getvalue()
+
+
+def _sample(read: LiveWeather) -> WeatherSample:
+    return WeatherSample(
+        mjd_utc=float(stamp(read.ticks)),
+        station=read.station,
+        temperature_c=read.temperature_c,
+        pressure_mb=read.pressure_hpa,
+        humidity_pct=read.humidity_percent,
+    )
 
 
 def _unholdable(read: LiveWeather) -> str:
@@ -159,10 +229,7 @@ def _unholdable(read: LiveWeather) -> str:
     if not np.isfinite(values).all():
         return "a reading with a silent sensor"
     try:
-        t, p, h = values
-        WeatherSample(
-            mjd_utc=read.ticks / TICKS_PER_DAY, station=read.station, temperature_c=t, pressure_mb=p, humidity_pct=h
-        )
+        _sample(read)
     except ValidationError:
         return "a reading out of a thermometer's, barometer's or hygrometer's range"
     return ""
@@ -280,9 +347,8 @@ def _row(number: int, ticks: int, ranger: str, target: str, cycles: int, samples
 
 def _shots_csv(chosen: list[ExportedShot], notes: list[str]) -> str:
     """Shots by their numbers; by their seq where numbers are not each once."""
-    numbers = [shot.number for shot in chosen]
-    if len(set(numbers)) < len(numbers) or min(numbers) < 0:
-        numbers = [shot.seq for shot in chosen]
+    numbers = _names(chosen)
+    if numbers != [shot.number for shot in chosen]:
         notes.append("shot numbers are not each once: shots.csv has the journal's seq instead")
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
@@ -291,6 +357,13 @@ def _shots_csv(chosen: list[ExportedShot], notes: list[str]) -> str:
         row = (number, stamp(shot.ticks), shot.ranger, shot.target, shot.cycles, shot.samples_per_cycle, frame)
         writer.writerow(row)
     return text.getvalue()
+
+
+def _names(chosen: list[ExportedShot]) -> list[int]:
+    """What shots.csv calls them: their numbers, or their seq where numbers are not each once."""
+    numbers = [shot.number for shot in chosen]
+    distinct = len(set(numbers)) == len(numbers) and min(numbers) >= 0
+    return numbers if distinct else [shot.seq for shot in chosen]
 
 
 def _weather_csv(readings: list[LiveWeather]) -> str:

@@ -1,8 +1,8 @@
 """A campaign: a directory of records, weather, shots and samples, read whole or refused in one line."""
 
 import os
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from catseye.constants import SECONDS_PER_DAY
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import in_row, refusal, shown
+from catseye.records.night.doubt import DOUBTS, DoubtRow, believed_samples, refuse_doubts
 from catseye.records.night.path_temperature import PathTemperature, PathTemperatureTable, path_temperature_columns
 from catseye.records.night.shot import ShotColumns, ShotRow, read_buffers, refuse_shots, shot_columns
 from catseye.records.night.weather import Weather, WeatherSample, weather_columns
@@ -32,12 +33,15 @@ PATH_TEMPERATURES = "path_temperatures.csv"  # optional
 class ObservedSite(SiteFolder):
     """A site with its shots and its weather, all that ranges and coordinates need once phases are known.
 
-    `path_temperatures` is None where no line's temperature was measured by sound.
+    `path_temperatures` is None where no line's temperature was measured by sound. `weather` and the site's stations are
+    what was believed, `doubted` the shots that were not, by their ids, with why; `doubt_notes` tell of the weather.
     """
 
     weather: Weather
     shots: ShotColumns
     path_temperatures: PathTemperatureTable | None = None
+    doubted: Mapping[int, str] = field(default_factory=dict)
+    doubt_notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -65,6 +69,8 @@ def read_campaign(directory: Path | str) -> Campaign:
     buffers = read_buffers(folder)
     sounded = os.path.lexists(folder.directory / PATH_TEMPERATURES)
     lines = folder.table(PATH_TEMPERATURES, PathTemperature) if sounded else []
+    judged = os.path.lexists(folder.directory / DOUBTS)
+    doubts = folder.table(DOUBTS, DoubtRow) if judged else []
 
     campaign = Campaign(
         **records.named(folder),
@@ -79,7 +85,26 @@ def read_campaign(directory: Path | str) -> Campaign:
     refuse_strangers(campaign, shots)
     refuse_times(campaign, shots)
     refuse_path_temperatures(campaign, lines)
-    return campaign
+    refuse_doubts(doubts, shots, samples)
+    return _as_believed(campaign, doubts, samples, shots) if doubts else campaign
+
+
+def _as_believed(
+    campaign: Campaign, doubts: Sequence[DoubtRow], samples: Sequence[WeatherSample], shots: Sequence[ShotRow]
+) -> Campaign:
+    """Without the weather that was not believed, and with the shots that were not named."""
+    kept, notes = believed_samples(samples, doubts, campaign.shots.mjd_utc)
+    spoke = {sample.station for sample in kept}
+    stations = tuple(station for station in campaign.site.weather_station if station.name in spoke)
+    believed = replace(
+        campaign,
+        site=campaign.site.model_copy(update={"weather_station": stations}),
+        weather=weather_columns(kept),
+        doubted={int(each.name): each.why for each in doubts if each.what == "shot"},
+        doubt_notes=tuple(notes),
+    )
+    refuse_times(believed, shots)
+    return believed
 
 
 def refuse_strangers(campaign: Campaign, shots: Iterable[ShotRow]) -> None:

@@ -13,6 +13,7 @@ from catseye.atmosphere.index.air import MODELS, group_refractivity
 from catseye.atmosphere.path.mean import mean_over_height, pressure_at
 from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import SECONDS_PER_DAY
+from catseye.errors import InputError, ValidityError
 from catseye.records.night.campaign import ObservedSite
 from catseye.records.night.path_temperature import PathTemperatureTable
 from catseye.reduction.epoch.parameter import BEND, GRADIENT, Parameter, ParameterKind
@@ -24,6 +25,8 @@ SOUND_NEAR = 600.0  # s from a shot to its line's nearest sounding, beyond which
 SMOOTHING = 300.0  # s, Gaussian half-width in time: noise of a reading every 30 s falls to a sixth
 DISTINCT_HEIGHTS = 5.0  # m, stations closer in height than this show no gradient
 MOST_KEPT = 64  # sets of times whose smoothed readings are kept: one a ranger, and more
+MUCH_C = 2.0  # °C, an offset of a thermometer worth telling
+LEAST_HPA = 600.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +234,10 @@ class AirField:
         count = len(self.heights) + 1
         values = np.zeros((1 + len(self.names), len(mjd_utc)))
         profile = self._by_thermometers(np.asarray(mjd_utc, dtype=float), parameters[:count])
-        values[: 1 + count] = mean_over_height(profile, a[:, 2], b[:, 2])
+        try:
+            values[: 1 + count] = mean_over_height(profile, a[:, 2], b[:, 2])
+        except ValidityError as problem:
+            raise InputError(self._impossible(np.asarray(mjd_utc, dtype=float), parameters[:count])) from problem
         for i, line in enumerate(self.lines if self.sounded is not None else ()):
             rows = np.flatnonzero(self.sounded == i)
             if len(rows):
@@ -241,6 +247,21 @@ class AirField:
                 values[: 1 + count, rows] = means[:-1]
                 values[1 + count + i, rows] = -share * means[-1]
         return PathAir(values[0], values[1:].T)
+
+    def _impossible(self, mjd_utc: np.ndarray, parameters: np.ndarray) -> str:
+        """What the stations read at the shot's time where they are farthest from any air."""
+        state, offsets = self.smoothed(mjd_utc), np.asarray(parameters[:-1])
+        apart = np.ptp(state[..., 0] - offsets, axis=1) + 100.0 * np.any(state[..., 1] < LEAST_HPA, axis=1)
+        k = int(np.argmax(apart))
+        each = "; ".join(
+            f"{name} {t:.1f} °C, {p:.1f} hPa, {h:.0f} %"
+            + (f", which the ranges make {offset:+.1f} °C too warm" if abs(offset) > MUCH_C else "")
+            for name, (t, p, h), offset in zip(self.stations, state[k], offsets, strict=True)
+        )
+        return (
+            f"weather.csv: at {mjd_utc[k]:.5f} the stations read {each}: along the paths that makes air for which no "
+            "index is known (see to these readings, or leave a station out of site.toml and weather.csv)"
+        )
 
     def _by_thermometers(self, mjd_utc: np.ndarray, parameters: np.ndarray) -> Profile:
         """Refractivity at heights (m, k), and its derivatives by the stations and the profile: (2 + stations, m, k)."""

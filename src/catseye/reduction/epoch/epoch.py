@@ -68,6 +68,7 @@ def reduce_epoch(
         for k, target in enumerate(campaign.shots.target)
     )
     notes = [
+        *campaign.doubt_notes,
         *coordinates.notes,
         *sheet_notes(campaign),
         *_weak_rangers(campaign, phases),

@@ -170,7 +170,7 @@ def measure_phases(campaign: Campaign, settings: ReductionSettings, progress: Pr
     A return is called blocked when what is left after the leakage is not five times its own uncertainty, that of the
     leakage included; dead when the samples do not even hold the leakage, which would otherwise be taken, with its sign
     changed, for a return; clipped when a sample stands at the converter's end; dropout and stuck see
-    `signal.detection.buffers`.
+    `signal.detection.buffers`; doubted when `doubts.csv` says that it was not believed while it was measured.
     """
     shots, adc = campaign.shots, campaign.site.adc
     n = len(shots.shot)
@@ -188,13 +188,18 @@ def measure_phases(campaign: Campaign, settings: ReductionSettings, progress: Pr
             if progress is not None:
                 progress("samples to phases", done, n)
     mirrors = [campaign.mirror_of(ranger) for ranger in shots.ranger]
-    return judged_phases(
+    phases = judged_phases(
         detected,
         shots.cycles,
         shots.samples_per_cycle,
         mirrors=mirrors,
         settings=settings,
         usual_of=lambda a: _usual_amplitude(campaign, a),
+    )
+    told = [campaign.doubted.get(int(shot)) for shot in shots.shot]
+    both = zip(phases.reason, told, strict=True)
+    return replace(
+        phases, reason=tuple(reason or (why and Reason(ShotStatus.DOUBTED, why)) or None for reason, why in both)
     )
 
 

@@ -29,6 +29,7 @@ class ShotStatus(StrEnum):
     CYCLES_UNKNOWN = "whole cycles unknown"
     REFLECTED = "reflected"
     UNDECIDED = "undecided"
+    DOUBTED = "doubted"  # while it was measured, by doubts.csv
 
 
 class Reason(str):

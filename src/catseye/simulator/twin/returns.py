@@ -1,5 +1,6 @@
 """What a beam falls on, and what comes back of it: the phasors of a living site's rangers."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 FARTHEST = 200.0  # m: a beam that sweeps by more than `SWEEP` there is looked at three times
 SWEEP = 0.1  # m
+MOST_PATHS = 1024  # whose noise is kept: a whole dish has 40 000, of 12 kB each
 
 
 class Meeting(NamedTuple):
@@ -60,7 +62,7 @@ class Returns:
         self._index_ppm = air.conditions.turbulence * ranging.path_index_fluctuation_ppm
         self.electronics = {name: ElectronicsWalk(name, streams, planted) for name in scene.stations}
         self._cubes = {name: reference_cube(station) for name, station in scene.stations.items()}
-        self._paths: dict[tuple[str, str], tuple[Waves, float]] = {}
+        self._path = lru_cache(MOST_PATHS)(self._drawn_path)
 
     def lit(self, ranger: str, counts: Array, t: Array, standing: TelescopeStanding) -> str | None:
         """The retroreflector on which a beam falls at counts (1, 2) and one time (1,), the nearest; None: on none."""
@@ -160,9 +162,7 @@ class Returns:
         index = self._air.index(self._scene.point(ranger, t, standing), t)
         return volts * np.exp(-1j * self.radians_per_metre * index * way)
 
-    def _path(self, ranger: str, name: str) -> tuple[Waves, float]:
-        """Noise of a path, and where between least and most its usual amplitude is: drawn when first asked for."""
-        if (ranger, name) not in self._paths:
-            noise = path_waves(ranger, name, index_ppm=self._index_ppm, streams=self._streams, planted=self._planted)
-            self._paths[ranger, name] = noise, float(self._streams(f"path/{ranger}/{name}").uniform())
-        return self._paths[ranger, name]
+    def _drawn_path(self, ranger: str, name: str) -> tuple[Waves, float]:
+        """Noise of a path, and where between least and most its usual amplitude is: the same whenever it is drawn."""
+        noise = path_waves(ranger, name, index_ppm=self._index_ppm, streams=self._streams, planted=self._planted)
+        return noise, float(self._streams(f"path/{ranger}/{name}").uniform())
