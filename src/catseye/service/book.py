@@ -9,6 +9,7 @@ from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution, Sto
 from catseye.records.night.live import Happening, LivePosture
 from catseye.reduction.epoch.reason import status_of
 from catseye.service.comparison import EpochComparison, TwinComparison
+from catseye.service.found import FaultFinder
 from catseye.service.logs import epoch_of
 
 UNKNOWN = "unknown"  # to this version
@@ -43,10 +44,14 @@ class LiveBook:
     """Fed with what is durable, in its order.
 
     comparison   against the twin's truth; None: there is none
+    finder       of faults on command
     """
 
-    def __init__(self, comparison: TwinComparison | None = None):
+    def __init__(self, comparison: TwinComparison | None = None, finder: FaultFinder | None = None):
         self._comparison = comparison
+        self._finder = finder or FaultFinder()
+        self.faults = self._finder.found
+        self.ticks = 0  # of the latest that came
         self.posture: LivePosture | None = None
         self.last: dict[str, LastShot] = {}
         self.shots: Counter[str] = Counter()  # good ones by ranger
@@ -62,6 +67,7 @@ class LiveBook:
 
     def entry(self, entry: Any) -> None:
         """Take in one entry of the journal."""
+        self.ticks = max(self.ticks, entry.shot.ticks if isinstance(entry, AnsweredShot) else entry.ticks)
         if isinstance(entry, AnsweredShot):
             self._shot(entry)
         elif isinstance(entry, EpochSolution):
@@ -70,6 +76,7 @@ class LiveBook:
             self.posture = entry
         elif isinstance(entry, Happening):
             self.events.append(entry)
+            self._finder.heard(entry)
             if entry.severity != "note":
                 self.troubles.add(entry)
 

@@ -63,6 +63,15 @@ def simulation_object(
         "rejected": {reason: n for reason, n in sorted(book.fates.items()) if reason not in GOOD},
         "epochs": [epoch_object(row, book.comparisons.get(row["number"])) for row in book.epochs],
         "faults": list(world.faults),
+        "found": [
+            {
+                "fault": each.text,
+                "after_s": each.after,
+                "kind": None if each.by is None else each.by.kind,
+                "text": None if each.by is None else each.by.text,
+            }
+            for each in book.faults
+        ],
         "troubles": [
             {"who": who, "kind": kind, "count": n, "text": book.troubles.texts[who, kind]}
             for (who, kind), n in sorted(book.troubles.counts.items())
@@ -162,15 +171,14 @@ def summary(
             )
     counts = book.troubles.counts
     worst = sorted(counts.items(), key=lambda pair: (pair[0][1] in OF_THE_LINE, -pair[1]))[:TOLD]
-    if worst:
-        passages.append(
-            (
-                "Noticed",
-                "; ".join(f"{book.troubles.texts[key]}" + (f" ({n} times)" if n > 1 else "") for key, n in worst) + ".",
-            )
-        )
+    noticed = [each.line(book.ticks) for each in book.faults]
+    noticed += [f"{book.troubles.texts[key]}" + (f" ({n} times)" if n > 1 else "") for key, n in worst]
+    if noticed:
+        passages.append(("Noticed", "; ".join(noticed) + "."))
     if world.faults:
-        passages.append(("Faults", "on command: " + "; ".join(world.faults) + "."))
+        missed = [each.text for each in book.faults if each.by is None and each.begins <= book.ticks]
+        none = f"; not noticed: {', '.join(missed)}" if missed else ", each that began was noticed"
+        passages.append(("Faults", "on command: " + "; ".join(world.faults) + none + "."))
     passages.append(
         (
             "Journal",

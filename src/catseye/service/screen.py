@@ -54,6 +54,7 @@ class LinesView(SilentView):
     def __init__(self, say: Callable[[str], None]):
         self._say = say
         self._book: LiveBook | None = None
+        self._found: set[str] = set()  # faults on command that were told
 
     def tell(self, text: str) -> None:
         self._say(one_line(text))
@@ -68,6 +69,10 @@ class LinesView(SilentView):
                 self._say(f"{time_text(entry.ticks)}  {epoch_line(latest)}")
         elif isinstance(entry, Happening) and entry.severity != "note" and entry.kind not in OF_THE_LINE:
             self._say(f"{time_text(entry.ticks)}  {entry.severity}: {one_line(entry.text)}")
+        for each in self._book.faults if self._book is not None else ():
+            if each.by is not None and each.text not in self._found:
+                self._found.add(each.text)
+                self._say(f"{time_text(each.by.ticks)}  fault {one_line(each.line(each.by.ticks))}")
 
 
 class ScreenView(SilentView):
@@ -138,9 +143,9 @@ class ScreenView(SilentView):
                 f"   {time_text(posture.ticks)}   telescope {azimuth:8.4f}° {elevation:7.4f}°", style="not bold"
             )
         ready = sum(link.state == "ready" for link in ziy.links.values())
+        asked = len(ziy.links) - len(ziy.firing.dropped)
         text.append(
-            f"   {ziy.mode}, round {ziy.round_number}, {ready} of {len(ziy.links)} rangers ready, "
-            f"{book.acknowledged} shots",
+            f"   {ziy.mode}, round {ziy.round_number}, {ready} of {asked} rangers ready, {book.acknowledged} shots",
             style="not bold",
         )
         return text
@@ -193,6 +198,9 @@ class ScreenView(SilentView):
         from rich.text import Text
 
         text = Text("\n", no_wrap=True, overflow="ellipsis")
+        for each in self._book.faults if self._book is not None else ():
+            line = f"{one_line(each.line(self._book.ticks if self._book is not None else 0))}\n"
+            text.append(line, style="" if each.by is not None else "yellow")
         for event in list(self._book.events if self._book is not None else ())[-EVENTS:]:
             line = f"{time_text(event.ticks)[11:19]} {one_line(event.text)}\n"
             text.append(line, style=STYLES[event.severity])

@@ -16,6 +16,7 @@ from catseye.service.book import LiveBook
 from catseye.service.child import LiveChild
 from catseye.service.comparison import TwinComparison
 from catseye.service.coordinator import LiveCoordinator, Orders, Peers
+from catseye.service.found import FaultFinder
 from catseye.service.rangers import Listening, RangersServed
 from catseye.service.running import FastLoop
 from catseye.service.warm import WarmingClock
@@ -148,7 +149,8 @@ class Simulation:
             tell=lambda kind, text, severity: self.view.tell(text) if kind == "journal" else None,
         )
         after = running.settings.reference_after
-        self.book = LiveBook(TwinComparison(self.site, self._twin, reference_after=after))
+        finder = FaultFinder(self.world.faults, self.world.start_mjd)
+        self.book = LiveBook(TwinComparison(self.site, self._twin, reference_after=after), finder)
         running.ziy.listeners.append(self._entry)
         self.view.begin(self.book, running)
         coordinator = asyncio.create_task(running.run())

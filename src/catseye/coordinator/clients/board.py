@@ -76,7 +76,8 @@ class Board:
         ready = sum(link.state == "ready" for link in z.links.values())
         telescope = "known" if z.telescope_known else "silent"
         journal = plain(z.intake.trouble or "well")
-        counts = (f"{ready} of {len(z.links)}", str(z.intake.numbered), str(z.intake.acknowledged), str(z.round_number))
+        asked = len(z.links) - len(z.firing.dropped)
+        counts = (f"{ready} of {asked}", str(z.intake.numbered), str(z.intake.acknowledged), str(z.round_number))
         return [(z.mode, *counts, telescope, journal)]
 
     def _rangers(self) -> Rows:
