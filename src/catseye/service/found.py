@@ -70,7 +70,7 @@ class FaultFinder:
         ]
 
     def heard(self, what: Happening) -> None:
-        """Take in one happening."""
+        """Take in one happening, in the order of the journal."""
         for each in self.found:
             if each.by is None and _names(what, each):
                 each.by = what
