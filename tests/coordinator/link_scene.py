@@ -105,10 +105,8 @@ class Served:
         await self.server.stop()
 
     def by_hand(self, line):
-        """What somebody does who sits at the ranger: no lease is asked for."""
-        self.ranger.guarded = False
-        self.ranger.receive(1, line)
-        self.ranger.guarded = True
+        """What somebody does who sits at the ranger, behind the back of who has the lease."""
+        self.ranger.receive(1 if self.ranger.lease is None else self.ranger.lease[0], line)
 
     def light(self):
         """What comes back from where: ZRG, and the cubes that the ranger knows."""

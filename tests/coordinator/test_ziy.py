@@ -258,10 +258,13 @@ def test_a_dropped_ranger_is_left_out_until_it_is_taken():
             await until(lambda: site.live.epochs)
             site.ziy.drop("ZY101")
             await asyncio.sleep(3.0)
-            count = len(site.live.shots)
+            count, commands = len(site.live.shots), len(of(site.journal.rows, SentCommand))
             await asyncio.sleep(10.0)
             assert {s.ranger for s in site.live.shots[count:]} == {"ZY102"}
             assert site.ziy.links["ZY101"].connected
+            assert site.served["ZY101"].ranger.lease is None  # left alone: whoever wants it has it
+            sent = [c for c in of(site.journal.rows, SentCommand)[commands:] if c.ranger == "ZY101"]
+            assert {c.line.split("\t")[-1].split()[0] for c in sent} <= {"VER", "LEASE"}
             site.ziy.take("ZY101")
             await until(lambda: site.live.shots[-1].ranger == "ZY101")
             with pytest.raises(InputError, match="ZY999"):
