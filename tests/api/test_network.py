@@ -92,7 +92,15 @@ def test_a_plan_says_what_it_would_be_worth(tmp_path):
     assert planned.u.shape == (len(planned.names), 3)
     assert planned.to_object()["monte_carlo"]["runs"] == 2
     assert planned.to_object()["verdict"]["word"] == planned.verdict.word
-    assert len(planned.to_table("candidates")) > 0
+    candidates, told = planned.to_table("candidates"), planned.to_object()
+    for column in ("gain", "mean_u"):
+        assert candidates[column].to_value("m").tolist() == pytest.approx([c[column] for c in told["candidates"]])
+    points = planned.to_table("points")
+    worst = {each["point"]: each["u"] for each in told["weakest"]}
+    longest = {str(row["point"]): row["longest_axis"].to_value("m") for row in points}
+    assert len(worst) >= 3
+    assert [longest[n] for n in worst] == pytest.approx(list(worst.values()))
+    assert points["u_x"].to_value("m").tolist() == pytest.approx([told["points"][n]["u"][0] for n in points["point"]])
 
 
 def test_a_network_without_an_answer_is_a_failed_result_that_is_not_saved(tmp_path):

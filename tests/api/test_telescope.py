@@ -68,6 +68,17 @@ def test_a_night_and_what_it_wrote_give_one_surface(night, written):
         catseye.surface()
 
 
+def test_a_surface_s_columns_are_in_their_units(night):
+    surface = catseye.surface(night)
+    prisms, told = surface.to_table("prisms"), surface.to_object()["deviations"]
+    for column in ("deviation", "u_deviation", "half_path"):
+        assert prisms[column].to_value("m").tolist() == pytest.approx([told[n][column] for n in prisms["point"]])
+    terms = surface.found.shapes[-1].expansion
+    zernike = surface.to_table("zernike")
+    assert zernike["value"].to_value("m") == pytest.approx(terms.value)
+    assert zernike["u"].to_value("m") == pytest.approx(np.sqrt(np.diag(terms.covariance)))
+
+
 def test_counts_of_many_points_are_those_of_each():
     to = np.array([[0.0, 0.0, 50.0], [10.0, -20.0, 60.0], [0.0, 0.0, -4000.0]])
     together = catseye.point(MONUMENT, MIRROR, to)

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catseye.coordinator.guard.guard import SafetyGuard
+from catseye.coordinator.guard.guard import SafetyGuard, _unforeseen
 from catseye.coordinator.visibility.surroundings import KeepClear
 from catseye.errors import InputError
 from catseye.ranger.initialisation import commands_of_ranger
@@ -11,6 +11,7 @@ from catseye.ranger.line import Reply, Request
 from catseye.ranger.status import StatusWord
 from catseye.records.night.live import TICK_SECONDS, LivePosture
 from catseye.records.site.interlock import Interlock, Interlocks
+from catseye.reduction.steering.tracking import AZIMUTH_SLEW, ELEVATION_SLEW, SLEW_ACCELERATION
 from coordinator.round_scene import DAY, DEGREE, MORNING, NIGHT, angle, beams, gbt, keep_out, posture, stands
 from sun_scene import astropy_sun
 
@@ -350,3 +351,14 @@ def test_thousands_of_cubes_are_learned_quickly():
     guard.telescope(replace(posture(), azimuth=np.arctan2(SUN[0], SUN[1]) + np.pi))
     guard.stands("ZY113", stands()["ZY113"].reference)
     assert said(guard, "ZY113", "CIL DP20C") is None
+
+
+@pytest.mark.parametrize(("seconds", "share"), [(1.0, 0.5), (2.0, 2.0), (0.0, 0.0)])
+def test_a_telescope_that_speeds_up_turns_by_half_the_acceleration_times_the_time_squared(seconds, share):
+    turned = np.hypot(share * SLEW_ACCELERATION, share * SLEW_ACCELERATION)
+    assert _unforeseen(seconds) == pytest.approx(turned, rel=1e-12)
+
+
+def test_a_telescope_turns_no_faster_than_it_slews_one_way_after_the_other():
+    most = np.hypot(2.0 * AZIMUTH_SLEW, 2.0 * ELEVATION_SLEW)
+    assert _unforeseen(1000.0) == pytest.approx(1000.0 * most, rel=1e-12)

@@ -126,6 +126,20 @@ def test_a_ranger_whose_own_place_is_poor_is_worth_less():
             assert [s.target for s in with_it.shots[name]][:4] == [s.target for s in without.shots[name]][:4]
 
 
+def test_a_range_is_worth_what_its_own_noise_and_the_rangers_place_leave_of_it():
+    """Of a point known to p in each direction, along any line: p - p^2 / 3 (p + sigma^2 + u^2) is left of its mean."""
+    u = 0.5e-3
+    known = {n: (0.3e-3) ** 2 * np.eye(3) for n, r in targets().items() if r.kind == "ball"}
+    planner = RoundPlanner(few_prisms(), targets=list(known))
+    told = state(NIGHT, ready=("ZY105",), u=known | {"ZY105": u**2 * np.eye(3)})
+    reasons = [shot.reason for shot in planner.round(told).shots["ZY105"] if shot.reason.startswith("u of TR")]
+    assert len(reasons) >= 3
+    for reason in reasons[:3]:
+        before, after = (1e-3 * float(reason.split()[k]) for k in (4, 6))
+        total = before**2 + planner.settings.sigma**2 + u**2
+        assert after == pytest.approx(np.sqrt(before**2 - before**4 / (3.0 * total)), abs=1e-7)
+
+
 def test_references_and_benchmarks_come_in_their_time():
     planner = RoundPlanner(few_prisms())
     bench = {b.ranger: b.target for b in gbt().benchmarks}
