@@ -4,6 +4,7 @@ It says where they listen in one JSON line, answers `report` with another, and e
 """
 
 import asyncio
+import gc
 import json
 import sys
 import time
@@ -41,6 +42,8 @@ async def serve(site, offset, twin):
     for head in heads.values():
         head.fired.clear()
     await feed.start(LOOPBACK, 0)
+    gc.collect()
+    gc.freeze()  # as `zy` does
     say({"rangers": served.addresses, "feed": (LOOPBACK, feed.port)})
     work = [asyncio.create_task(each) for each in (served.serve(), feed.serve(), _asked(heads))]
     try:

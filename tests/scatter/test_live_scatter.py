@@ -127,16 +127,17 @@ def test_many_nights_err_by_what_they_claim(motion, nights, faults, filter_):
             assert np.abs(t).max() < 5.0, f"{name} is off by {t} standard errors night after night"
 
 
-@draws(3, 50, name="nights")
+@draws(50, 3, name="nights")
 def test_the_first_epoch_errs_by_what_it_claims(nights):
-    """It has typed places and no history. Fifty runs of `simulate --fast`, seeds 101 to 150, gave 0.73 and none beyond
-    its band of 99 %; a chi-square of 3.75 was seen before typed places were told from known ones."""
+    """It has typed places and no history. These fifty nights give 0.83 with u 0.04, 1.97 in the worst; `simulate --fast`
+    with seeds 101 to 150 gave 0.75 and none beyond its band of 99 %. 3.75 was seen before typed places were told from
+    known ones."""
     each = []
     for seed in range(601, 601 + nights):
         found, _ = night(TRACK, seed, 1)
         each.append(np.mean([np.mean(z**2) for z in found.values()]))
-    assert same_chance(0.4, 10, nights * 10) < np.mean(each) < same_chance(1.2, 10, nights * 10)
-    assert max(each) < 2.5
+    assert same_chance(0.3, 3 * 10, nights * 10) < np.mean(each) < same_chance(1.5, 3 * 10, nights * 10)
+    assert max(each) < 3.0
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """The rangers of a site served by this process, and a twin's feed with them."""
 
 import asyncio
+import gc
 import importlib
 import logging
 import os
@@ -156,12 +157,15 @@ class RangersServed:
             if self._feed is not None:
                 await self._feed.start(*self._feed_at)
                 at = (self._feed_at[0], self._feed.port)
+            gc.collect()
+            gc.freeze()  # thousands of cubes a ranger: a full collection is 100 ms in which nobody is answered
             listening(Listening(dict(self._served.addresses), at))
             await asyncio.gather(self._served.serve(), *([] if self._feed is None else [self._feed.serve()]))
         finally:
             if self._feed is not None:
                 await self._feed.stop()
             await self._served.stop()
+            gc.unfreeze()
 
 
 def heads_of(factory: str, rangers: tuple[str, ...]) -> dict[str, RangerHead]:

@@ -376,3 +376,17 @@ def test_a_shot_costs_about_a_millisecond():
             made.shot("ZY105", "ZEG41040L", 0.1 * k)
         best = min(best, (time.process_time() - begin) / 25)
     assert best < 3e-3  # 0.9 ms on an idle core; others share this one
+
+
+def test_noise_of_paths_is_kept_for_so_many_and_the_same_when_it_is_drawn_again():
+    """A whole dish has 40 000 lines; a night that goes on fires at all of them."""
+    made = twin()
+    ranger, name = PAIRS[0]
+    before = aimed(made, ranger, name, [1.0, 20.0])
+    path = made.returns._path
+    for k in range(path.cache_info().maxsize + 10):
+        path(ranger, f"L{k}")
+    assert path.cache_info().currsize == path.cache_info().maxsize <= 2000
+    missed = path.cache_info().misses
+    assert np.array_equal(aimed(made, ranger, name, [1.0, 20.0]), before)
+    assert path.cache_info().misses == missed + 1
