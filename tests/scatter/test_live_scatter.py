@@ -129,9 +129,9 @@ def test_many_nights_err_by_what_they_claim(motion, nights, faults, filter_):
 
 @draws(50, 3, name="nights")
 def test_the_first_epoch_errs_by_what_it_claims(nights):
-    """It has typed places and no history. These fifty nights give 0.83 with u 0.04, 1.97 in the worst; `simulate --fast`
-    with seeds 101 to 150 gave 0.75 and none beyond its band of 99 %. 3.75 was seen before typed places were told from
-    known ones."""
+    """It has typed places and no history. These fifty nights give 0.83 with u 0.04, 1.97 in the worst;
+    `simulate --fast` with seeds 101 to 150 gave 0.75 and none beyond its band of 99 %. 3.75 was seen before typed
+    places were told from known ones."""
     each = []
     for seed in range(601, 601 + nights):
         found, _ = night(TRACK, seed, 1)
