@@ -46,14 +46,20 @@ def page(ports, who):
 
 
 async def origin(text):
-    """An HTTP server that answers everything with one page."""
+    """An HTTP server that answers everything with one page; a browser also connects without ever asking."""
 
     async def answer(reader, writer):
-        await reader.readuntil(b"\r\n\r\n")
-        head = f"HTTP/1.1 200 OK\r\nContent-Type: text/html\r\nContent-Length: {len(text)}\r\nConnection: close\r\n\r\n"
-        writer.write(head.encode() + text.encode())
-        await writer.drain()
-        writer.close()
+        try:
+            await reader.readuntil(b"\r\n\r\n")
+            writer.write(
+                b"HTTP/1.1 200 OK\r\nContent-Type: text/html\r\nConnection: close\r\n"
+                + f"Content-Length: {len(text)}\r\n\r\n{text}".encode()
+            )
+            await writer.drain()
+        except asyncio.IncompleteReadError:
+            pass
+        finally:
+            writer.close()
 
     return await asyncio.start_server(answer, LOOPBACK, 0)
 
