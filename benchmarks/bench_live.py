@@ -13,8 +13,10 @@ and not in the journal.
 Beside it what a user would write instead, on the same rangers: asyncio streams, a phase of each buffer, and sqlite3
 with a commit a shot, samples as JSON or as bytes; no reduction, no guard, no epochs.
 
-`--series` measures catseye alone, and the disk beside it: each second a buffer is written and flushed to the same disk.
-The file has a row a shot and a row a flush: kind, s since the first, ms. `studies/lasting.py` draws it.
+`--series` measures catseye alone, and the machine beside it: five times a second a buffer is written and flushed to the
+same disk, and each second the kernel is asked how much of both cores' time a virtual machine's host gave to others.
+The file has a row a shot, a flush and a second: kind (shot, flush, stolen), s since the first, ms. `studies/lasting.py`
+draws it.
 """
 
 import argparse
@@ -73,13 +75,13 @@ def result(name: str, late: list[float], cpu: float, wall: float, rangers: int, 
 
 
 async def coordinated(
-    child: LoadChild, site: Any, journal: str, name: str, seconds: float, late: list[float] | None = None
+    child: LoadChild, site: Any, journal: str, name: str, seconds: float, told: list[tuple[float, float]] | None = None
 ) -> Result:
     """The coordinator; first a round that gives each ranger a reference and a target, then streams.
 
-    late   is filled with s until durable, of each shot in order
+    told   is filled with when each shot was durable (`time.monotonic`) and how many s after its buffer's end
     """
-    late = [] if late is None else late
+    told = [] if told is None else told
     targets: dict[str, str] = {}
     before = child.report()["fired"]
     running = LiveCoordinator(
@@ -89,7 +91,7 @@ async def coordinated(
     def entry(entry: Any) -> None:
         if isinstance(entry, AnsweredShot):
             shot = entry.shot
-            late.append(child.clock.now_ns() * 1e-9 - shot.ticks * TICK - shot.duration)
+            told.append((time.monotonic(), child.clock.now_ns() * 1e-9 - shot.ticks * TICK - shot.duration))
             if entry.status == "used" and shot.target != REFERENCE:
                 targets[shot.ranger] = shot.target
 
@@ -101,10 +103,10 @@ async def coordinated(
     for ranger in child.addresses:
         running.ziy.stream(ranger, targets.get(ranger, REFERENCE))
     await asyncio.sleep(SETTLED)  # the round that was planned before comes to its end
-    late.clear()
+    told.clear()
     cpu, solving, wall = time.process_time(), solver_cpu(running), time.perf_counter()
     await asyncio.sleep(seconds)
-    cpu, wall, measured = time.process_time() - cpu, time.perf_counter() - wall, list(late)
+    cpu, wall, measured = time.process_time() - cpu, time.perf_counter() - wall, [late for _, late in told]
     solving = solver_cpu(running) - solving
     for ranger in child.addresses:
         running.ziy.stream(ranger, None)
@@ -209,23 +211,28 @@ async def measured(options: argparse.Namespace, folder: Path) -> list[Result]:
     return found
 
 
-class Flushes(threading.Thread):
-    """What the disk takes for a buffer each second, ms, until stopped."""
+class Machine(threading.Thread):
+    """What the machine does meanwhile, until stopped: (kind, `time.monotonic`, ms)."""
 
     def __init__(self, path: Path):
         super().__init__(daemon=True)
-        self._path, self._stopped, self.ms = path, threading.Event(), []
+        self._path, self._stopped, self.rows = path, threading.Event(), []
 
     def run(self) -> None:
-        """Write and flush; a buffer lies over the one before, so that the file does not grow."""
+        """Write and flush, a buffer over the one before, so that the file does not grow; read what was stolen."""
         raw = os.urandom(BUFFER_BYTES)
+        stolen, turns = stolen_ms(), 0
         with self._path.open("wb", buffering=0) as file:
-            while not self._stopped.wait(1.0):
+            while not self._stopped.wait(0.2):
                 file.seek(0)
                 file.write(raw)
                 began = time.perf_counter()
                 os.fsync(file.fileno())
-                self.ms.append(1e3 * (time.perf_counter() - began))
+                self.rows.append(("flush", time.monotonic(), 1e3 * (time.perf_counter() - began)))
+                turns += 1
+                if turns % 5 == 0:
+                    before, stolen = stolen, stolen_ms()
+                    self.rows.append(("stolen", time.monotonic(), stolen - before))
 
     def stop(self) -> None:
         """End it."""
@@ -233,24 +240,34 @@ class Flushes(threading.Thread):
         self.join()
 
 
+def stolen_ms() -> float:
+    """ms of all cores since the machine began that its host did not give it."""
+    with Path("/proc/stat").open(encoding="ascii") as file:
+        return 1e3 * int(file.readline().split()[8]) / os.sysconf("SC_CLK_TCK")
+
+
 async def series(options: argparse.Namespace, folder: Path) -> Result:
     """A long run, shot by shot, into a table."""
-    late: list[float] = []
-    flushes = Flushes(folder / "flushed")
+    told: list[tuple[float, float]] = []
+    machine = Machine(folder / "flushed")
     with LoadChild(options.rangers, twin=options.heads == "twin") as child:
-        flushes.start()
+        machine.start()
         place, name = str(folder / "night.db"), "catseye, SQLite"
-        found = await coordinated(child, load_site(options.rangers), place, name, options.seconds, late)
-        flushes.stop()
-    rows = [("shot", k * options.seconds / found.shots, 1e3 * each) for k, each in enumerate(late[: found.shots])]
-    rows += [("flush", float(k), each) for k, each in enumerate(flushes.ms)]
-    text = "kind,s,ms\n" + "".join(f"{kind},{at:.3f},{ms:.3f}\n" for kind, at, ms in rows)
+        found = await coordinated(child, load_site(options.rangers), place, name, options.seconds, told)
+        machine.stop()
+    began, ended = told[0][0], told[found.shots - 1][0]
+    rows = [("shot", at, 1e3 * late) for at, late in told[: found.shots]]
+    rows += [row for row in machine.rows if began <= row[1] <= ended]
+    text = "kind,s,ms\n" + "".join(f"{kind},{at - began:.3f},{ms:.3f}\n" for kind, at, ms in rows)
     options.series.write_text(text, encoding="utf-8")
-    p99 = float(np.percentile(flushes.ms, 99))
+    flushes = [ms for kind, _, ms in rows if kind == "flush"]
+    stolen = [ms for kind, _, ms in rows if kind == "stolen"]
+    p99 = float(np.percentile(flushes, 99))
     sys.stdout.write(
         f"{found.shots} shots in {options.seconds:g} s: p50 {found.p50_ms:.1f} ms, p99 {found.p99_ms:.1f}, most "
         f"{found.max_ms:.1f}; lost {found.lost}, doubled {found.doubled}; a flush p50 "
-        f"{np.median(flushes.ms):.1f} ms, p99 {p99:.1f}; limit max(20, 3 x {p99:.1f}) ms\n"
+        f"{np.median(flushes):.1f} ms, p99 {p99:.1f}; limit max(20, 3 x {p99:.1f}) ms; stolen {np.mean(stolen):.0f} ms "
+        f"a second, {np.max(stolen):.0f} in the worst\n"
     )
     return found
 
@@ -263,7 +280,7 @@ def main() -> None:
     parser.add_argument("--postgresql", metavar="URL", help="an empty database")
     parser.add_argument("--folder", type=Path, help="where the journals are written and removed again")
     parser.add_argument("--json", action="store_true")
-    parser.add_argument("--series", type=Path, metavar="FILE.csv", help="a row for each shot and each flush")
+    parser.add_argument("--series", type=Path, metavar="FILE.csv", help="a row for each shot, flush and second")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(dir=options.folder) as name:
         folder = Path(name)

@@ -67,7 +67,7 @@ class JournalSettings:
     rotate_nightly whether it does at noon UTC
     """
 
-    group: float = 0.005
+    group: float = 0.001
     keep_buffers: bool = True
     compress: bool = False
     patience: float = PATIENCE
