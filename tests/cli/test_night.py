@@ -20,12 +20,16 @@ def run(capsys):
 SMALL = ("--dish-prisms", "20", "--interval-s", "14", "--again", "0.5", "--seed", "5")
 
 
-def test_a_small_night_is_a_campaign_whose_points_are_its_truth(run, tmp_path):
-    status, said, complained = run("night", tmp_path / "night", *SMALL, "--json")
+@pytest.mark.parametrize("nature", [0.0, 1.0])
+def test_a_small_night_is_a_campaign_whose_points_are_its_truth(run, tmp_path, nature):
+    strength = ("--nature", "0") if nature == 0.0 else ()  # 1 is the default
+    status, said, complained = run("night", tmp_path / "night", *SMALL, *strength, "--json")
     assert status == 0, complained
-    assert json.loads(said)["seed"] == 5
+    assert (json.loads(said)["seed"], json.loads(said)["nature"]) == (5, nature)
     campaign = read_campaign(tmp_path / "night")
     truth = json.loads((tmp_path / "night" / "truth.json").read_text())
+    assert truth["nature"]["strength"] == nature
+    assert bool(truth["nature"]["waves"]) == (nature > 0.0)
     again = sum(t.startswith("DP") for t in campaign.shots.target) / 20 / 6
     assert 1.2 < again < 1.7  # the weak ranger shoots two thirds
     coordinates = reduce_epoch(campaign).coordinates
@@ -51,7 +55,13 @@ def test_a_place_that_holds_something_and_numbers_beyond_the_limits_are_refused(
     assert "exists and is not an empty directory" in complained
     with pytest.raises(InputError):
         catseye.night(tmp_path)
-    for wrong in ({"interval_s": 0.0}, {"again": -1.0}, {"elevation_deg": 2.0}, {"dish_prisms": 20_000}):
+    for wrong in (
+        {"interval_s": 0.0},
+        {"again": -1.0},
+        {"elevation_deg": 2.0},
+        {"dish_prisms": 20_000},
+        {"nature": -1.0},
+    ):
         with pytest.raises(ValidityError):
             catseye.night(tmp_path / "new", **wrong)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["mine.txt"]

@@ -298,6 +298,7 @@ def night(
     elevation_deg: float = 30.0,
     interval_s: float = 8.0,
     again: float = 0.43,
+    nature: float = 1.0,
 ) -> Path:
     """A simulated night as a campaign that `reduce` reads, and beside it `truth.json`, which `reduce` does not read.
 
@@ -307,11 +308,17 @@ def night(
     azimuth_deg, elevation_deg   of the telescope
     interval_s     between two shots of a ranger, s
     again          how often each ranger of the feed arm shoots each prism once more; 0.43 makes some 20 000 shots
+    nature         strength, 0 to 10, of waves, fronts, turbulence and gradients in the air, of thermometers that lag
+                   and of a telescope that expands: at 1 up to nature's own, drawn from the seed; 0: smooth air that
+                   drifts evenly, a rigid telescope
 
     Raises InputError where the directory holds something and ValidityError for numbers beyond these.
     """
+    from dataclasses import asdict
+
     from catseye.errors import ValidityError
     from catseye.gateways.writers.objects import json_page
+    from catseye.simulator.night.nature import Nature
     from catseye.simulator.night.schedule import Schedule
     from catseye.simulator.night.sheets import write_night
     from catseye.simulator.night.simulate import SimulatedTelescope, simulate_night
@@ -323,12 +330,14 @@ def night(
         seed,
         telescope=SimulatedTelescope(azimuth_deg, elevation_deg, dish_prisms),
         schedule=Schedule(interval_s=interval_s, again=again),
+        nature=Nature.drawn(seed, nature),
     )
     where = write_night(made, Path(directory))
     truth = made.truth
     page = {
         "what": "the truth behind a simulated night: metres in the ground frame, status of each shot",
         "seed": seed,
+        "nature": {"strength": nature, "points_hold_at_s": truth.reference_s, **asdict(truth.nature)},
         "points": {name: {axis: x[k] for k, axis in enumerate("xyz")} for name, x in truth.points.items()},
         "surface_deviations": None if truth.paraboloid is None else truth.paraboloid.deviations,
         "shots": truth.shot_status,

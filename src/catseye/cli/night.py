@@ -14,7 +14,7 @@ from catseye.cli.terminal import say
     "Then: catseye reduce whole-dish --out whole-dish-report\n"
     "A small one: catseye night small --dish-prisms 60 --interval-s 14 --again 0"
 )
-def night(
+def night(  # noqa: PLR0913 - its options are its command line
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Where the campaign goes: new or empty.")],
     seed: Annotated[int, typer.Option(help="Of every draw: the same night each time.")] = 2209,
     dish_prisms: Annotated[int, typer.Option(help="Prisms on the dish; the telescope has 2209.")] = 2209,
@@ -24,6 +24,13 @@ def night(
     again: Annotated[
         float, typer.Option(help="How often each feed-arm ranger shoots each prism once more; a fraction is a share.")
     ] = 0.43,
+    nature: Annotated[
+        float,
+        typer.Option(
+            help="Strength of what air, thermometers and steel do beyond a smooth night: 1 is up to nature's own, "
+            "0 an even drift and a rigid telescope."
+        ),
+    ] = 1.0,
     json: Json = False,
 ) -> None:
     """A simulated night of the whole telescope as a campaign: 18 rangers, 2209 prisms, 20 000 shots."""
@@ -38,9 +45,10 @@ def night(
         elevation_deg=elevation_deg,
         interval_s=interval_s,
         again=again,
+        nature=nature,
     )
     if json:
-        say(json_line({"written": str(where), "seed": seed, "truth": str(where / "truth.json")}))
+        say(json_line({"written": str(where), "seed": seed, "nature": nature, "truth": str(where / "truth.json")}))
     else:
         say(f"Written: {where}/, a campaign; its truth is in truth.json, which no reduction reads")
         say(f"Next:    catseye reduce {where} --out {where}-report")

@@ -221,6 +221,11 @@ def test_faults_of_stations_and_converters_do_what_they_say():
         ("thermal", "ZY105", "ZEG41040L", "fixed 145.3 30", 20_000.0, 20, 8_000),
         ("vibration", "ZY105", "ZEG41040L", "fixed 145.3 30", 5.0, 1, 300),
         ("wind", "ZY105", "ZEG41040L", "fixed 145.3 30", 5.0, 1, 1_500),
+        ("expansion", "ZY105", "ZEG41040L", "fixed 145.3 30", 7200.0, 50, 8_000),
+        ("air_waves", "ZY105", "ZEG41040L", "fixed 145.3 30", 700.0, 2, 60),
+        ("fronts", "ZY105", "ZEG41040L", "fixed 145.3 30", 7200.0, 5, 80),
+        ("eddies", "ZY105", "ZEG41040L", "fixed 145.3 30", 0.0, 1, 25),
+        ("pressure_waves", "ZY105", "ZEG41040L", "fixed 145.3 30", 700.0, 0.5, 20),
         ("settling", "ZY105", "ZBM01", "fixed 145.3 30", 36_000.0, 0.5, 100),
         ("posture", "ZY105", "ZEG41040L", "fixed 145.3 30", 0.0, 50, 20_000),
         ("feed_arm", "ZY105", "ZEG41040L", "fixed 145.3 30", 0.0, 50, 20_000),
@@ -238,7 +243,7 @@ def test_faults_of_stations_and_converters_do_what_they_say():
     ],
 )
 def test_each_effect_can_be_left_out_and_is_of_its_size(effect, ranger, name, motion, seconds, least_um, most_um):
-    base = {"normals": ("obliquity",), "thermal": ("diurnal",)}.get(effect, ())
+    base = {"normals": ("obliquity",), "thermal": ("diurnal",), "expansion": ("diurnal",)}.get(effect, ())
     sizes = []
     for seed in range(4):
         with_, without = (twin(motion, seed=seed, planted=only(*base, *more)) for more in ((effect,), ()))

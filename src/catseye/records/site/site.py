@@ -103,10 +103,15 @@ class Adc(Record):
 
 
 class WeatherStation(Record):
-    """[[weather_station]]: its elevation is above sea level."""
+    """[[weather_station]]: its elevation is above sea level, its place in the ground frame.
+
+    x_m, y_m   east and north of the pintle bearing; not said: it may stand anywhere on the site
+    """
 
     name: Name
     elevation_m: Elevation
+    x_m: float | None = None
+    y_m: float | None = None
 
 
 class SiteRecord(Certificate):

@@ -5,13 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catseye.constants import PPM, ZERO_CELSIUS_K
-from catseye.simulator.night.faults import Faults, Planted, Streams
 
 WAVELENGTH_UM = 0.780
 PRESSURE_LAPSE_HPA_PER_M = 0.11
-STATIONS = {"WX1": 803.800, "WX2": 850.150}  # elevation above sea level, m
 ELEVATION_OF_Z0 = 806.42  # m above sea level
-READING_INTERVAL_S = 30.0
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)  # 12 nodes: below 1e-12 on a profile of 10 m scale height
 
 
@@ -40,6 +37,11 @@ SUMMER_DAY = replace(
     NIGHT, temperature_c=28.0, humidity_percent=60.0, gradient_c_per_m=-0.0098, surface_layer_c=-0.8, drift_c_per_h=0.8
 )
 WINTER = replace(NIGHT, temperature_c=-12.0, humidity_percent=80.0, surface_layer_c=0.8, gradient_c_per_m=0.015)
+
+
+def saturation_hpa(temperature_c):
+    """Saturation vapour pressure by Magnus' form, good to 0.5 %: only ratios are taken of it."""
+    return 6.112 * np.exp(17.62 * temperature_c / (243.12 + temperature_c))
 
 
 def group_refractivity_ppm(temperature_c, pressure_hpa, humidity_percent):
@@ -96,47 +98,21 @@ class TrueAir:
         p, h = self.pressure_hpa(z, seconds), self.humidity_percent(seconds)
         return 1.0 + PPM * group_refractivity_ppm(self.temperature_c(z, seconds), p, h)
 
+    def weather_at(self, points, seconds):
+        """Temperature, °C, pressure, hPa, and relative humidity, %, at points (..., 3) and times (...)."""
+        z = points[..., 2]
+        return self.temperature_c(z, seconds), self.pressure_hpa(z, seconds), self.humidity_percent(seconds)
+
+    def index_at(self, points, seconds):
+        """Group index at points (..., 3) and times (...)."""
+        return self.index(points[..., 2], seconds)
+
+    def common_c(self, seconds):
+        """Temperature of the whole site at times (...) less that at the start."""
+        return self.conditions.drift_c_per_h * np.asarray(seconds, dtype=float) / 3600.0
+
     def path_index(self, start, end, seconds):
         """Group index averaged along straight lines from start to end, points (..., 3): Gauss-Legendre quadrature."""
         share = 0.5 * (NODES + 1.0)
         z = start[..., 2, None] + (end - start)[..., 2, None] * share
         return 0.5 * self.index(z, np.asarray(seconds)[..., None]) @ WEIGHTS
-
-
-@dataclass(frozen=True)
-class WeatherReading:
-    """One line of weather.csv."""
-
-    seconds: float
-    station: str
-    temperature_c: float
-    pressure_hpa: float
-    humidity_percent: float
-
-
-def weather_readings(
-    air: TrueAir, *, streams: Streams, faults: Faults, planted: Planted, until_s: float
-) -> tuple[list[WeatherReading], dict[str, float]]:
-    """Readings of both stations every 30 s from 180 s before the start, and the true thermometer offsets."""
-    seconds = np.arange(-180.0, max(4110.0, until_s + 600.0), READING_INTERVAL_S)
-    columns, offsets = {}, {}
-    for station, elevation in STATIONS.items():
-        rng = streams(f"weather/{station}")
-        offset = planted.gain("thermometer_offsets") * rng.normal(0.0, air.conditions.thermometer_offset_c)
-        offset += faults.lying_thermometer_c if station == faults.lying_station else 0.0
-        scatter = planted.gain("weather_scatter") * rng.normal(size=(len(seconds), 3)) * (0.05, 0.05, 0.5)
-        z = elevation - ELEVATION_OF_Z0
-        columns[station] = np.column_stack(
-            (
-                air.temperature_c(z, seconds) + offset + scatter[:, 0],
-                air.pressure_hpa(z, seconds) + scatter[:, 1],
-                np.clip(air.humidity_percent(seconds) + scatter[:, 2], 0.0, 100.0),
-            )
-        )
-        offsets[station] = float(offset)
-    readings = [
-        WeatherReading(float(s), station, *(float(v) for v in columns[station][i]))
-        for i, s in enumerate(seconds)
-        for station in STATIONS
-    ]
-    return readings, offsets

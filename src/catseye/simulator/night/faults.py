@@ -88,7 +88,7 @@ class Planted:
         return 0.0 if effect in self.ignore else float(self.signs.get(effect, 1.0))
 
 
-NIGHTLY = ("samples/", "returns/", "path/", "path noise/", "electronics", "weather/", "sound/", "air/")
+NIGHTLY = ("samples/", "returns/", "path/", "path noise/", "electronics", "weather/", "sound/", "air/", "nature/")
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,12 @@ import numpy as np
 
 from catseye.constants import PPM, SPEED_OF_LIGHT, TWO_PI
 from catseye.simulator.night.air import TrueAir
+from catseye.simulator.night.expansion import MovingPoints
 from catseye.simulator.night.faults import Faults, Planted, Streams
 from catseye.simulator.night.glass import GLASS_TO_AIR, ball_delay, prism_delay
 from catseye.simulator.night.schedule import REFERENCE, ScheduledShot
 from catseye.simulator.night.structure import TrueTarget, unit
+from catseye.simulator.night.warm_lines import WarmLine
 from catseye.simulator.night.world import TrueHead
 
 MODULATION_HZ = 1.5e9
@@ -88,9 +90,9 @@ def returns_of_ranger(
     head: TrueHead,
     shots: list[ScheduledShot],
     *,
-    points: dict[str, np.ndarray],
+    points: MovingPoints,
     targets: dict[str, TrueTarget],
-    air: TrueAir,
+    air: TrueAir | WarmLine,
     faults: Faults,
     planted: Planted,
     streams: Streams,
@@ -103,10 +105,10 @@ def returns_of_ranger(
     fluctuation = np.array([paths.get(s.target, 0.0) for s in shots]) * air.conditions.index_fluctuation_ppm * PPM
     flicker = 1.0 + planted.gain("scintillation") * 0.022 * rng.normal(size=len(shots))
     fate, foreign = rng.uniform(size=len(shots)), rng.uniform(size=(len(shots), 4))
-    here = points[head.ranger]
-    ends = np.array([here if s.target == REFERENCE else points[s.target] for s in shots])
+    here = points.at([head.ranger] * len(shots), seconds)
+    ends = points.at([head.ranger if s.target == REFERENCE else s.target for s in shots], seconds)
     index = air.path_index(here, ends, seconds) + planted.gain("index_fluctuation") * fluctuation
-    end_index = air.index(ends[:, 2], seconds)
+    end_index = air.index_at(ends, seconds)
     volt = {name: usual_volt(name, streams(f"path/{head.ranger}/{name}").uniform()) for name in targets}
     weak = faults.weak_amplitude if head.ranger == faults.weak_ranger else 1.0
 
@@ -117,7 +119,7 @@ def returns_of_ranger(
             phasor = REFERENCE_VOLT * wanted + head.true_leakage
             returns.append(Return(shot, complex(phasor), "good", 1.0, head.true_d0, 0.0))
             continue
-        away = here - ends[i]
+        away = here[i] - ends[i]
         distance = float(np.linalg.norm(away))
         glass = glass_delay(targets[shot.target], unit(away), obliquity=planted.gain("obliquity"))
         path = index[i] * distance + end_index[i] * glass

@@ -4,26 +4,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.simulator.night.air import AirConditions, WeatherReading
+from catseye.simulator.night.air import AirConditions
+from catseye.simulator.night.nature import CALM, Nature
 from catseye.simulator.night.schedule import ScheduledShot
+from catseye.simulator.night.stations import WeatherReading
 from catseye.simulator.night.structure import Structure, TrueTarget
 from catseye.simulator.night.truth import Truth
+from catseye.simulator.night.warm_lines import Sounding
 from catseye.simulator.night.world import (
     TrueBenchmark,
     TrueHead,
     TrueMonument,
 )
-
-
-@dataclass(frozen=True)
-class Sounding:
-    """One line of path_temperatures.csv."""
-
-    seconds: float
-    ranger: str
-    target: str
-    temperature_c: float
-    u_temperature_c: float
 
 
 @dataclass(frozen=True)
@@ -46,3 +38,4 @@ class Night:
     frames: np.ndarray  # int16, (shots, 8192)
     truth: Truth
     sounded: tuple[Sounding, ...] = ()  # rows of path_temperatures.csv; no file without
+    nature: Nature = CALM

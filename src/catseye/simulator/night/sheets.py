@@ -12,6 +12,7 @@ from catseye.simulator.night.air import ELEVATION_OF_Z0
 from catseye.simulator.night.glass import GLASS_TO_AIR
 from catseye.simulator.night.head import CYCLES, SAMPLES_PER_CYCLE
 from catseye.simulator.night.night import Night
+from catseye.simulator.night.stations import STATIONS
 from catseye.simulator.night.structure import TrueTarget, TrueTriplet
 from catseye.simulator.night.world import METRES_PER_DEGREE, SITE_LATITUDE_DEG, TrueHead, TrueMonument
 
@@ -62,13 +63,10 @@ full_scale_volt = 10.0      # code 32768 = 10 V, bipolar
 samples_per_cycle = 64
 cycles = 128
 
-[[weather_station]]
-name = "WX1"
-elevation_m = 803.800
-
-[[weather_station]]
-name = "WX2"
-elevation_m = 850.150
+"""
+STATION = """[[weather_station]]
+name = "{name}"
+elevation_m = {elevation:.3f}
 """
 
 
@@ -123,6 +121,15 @@ def target_entry(t: TrueTarget) -> str:
         entry += f"normal = {vector(t.normal_typed, 5)}     # outward normal of the entry face, same frame\n"
         entry += prism_constants(t.sizes_mm[0])
     return entry
+
+
+def station_entry(night: Night, name: str) -> str:
+    """A weather station's table; where it stands is said where that matters."""
+    entry = STATION.format(name=name, elevation=STATIONS[name])
+    if night.truth.nature.calm:
+        return entry
+    x, y, _ = night.truth.stations.places[name]
+    return entry + f"x_m = {x:.1f}\ny_m = {y:.1f}\n"
 
 
 def triplet_sheet(t: TrueTriplet) -> str:
@@ -210,7 +217,8 @@ def _texts(night: Night) -> dict[str, str]:
             azimuth=float(night.azimuth_deg),
             elevation=float(night.elevation_deg),
             fluctuation=float(night.conditions.index_fluctuation_ppm),
-        ),
+        )
+        + "\n".join(station_entry(night, name) for name in STATIONS),
         "feedarm.toml": feed_arm_sheet(night.telescope.feed_arm, night.telescope.aim_point_mm),
         "targets.toml": TARGETS + "\n".join(target_entry(t) for t in night.single_targets),
     }

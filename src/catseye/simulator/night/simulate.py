@@ -1,20 +1,33 @@
 """A whole synthetic night: the campaign as the files would tell it, and the truth that they do not."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.constants import PPM, TWO_PI
 from catseye.errors import InputError, ValidityError
-from catseye.simulator.night.air import NIGHT, AirConditions, TrueAir, group_refractivity_ppm, weather_readings
+from catseye.simulator.night.air import NIGHT, AirConditions, TrueAir
+from catseye.simulator.night.batches import in_batches
+from catseye.simulator.night.expansion import MovingPoints, SteelExpansion
 from catseye.simulator.night.faults import Faults, Planted, Streams
 from catseye.simulator.night.head import Return, returns_of_ranger, sampled_frames
-from catseye.simulator.night.night import Night, Sounding
+from catseye.simulator.night.natural_air import NaturalAir
+from catseye.simulator.night.nature import CALM, Nature
+from catseye.simulator.night.night import Night
 from catseye.simulator.night.posture import TruePosture, posture
-from catseye.simulator.night.schedule import Schedule, feed_arm_targets, ground_targets, plan_shots
-from catseye.simulator.night.structure import Structure, TrueTarget, structure, typed_mm, typing_error
+from catseye.simulator.night.schedule import Schedule, ScheduledShot, feed_arm_targets, ground_targets, plan_shots
+from catseye.simulator.night.stations import WeatherStations, station_points
+from catseye.simulator.night.structure import (
+    APERTURE_CENTRE,
+    Structure,
+    TrueTarget,
+    height_above_vertex,
+    structure,
+    typed_mm,
+    typing_error,
+)
 from catseye.simulator.night.truth import truth_of
+from catseye.simulator.night.warm_lines import LineWarmth, air_of_rangers, soundings
 from catseye.simulator.night.world import (
     FEED_ARM_RANGERS,
     GROUND_RANGERS,
@@ -27,37 +40,6 @@ from catseye.simulator.night.world import (
 )
 
 START_MJD_UTC = 52889.125
-SOUNDING_INTERVAL_S = 120.0
-
-
-@dataclass(frozen=True)
-class WarmLine(TrueAir):
-    """Air that is warmer by a plume on the way to some points than smooth air at these heights.
-
-    plumes   (point (3,) m, °C that the mean of the straight line is warmer: twice that half-way, none at the ends)
-    """
-
-    plumes: tuple[tuple[np.ndarray, float], ...] = ()
-
-    def path_index(self, start, end, seconds):
-        """As of `TrueAir`; towards a plume's point by the midpoint rule over 500 parts."""
-        index = super().path_index(start, end, seconds)
-        for point, warmer in self.plumes:
-            share = (np.arange(500) + 0.5) / 500
-            plume = warmer * (1.0 - np.cos(TWO_PI * share))
-            for i in np.flatnonzero(np.all(np.asarray(end) == point, axis=-1)):
-                z = start[2] + (end[i, 2] - start[2]) * share
-                t = self.temperature_c(z, seconds[i]) + plume
-                weather = self.pressure_hpa(z, seconds[i]), self.humidity_percent(seconds[i])
-                # the plume warms, it does not wet: the same vapour is a lower relative humidity
-                drier = saturation_hpa(self.temperature_c(z, seconds[i])) / saturation_hpa(t)
-                index[i] = 1.0 + PPM * group_refractivity_ppm(t, weather[0], weather[1] * drier).mean()
-        return index
-
-
-def saturation_hpa(temperature_c):
-    """Magnus' form, good to 0.5 %: only ratios are taken of it."""
-    return 6.112 * np.exp(17.62 * temperature_c / (243.12 + temperature_c))
 
 
 @dataclass(frozen=True)
@@ -86,19 +68,6 @@ class SimulatedTelescope:
             )
 
 
-@dataclass(frozen=True)
-class LineWarmth:
-    """Lines in warmer air than smooth, and whether sound measures them.
-
-    warmer_c    (ranger, target) -> °C by which the mean of that line is warmer
-    u_sound_c   °C: these lines are sounded, each with an offset of its own drawn from it, and noise of a fifth;
-                None: no sound
-    """
-
-    warmer_c: Mapping[tuple[str, str], float] = field(default_factory=dict)
-    u_sound_c: float | None = None
-
-
 @dataclass(frozen=True, eq=False)
 class NightSite:
     """What stands on the site of a simulated night; `cubes` are the benchmarks as targets, `points` all, m, ground."""
@@ -117,7 +86,7 @@ class NightSite:
         return self.telescope.targets | {t.name: t for t in self.cubes}
 
 
-def simulate_night(
+def simulate_night(  # noqa: PLR0913 - what a night is made of, keyword-only
     seed: int,
     *,
     telescope: SimulatedTelescope | None = None,
@@ -127,39 +96,62 @@ def simulate_night(
     planted: Planted | None = None,
     warmth: LineWarmth | None = None,
     night: int = 0,
+    nature: Nature | None = None,
+    start_mjd_utc: float = START_MJD_UTC,
 ) -> Night:
     """A night in the manner of night-01, from one seed.
 
-    warmth   of lines; none if None
-    night    another one at the same site: noise, electronics, weather and air are drawn anew
+    warmth          of lines; none if None
+    night           another one at the same site: noise, electronics, weather and air are drawn anew
+    nature          waves, fronts, turbulence, thermometers that lag, a telescope that expands; none of these if None
+    start_mjd_utc   decides with `nature` how the Sun stands, no more
 
     Raises InputError: something planted on what the night does not have.
     """
-    stands, warmth = telescope or SimulatedTelescope(), warmth or LineWarmth()
+    stands, warmth, nature = telescope or SimulatedTelescope(), warmth or LineWarmth(), nature or CALM
     faults, rule, planted = faults or Faults(), schedule or Schedule(), planted or Planted()
     streams = Streams(seed, night)
-    site = _site(stands, faults, planted, streams)
-    air = TrueAir(conditions, planted.gain("stratification"))
-    returns = _returns(site, rule, _air_of_rangers(site, air, warmth), faults, planted, streams)
+    site = _site(stands, faults, planted, streams, batch_heights=nature.batch_heights)
+    stratification = planted.gain("stratification")
+    air = TrueAir(conditions, stratification) if nature.calm else NaturalAir(conditions, stratification, nature)
+    plan = _plan(site, rule, faults, streams)
+    moving = _moving(site, air, nature.expansion, plan)
+    air_of = air_of_rangers(site.heads, site.points, air, warmth)
+    returns = {
+        r: returns_of_ranger(
+            site.heads[r],
+            plan[r],
+            points=moving,
+            targets=site.targets,
+            air=air_of[r],
+            faults=faults,
+            planted=planted,
+            streams=streams,
+        )
+        for r in site.heads
+    }
     ordered, frames = in_time(site.heads, returns, streams, planted=planted)
     until_s = ordered[-1].shot.seconds
-    weather, offsets = weather_readings(air, streams=streams, faults=faults, planted=planted, until_s=until_s)
+    wind = float(np.hypot(*nature.wind_m_s))
+    stations = WeatherStations(station_points(streams), nature.stations, wind, start_mjd_utc)
+    weather, offsets = stations.readings(air, streams=streams, faults=faults, planted=planted, until_s=until_s)
     truth = truth_of(
         heads=site.heads,
         monuments=site.monuments,
         telescope=site.telescope,
-        points=site.points,
+        moving=moving,
         returns=ordered,
-        air=air,
+        stations=stations,
         thermometer_offsets_c=offsets,
         pose=site.pose,
+        nature=nature,
     )
     return Night(
         name=f"simulated-{seed}",
         seed=seed,
         azimuth_deg=stands.azimuth_deg,
         elevation_deg=stands.elevation_deg,
-        start_mjd_utc=START_MJD_UTC,
+        start_mjd_utc=start_mjd_utc,
         conditions=conditions,
         monuments=site.monuments,
         heads=site.heads,
@@ -171,10 +163,13 @@ def simulate_night(
         frames=frames,
         truth=truth,
         sounded=soundings(air, warmth, site.points, streams=streams, until_s=until_s),
+        nature=nature,
     )
 
 
-def _site(stands: SimulatedTelescope, faults: Faults, planted: Planted, streams: Streams) -> NightSite:
+def _site(
+    stands: SimulatedTelescope, faults: Faults, planted: Planted, streams: Streams, *, batch_heights: float
+) -> NightSite:
     """Rangers, benchmarks and telescope, drawn. Raises InputError: an error planted on a stranger."""
     heads = {r: head(r, streams, planted) for r in (*GROUND_RANGERS, *FEED_ARM_RANGERS)}
     monuments = {r: monument(r, heads[r], streams, planted=planted) for r in GROUND_RANGERS}
@@ -188,6 +183,7 @@ def _site(stands: SimulatedTelescope, faults: Faults, planted: Planted, streams:
         faults=faults,
         planted=planted,
     )
+    telescope = in_batches(telescope, batch_heights, streams, planted)
     cubes = benchmark_targets(marks, streams, planted)
     targets = telescope.targets | {t.name: t for t in cubes}
     points = {r: m.true_scan_point for r, m in monuments.items()} | {t.name: t.point for t in targets.values()}
@@ -198,62 +194,26 @@ def _site(stands: SimulatedTelescope, faults: Faults, planted: Planted, streams:
     return NightSite(heads, monuments, marks, pose, telescope, cubes, points)
 
 
-def _air_of_rangers(site: NightSite, air: TrueAir, warmth: LineWarmth) -> dict[str, TrueAir]:
-    """The air as each ranger looks through it. Raises InputError: a warm line with a strange end."""
-    for ranger, target in warmth.warmer_c:
-        if ranger not in site.heads or target not in site.points:
-            raise InputError(f"a warm line {ranger} - {target}: the night has no such ends")
-    plumes = {r: tuple((site.points[t], w) for (a, t), w in warmth.warmer_c.items() if a == r) for r in site.heads}
-    return {r: WarmLine(air.conditions, air.stratification, p) if p else air for r, p in plumes.items()}
-
-
-def _returns(
-    site: NightSite,
-    rule: Schedule,
-    air_of: Mapping[str, TrueAir],
-    faults: Faults,
-    planted: Planted,
-    streams: Streams,
-) -> dict[str, list[Return]]:
-    """What comes back to each ranger from the shots that the schedule plans."""
+def _plan(site: NightSite, rule: Schedule, faults: Faults, streams: Streams) -> dict[str, list[ScheduledShot]]:
+    """Shots of every ranger."""
     telescope = site.telescope
     lists = ground_targets(
         rule, monuments=site.monuments, telescope=telescope, marks=site.marks, pose=site.pose, streams=streams
     ) | {r: feed_arm_targets(r, rule, telescope, faults=faults, streams=streams) for r in FEED_ARM_RANGERS}
-    plan = plan_shots(rule, lists, streams)
-    targets = site.targets
-    return {
-        r: returns_of_ranger(
-            site.heads[r],
-            plan[r],
-            points=site.points,
-            targets=targets,
-            air=air_of[r],
-            faults=faults,
-            planted=planted,
-            streams=streams,
-        )
-        for r in site.heads
-    }
+    return plan_shots(rule, lists, streams)
 
 
-def soundings(
-    air: TrueAir, warmth: LineWarmth, points: Mapping[str, np.ndarray], *, streams: Streams, until_s: float
-) -> tuple[Sounding, ...]:
-    """What sound measures of the warm lines: their true mean, an offset a line, and noise."""
-    u_sound_c = warmth.u_sound_c
-    if u_sound_c is None:
-        return ()
-    rows = []
-    for (ranger, target), warmer in warmth.warmer_c.items():
-        rng = streams(f"sound/{ranger}/{target}")
-        offset = u_sound_c * rng.normal()
-        z = np.linspace(points[ranger][2], points[target][2], 2001)
-        for seconds in np.arange(0.0, until_s + SOUNDING_INTERVAL_S, SOUNDING_INTERVAL_S):
-            mean = float(np.mean(air.temperature_c(z, seconds))) + warmer
-            read = mean + offset + 0.2 * u_sound_c * rng.normal()
-            rows.append(Sounding(float(seconds), ranger, target, read, u_sound_c))
-    return tuple(sorted(rows, key=lambda row: row.seconds))
+def _moving(
+    site: NightSite, air: TrueAir, law: SteelExpansion | None, plan: Mapping[str, list[ScheduledShot]]
+) -> MovingPoints:
+    """The points while the telescope expands: what was drawn holds half-way from the first shot to the last."""
+    seconds = [shot.seconds for shots in plan.values() for shot in shots]
+    own = dict.fromkeys(site.telescope.targets, 0.0)
+    if law is not None:
+        units = [t.name for unit in site.telescope.triplets for t in unit.targets]
+        own |= dict.fromkeys([*(t.name for t in site.telescope.dish), *units], law.dish_share)
+    middle = np.array([*APERTURE_CENTRE, height_above_vertex(APERTURE_CENTRE)])
+    return MovingPoints(site.points, air, law, 0.5 * (min(seconds) + max(seconds)), own, site.pose.dish(middle))
 
 
 def benchmark_targets(marks: list[TrueBenchmark], streams: Streams, planted: Planted) -> list[TrueTarget]:

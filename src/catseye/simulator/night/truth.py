@@ -6,10 +6,13 @@ import numpy as np
 
 from catseye.constants import PPM
 from catseye.simulator.night.air import TrueAir
+from catseye.simulator.night.expansion import MovingPoints
 from catseye.simulator.night.head import Return
+from catseye.simulator.night.nature import Nature
 from catseye.simulator.night.paraboloid import GroundParaboloid, best_paraboloid
 from catseye.simulator.night.posture import TruePosture
 from catseye.simulator.night.schedule import REFERENCE
+from catseye.simulator.night.stations import WeatherStations
 from catseye.simulator.night.structure import Structure
 from catseye.simulator.night.world import TrueHead, TrueMonument
 
@@ -18,7 +21,8 @@ from catseye.simulator.night.world import TrueHead, TrueMonument
 class Truth:
     """What really was. Metres, radians, ground frame; shots are keyed by their id as text, from '1'.
 
-    points             every scan point, triplet target, dish prism, structural target, benchmark: name -> (3,)
+    points             every scan point, triplet target, dish prism, structural target, benchmark: name -> (3,), at
+                       `reference_s` where the telescope expands: half-way from the first shot to the last
     shot_status        'good', 'blocked' or 'reflected' (reference shots are good)
     shot_ranges        straight distance scan point to reference point (a reference shot: D0)
     shot_phase_errors  what a foreign return adds to the phase, rad (0 for the others)
@@ -29,7 +33,10 @@ class Truth:
     normals            of prisms (entry face) and balls (their axis, the way they look), unit vectors
     paraboloid         best fit to the true dish prisms: axis, vertex, focus, normal deviations; None below six prisms
     posture            the departure from the nominal posture that placed everything
-    air                the air itself, a function of height and seconds since the start
+    air                the air itself, a function of place and seconds since the start
+    moving             the points at any time, `moving.at(names, seconds)`; `moving.scale(seconds)` is the expansion
+    stations           places, time constants and radiation errors of the weather stations
+    nature             every effect beyond smooth air and a rigid telescope, as it was
     wrongly_typed      whose approximate position carries the gross error (a triplet: TRnn)
     """
 
@@ -48,21 +55,36 @@ class Truth:
     paraboloid: GroundParaboloid | None
     posture: TruePosture
     air: TrueAir
+    moving: MovingPoints
+    stations: WeatherStations
+    nature: Nature
     wrongly_typed: str | None
 
+    @property
+    def reference_s(self) -> float:
+        """When the points, the paraboloid and the posture hold, s since the start."""
+        return self.moving.reference_s
 
-def truth_of(
+    @property
+    def thermometer_lags_s(self) -> dict[str, float]:
+        """Time constants of the stations' thermometers."""
+        return {station: self.nature.stations.lags_s.get(station, 0.0) for station in self.stations.places}
+
+
+def truth_of(  # noqa: PLR0913 - keyword-only, from every part of the night
     *,
     heads: dict[str, TrueHead],
     monuments: dict[str, TrueMonument],
     telescope: Structure,
-    points: dict[str, np.ndarray],
+    moving: MovingPoints,
     returns: list[Return],
-    air: TrueAir,
+    stations: WeatherStations,
     thermometer_offsets_c: dict[str, float],
     pose: TruePosture,
+    nature: Nature,
 ) -> Truth:
     """Gather the truth; returns in the order of the shots."""
+    points = dict(moving.points)
     shots = {str(i + 1): r for i, r in enumerate(returns)}
     ranged = {i: r for i, r in shots.items() if r.shot.target != REFERENCE}
     good = [(r.index - 1.0) / PPM for r in ranged.values() if r.status == "good"]
@@ -81,6 +103,9 @@ def truth_of(
         normals={name: t.normal for name, t in telescope.targets.items() if t.normal is not None},
         paraboloid=best_paraboloid({t.name: points[t.name] for t in telescope.dish}, pose),
         posture=pose,
-        air=air,
+        air=moving.air,
+        moving=moving,
+        stations=stations,
+        nature=nature,
         wrongly_typed=telescope.wrongly_typed,
     )

@@ -10,6 +10,7 @@ from catseye.records.site.folder import SiteFolder
 from catseye.simulator.night.air import PRESSURE_LAPSE_HPA_PER_M, group_refractivity_ppm
 from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.twin.conditions import LivingConditions
+from catseye.simulator.twin.passing import PassingAir
 from catseye.simulator.twin.waves import Waves, correlated, joined, walk
 
 Array = NDArray[np.float64]
@@ -17,6 +18,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)  # below 1e-10 of the index 
 SHARES, WEIGHTS = 0.5 * (NODES + 1.0), 0.5 * WEIGHTS
 WARMEST_HOUR, BRIGHTEST_HOUR = 15.0, 12.5  # local mean time
 STEEL_LAG_HOURS, STEEL_SHARE = 1.0, 0.8  # steel follows the day's swing so much later and so much less
+STEEL_AT = np.array([0.0, 0.0, 50.0])  # m: middle of the telescope
 WET, WET_WIDTH_C = 0.03, 0.15  # amplitude left on wet glass; width of the change about the dew point
 
 
@@ -44,6 +46,7 @@ class LivingAir:
     diurnal: float
     dew: float
     dew_point_c: float
+    passing: PassingAir
 
     @staticmethod
     def of(
@@ -67,6 +70,7 @@ class LivingAir:
             planted.gain("diurnal"),
             planted.gain("dew"),
             float(_dew_point_c(vapour, c.pressure_hpa)),
+            PassingAir.of(c, streams=streams, planted=planted),
         )
 
     def sunshine(self, seconds: ArrayLike) -> Array:
@@ -82,21 +86,45 @@ class LivingAir:
 
     def steel_c(self, seconds: ArrayLike) -> Array:
         """Temperature of the structure less that at the start (...), °C."""
-        return STEEL_SHARE * self._day(seconds, STEEL_LAG_HOURS)
+        times = np.append(np.asarray(seconds, dtype=float).ravel(), 0.0)
+        passing = self.passing.common_c(STEEL_AT, times, STEEL_LAG_HOURS * 3600.0)
+        return STEEL_SHARE * self._day(seconds, STEEL_LAG_HOURS) + (passing[:-1] - passing[-1]).reshape(
+            np.shape(seconds)
+        )
 
     def weather(self, points: Array, seconds: Array) -> tuple[Array, Array, Array]:
         """Temperature, °C, pressure, hPa, and humidity over water, %, each (k, m), at points (k, m, 3), times (k,)."""
-        c, sun, drift = self.conditions, self.sunshine(seconds), self.wander(seconds)
-        z = points[..., 2]
-        gradient, layer = (a + (b - a) * sun for a, b in (c.gradient_c_per_m, c.surface_layer_c))
-        layered = gradient[:, None] * z + layer[:, None] * (1.0 - np.exp(-z / c.surface_layer_m))
-        level = c.temperature_c + self._day(seconds) + drift[:, 0]
-        temperature = level[:, None] + self.stratification * layered + points[..., :2] @ self.slope
-        pressure = (c.pressure_hpa + drift[:, 1])[:, None] - self.stratification * PRESSURE_LAPSE_HPA_PER_M * z
+        return self._weather(points, seconds, self.passing.eddies_c(points, seconds[:, None]))
+
+    def _weather(self, points: Array, seconds: Array, eddies_c: Array) -> tuple[Array, Array, Array]:
+        """As `weather`, with eddies (k, m)."""
+        c, drift, z = self.conditions, self.wander(seconds), points[..., 2]
+        temperature = self._temperature(points, seconds, drift[:, 0]) + eddies_c
+        pressure = (c.pressure_hpa + drift[:, 1])[:, None] + self.passing.pressure_hpa(points, seconds[:, None])
+        pressure = pressure - self.stratification * PRESSURE_LAPSE_HPA_PER_M * z
         # vapour is well mixed: its pressure is one, relative humidity changes with temperature
         vapour = saturation_hpa(self.dew_point_c + drift[:, 2], c.pressure_hpa)
         humidity = np.minimum(100.0 * vapour[:, None] / saturation_hpa(temperature, pressure), 100.0)
         return temperature, pressure, humidity
+
+    def _temperature(self, points: Array, seconds: Array, wander: Array, lag: float = 0.0) -> Array:
+        """Temperature (k, m), °C, of what follows the air with a lag, s, but for eddies; `wander` (k,) has it already.
+
+        Day and layers are slow: there a lag of a minute or two is a delay, to 0.1 mK.
+        """
+        c, slow = self.conditions, seconds - lag
+        gradient, layer = (a + (b - a) * self.sunshine(slow) for a, b in (c.gradient_c_per_m, c.surface_layer_c))
+        z = points[..., 2]
+        layered = gradient[:, None] * z + layer[:, None] * (1.0 - np.exp(-z / c.surface_layer_m))
+        level = c.temperature_c + self._day(slow) + wander
+        even = level[:, None] + self.stratification * layered + points[..., :2] @ self.slope
+        return even + self.passing.common_c(points, seconds[:, None], lag)
+
+    def felt_c(self, point: Array, seconds: Array, lag: float) -> Array:
+        """Temperature (k,), °C, of what stands at a point (3,) and follows the air with a lag, s."""
+        wander = self.wander.lagged(lag)(seconds)[:, 0]
+        even = self._temperature(point[None, None], seconds, wander, lag)[:, 0]
+        return even + self.passing.eddies_c(point, seconds, lag)
 
     def index(self, points: Array, seconds: Array) -> Array:
         """Group index (k,) at points (k, 3)."""
@@ -106,10 +134,13 @@ class LivingAir:
         """Straight lines from start to end, points (k, 3): their mean group index, that at the end, and the share of
         amplitude that a retroreflector outside at the end keeps, wet below the dew point; (k,) each.
 
-        By quadrature; the ray itself is bent, by less than 0.1 um of path here.
+        By quadrature; eddies enter as their mean, which leaves out what they share with layers: 20 nm in 100 m. The ray
+        itself is bent, by less than 0.1 um of path here.
         """
         on = start[:, None] + (end - start)[:, None] * np.append(SHARES, 1.0)[:, None]
-        weather = self.weather(on, seconds)
+        eddies = np.repeat(self.passing.mean_eddies_c(start, end, seconds)[:, None], on.shape[1], axis=1)
+        eddies[:, -1] = self.passing.eddies_c(end, seconds)
+        weather = self._weather(on, seconds, eddies)
         index = 1.0 + PPM * group_refractivity_ppm(*weather)
         temperature_c, pressure_hpa, humidity_percent = (v[:, -1] for v in weather)
         kept = self._kept(temperature_c, pressure_hpa, humidity_percent, seconds)

@@ -3,17 +3,25 @@
 from dataclasses import dataclass, replace
 
 from catseye.errors import InputError
+from catseye.simulator.night.expansion import STEEL_PER_K
 from catseye.simulator.night.faults import EFFECTS, Planted
 
 LIVING_EFFECTS = (
+    "air_waves",  # of temperature, common to the site
     "bearing_tilt",  # of the azimuth bearing and track
     "dew",  # amplitude lost where retroreflectors are wet
     "diurnal",  # temperature and layers through the day
+    "eddies",  # of temperature, which the wind carries across the site
     "encoder",  # what the telescope's encoders tell wrongly
+    "expansion",  # of the whole telescope with the temperature of its steel
+    "fronts",  # steps of temperature that pass
     "gravity",  # bending with elevation
     "horizontal_gradient",  # of temperature
+    "pressure_waves",
+    "radiation_error",  # of thermometers in the Sun
     "settling",  # monuments sink and lean
     "thermal",  # bending with the temperature of the steel
+    "thermometer_lag",
     "vibration",  # of the feed arm
     "weather_wander",  # of temperature, pressure and dew point
     "wind",  # on the feed arm
@@ -54,6 +62,18 @@ class LivingConditions:
     turbulence              factor on the site's path_index_fluctuation_ppm
     wind_m_s                mean; moves the feed arm with its square
     sky_cooling_c           how far below the air a retroreflector cools under a clear night sky in still air
+
+    Sources of those below and of the periods: `simulator.night.nature`, where a night's largest are twice these.
+
+    wave_c                  largest amplitude of each of three waves of 5 to 90 min
+    front_c                 largest step of a front; one comes every two hours
+    eddy_c                  one sigma of turbulence that the wind carries
+    eddy_outer_m            its outer scale
+    pressure_wave_hpa       largest amplitude of each of two waves of 5 to 60 min
+    thermometer_lag         s, largest time constant of a station's thermometer
+    radiation_c             largest error of a thermometer under a Sun in the zenith in still air
+    expansion_per_k         of the whole telescope about the pintle bearing: structural steel's
+    dish_expansion          largest share of it by which the dish expands more or less, about its own middle
     """
 
     temperature_c: float = 11.3
@@ -71,6 +91,15 @@ class LivingConditions:
     turbulence: float = 1.0
     wind_m_s: float = 4.0
     sky_cooling_c: float = 3.0
+    wave_c: float = 0.2
+    front_c: float = 0.75
+    eddy_c: float = 0.075
+    eddy_outer_m: float = 80.0
+    pressure_wave_hpa: float = 0.25
+    thermometer_lag: float = 60.0
+    radiation_c: float = 0.25
+    expansion_per_k: float = STEEL_PER_K
+    dish_expansion: float = 0.2
 
 
 LIVING_NIGHT = LivingConditions()

@@ -62,6 +62,7 @@ class TwinPlaces:
             rest = s.place if s.body == "arm" else certified[name]
             self.retros[name] = BodyRetroreflector("hollow", s.body, rest, None, (), USUAL_VOLT["arm"])
         self._surface = draw.surface
+        self._dish_middle = np.array([*draw.surface.centre, draw.surface.height(draw.surface.centre)])
         self._crowds = {body: self._crowd(body) for body in ("ground", "alidade", "dish", "arm")}
         self._rows = {name: row for crowd in self._crowds.values() for row, name in enumerate(crowd.names)}
         self._shifts = {name: np.array(by, dtype=float) for name, by in planted.shifts.items()}
@@ -114,13 +115,15 @@ class TwinPlaces:
         return places
 
     def _ridden(self, body: str, rows: list[int], standing: TelescopeStanding) -> Array:
-        """(k, m, 3) of rows of a body's crowd."""
+        """(k, m, 3) of rows of a body's crowd; what is not on the ground expands with the telescope."""
         crowd, (turn, shift) = self._crowds[body], standing.bodies[body]
         rest = crowd.rest[rows]
         if body == "dish":
             bent = standing.orders @ crowd.orders[rows].T
             rest = rest + bent[..., None] * crowd.up[rows]
-        return rest @ np.swapaxes(turn, -1, -2) + shift[:, None]
+            rest = rest + standing.dish_scale[:, None, None] * (rest - self._dish_middle)
+        place = rest @ np.swapaxes(turn, -1, -2) + shift[:, None]
+        return place if body == "ground" else place * (1.0 + standing.scale[:, None, None])
 
     def facing(self, name: str, standing: TelescopeStanding) -> Array | None:
         """Where a retroreflector looks (k, 3), ground frame; None: any way."""

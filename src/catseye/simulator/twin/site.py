@@ -33,6 +33,7 @@ from catseye.simulator.twin.motion import AxisAngles, AxisMotion
 from catseye.simulator.twin.returns import Returns
 from catseye.simulator.twin.scene import Beam, StationFrame, TwinPlaces
 from catseye.simulator.twin.telescope import TelescopeStanding, telescope
+from catseye.simulator.twin.thermometers import thermometers
 
 Array = NDArray[np.float64]
 NS_PER_TICK = PER_DAY // TICKS_PER_DAY
@@ -85,11 +86,7 @@ class Twin:
         self.returns = Returns(self.scene, self.air, site.site.ranging, faults=self.faults, **drawn)
         self._converters = {name: Converter.of(name, seed) for name in self.scene.stations}
         self._weather_at = station_places(site, self._streams)
-        self._thermometers = {
-            name: self._planted.gain("thermometer_offsets")
-            * float(self._streams(f"thermometer/{name}").normal(0.0, conditions.thermometer_offset_c))
-            for name in self._weather_at
-        }
+        self.thermometers = thermometers(site, self.air, start_mjd, places=self._weather_at, **drawn)
 
     # Time -----------------------------------------------------------------------------------------------------------
 
@@ -180,7 +177,7 @@ class Twin:
     # Readings -------------------------------------------------------------------------------------------------------
 
     def weather(self, station: str, seconds: float) -> LiveWeather:
-        """What a weather station reads: the air there, its own offset, scatter; NaN while it is silent."""
+        """What a weather station reads: the air there with its lag, its errors and scatter; NaN while silent."""
         if station not in self._weather_at:
             raise InputError(
                 f"weather station {station!r} is not at this site (expected {', '.join(self._weather_at)})"
@@ -191,9 +188,18 @@ class Twin:
         true = self.air.weather(self._weather_at[station][None, None], _times(seconds))
         scatter = self._planted.gain("weather_scatter") * self._streams(f"reading/{station}/{ticks}").normal(size=3)
         lie = self.faults.active("lying-station", station, at=seconds)
-        offset = self._thermometers[station] + (0.0 if lie is None else lie.size)
-        t, p, h = (float(v[0, 0]) + s * u for v, s, u in zip(true, scatter, READ_SCATTER, strict=True))
-        return LiveWeather(station, ticks, round(t + offset, 3), round(p, 3), round(min(max(h, 0.0), 100.0), 2))
+        read = float(self.thermometers[station].temperature_c(self.air, _times(seconds))[0])
+        t, p, h = (
+            v + s * u
+            for v, s, u in zip((read, *(float(v[0, 0]) for v in true[1:])), scatter, READ_SCATTER, strict=True)
+        )
+        return LiveWeather(
+            station,
+            ticks,
+            round(t + (0.0 if lie is None else lie.size), 3),
+            round(p, 3),
+            round(min(max(h, 0.0), 100.0), 2),
+        )
 
     def shot(
         self, ranger: str, target: str, seconds: float, *, cycles: int = 128, samples: int = 64, if_hz: int = 1000

@@ -63,10 +63,17 @@ class Body(NamedTuple):
 
 
 class TelescopeStanding(NamedTuple):
-    """The telescope at k times: its bodies, and what its surface's low orders are (k, 6), m along the normals."""
+    """The telescope at k times.
+
+    orders       (k, 6) m along the normals: its surface's low orders
+    scale        (k,) by which all that rides on it expands about the pintle bearing, after all else
+    dish_scale   (k,) by which the dish expands about its own middle, before all else
+    """
 
     bodies: dict[str, Body]
     orders: Array
+    scale: Array
+    dish_scale: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +90,7 @@ class Telescope:
     sway             waves (6): shift of the arm's tip by wind and by vibration, m
     tilt             (2, 3) rad: lean of the bearing to east and north, constant, cosine and sine of twice the azimuth
     encoder          (2, 2, 3) rad: cosines and sines of both encoders' errors by `ENCODER_ORDERS`
+    expansion        (2,) a °C of the steel: the whole telescope, and what the dish expands beyond it
     """
 
     motion: AxisMotion
@@ -101,6 +109,7 @@ class Telescope:
     sway: Waves
     tilt: Array
     encoder: Array
+    expansion: Array
 
     def angles(self, seconds: Array) -> AxisAngles:
         """Where the axes truly are, at times (k,)."""
@@ -145,7 +154,8 @@ class Telescope:
             "dish": Body(dish, dish_shift),
             "arm": Body(dish @ bend, arm_shift),
         }
-        return TelescopeStanding(bodies, bent[:, 3:] + warm[:, 4:])
+        scale = steel * self.expansion
+        return TelescopeStanding(bodies, bent[:, 3:] + warm[:, 4:], scale[:, 0], scale[:, 1])
 
     def _leaning(self, azimuth: Array) -> Array:
         """Turn of the alidade (k, 3, 3) by the bearing's lean."""
@@ -168,6 +178,7 @@ def telescope(
     steel *= np.array([0.0, *[STEEL_SHIFT] * 3, *[STEEL_DISH / np.sqrt(6.0)] * 6])
     steel[0] = STEEL_RISE
     nominal = site.site.frames.reflector
+    conditions, dish = air.conditions, float(streams("dish expansion").uniform(-1.0, 1.0))
     return Telescope(
         motion,
         site.site.site.latitude_deg * DEGREE,
@@ -185,6 +196,9 @@ def telescope(
         sway=_sway(air.conditions.wind_m_s, streams, planted),
         tilt=planted.gain("bearing_tilt") * TILT * streams("bearing").normal(size=(2, 3)) * (1.0, 0.4, 0.4),
         encoder=planted.gain("encoder") * ENCODER * streams("encoders").normal(size=(2, 2, 3)) * (1.0, 0.5, 0.1),
+        expansion=planted.gain("expansion")
+        * conditions.expansion_per_k
+        * np.array([1.0, conditions.dish_expansion * dish]),
     )
 
 

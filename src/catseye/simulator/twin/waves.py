@@ -42,6 +42,14 @@ class Waves:
         by = np.asarray(factor, dtype=float)
         return Waves(self.omega, self.cosine * by, self.sine * by, self.origin * by)
 
+    def lagged(self, lag: float) -> "Waves":
+        """What follows them with a first-order lag, s: each wave times 1 / (1 + i w T)."""
+        turn = (self.omega * lag)[:, None]
+        less = 1.0 + turn**2
+        return Waves(
+            self.omega, (self.cosine - turn * self.sine) / less, (self.sine + turn * self.cosine) / less, self.origin
+        )
+
 
 def joined(*parts: Waves) -> Waves:
     """Several as one, their channels side by side: one call evaluates all."""

@@ -1,0 +1,68 @@
+"""Expansion of the telescope with the temperature of its steel, while a night is measured."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from catseye.simulator.night.air import TrueAir
+from catseye.simulator.night.lag import lagged
+from catseye.simulator.night.limits import require
+
+STEEL_PER_K = 11.7e-6  # structural steel: AISC, Steel Construction Manual, 6.5e-6 per degF
+STEP_S = 10.0  # a thirtieth of the shortest wave
+
+
+@dataclass(frozen=True)
+class SteelExpansion:
+    """Law of the telescope's expansion.
+
+    share        of steel's whole coefficient, about the pintle bearing
+    lag_s        time constant of the steel behind the air
+    dish_share   by which the dish expands about its own middle on top, as a share of the telescope's expansion
+    """
+
+    share: float = 1.0
+    lag_s: float = 3600.0
+    dish_share: float = 0.0
+
+    def __post_init__(self):
+        require("share of the steel's expansion", self.share, -10.0, 10.0)
+        require("lag_s of the steel", self.lag_s, 60.0, 86_400.0)
+        require("dish_share of the expansion", self.dish_share, -1.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class MovingPoints:
+    """Points of a night at any time; without a law they stay where they are.
+
+    points        m, ground frame, at `reference_s`
+    own           by name how much more than itself a point expands about the dish's middle: `dish_share`, 0 elsewhere;
+                  what is not in it stands on the ground
+    dish_middle   (3,) m
+    """
+
+    points: Mapping[str, np.ndarray]
+    air: TrueAir
+    law: SteelExpansion | None = None
+    reference_s: float = 0.0
+    own: Mapping[str, float] = field(default_factory=dict)
+    dish_middle: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    def scale(self, seconds):
+        """Expansion of the telescope since `reference_s`, at times (k,): 1e-6 is a micrometre a metre."""
+        if self.law is None:
+            return np.zeros(np.shape(seconds))
+        times = np.append(np.asarray(seconds, dtype=float), self.reference_s)
+        steel_c = lagged(self.air.common_c, times, time_constant_s=self.law.lag_s, step_s=STEP_S)
+        return self.law.share * STEEL_PER_K * (steel_c[:-1] - steel_c[-1])
+
+    def at(self, names: list[str], seconds):
+        """Where points are (k, 3), each at its own time (k,)."""
+        rest = np.array([self.points[name] for name in names])
+        if self.law is None:
+            return rest
+        scale = self.scale(seconds)[:, None]
+        rides = np.array([name in self.own for name in names])[:, None]
+        own = np.array([self.own.get(name, 0.0) for name in names])[:, None]
+        return rest + rides * scale * (rest + own * (rest - self.dish_middle))
