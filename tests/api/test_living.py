@@ -29,6 +29,7 @@ def test_a_site_is_simulated_and_its_journal_gives_the_same_bits(tmp_path):
     assert len(site.to_table()) == len(site.epochs) >= 1
     again = catseye.replay(tmp_path / "site.db")
     assert again.same
+    assert again.identical
     assert again.verdict.word == "good"
     assert again.shots == again.same_shots > 100
     assert catseye.replay(catseye.load(tmp_path / "site.db")).same

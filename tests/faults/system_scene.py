@@ -16,6 +16,7 @@ from catseye.coordinator.clients.samplers import rows_of
 from catseye.coordinator.clients.server import PUSHED
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.replay import replay
+from catseye.coordinator.journal.sameness import Sameness
 from catseye.ranger.addresses import ranger_addresses
 from catseye.records.site.folder import read_site
 from catseye.reduction.live.live import Live
@@ -298,7 +299,7 @@ def replays(reader: JournalReader, run: int) -> int:
         return made[-1]
 
     epochs = list(replay(reader, run, factory))
-    assert [each.seq for each in epochs if not each.same] == []
+    assert [each.seq for each in epochs if each.sameness is not Sameness.IDENTICAL] == []
     stored = [
         (str(entry.shot.number), entry.status, entry.text, *map(repr, _numbers(entry)))
         for _, entry in reader.shots(run, buffers=False)

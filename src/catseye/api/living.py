@@ -140,13 +140,15 @@ def _in_thread(simulation: "Simulation", loop_factory: Any) -> None:
 class ReplayResult(Result):
     """A journal's run reduced again.
 
-    same      whether every answer is the same to the last bit
-    shots     fed, and `same_shots` of them the same
-    epochs    solved, and `same_epochs` of them the same
-    outcome   everything else: how far each point moved
+    same        whether every number, reason code and status is the same to the last bit
+    identical   whether the texts are, too
+    shots       fed, and `same_shots` of them the same
+    epochs      solved, and `same_epochs` of them the same
+    outcome     everything else: how far each point moved, and by what
     """
 
     same: bool
+    identical: bool
     shots: int
     same_shots: int
     epochs: int
@@ -167,12 +169,13 @@ class ReplayResult(Result):
         return replay_object(self.outcome)
 
     def tables(self) -> "dict[str, QTable]":
-        """`moved`: a row a point, new less stored."""
+        """`moved`: a row a point, new less stored; `largest_u` is of a coordinate, in its stored u."""
         moved = sorted(self.outcome.moved.items())
         columns = {
             "point": ([name for name, _ in moved], ""),
             **{axis: ([m.mean_mm[k] for _, m in moved], "mm") for k, axis in enumerate(("dx", "dy", "dz"))},
             "largest": ([m.largest_mm for _, m in moved], "mm"),
+            "largest_u": ([m.largest_u for _, m in moved], ""),
             "epochs": ([m.epochs for _, m in moved], ""),
         }
         return {"moved": quantities(columns)}
@@ -185,7 +188,7 @@ def replay(
     calibrations: "str | os.PathLike[str] | None" = None,
     progress: Progress | None = None,
 ) -> ReplayResult:
-    """A journal's run again: the same to the last bit, or how far other calibrations move each point.
+    """A journal's run again: the same to the last bit, or how far this version or other calibrations move each point.
 
     journal        file, postgresql://USER@HOST/DATABASE, or what `load` gave
     run            number, or the beginning of its uuid; the last without
@@ -202,11 +205,12 @@ def replay(
     other = None if calibrations is None else place_of(calibrations)
     outcome = replayed(place, run, other, progress=progress or (lambda what, done, total: None))
     return ReplayResult(
-        replay_verdict(outcome),
-        outcome.same,
-        outcome.shots,
-        outcome.same_shots,
-        outcome.epochs,
-        outcome.same_epochs,
-        outcome,
+        verdict=replay_verdict(outcome),
+        same=outcome.same,
+        identical=outcome.identical,
+        shots=outcome.shots,
+        same_shots=outcome.same_shots,
+        epochs=outcome.epochs,
+        same_epochs=outcome.same_epochs,
+        outcome=outcome,
     )

@@ -1,8 +1,11 @@
-"""A run of a journal reduced again: the same to the last bit, or how far other calibrations move its points."""
+"""A run of a journal reduced again: the same, or how far this version or other calibrations move its points."""
 
-from collections import defaultdict
+import math
+import platform
+from collections import Counter, defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -10,44 +13,69 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.coordinator.journal.check import ChainReport, check_whole
-from catseye.coordinator.journal.entries import EpochSolution
+from catseye.coordinator.journal.movement import Movement, Movements, Moving, in_u, places, point_moves
 from catseye.coordinator.journal.reader import JournalReader, StoredRun
 from catseye.coordinator.journal.replay import Replayed, replay
+from catseye.coordinator.journal.sameness import Sameness
 from catseye.errors import InputError
 from catseye.gateways.journal.chain import chain_object, chain_words
+from catseye.gateways.journal.movement import movement_object, movement_words, shown
 from catseye.gateways.writers.verdict import Verdict
 from catseye.records.site.folder import SiteFolder, read_site
 from catseye.reduction.live.live import Live
 from catseye.service.settings import live_settings
+from catseye.version import __version__
 
 TOLD = 20  # points that people are told of: those that move most
+LEAST_TOLD_MM = 5e-4  # a point that moves less shows nothing in three decimals
 Progress = Callable[[str, int, int], None]
+
+
+class Cause(StrEnum):
+    """Why a replay's numbers are not the stored ones; the value is what programs read."""
+
+    RECORDS = "records"  # other ones were given
+    JOURNAL = "journal"  # it is not as it was written
+    SAMPLES = "samples"  # none were kept
+    SOFTWARE = "software"  # all else is the run's own: catseye, what it computes with, or the machine's rounding
 
 
 @dataclass(frozen=True)
 class Moved:
-    """A point's difference, new less stored: mean (x, y, z), largest length, mm, and in how many epochs."""
+    """A point's difference, new less stored, over epochs.
+
+    mean_mm      (x, y, z)
+    largest_mm   length
+    largest_u    of a coordinate over its stored u; NaN where none was stored
+    epochs       in how many
+    """
 
     mean_mm: tuple[float, float, float]
     largest_mm: float
+    largest_u: float
     epochs: int
 
 
 @dataclass
 class ReplayOutcome:
-    """What came of a run that was replayed: counts of what is the same, and how far points moved.
+    """What came of a run that was replayed: counts of what is the same, and how far answers moved.
 
-    run            that was replayed
-    calibrations   folder of other records, None for the run's own
-    epochs, shots  fed
-    same_epochs    that are the same to the last bit
-    same_shots     the same
-    late_shots     of all shots, those behind the last epoch
-    unasked        shots with which no answer is stored: not compared
-    chain          what the journal's chain says of the run
-    first          number of the first epoch that differs, and of what
-    moved          by point
-    lost           points of stored epochs that the new ones do not have
+    "Same" is of numbers, reason codes and statuses, to the last bit; "identical" is of the texts, too.
+
+    run                that was replayed
+    calibrations       folder of other records, None for the run's own
+    epochs, shots      fed
+    same_epochs, identical_epochs   by their solutions
+    same_shots, identical_shots     by their answers
+    late_shots         of all shots, those behind the last epoch
+    unasked            shots with which no answer is stored: not compared
+    chain              what the journal's chain says of the run
+    first              number of the first epoch that differs, and by what
+    parts              of solutions that differ: in how many epochs
+    unstored           keys that answers have now and the stored ones have not: not compared
+    movements          by kind, in its unit and in u
+    moved              by point
+    lost               points of stored epochs that the new ones do not have
     """
 
     run: StoredRun
@@ -56,23 +84,67 @@ class ReplayOutcome:
     epochs: int = 0
     shots: int = 0
     same_epochs: int = 0
+    identical_epochs: int = 0
     same_shots: int = 0
+    identical_shots: int = 0
     late_shots: int = 0
     unasked: int = 0
     first: str = ""
+    parts: Counter[str] = field(default_factory=Counter)
+    unstored: set[str] = field(default_factory=set)
+    movements: dict[Moving, Movement] = field(default_factory=dict)
     moved: dict[str, Moved] = field(default_factory=dict)
     lost: int = 0
 
     @property
+    def sameness(self) -> Sameness:
+        """Sameness of the whole run, solutions and shots."""
+        asked = self.shots - self.unasked
+        if (self.same_epochs, self.same_shots) != (self.epochs, asked):
+            return Sameness.DIFFERENT
+        identical = (self.identical_epochs, self.identical_shots) == (self.epochs, asked)
+        return Sameness.IDENTICAL if identical else Sameness.TEXTS
+
+    @property
     def same(self) -> bool:
-        """Whether all answers are the same to the last bit."""
-        return self.epochs == self.same_epochs and self.shots == self.same_shots + self.unasked
+        """Whether all numbers, reason codes and statuses are the same to the last bit."""
+        return self.sameness is not Sameness.DIFFERENT
+
+    @property
+    def identical(self) -> bool:
+        """Whether all answers are the same to the last bit, texts included."""
+        return self.sameness is Sameness.IDENTICAL
+
+    @property
+    def cause(self) -> Cause | None:
+        """Why numbers differ, None where none does: what is left when records, journal and samples are the run's own
+        is the software. A version's name does not decide it: many states of the source may have one name.
+        """
+        if self.same:
+            return None
+        if self.calibrations is not None:
+            return Cause.RECORDS
+        if self.chain.count:
+            return Cause.JOURNAL
+        return Cause.SOFTWARE if self.run.buffers else Cause.SAMPLES
+
+    @property
+    def other_version(self) -> bool:
+        """Whether the run was written by another catseye, Python or numpy, by their names."""
+        return self.run.versions != versions_here()
 
     @property
     def not_compared(self) -> tuple[str, ...]:
         """What a replay says nothing about."""
         told = [f"{self.unasked} shots whose answer was not stored"] * bool(self.unasked)
+        if self.unstored:
+            told.append(f"what the journal's version did not store ({', '.join(sorted(self.unstored))})")
         return (*told, "commands, happenings and documents, which the reduction does not see")
+
+
+def versions_here() -> dict[str, str]:
+    """Versions of this software by name, as a run's record has them."""
+    return {"catseye": __version__, "python": platform.python_version(), "numpy": np.__version__}
 
 
 def replayed(journal: str, which: int | str | None, calibrations: Path | None, *, progress: Progress) -> ReplayOutcome:
@@ -84,8 +156,10 @@ def replayed(journal: str, which: int | str | None, calibrations: Path | None, *
     with JournalReader(journal) as reader:
         run = reader.run(which)
         settings = live_settings(run.settings, f"journal {reader.place}: run {run.run}")
+        movements = Movements()
 
         def made(site: SiteFolder, _: StoredRun) -> Live:
+            movements.stations = [station.name for station in site.site.weather_station]
             return Live(site if other is None else other, settings)
 
         chain = check_whole(reader, run.run, progress=progress)
@@ -95,64 +169,85 @@ def replayed(journal: str, which: int | str | None, calibrations: Path | None, *
         if not total:
             raise InputError(f"journal {reader.place}: run {run.run} holds no epoch (expected one at least)")
         outcome = ReplayOutcome(run, calibrations, chain)
-        off: dict[str, list[np.ndarray]] = defaultdict(list)
+        off: dict[str, list[tuple[np.ndarray, np.ndarray]]] = defaultdict(list)
         for each in replay(reader, run.run, made):
             progress("epochs", outcome.epochs, total)
             _count(outcome, each)
             _compare(outcome, each, off)
-    outcome.moved = {name: _moved(np.array(rows) / MILLIMETRE) for name, rows in sorted(off.items())}
+            movements.add(each)
+    outcome.movements = movements.found
+    outcome.moved = {name: _moved(rows) for name, rows in sorted(off.items())}
     return outcome
 
 
 def _count(outcome: ReplayOutcome, each: Replayed) -> None:
-    outcome.shots += each.shots
-    outcome.same_shots += each.shots - len(each.differing) - len(each.unasked)
-    outcome.unasked += len(each.unasked)
+    shots, solution = each.shots, each.solution
+    same_shots = shots.count - len(shots.differing) - len(shots.unasked)
+    outcome.shots += shots.count
+    outcome.same_shots += same_shots
+    outcome.identical_shots += same_shots - len(shots.reworded)
+    outcome.unasked += len(shots.unasked)
     if each.stored is None:
-        outcome.late_shots += each.shots
-        where = f"shots behind the last epoch (event {each.differing[0]})" if each.differing else ""
+        outcome.late_shots += shots.count
+        where = f"shots behind the last epoch (event {shots.differing[0]})" if shots.differing else ""
     else:
         outcome.epochs += 1
-        outcome.same_epochs += each.same_solution
-        what = "a shot" if each.differing else "its solution"
+        outcome.same_epochs += solution.sameness is not Sameness.DIFFERENT
+        outcome.identical_epochs += solution.sameness is Sameness.IDENTICAL
+        outcome.parts.update(solution.parts)
+        outcome.unstored.update(solution.unstored)
+        what = "a shot" if shots.differing else f"its solution ({', '.join(solution.parts)})"
         where = f"epoch {each.stored.answer.get('number')} (event {each.seq}) by {what}"
     if not each.same and not outcome.first:
         outcome.first = where
 
 
-def _compare(outcome: ReplayOutcome, each: Replayed, off: dict[str, list[np.ndarray]]) -> None:
+def _compare(outcome: ReplayOutcome, each: Replayed, off: dict[str, list[tuple[np.ndarray, np.ndarray]]]) -> None:
     if each.stored is None or each.new is None:
         return
-    before, after = _places(each.stored), _places(each.new)
-    outcome.lost += len(set(before) - set(after))
-    for name in set(before) & set(after):
-        off[name].append(after[name] - before[name])
+    outcome.lost += len(set(places(each.stored)) - set(places(each.new)))
+    for name, change, u in point_moves(each.stored, each.new):
+        off[name].append((change, u))
 
 
-def _places(solution: EpochSolution) -> dict[str, np.ndarray]:
-    names, x = solution.answer.get("names") or [], solution.answer.get("x") or []
-    return {name: np.array(place, dtype=float) for name, place in zip(names, x, strict=False)}
-
-
-def _moved(rows: np.ndarray) -> Moved:
-    mean = rows.mean(axis=0)
-    return Moved((float(mean[0]), float(mean[1]), float(mean[2])), float(np.linalg.norm(rows, axis=1).max()), len(rows))
+def _moved(rows: list[tuple[np.ndarray, np.ndarray]]) -> Moved:
+    changes, u = (np.array(column) for column in zip(*rows, strict=True))
+    x, y, z = (changes.mean(axis=0) / MILLIMETRE).tolist()
+    over = np.abs(in_u(changes, u))
+    largest = float(np.linalg.norm(changes, axis=1).max()) / MILLIMETRE
+    return Moved((x, y, z), largest, float(over.max()) if len(over) else math.nan, len(rows))
 
 
 def replay_verdict(outcome: ReplayOutcome) -> Verdict:
-    """Whether the run's own records give its answers again to the last bit; of other records how far they move it."""
+    """Whether the run's own records give its numbers again to the last bit; otherwise what moved them, and how far."""
     chain = outcome.chain
     if chain.count:
         return Verdict("failed", f"the journal is not as it was written: {chain.problems[0]}")
     if outcome.same:
         kept = "" if chain.chained else "; an older catseye wrote it, without a chain that could be checked"
-        return Verdict("good", f"every answer is the same bit for bit{kept}")
-    if outcome.calibrations is not None:
+        if outcome.identical:
+            return Verdict("good", f"every answer is the same bit for bit{kept}")
+        return Verdict(
+            "good", f"every number, reason code and status is the same bit for bit, texts are another version's{kept}"
+        )
+    if outcome.cause is Cause.RECORDS:
         furthest = max((m.largest_mm for m in outcome.moved.values()), default=0.0)
         return Verdict("good", f"reduced with other records, which move points by up to {furthest:.3f} mm")
-    if not outcome.run.buffers:
+    if outcome.cause is Cause.SAMPLES:
         return Verdict("doubtful", "the run kept no samples, so its answers cannot be had again bit for bit")
-    return Verdict("failed", f"the run's own samples and records give other answers, first {outcome.first}")
+    by = f"this version moves the run's answers: {_how_far(outcome)}, first {outcome.first}"
+    if outcome.other_version:
+        return Verdict("doubtful", by)
+    return Verdict("failed", f"{by}; a version of the same name should not")
+
+
+def _how_far(outcome: ReplayOutcome) -> str:
+    """The furthest move of a point in words."""
+    points = outcome.movements.get(Moving.POINTS)
+    if points is None or not points.largest.size:
+        return "no point moves"
+    largest = f"points by up to {shown(points.largest.size / MILLIMETRE)} mm"
+    return largest if points.largest_u is None else f"{largest}, {shown(points.largest_u.size)} of a coordinate's u"
 
 
 def replay_object(outcome: ReplayOutcome) -> dict[str, Any]:
@@ -163,17 +258,29 @@ def replay_object(outcome: ReplayOutcome) -> dict[str, Any]:
         "uuid": outcome.run.uuid,
         "site": outcome.run.site,
         "calibrations": None if outcome.calibrations is None else str(outcome.calibrations),
+        "versions": {"stored": outcome.run.versions, "here": versions_here()},
         "epochs": outcome.epochs,
         "epochs_same": outcome.same_epochs,
+        "epochs_identical": outcome.identical_epochs,
         "shots": outcome.shots,
         "shots_same": outcome.same_shots,
+        "shots_identical": outcome.identical_shots,
         "same": outcome.same,
+        "identical": outcome.identical,
+        "cause": outcome.cause,
         "first_difference": outcome.first or None,
+        "parts_differing": dict(sorted(outcome.parts.items())),
         "shots_behind_the_last_epoch": outcome.late_shots,
         "not_compared": list(outcome.not_compared),
         "chain": chain_object(outcome.chain),
+        "moved": movement_object(outcome.movements),
         "points": {
-            name: {"mean_mm": list(m.mean_mm), "largest_mm": m.largest_mm, "epochs": m.epochs}
+            name: {
+                "mean_mm": list(m.mean_mm),
+                "largest_mm": m.largest_mm,
+                "largest_u": m.largest_u,
+                "epochs": m.epochs,
+            }
             for name, m in outcome.moved.items()
         },
         "points_lost": outcome.lost,
@@ -187,9 +294,11 @@ def replay_passages(outcome: ReplayOutcome) -> list[tuple[str, str]]:
     passages = [("Run", f"{run.run} of {run.site}, catseye {run.versions['catseye']}, {outcome.shots} shots{late}.")]
     passages += [("Chain", text) for text in chain_words(outcome.chain)]
     passages.append(("Not seen", f"{'; '.join(outcome.not_compared)}."))
-    if outcome.same:
+    if outcome.identical:
         passages.append(("Epochs", f"{outcome.epochs} the same bit for bit, and all {outcome.same_shots} shots."))
         return passages
+    if outcome.same:
+        return [*passages, ("Epochs", _reworded(outcome))]
     passages.append(
         (
             "Epochs",
@@ -197,13 +306,54 @@ def replay_passages(outcome: ReplayOutcome) -> list[tuple[str, str]]:
             f"shots; the first that differs is {outcome.first}.",
         )
     )
-    if outcome.calibrations is None and not run.buffers:
-        passages.append(("Why", "the run kept no samples (catseye ziy --keep-buffers keeps them)."))
-    for name, m in sorted(outcome.moved.items(), key=lambda pair: -pair[1].largest_mm)[:TOLD]:
-        x, y, z = m.mean_mm
-        passages.append(
-            (name, f"{x:+.3f}, {y:+.3f}, {z:+.3f} mm on the mean of {m.epochs} epochs, at most {m.largest_mm:.3f} mm")
-        )
-    if len(outcome.moved) > TOLD:
-        passages.append(("And", f"{len(outcome.moved) - TOLD} more points, which moved less (--json has them)."))
+    if outcome.parts:
+        counts = (f"{part} in {n}" for part, n in sorted(outcome.parts.items()))
+        passages.append(("Differing", f"{', '.join(counts)} of {outcome.epochs} epochs; texts do not count."))
+    passages += [("Why", why) for why in _why(outcome)]
+    passages += movement_words(outcome.movements)
+    furthest = sorted(outcome.moved.items(), key=lambda pair: -pair[1].largest_mm)
+    told = [pair for pair in furthest[:TOLD] if pair[1].largest_mm >= LEAST_TOLD_MM]
+    passages += [(name, _point_words(m)) for name, m in told]
+    if len(furthest) > len(told):
+        passages.append(("And", f"{len(furthest) - len(told)} more points, which moved less (--json has them)."))
     return passages
+
+
+def _reworded(outcome: ReplayOutcome) -> str:
+    """Counts of a run whose texts alone have changed."""
+    asked = outcome.shots - outcome.unasked
+    return (
+        f"{outcome.epochs} with the same numbers, reason codes and statuses bit for bit, and all {outcome.same_shots} "
+        f"shots; {outcome.epochs - outcome.identical_epochs} epochs and {asked - outcome.identical_shots} shots have "
+        "texts of another version."
+    )
+
+
+def _why(outcome: ReplayOutcome) -> list[str]:
+    """What made numbers differ, in sentences."""
+    if outcome.cause is Cause.SAMPLES:
+        return ["the run kept no samples (catseye ziy --keep-buffers keeps them)."]
+    if outcome.cause is not Cause.SOFTWARE:
+        return []
+    stored, here = (
+        ", ".join(f"{name} {version}" for name, version in versions.items())
+        for versions in (outcome.run.versions, versions_here())
+    )
+    if outcome.other_version:
+        told = [f"samples and records are the run's own, so it is the software: {stored} then, {here} now."]
+    else:
+        told = [
+            f"samples and records are the run's own, so it is the software: another state of {here}, or a machine that "
+            "rounds otherwise."
+        ]
+    if not outcome.chain.chained:
+        told.append("the journal has no chain, so that a change of the file cannot be told from one of the software.")
+    return told
+
+
+def _point_words(m: Moved) -> str:
+    """A point's move in words."""
+    x, y, z = m.mean_mm
+    in_u = "" if math.isnan(m.largest_u) else f", {shown(m.largest_u)} of its u"
+    epochs = f"on the mean of {m.epochs} epochs"
+    return f"{x:+.3f}, {y:+.3f}, {z:+.3f} mm {epochs}, at most {shown(m.largest_mm)} mm{in_u}"

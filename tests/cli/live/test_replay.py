@@ -1,4 +1,4 @@
-"""A journal again: the same to the last bit, and with other calibrations."""
+"""A journal again: the same to the last bit, under another version, and with other calibrations."""
 
 import json
 import shutil
@@ -7,6 +7,7 @@ import sqlite3
 import pytest
 
 from cli.living_scene import recorded, small_site
+from service.replay_scene import in_epoch, reworded, rewritten
 from simulator.living_scene import site
 
 
@@ -20,6 +21,41 @@ def test_a_run_is_the_same_bit_for_bit(catseye):
     assert told["epochs"] == told["epochs_same"] >= 2
     assert told["shots"] == told["shots_same"] > 100
     assert all(point["largest_mm"] == 0.0 for point in told["points"].values())
+    assert (told["identical"], told["cause"], told["parts_differing"]) == (True, None, {})
+    assert told["epochs_identical"] == told["epochs"]
+    assert told["shots_identical"] == told["shots"]
+    assert told["versions"]["stored"] == told["versions"]["here"]
+
+
+def test_texts_of_another_version_are_no_difference(catseye, tmp_path):
+    journal = rewritten(tmp_path / "j.db", reworded)
+    status, out, err = catseye("replay", journal)
+    assert (status, err) == (0, "")
+    assert "texts are another version's" in " ".join(out.split())
+    told = json.loads(catseye("replay", journal, "--json")[1])
+    assert (told["same"], told["identical"], told["first_difference"]) == (True, False, None)
+    assert (told["epochs_same"], told["epochs_identical"]) == (2, 0)
+
+
+def test_another_version_says_how_far_it_moves_the_answers(catseye, tmp_path):
+    """All of epoch 1 stored 0.25 mm higher: that far, by the software, in mm and in u, for people and programs."""
+    raised = in_epoch(1, lambda entry: {"x": [[x, y, z + 2.5e-4] for x, y, z in entry.answer["x"]]})
+    journal = rewritten(tmp_path / "j.db", raised)
+    status, out, _ = catseye("replay", journal)
+    words = " ".join(out.split())
+    assert status == 1
+    assert "this version moves the run's answers: points by up to 0.250 mm" in words
+    assert "so it is the software" in words
+    assert "in stored u" in words
+    status, out, _ = catseye("replay", journal, "--json")
+    told = json.loads(out)
+    assert (status, told["same"], told["identical"], told["cause"]) == (1, False, False, "software")
+    assert told["parts_differing"] == {"x": 1}
+    points = told["moved"]["points"]
+    assert round(points["largest_mm"], 9) == 0.25
+    assert points["largest"]["epoch"] == points["largest_in_u"]["epoch"] == 1
+    assert 0.0 < points["rms_mm"] < 0.25
+    assert 0.0 < points["rms_u"] < points["largest_u"]
 
 
 def test_other_calibrations_move_the_ranger_whose_mirror_they_change(catseye, tmp_path):
@@ -32,7 +68,7 @@ def test_other_calibrations_move_the_ranger_whose_mirror_they_change(catseye, tm
     mirror.write_text(text.replace(before, f"d0_mm = {float(before.split('=')[1]) + 0.2}"))
     status, out, err = catseye("replay", recorded(), "--calibrations", folder, "--json")
     told = json.loads(out)
-    assert (status, err, told["same"]) == (0, "", False)
+    assert (status, err, told["same"], told["cause"]) == (0, "", False, "records")
     largest = [point["largest_mm"] for point in told["points"].values()]
     assert 0.001 < max(largest) < 10.0
     assert told["epochs_same"] == 0
@@ -49,6 +85,7 @@ def test_a_journal_that_was_changed_is_found_out(catseye, tmp_path):
     status, out, _ = catseye("replay", journal)
     assert status == 1
     assert "the first that differs is epoch 1" in " ".join(out.split())
+    assert json.loads(catseye("replay", journal, "--json")[1])["cause"] == "journal"
 
 
 @pytest.mark.parametrize(

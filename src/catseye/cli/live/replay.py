@@ -34,7 +34,7 @@ def replay(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """A run again: the same to the last bit, or how far other calibrations move each point."""
+    """A run again: the same to the last bit, or how far this version or other calibrations move each point."""
     from catseye.service.replay import replay_object, replay_passages, replay_verdict, replayed
 
     progress = ProgressLine(quiet)

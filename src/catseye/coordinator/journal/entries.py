@@ -119,19 +119,8 @@ class EpochSolution:
 
     @property
     def text(self) -> str:
-        """The answer as JSON, keys sorted: two answers are the same where their texts are."""
+        """The answer as JSON, keys sorted: two answers are the same to the last bit where this is."""
         return json.dumps(self.answer, sort_keys=True, allow_nan=False, ensure_ascii=False)
-
-    def same(self, other: "EpochSolution | None") -> bool:
-        """Whether the other is this one to the last bit."""
-        if other is None or (self.covariance is None) != (other.covariance is None):
-            return False
-        if self.covariance is not None and other.covariance is not None:
-            pair = (np.ascontiguousarray(m, dtype="<f8") for m in (self.covariance, other.covariance))
-            one, two = ((matrix.shape, matrix.tobytes()) for matrix in pair)
-            if one != two:
-                return False
-        return self.ticks == other.ticks and self.text == other.text
 
 
 @dataclass(frozen=True)

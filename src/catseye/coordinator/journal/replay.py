@@ -1,46 +1,103 @@
 """A run fed to the reduction again, in the order in which it was fed then, and held against what it said then."""
 
+import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Document, EpochSolution
 from catseye.coordinator.journal.reader import JournalReader, Kind, StoredRun
+from catseye.coordinator.journal.sameness import (
+    Sameness,
+    SolutionComparison,
+    compare_shots,
+    compare_solutions,
+    least_same,
+)
 from catseye.errors import CatseyeError
 from catseye.records.night.live import LivePosture, LiveShot, LiveWeather
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.live.live import EpochJob, Live
 
+NOTHING_TO_COMPARE = SolutionComparison(Sameness.IDENTICAL)
 LiveFactory = Callable[[SiteFolder, StoredRun], Live]
+
+
+@dataclass(frozen=True)
+class RangeMove:
+    """A shot's range made again, less the stored one, and its stored u: m."""
+
+    ranger: str
+    target: str
+    change: float
+    u: float
+
+
+@dataclass
+class ShotComparisons:
+    """Shots fed since the solution before, their answers beside the stored ones.
+
+    count       of all
+    differing   seqs of those with another number or status
+    reworded    seqs of those with the same numbers and status but another text
+    unasked     seqs of those with which no answer is stored: nothing to compare
+    moves       of those that have a range both times
+    """
+
+    count: int = 0
+    differing: list[int] = field(default_factory=list)
+    reworded: list[int] = field(default_factory=list)
+    unasked: list[int] = field(default_factory=list)
+    moves: list[RangeMove] = field(default_factory=list)
+
+    def add(self, seq: int, stored: AnsweredShot, new: AnsweredShot) -> None:
+        """Compare one more shot with its stored answer."""
+        self.count += 1
+        if not stored.status:
+            self.unasked.append(seq)
+            return
+        found = compare_shots(stored, new)
+        if found is Sameness.DIFFERENT:
+            self.differing.append(seq)
+        elif found is Sameness.TEXTS:
+            self.reworded.append(seq)
+        change = new.range_ - stored.range_
+        if math.isfinite(change):
+            self.moves.append(RangeMove(stored.shot.ranger, stored.shot.target, change, stored.u_range))
+
+    @property
+    def sameness(self) -> Sameness:
+        """Of the one that is least the same."""
+        if self.differing:
+            return Sameness.DIFFERENT
+        return Sameness.TEXTS if self.reworded else Sameness.IDENTICAL
 
 
 @dataclass(frozen=True, eq=False)
 class Replayed:
     """One solution, stored and made again; or at the end the shots that no solution is stored for.
 
-    seq         in its run
-    stored      None at the end
-    new         its answer is empty where nothing could be solved this time; None at the end
-    shots       fed since the solution before
-    differing   seqs of those whose answer is not the stored one to the last bit
-    unasked     seqs of those with which no answer is stored: nothing to compare
+    seq        in its run
+    stored     None at the end
+    new        its answer is empty where nothing could be solved this time; None at the end
+    shots      fed since the solution before
+    solution   stored and new compared
     """
 
     seq: int
     stored: EpochSolution | None
     new: EpochSolution | None
-    shots: int
-    differing: tuple[int, ...]
-    unasked: tuple[int, ...] = ()
+    shots: ShotComparisons
+    solution: SolutionComparison = NOTHING_TO_COMPARE
 
     @property
-    def same_solution(self) -> bool:
-        """Whether the solution is as it was, to the last bit."""
-        return self.stored is None or self.stored.same(self.new)
+    def sameness(self) -> Sameness:
+        """Of the solution and its shots together."""
+        return least_same((self.solution.sameness, self.shots.sameness))
 
     @property
     def same(self) -> bool:
-        """Whether all that can be compared is as it was, to the last bit."""
-        return self.same_solution and not self.differing
+        """Whether all numbers, reason codes and statuses are as they were, to the last bit; texts apart."""
+        return self.sameness is not Sameness.DIFFERENT
 
 
 def replay(
@@ -55,19 +112,13 @@ def replay(
     Without stored samples the reduction sees what the rangers made of them, and answers differ.
     """
     live = live_factory(reader.site(run), reader.run(run))
-    shots, last = 0, 0
-    differing: list[int] = []
-    unasked: list[int] = []
+    shots, last = ShotComparisons(), 0
     job: EpochJob | None = None
     kinds: list[Kind] = ["shots", "weather", "postures", "documents", "solutions"]
     for seq, entry in reader.events(run, until=until, kinds=kinds):
         if isinstance(entry, AnsweredShot):
-            shots, last = shots + 1, seq
-            again = _asked(live, entry.shot)
-            if not entry.status:
-                unasked.append(seq)
-            elif _answer(again) != _answer(entry):
-                differing.append(seq)
+            last = seq
+            shots.add(seq, entry, _asked(live, entry.shot))
         elif isinstance(entry, LiveWeather):
             live.weather(entry)
         elif isinstance(entry, LivePosture):
@@ -76,10 +127,10 @@ def replay(
             job = live.begin(entry.ticks)
         elif isinstance(entry, EpochSolution):
             new = EpochSolution.of(entry.ticks, None if job is None else live.take_in(job, job.solve()))
-            yield Replayed(seq, entry, new, shots, tuple(differing), tuple(unasked))
-            shots, differing, unasked, job = 0, [], [], None
-    if shots:
-        yield Replayed(last, None, None, shots, tuple(differing), tuple(unasked))
+            yield Replayed(seq, entry, new, shots, compare_solutions(entry, new))
+            shots, job = ShotComparisons(), None
+    if shots.count:
+        yield Replayed(last, None, None, shots)
 
 
 def _asked(live: Live, shot: LiveShot) -> AnsweredShot:
@@ -88,8 +139,3 @@ def _asked(live: Live, shot: LiveShot) -> AnsweredShot:
         return AnsweredShot.of(shot, live.shot(shot))
     except CatseyeError as problem:
         return AnsweredShot(shot, "refused", str(problem))
-
-
-def _answer(shot: AnsweredShot) -> tuple[str, ...]:
-    """Status and numbers; as text, in which NaN is NaN and every bit shows."""
-    return (shot.status, shot.text, *(repr(float(value)) for value in (shot.range_, shot.u_range, shot.misfit)))

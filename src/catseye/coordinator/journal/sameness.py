@@ -1,0 +1,133 @@
+"""Comparison of a stored answer with the one that the same shots give now: numbers, reason codes and statuses.
+
+Texts for people stand apart: a version that words a reason otherwise has not changed an answer.
+"""
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
+from catseye.reduction.epoch.reason import status_of
+
+NOTES, REJECTED, POSE, MISSING = "notes", "rejected", "pose", "missing"  # keys of a stored answer, and of its pose
+SOLVED = "solved or not"  # parts that are no keys of the answer
+TICKS = "ticks asked for"
+COVARIANCE = "covariance"
+
+
+class Sameness(StrEnum):
+    """How an answer that was made again is like the stored one; the value is what people read."""
+
+    IDENTICAL = "identical to the last bit, texts included"
+    TEXTS = "same numbers, texts of another version"
+    DIFFERENT = "different numbers"  # or another reason code or status
+
+
+ORDER = tuple(Sameness)  # worse and worse
+
+
+def least_same(found: Iterable[Sameness]) -> Sameness:
+    """The worst of several; identical of none.
+
+    >>> least_same([Sameness.TEXTS, Sameness.IDENTICAL]).name
+    'TEXTS'
+    """
+    return max(found, key=ORDER.index, default=Sameness.IDENTICAL)
+
+
+@dataclass(frozen=True)
+class SolutionComparison:
+    """An epoch's solution, made again, beside the stored one.
+
+    sameness   of the two
+    parts      keys of the answer whose numbers, reason codes or statuses differ
+    unstored   keys that only the new answer has, since an older version did not store them: not compared
+    """
+
+    sameness: Sameness
+    parts: tuple[str, ...] = ()
+    unstored: tuple[str, ...] = ()
+
+
+def compare_solutions(stored: EpochSolution, new: EpochSolution) -> SolutionComparison:
+    """What differs between a stored solution and a new one."""
+    bits = _bits_of(stored.covariance) == _bits_of(new.covariance)
+    if bits and stored.ticks == new.ticks and stored.text == new.text:
+        return SolutionComparison(Sameness.IDENTICAL)
+    if bool(stored.answer) != bool(new.answer):
+        return SolutionComparison(Sameness.DIFFERENT, (SOLVED,))
+    before, after = _without_texts(stored.answer), _without_texts(new.answer)
+    parts = [part for part in before if part not in after or _differ(before[part], after[part], part)]
+    parts += [TICKS] * (stored.ticks != new.ticks) + [COVARIANCE] * (not bits)
+    unstored = sorted(set(after) - set(before))
+    if POSE in before and POSE in after:
+        unstored += _only_in(after[POSE], before[POSE], POSE)
+    return SolutionComparison(Sameness.DIFFERENT if parts else Sameness.TEXTS, tuple(parts), tuple(unstored))
+
+
+def compare_shots(stored: AnsweredShot, new: AnsweredShot) -> Sameness:
+    """How a shot's new answer is like the stored one: its status and numbers count, NaN is NaN."""
+    if (stored.status, *_numbers(stored)) != (new.status, *_numbers(new)):
+        return Sameness.DIFFERENT
+    return Sameness.IDENTICAL if stored.text == new.text else Sameness.TEXTS
+
+
+def _numbers(shot: AnsweredShot) -> tuple[str, ...]:
+    """As text, in which every bit shows."""
+    return tuple(repr(float(value)) for value in (shot.range_, shot.u_range, shot.misfit))
+
+
+def _without_texts(answer: Mapping[str, object]) -> dict[str, object]:
+    """An answer's keys with reason codes in place of reasons; notes and why a pose is missing are left out."""
+    kept = {key: value for key, value in answer.items() if key != NOTES}
+    rejected, pose = kept.get(REJECTED), kept.get(POSE)
+    if isinstance(rejected, Mapping):
+        kept[REJECTED] = {number: _code(line) for number, line in rejected.items()}
+    if isinstance(pose, Mapping):
+        kept[POSE] = {key: value for key, value in pose.items() if key != MISSING}
+    return kept
+
+
+def _code(line: object) -> object:
+    """The status of a reason's line; the line itself where it begins with none, lest two be taken for the same."""
+    return status_of(line) or line if isinstance(line, str) else line
+
+
+def _differ(before: object, after: object, part: str) -> bool:
+    if part == POSE:
+        after = _as_stored(before, after)
+    return _bits(before) != _bits(after)
+
+
+def _bits(value: object) -> str:
+    """A JSON value as text, keys sorted, in which every bit of a number shows."""
+    return json.dumps(value, sort_keys=True, allow_nan=False, ensure_ascii=False)
+
+
+def _as_stored(before: object, after: object) -> object:
+    """A record with those keys alone that the stored one has."""
+    if isinstance(before, Mapping) and isinstance(after, Mapping):
+        return {key: _as_stored(before[key], value) for key, value in after.items() if key in before}
+    return after
+
+
+def _only_in(after: object, before: object, place: str) -> list[str]:
+    """Names of a record's keys that the stored one lacks, "pose.dish.bending"."""
+    if not (isinstance(before, Mapping) and isinstance(after, Mapping)):
+        return []
+    names: list[str] = []
+    for key, value in after.items():
+        names += _only_in(value, before[key], f"{place}.{key}") if key in before else [f"{place}.{key}"]
+    return names
+
+
+def _bits_of(matrix: NDArray[np.float64] | None) -> tuple[tuple[int, ...], bytes] | None:
+    if matrix is None:
+        return None
+    whole = np.ascontiguousarray(matrix, dtype="<f8")
+    return whole.shape, whole.tobytes()
