@@ -4,6 +4,8 @@ Along a straight line the height is linear in the distance run, so that the mean
 path; over 1 km the Earth's curvature departs from that by 2 cm.
 """
 
+from functools import cache
+
 import numpy as np
 
 from catseye.constants import DRY_AIR_KG_PER_MOL, GAS_CONSTANT, STANDARD_GRAVITY, WATER_OVER_AIR, ZERO_CELSIUS_K
@@ -124,6 +126,11 @@ def nodes_along(z_a, z_b, nodes):
     >>> [part.round(4).tolist() for part in nodes_along(0.0, 10.0, 2)]
     [[2.1132, 7.8868], [0.5, 0.5]]
     """
-    x, weight = np.polynomial.legendre.leggauss(nodes)
+    x, weight = _legendre(nodes)
     z_a, z_b = np.asarray(z_a, float)[..., None], np.asarray(z_b, float)[..., None]
     return 0.5 * (z_a + z_b) + 0.5 * (z_b - z_a) * x, 0.5 * weight
+
+
+@cache
+def _legendre(nodes):
+    return np.polynomial.legendre.leggauss(nodes)

@@ -8,6 +8,7 @@ from catseye.estimation.least_squares.adjustment import NONCENTRALITY, LeastSqua
 from catseye.estimation.least_squares.rows import ActiveRows
 from catseye.estimation.observations.kinds import ObservationGroup
 
+UNSEEN = 1e-6  # share of a pattern that the parameters leave, below which it is rounding
 AT_ONCE = 32  # observations whose influence is computed together
 
 
@@ -72,15 +73,31 @@ class Influence:
         self.active[k] = False
         self._out = np.concatenate([self._out, (column / root)[None]])
 
+    def errors_of(self, patterns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """An error of each of k patterns (rows, k) in the observations, by itself: estimate (k,) and its u (k,).
+
+        Of the solution itself, before any row is left out. What the parameters take up wholly has an infinite u.
+        """
+        seen = np.sum(patterns * self._through(patterns).T, axis=0)
+        usual = np.sum(patterns**2 * self.visible[:, None], axis=0)
+        shown = seen > UNSEEN * np.maximum(usual, 1e-300)
+        seen = np.where(shown, seen, 1.0)
+        estimate = np.where(shown, patterns.T @ self.weighed / seen, 0.0)
+        return estimate, np.where(shown, seen**-0.5, np.inf)
+
     def _of(self, wanted: np.ndarray) -> np.ndarray:
         """Columns of P_v of the solution itself, a row each."""
-        unit, right = [], np.zeros((len(self._q.diagonal()), len(wanted)))
+        unit = np.zeros((int(self.first[-1]), len(wanted)))
+        unit[wanted, np.arange(len(wanted))] = 1.0
+        return self._through(unit)
+
+    def _through(self, vectors: np.ndarray) -> np.ndarray:
+        """P_v times vectors (rows, k), a row each."""
+        unit, right = [], np.zeros((len(self._q.diagonal()), vectors.shape[1]))
         for rows, design, low, high in zip(self._rows, self._designs, self.first, self.first[1:], strict=False):
-            mine = np.flatnonzero((wanted >= low) & (wanted < high))
-            one = np.zeros((high - low, len(wanted)))
-            if len(mine):
-                one[wanted[mine] - low, mine] = 1.0
-                one = rows.weigh(one)
+            one = vectors[low:high]
+            if one.any():
+                one = rows.weigh(np.where(rows.active[:, None], one, 0.0))
                 touched = np.flatnonzero(one.any(axis=1))
                 if rows.columns.ndim == 1:
                     right[rows.columns] += design[touched].T @ one[touched]

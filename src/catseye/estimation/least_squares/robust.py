@@ -35,6 +35,10 @@ UNCHECKED = 0.05  # share of sigma^2 / variance of the estimated error below whi
 CHECKED = NONCENTRALITY / UNCHECKED**0.5  # detectable error over sigma up to which an observation is checked
 BACK = 0.9  # of `critical`: what is out comes back below it; between the two it stays as it is, or rounds would not end
 MOST_AT_ONCE = 200  # observations left out between two adjustments
+MOST_REWEIGHTED, STEADY = (
+    8,
+    0.3,
+)  # fits of the robust start; and change of a residual, over itself or its sigma, that ends it
 MOST_RETURNS = 2  # of one observation; so the rounds end
 
 
@@ -227,9 +231,11 @@ def _reweighted(
         free = ~border.fine if free is None else free & ~border.fine
     rough = SolverSettings(iterations=1, tests=False, border=border)
     solution = adjust(x0, groups, free=free, names=names, solver=rough)
-    for _ in range(8):
-        if not solution.solved:
+    before: list[np.ndarray] = []
+    for _ in range(MOST_REWEIGHTED):
+        if not solution.solved or _steady(solution, before):
             break
+        before = [f.residual for f in solution.fits]
         for i, (fit, may) in enumerate(zip(solution.fits, removable, strict=True)):
             extra[i] = np.where(may, (fit.residual / 2.0) ** 2, 0.0)
         solution = adjust(
@@ -241,6 +247,14 @@ def _reweighted(
             solver=rough,
         )
     return solution
+
+
+def _steady(solution: LeastSquaresSolution, before: Sequence[np.ndarray]) -> bool:
+    """Whether no residual still moves by what a choice of weights would feel."""
+    return all(
+        np.all(np.abs(f.residual - old) < STEADY * np.maximum(f.sigma, np.abs(old)))
+        for f, old in zip(solution.fits, before, strict=False)
+    ) and bool(before)
 
 
 def _searched(

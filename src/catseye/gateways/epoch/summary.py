@@ -47,6 +47,8 @@ def verdict(reduction: Reduction) -> Verdict:
             "doubtful",
             f"{count[ShotStatus.UNDECIDED]} shots contradict each other, and nothing says which is wrong",
         )
+    if coordinates.doubts:
+        return Verdict("doubtful", coordinates.doubts[0])
     says = "as their uncertainties claim" if factor >= 1.0 - 2.0 * spread else "less than their uncertainties claim"
     return Verdict("good", f"the measurements scatter {says}, and {rejected} of {shots} shots were rejected")
 

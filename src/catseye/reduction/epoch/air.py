@@ -1,4 +1,4 @@
-"""The air of a campaign from its weather stations: smoothed in time, a line in height, with offsets to be estimated.
+"""The air of a campaign: its stations' records, a line in height, a process in time, and offsets to be estimated.
 
 Where sound measured the mean temperature of a line (path_temperatures.csv), that takes the thermometers' place in the
 index of the line's shots near in time; pressure and vapour stay the stations'.
@@ -10,113 +10,58 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from catseye.atmosphere.index.air import MODELS, group_refractivity
-from catseye.atmosphere.path.mean import mean_over_height, pressure_at
+from catseye.atmosphere.path.mean import nodes_along, pressure_at
 from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
-from catseye.constants import SECONDS_PER_DAY
+from catseye.constants import DEGREE, SECONDS_PER_DAY
 from catseye.errors import InputError, ValidityError
+from catseye.estimation.series.trend import Trend
 from catseye.records.night.campaign import ObservedSite
-from catseye.records.night.path_temperature import PathTemperatureTable
+from catseye.records.site.site import Location
+from catseye.reduction.epoch.air_process import LEVEL_HEIGHT, AirKnots
 from catseye.reduction.epoch.parameter import BEND, GRADIENT, Parameter, ParameterKind
 from catseye.reduction.epoch.settings import ReductionSettings
+from catseye.reduction.epoch.sounded import SoundedLine, sounded_lines
+from catseye.reduction.epoch.station_record import StationRecord, states_at
 
-Profile = Callable[[np.ndarray], np.ndarray]
-
-SOUND_NEAR = 600.0  # s from a shot to its line's nearest sounding, beyond which the thermometers count again
-SMOOTHING = 300.0  # s, Gaussian half-width in time: noise of a reading every 30 s falls to a sixth
 DISTINCT_HEIGHTS = 5.0  # m, stations closer in height than this show no gradient
-MOST_KEPT = 64  # sets of times whose smoothed readings are kept: one a ranger, and more
+MOST_KEPT = 64  # sets of times whose states are kept: one a ranger, and more
 MUCH_C = 2.0  # °C, an offset of a thermometer worth telling
 LEAST_HPA = 600.0
+NODES = 5  # of the quadrature along a path: 1e-12 for straight profiles over 200 m
+HALF = 0.5  # °C on either side, over which slopes are taken
+DAY = (3.0, 21.0)  # hours of local mean solar time, outside which no Sun stands above 60° of latitude's horizon
 
 
 @dataclass(frozen=True, eq=False)
 class PathAir:
-    """Group refractivity averaged along m paths, and its derivatives by the q parameters of the air.
+    """Group refractivity averaged along m paths, and its derivatives by the parameters of the air.
 
-    refractivity   (m,) n_g - 1
-    slopes         (m, q) per °C of a thermometer's offset (it reads too high), per °C of bend (warmer
-                   half-way between the stations than on their line), per °C/m of gradient, or per °C that the sound
-                   of a line reads too warm
+    refractivity     (m,) n_g - 1
+    slopes           (m, q) by those of `AirField.names`: per °C of a thermometer's offset (it reads too high), per °C
+                     of bend (warmer half-way between the stations than on their line), per °C/m of gradient, or per °C
+                     that the sound of a line reads too warm
+    columns          (m, w) further parameters that each path hangs on, counted in `AirField.parameters`, and
+    column_slopes    (m, w) derivatives by them: per s of a thermometer's lag, per °C or °C/m of the process' knots
     """
 
     refractivity: np.ndarray
     slopes: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class SoundedLine:
-    """A line whose mean temperature was measured by sound, (k,) rows in order of time.
-
-    ends            the two names; a line is the same from either end
-    temperature_c   mean along the line
-    u               °C, of each row; what makes it is taken as common to all rows of the line
-    """
-
-    ends: frozenset[str]
-    mjd_utc: np.ndarray
-    temperature_c: np.ndarray
-    u: np.ndarray
-
-    @property
-    def name(self) -> str:
-        return " - ".join(sorted(self.ends))
-
-    @property
-    def sigma(self) -> float:
-        """°C, of the line's parameter; a row with another u feels it in proportion."""
-        return float(np.sqrt(np.mean(self.u**2)))
-
-    def near(self, mjd_utc: np.ndarray) -> np.ndarray:
-        """(m,) bool: a row lies near enough in time."""
-        return np.min(np.abs(mjd_utc[:, None] - self.mjd_utc), axis=1) * SECONDS_PER_DAY <= SOUND_NEAR
-
-    def at(self, mjd_utc: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(m,) °C and share of the line's parameter, linear between rows, constant before the first and after the last.
-
-        Two rows far apart are joined by a line: only shots `near` one of them ask.
-        """
-        temperature = np.interp(mjd_utc, self.mjd_utc, self.temperature_c)
-        return temperature, np.interp(mjd_utc, self.mjd_utc, self.u) / self.sigma
-
-    def note(self, mjd_utc: np.ndarray, warm: tuple[float, float], w: float, critical: float) -> str:
-        """What the line did, in a sentence.
-
-        mjd_utc    (m,) times of all its shots
-        warm       °C that it is found to read too warm, and u
-        w          test statistic of that against its prior; beyond `critical` the ranges contradict it
-        """
-        near = self.near(mjd_utc)
-        if not near.any():
-            return f"{self.name}: no shot within {SOUND_NEAR / 60.0:.0f} min of its path temperatures: they do nothing"
-        late = f", {(~near).sum()} more too far in time" if not near.all() else ""
-        doubt = (
-            f"; the ranges contradict it (w {w:.1f}) and do without: see its length, delay" if abs(w) > critical else ""
-        )
-        return (
-            f"{self.name}: air {self.at(mjd_utc[near])[0].mean():.2f} °C by sound for {near.sum()} shots{late}; it is "
-            f"found to read {warm[0]:+.2f} °C too warm (u {warm[1]:.2f} °C){doubt}"
-        )
-
-
-def sounded_lines(table: PathTemperatureTable | None) -> tuple[SoundedLine, ...]:
-    """The lines of path_temperatures.csv, sorted by name; none without the file."""
-    if table is None:
-        return ()
-    pairs = [frozenset(pair) for pair in zip(table.ranger, table.target, strict=True)]
-    made = []
-    for ends in dict.fromkeys(pairs):
-        rows = np.array([k for k, pair in enumerate(pairs) if pair == ends])
-        rows = rows[np.argsort(table.mjd_utc[rows])]
-        made.append(SoundedLine(ends, table.mjd_utc[rows], table.temperature_c[rows], table.u_temperature_c[rows]))
-    return tuple(sorted(made, key=lambda line: line.name))
+    columns: np.ndarray
+    column_slopes: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
 class AirField:
-    """Temperature, pressure and humidity around the site as functions of time and height.
+    """Temperature, pressure and humidity around the site as functions of time and place.
 
-    names     what the q parameters are: one thermometer offset a station, "bend" or "gradient", then the sounded lines
+    names     of the q lasting parameters: one thermometer offset a station, "bend" or "gradient", then sounded lines
     sigmas    (q,) their standard uncertainties beforehand
+    heights   (stations,) m, ground frame
+    places    (stations, 2) m, east and north; zero where site.toml does not say,
+    placed    (stations,) bool, which it does
+    records   of the stations
+    knots     of the process in time
+    sun       (2, n) s and the sine of the Sun's altitude then, 0 below the horizon; (2, 0) of a night
     lines     where sound measured the temperature
     sounded   (m,) index into `lines` of each path that `along` is asked for, -1 where none; None for no path at all
     """
@@ -124,14 +69,17 @@ class AirField:
     names: tuple[str, ...]
     sigmas: np.ndarray
     heights: np.ndarray
-    seconds: tuple[np.ndarray, ...]
-    readings: tuple[np.ndarray, ...]
+    places: np.ndarray
+    placed: np.ndarray
+    records: tuple[StationRecord, ...]
+    knots: AirKnots
+    sun: np.ndarray
     start_mjd: float
     wavelength_um: float
     model: str
     lines: tuple[SoundedLine, ...] = ()
     sounded: np.ndarray | None = None
-    _smooth: dict[bytes, np.ndarray] = field(default_factory=dict)  # times: what `smoothed` gave
+    _states: dict[bytes, np.ndarray] = field(default_factory=dict)  # times: what `states` gave
 
     @classmethod
     def of(cls, campaign: ObservedSite, settings: ReductionSettings) -> "AirField":
@@ -142,8 +90,11 @@ class AirField:
         start = float(campaign.shots.mjd_utc[0])
         table = np.stack([weather.temperature_c, weather.pressure_hpa, weather.humidity_percent], axis=1)
         heights = np.array([s.elevation_m - site.site.elevation_of_z0_m for s in stations])
-        flat = np.ptp(heights) < DISTINCT_HEIGHTS
+        flat = bool(np.ptp(heights) < DISTINCT_HEIGHTS)
         lines = sounded_lines(campaign.path_temperatures)
+        seconds = (weather.mjd_utc - start) * SECONDS_PER_DAY
+        records = tuple(StationRecord.of(seconds[where == s.name], table[where == s.name]) for s in stations)
+        shots = (campaign.shots.mjd_utc - start) * SECONDS_PER_DAY
         return cls(
             names=(*(s.name for s in stations), "gradient" if flat else "bend", *(line.name for line in lines)),
             sigmas=np.array(
@@ -152,8 +103,19 @@ class AirField:
                 + [line.sigma for line in lines]
             ),
             heights=heights,
-            seconds=tuple((weather.mjd_utc[where == s.name] - start) * SECONDS_PER_DAY for s in stations),
-            readings=tuple(table[where == s.name] for s in stations),
+            places=np.array([[s.x_m or 0.0, s.y_m or 0.0] for s in stations]),
+            placed=np.array([s.x_m is not None and s.y_m is not None for s in stations]),
+            records=records,
+            knots=AirKnots.of(
+                (float(shots.min()), float(shots.max())),
+                len(shots),
+                [r.temperature_c for r in records],
+                _worth(
+                    records, float(shots.mean()), wavelength_um=site.ranging.wavelength_um, model=settings.air_model
+                ),
+                zeta=None if flat else _zeta(heights, heights),
+            ),
+            sun=_sun(site.site, campaign.shots.mjd_utc, start),
             start_mjd=start,
             wavelength_um=site.ranging.wavelength_um,
             model=settings.air_model,
@@ -162,12 +124,25 @@ class AirField:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """The q parameters as values, in the order of `names`."""
+        """All parameters as values: those of `names` in their order, lags of thermometers, by day
+        what the Sun adds to them, knots of the process."""
         return (
             *(Parameter(ParameterKind.THERMOMETER, station) for station in self.stations),
             GRADIENT if self.profile == "gradient" else BEND,
             *(Parameter(ParameterKind.SOUND, *sorted(line.ends)) for line in self.lines),
+            *(Parameter(kind, station) for kind in self.errors for station in self.stations),
+            *(Parameter(ParameterKind.AIR, *label) for label in self.knots.labels),
         )
+
+    @property
+    def errors(self) -> tuple[ParameterKind, ...]:
+        """Kinds of error that each thermometer has beside its offset."""
+        return (ParameterKind.LAG, ParameterKind.RADIATION) if self.sun.shape[1] else (ParameterKind.LAG,)
+
+    @property
+    def first_knot(self) -> int:
+        """Where the process begins among the parameters."""
+        return len(self.names) + len(self.errors) * len(self.heights)
 
     @property
     def stations(self) -> tuple[str, ...]:
@@ -201,52 +176,101 @@ class AirField:
         return replace(self, sounded=sounded)
 
     def smoothed(self, mjd_utc: np.ndarray) -> np.ndarray:
-        """Temperature °C, pressure hPa, humidity % of each station: (m, stations, 3), by local straight lines.
-
-        Humidity stays within 0 to 100 %: a line through readings near an end, or rounding in fog, leads beyond.
-        """
+        """Temperature °C, pressure hPa, humidity % of each station: (m, stations, 3), by their records' states."""
         times = np.asarray(mjd_utc, dtype=float)
         asked = times.tobytes()  # pass after pass
-        if asked not in self._smooth:
-            t = (times - self.start_mjd) * SECONDS_PER_DAY
-            state = np.stack(
-                [_local_line(when, values, t) for when, values in zip(self.seconds, self.readings, strict=True)], axis=1
-            )
-            state[..., 2] = np.clip(state[..., 2], 0.0, 100.0)
-            if len(self._smooth) >= MOST_KEPT:
-                self._smooth.clear()
-            self._smooth[asked] = state
-        return self._smooth[asked]
+        if asked not in self._states:
+            if len(self._states) >= MOST_KEPT:
+                self._states.clear()
+            self._states[asked] = states_at(self.records, self.seconds(times))
+        return self._states[asked]
+
+    def seconds(self, mjd_utc: np.ndarray) -> np.ndarray:
+        """Times as seconds since the first shot."""
+        return (np.asarray(mjd_utc, dtype=float) - self.start_mjd) * SECONDS_PER_DAY
 
     def along(self, mjd_utc: np.ndarray, a: np.ndarray, b: np.ndarray, parameters: np.ndarray) -> PathAir:
         """Mean group refractivity of straight paths, by Gauss-Legendre quadrature along them.
 
         mjd_utc      (m,) time of the shot
         a, b         (m, 3) ends in the ground frame, m
-        parameters   (q,) values of `names`
+        parameters   (p,) values of `parameters`, or of the first of them: the others are zero
 
         On a path of `sounded` lines the temperature is the sound's, everywhere along it: the mean of the index differs
         from the index of the mean by 4e-9 where the temperature scatters by 1 °C along the path.
 
         Source: README of the campaign layout: temperature linear between the stations and beyond, pressure falling
-        by 0.11 hPa a metre ([PARKER04] section 1.4.2), relative humidity independent of height.
+        by 0.11 hPa a metre ([PARKER04] section 1.4.2), relative humidity independent of height; the process of
+        `air_process` on top.
         """
-        count = len(self.heights) + 1
-        values = np.zeros((1 + len(self.names), len(mjd_utc)))
-        profile = self._by_thermometers(np.asarray(mjd_utc, dtype=float), parameters[:count])
+        values = np.zeros(self.count)
+        values[: len(parameters)] = parameters
+        m, q, s, first = len(mjd_utc), len(self.names), len(self.heights), self.first_knot
+        columns, share = self.knots.columns(self.seconds(mjd_utc))
+        own = np.broadcast_to(np.arange(q, first), (m, first - q))
+        columns = np.concatenate([own, columns + first], axis=1)
+        path = PathAir(np.zeros(m), np.zeros((m, q)), columns, np.zeros(columns.shape))
+        state = _Weather.of(self, np.asarray(mjd_utc, dtype=float), values, share)
+        every = np.arange(m)
         try:
-            values[: 1 + count] = mean_over_height(profile, a[:, 2], b[:, 2])
+            self._into(path, every, state, self._by_thermometers, a, b)
         except ValidityError as problem:
-            raise InputError(self._impossible(np.asarray(mjd_utc, dtype=float), parameters[:count])) from problem
+            raise InputError(self._impossible(np.asarray(mjd_utc, dtype=float), values[: s + 1])) from problem
         for i, line in enumerate(self.lines if self.sounded is not None else ()):
             rows = np.flatnonzero(self.sounded == i)
             if len(rows):
-                warm, share = line.at(mjd_utc[rows])
-                profile = self._by_sound(mjd_utc[rows], parameters[:count], warm - share * parameters[count + i])
-                means = mean_over_height(profile, a[rows, 2], b[rows, 2])
-                values[: 1 + count, rows] = means[:-1]
-                values[1 + count + i, rows] = -share * means[-1]
-        return PathAir(values[0], values[1:].T)
+                warm, own = line.at(mjd_utc[rows])
+                warm = warm - own * values[s + 1 + i]
+                by_sound = self._into(
+                    path,
+                    rows,
+                    state.of_rows(rows),
+                    lambda w, n, warm=warm: self._by_sound(w, n, warm),
+                    a[rows],
+                    b[rows],
+                )
+                path.slopes[rows, s + 1 + i] = -own * by_sound
+        return path
+
+    @property
+    def count(self) -> int:
+        """Number p of all parameters."""
+        return self.first_knot + self.knots.count
+
+    def _into(
+        self,
+        path: PathAir,
+        rows: np.ndarray,
+        state: "_Weather",
+        index: Callable[["_Weather", "_Nodes"], tuple[np.ndarray, ...]],
+        a: np.ndarray,
+        b: np.ndarray,
+    ) -> np.ndarray:
+        """Fill some rows of a path's refractivity and slopes; the mean slope by sound's temperature, or nothing."""
+        nodes = _Nodes.of(self, a, b)
+        refractivity, per_c, *by_sound = index(state, nodes)
+        s, weight = len(self.heights), nodes.weight
+        path.refractivity[rows] = refractivity @ weight
+        weighed = per_c * weight
+        by_station = np.einsum("mk,mks->ms", weighed, nodes.share)
+        path.slopes[rows] = 0.0
+        path.slopes[np.ix_(rows, np.arange(s))] = -by_station
+        path.slopes[rows, s] = np.sum(weighed * nodes.profile, axis=1)
+        path.column_slopes[np.ix_(rows, np.arange(s))] = by_station * state.rate
+        path.column_slopes[np.ix_(rows, np.arange(s, s * len(self.errors)))] = np.tile(
+            -by_station * state.sun[:, None], len(self.errors) - 1
+        )
+        at_stations = by_station @ self.places
+        parts = [
+            weighed.sum(axis=1),
+            np.sum(weighed * nodes.zeta, axis=1),
+            np.sum(weighed * nodes.east, axis=1) - at_stations[:, 0],
+            np.sum(weighed * nodes.north, axis=1) - at_stations[:, 1],
+        ]
+        by_part = np.stack(parts, axis=1)
+        both = np.stack([by_part * (1.0 - state.share), by_part * state.share], axis=2)
+        path.column_slopes[np.ix_(rows, s * len(self.errors) + np.arange(8))] = both.reshape(len(rows), 8)
+        return by_sound[0] @ weight if by_sound else np.zeros(0)
 
     def _impossible(self, mjd_utc: np.ndarray, parameters: np.ndarray) -> str:
         """What the stations read at the shot's time where they are farthest from any air."""
@@ -263,69 +287,53 @@ class AirField:
             "index is known (see to these readings, or leave a station out of site.toml and weather.csv)"
         )
 
-    def _by_thermometers(self, mjd_utc: np.ndarray, parameters: np.ndarray) -> Profile:
-        """Refractivity at heights (m, k), and its derivatives by the stations and the profile: (2 + stations, m, k)."""
-        weather = self._weather(mjd_utc, parameters)
-
-        def profile(z: np.ndarray) -> np.ndarray:
-            share, last, temperature, pressure, humidity = weather(z)
-            index, above, below = (
-                group_refractivity(
-                    temperature + step, pressure, humidity, wavelength_um=self.wavelength_um, model=self.model
-                )
-                for step in (0.0, 0.5, -0.5)
+    def _by_thermometers(self, state: "_Weather", nodes: "_Nodes") -> tuple[np.ndarray, ...]:
+        """Refractivity at nodes (m, k), and its derivative by temperature."""
+        temperature, pressure, humidity = state.at(nodes)
+        index, above, below = (
+            group_refractivity(
+                temperature + step, pressure, humidity, wavelength_um=self.wavelength_um, model=self.model
             )
-            per_c = above - below
-            return np.concatenate([index[None], -per_c * np.moveaxis(share, -1, 0), (per_c * last)[None]])
+            for step in (0.0, HALF, -HALF)
+        )
+        return index, above - below
 
-        return profile
-
-    def _by_sound(self, mjd_utc: np.ndarray, parameters: np.ndarray, warm: np.ndarray) -> Profile:
+    def _by_sound(self, state: "_Weather", nodes: "_Nodes", warm: np.ndarray) -> tuple[np.ndarray, ...]:
         """The same at the temperature `warm` (m,) °C all along the path, and then its derivative by that temperature.
 
         The vapour pressure stays what the stations' thermometers and hygrometers say: warming air does not wet it. In
         fog a line that sound finds colder would be a little more than saturated; the formulas are smooth there.
         """
-        weather = self._weather(mjd_utc, parameters)
         chosen = MODELS[self.model]
         chosen.check(temperature_c=warm)
+        temperature, pressure, humidity = state.at(nodes)
+        vapour, above, below = (
+            vapour_pressure_hpa(temperature + step, pressure, humidity, chosen.vapour_formula)
+            for step in (0.0, HALF, -HALF)
+        )
+        light = {"wavelength_um": self.wavelength_um, "co2_ppm": chosen.co2_ppm}
+        at = (np.broadcast_to(warm[:, None], temperature.shape), pressure, vapour)
+        partials = chosen.partials(*at, **light)
+        by_vapour = partials.vapour_pressure_hpa * (above - below)
+        return chosen.refractivity(*at, **light), by_vapour, partials.temperature_c
 
-        def profile(z: np.ndarray) -> np.ndarray:
-            share, last, temperature, pressure, humidity = weather(z)
-            vapour, above, below = (
-                vapour_pressure_hpa(temperature + step, pressure, humidity, chosen.vapour_formula)
-                for step in (0.0, 0.5, -0.5)
-            )
-            state = (np.broadcast_to(warm[:, None], z.shape), pressure, vapour)
-            partials = chosen.partials(*state, wavelength_um=self.wavelength_um, co2_ppm=chosen.co2_ppm)
-            per_c = partials.vapour_pressure_hpa * (above - below)
-            index = chosen.refractivity(*state, wavelength_um=self.wavelength_um, co2_ppm=chosen.co2_ppm)
-            by_stations = -per_c * np.moveaxis(share, -1, 0)
-            return np.concatenate([index[None], by_stations, (per_c * last)[None], partials.temperature_c[None]])
+    def steepest(self, values: np.ndarray) -> float:
+        """Mean temperature gradient from lowest to highest station, °C/m; 0 at one height.
 
-        return profile
-
-    def _weather(self, mjd_utc: np.ndarray, parameters: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, ...]]:
-        """Function of heights z (m, k): shares of the stations, profile, temperature °C, pressure hPa, humidity %."""
-        state = self.smoothed(mjd_utc)
-        middle = self.heights.mean()
-        temperatures = state[:, :, 0] - parameters[:-1]
-        pressure, humidity = state[:, None, :, 1].mean(axis=2), state[:, None, :, 2].mean(axis=2)
-
-        def weather(z: np.ndarray) -> tuple[np.ndarray, ...]:
-            share, last = self._shares(z)
-            temperature = np.einsum("mks,ms->mk", share, temperatures) + parameters[-1] * last
-            return share, last, temperature, pressure_at(pressure, middle, z), np.broadcast_to(humidity, z.shape)
-
-        return weather
-
-    def steepest(self, offsets: np.ndarray) -> float:
-        """Mean temperature gradient from lowest to highest station, °C/m, offsets removed; 0 at one height."""
+        values   of the thermometers' offsets, or of all `parameters`: what the site's own gradient makes goes off too
+        """
         if self.profile == "gradient":
             return 0.0
-        mean = np.array([values[:, 0].mean() for values in self.readings]) - offsets
+        mean = np.array([r.temperature_c.level.mean() for r in self.records]) - values[: len(self.heights)]
+        if len(values) == self.count:
+            mean = mean - self.places @ self.across(values)
         low, high = int(np.argmin(self.heights)), int(np.argmax(self.heights))
         return float((mean[high] - mean[low]) / (self.heights[high] - self.heights[low]))
+
+    def across(self, values: np.ndarray) -> np.ndarray:
+        """(2,) °C/m, mean gradient towards the east and the north; values (p,) of `parameters`."""
+        knots = values[self.first_knot :][2 * len(self.knots.knots) :]
+        return np.asarray(knots.reshape(2, -1).mean(axis=1))
 
     def _shares(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """How much each station counts at heights z (m, k): (m, k, stations); and the profile of the last parameter."""
@@ -340,20 +348,120 @@ class AirField:
         return share, 4.0 * (z - low) * (high - z) / span**2
 
 
-def _local_line(when: np.ndarray, values: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Values (n, c) at times `when`, smoothed at times t (m,): weighted straight lines, a constant where one sample is.
+@dataclass(frozen=True, eq=False)
+class _Nodes:
+    """Nodes (m, k) of the quadrature along m paths: what counts there of stations and process."""
 
-    The half-width grows where samples are far, so that the nearest always counts. Before the first sample and after
-    the last the value is the one there: no jump at the ends, and no trend carried on.
+    z: np.ndarray
+    east: np.ndarray
+    north: np.ndarray
+    zeta: np.ndarray
+    share: np.ndarray
+    profile: np.ndarray
+    weight: np.ndarray
+
+    @staticmethod
+    def of(field: AirField, a: np.ndarray, b: np.ndarray) -> "_Nodes":
+        east, north, z = (nodes_along(a[:, i], b[:, i], NODES)[0] for i in range(3))
+        share, profile = field._shares(z)
+        heights = field.heights
+        zeta = (z - heights.mean()) / LEVEL_HEIGHT if field.profile == "gradient" else _zeta(z, heights)
+        return _Nodes(z, east, north, zeta, share, profile, nodes_along(0.0, 1.0, NODES)[1])
+
+
+@dataclass(frozen=True, eq=False)
+class _Weather:
+    """The stations' weather at m times, offsets and process applied.
+
+    temperature         (m, stations) °C, of the stations' own air brought to the middle of the site
+    rate                (m, stations) °C/s
+    pressure, humidity  (m,) hPa at the stations' mean height, %
+    process             (m, 4) of `PARTS`
+    sun                 (m,) sine of its altitude
+    profile             of the profile's parameter
+    share               (m, 4) how far each time is on the way to the next knot
+    middle              m, mean height of the stations
     """
-    t = np.clip(t, when.min(), when.max())
-    gap = np.min(np.abs(t[:, None] - when), axis=1)
-    width = np.maximum(SMOOTHING, gap)
-    distance = when - t[:, None]
-    weight = np.exp(-0.5 * (distance / width[:, None]) ** 2)
-    s0, s1, s2 = weight.sum(axis=1), (weight * distance).sum(axis=1), (weight * distance**2).sum(axis=1)
-    spread = s2 * s0 - s1**2
-    line = (weight * (s2[:, None] - s1[:, None] * distance)) / np.where(spread > 0.0, spread, 1.0)[:, None]
-    lonely = spread <= 1e-9 * (s0 * width) ** 2
-    smooth = np.where(lonely[:, None], weight / s0[:, None], line)
-    return smooth @ values
+
+    temperature: np.ndarray
+    rate: np.ndarray
+    pressure: np.ndarray
+    humidity: np.ndarray
+    process: np.ndarray
+    sun: np.ndarray
+    profile: float
+    share: np.ndarray
+    middle: float
+
+    @staticmethod
+    def of(field: AirField, mjd_utc: np.ndarray, values: np.ndarray, share: np.ndarray) -> "_Weather":
+        state, seconds = field.smoothed(mjd_utc), field.seconds(mjd_utc)
+        q, s = len(field.names), len(field.heights)
+        sun = np.interp(seconds, *field.sun) if field.sun.shape[1] else np.zeros(len(seconds))
+        errors = values[q : field.first_knot].reshape(-1, s)
+        rate = np.stack([r.temperature_c.rate_at(seconds) for r in field.records], axis=1)
+        knots = values[field.first_knot :][field.knots.columns(seconds)[0]].reshape(len(seconds), 4, 2)
+        process = knots[:, :, 0] * (1.0 - share) + knots[:, :, 1] * share
+        temperature = state[:, :, 0] - values[:s] + errors[0] * rate - process[:, 2:] @ field.places.T
+        if len(errors) > 1:
+            temperature = temperature - errors[1] * sun[:, None]
+        return _Weather(
+            temperature,
+            rate,
+            state[:, :, 1].mean(axis=1),
+            state[:, :, 2].mean(axis=1),
+            process,
+            sun,
+            float(values[s]),
+            share,
+            float(field.heights.mean()),
+        )
+
+    def of_rows(self, rows: np.ndarray) -> "_Weather":
+        """The same at some of the times."""
+        own = {
+            n: getattr(self, n)[rows]
+            for n in ("temperature", "rate", "pressure", "humidity", "process", "sun", "share")
+        }
+        return replace(self, **own)
+
+    def at(self, nodes: _Nodes) -> tuple[np.ndarray, ...]:
+        """Temperature °C, pressure hPa, humidity % at nodes (m, k)."""
+        level, slope, east, north = self.process.T[:, :, None]
+        temperature = np.einsum("mks,ms->mk", nodes.share, self.temperature) + self.profile * nodes.profile
+        temperature = temperature + level + slope * nodes.zeta + east * nodes.east + north * nodes.north
+        pressure = pressure_at(self.pressure[:, None], self.middle, nodes.z)
+        return temperature, pressure, np.broadcast_to(self.humidity[:, None], nodes.z.shape)
+
+
+def _zeta(z: np.ndarray, heights: np.ndarray) -> np.ndarray:
+    """Height in units of the slope's: 1 at the highest station, -1 at the lowest."""
+    return np.asarray((z - 0.5 * (heights.min() + heights.max())) / (0.5 * np.ptp(heights)))
+
+
+def _sun(where: Location, mjd_utc: np.ndarray, start: float) -> np.ndarray:
+    """(2, n) s since the start and sine of the Sun's altitude, 0 below the horizon; (2, 0) where it is night."""
+    hours = 24.0 * (mjd_utc + where.longitude_deg / 360.0) % 24.0
+    if np.all((hours < DAY[0]) | (hours > DAY[1])):
+        return np.zeros((2, 0))
+    from catseye.geometry.sky.sun import sun_direction
+
+    times = np.linspace(mjd_utc.min(), mjd_utc.max(), max(2, int(np.ptp(mjd_utc) * 96.0) + 1))
+    high = sun_direction(times, where.latitude_deg * DEGREE, where.longitude_deg * DEGREE)[:, 2]
+    if np.all(high <= 0.0):
+        return np.zeros((2, 0))
+    return np.stack([(times - start) * SECONDS_PER_DAY, np.maximum(high, 0.0)])
+
+
+def _worth(
+    records: Sequence[StationRecord], seconds: float, *, wavelength_um: float, model: str
+) -> list[tuple[Trend, float]]:
+    """Pressure and humidity records, and what a hPa or a % of each is worth in °C: the same change of the index."""
+    state = states_at(records, np.array([seconds]))[0].mean(axis=0)
+    light = {"wavelength_um": wavelength_um, "model": model}
+    by = []
+    for k, step in enumerate((HALF, 0.5, 0.5)):
+        up, down = state.copy(), state.copy()
+        up[k], down[k] = up[k] + step, max(down[k] - step, 0.0) if k else down[k] - step
+        by.append(float(group_refractivity(*up, **light) - group_refractivity(*down, **light)) / (up[k] - down[k]))
+    return [(r.trends[k], by[k] / by[0]) for r in records for k in (1, 2)]

@@ -1,7 +1,8 @@
 """From phases to coordinates: one adjustment of points, ranger zeros, leakage, air and prism normals together."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,14 +19,17 @@ from catseye.estimation.least_squares.covariance import JointPoints
 from catseye.estimation.least_squares.robust import CHECKED, OutlierSearch, adjust_robustly
 from catseye.estimation.observations.kinds import Linear, ObservationGroup
 from catseye.records.night.campaign import ObservedSite
+from catseye.reduction.epoch.allowance import DOUBTED_C, Allowance, for_families, for_the_air, refused
 from catseye.reduction.epoch.cycles import KEPT, MANY, Resolved, line_errors, resolve_cycles, without_shots
 from catseye.reduction.epoch.dish import dish_advice
 from catseye.reduction.epoch.head import head_unknowns
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases, Progress
 from catseye.reduction.epoch.reason import Reason
+from catseye.reduction.epoch.self_check import self_checks, sortings
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.shots import ShotGroup, ShotParts, shot_group
+from catseye.reduction.epoch.strengths import ProcessStrength
 from catseye.reduction.epoch.unknowns import (
     APPROXIMATE,
     HEADS,
@@ -40,10 +44,12 @@ from catseye.reduction.site.places import RangedPoint
 PASSES = 6  # cap of passes in which cycles, incidence and air are renewed from the adjusted coordinates
 FIRST = 3  # passes that the first takes as long as, more
 TESTED = 2  # passes that search for wrong shots; later ones keep the choice, so that it cannot swing to and fro
+SEARCHED_C = 1.0  # °C, standard uncertainty of a thermometer's offset while wrong shots are searched for first
+JUDGED = 3  # times that what an adjustment says is judged, and adjusted again with what is allowed for
+STRENGTHENED = 2  # passes that look how strong the processes are; later ones keep the strengths
 SETTLED = 1e-6  # m, no coordinate moves further in the last pass,
-SETTLED_U = 0.01  # or than this share of its standard uncertainty
+SETTLED_U = 0.1  # or than this share of its standard uncertainty: what is linearised there changes by its square
 UNSUSPICIOUS = 1.5  # variance factor, beyond which somebody is wrong though none stands out
-STEEP = 0.03  # °C/m between the stations, beyond which the thermometers are doubted
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +123,8 @@ class AdjustedCoordinates:
     fits         of all groups, for reports
     notes        what a person should know, one line each
     unresolved   index into the campaign's shots: why its whole cycles cannot be known; such shots are not in `ranges`
+    strength     of the processes in time, as the ranges have them
+    doubts       why the answer is not good although its tests passed, a sentence each
     """
 
     points: tuple[str, ...]
@@ -138,6 +146,8 @@ class AdjustedCoordinates:
     notes: tuple[str, ...]
     unresolved: dict[int, Reason]
     sound: dict[str, tuple[float, float]] = field(default_factory=dict)
+    strength: ProcessStrength = field(default_factory=ProcessStrength)
+    doubts: tuple[str, ...] = ()
 
     def index(self, name: str) -> int:
         """Row of a point by its name."""
@@ -161,6 +171,19 @@ class AdjustedCoordinates:
     def u(self) -> np.ndarray:
         """(points, 3) m, standard uncertainties."""
         return self.joint.u
+
+
+class SettledNetwork(NamedTuple):
+    """An adjustment that has settled.
+
+    network    with the strengths of its processes as they came out
+    solution   of all parameters
+    shots      of each ranger, as last seen
+    """
+
+    network: CampaignNetwork
+    solution: LeastSquaresSolution
+    shots: list[tuple[ShotGroup, ShotParts]]
 
 
 def adjust_coordinates(
@@ -188,8 +211,45 @@ def adjust_coordinates(
     if not network.rangers:
         why = next(iter(resolved.rejected.values()), "no shot on any target has a usable phase and reference")
         raise InputError(f"shots.csv: {why}; nothing to adjust")
-    solution, shots = settle_network(network, resolved.starts, progress)
-    return coordinates_of(network, solution, shots, resolved=resolved)
+    settled = settle_network(network, resolved.starts, progress)
+    for _ in range(JUDGED):
+        allowance = allowed(settled)
+        if allowance.same(settled.network.allowance):
+            break
+        network = build_network(
+            campaign, phases, settled.network.electronics, settings=settings, allowance=allowance
+        ).with_strength(settled.network.strength)
+        starts = {name: settled.solution.x[network.layout.columns(name)] for name in network.places}
+        settled = settle_network(network, starts, progress, active=_selection(settled, network))
+    return coordinates_of(settled, resolved=resolved)
+
+
+def _selection(settled: SettledNetwork, network: CampaignNetwork) -> list[np.ndarray]:
+    """What takes part in a network with the shots of one that has settled: the shots that took part there."""
+    count = len(settled.shots)
+    shots = [fit.active for fit in settled.solution.fits[:count]]
+    return [*shots, *(np.ones(len(prior.observed), dtype=bool) for prior in network.priors)]
+
+
+def allowed(settled: SettledNetwork) -> Allowance:
+    """What is to be allowed for after an adjustment: its explanations judged, its residuals averaged."""
+    network, solution, shots = settled
+    air, layout = network.field, network.layout
+    dropped, variance = {}, solution.q.diagonal()
+    for group, fit in zip(network.priors, solution.fits[len(shots) :], strict=True):
+        if fit.name in (THERMOMETERS, ZEROS, SOUND):
+            columns = np.ravel(group.columns)[~fit.active].tolist()
+            dropped |= {layout.parameters[c]: float(solution.x[c]) for c in columns}
+    u = {n: float(np.sqrt(variance[c])) for n, c in zip(air.stations, layout.air, strict=False)}
+    allowance = refused(network.allowance, dropped, air, u, len(network.rangers))
+    if allowance.held != network.allowance.held:
+        return allowance
+    allowance = for_the_air(allowance, air, solution, layout.air)
+    own = {name: network.electronics[name].shots for name in network.rangers}
+    lines = [(p.name, p.electronics.shots, 1.0 + p.refractivity, p.distance) for _, p in shots]
+    groups = [*(g for g, _ in shots), *network.priors]
+    sorts = sortings(network.campaign, network.places, own)
+    return for_families(allowance, self_checks(groups, solution, sorts, lines))
 
 
 def settle_network(
@@ -199,12 +259,14 @@ def settle_network(
     *,
     keep: float = 0.0,
     predicted: bool = False,
-) -> tuple[LeastSquaresSolution, list[tuple[ShotGroup, ShotParts]]]:
+    active: list[np.ndarray] | None = None,
+) -> SettledNetwork:
     """The adjustment repeated until cycles, incidence and air no longer change, with the shots as last seen.
 
     network   with priors for whatever its shots do not hold
     starts    point: (3,) m, where to begin instead of the layout's start
     keep      m, added to what counts as settled: an epoch that is one of many need not be settled to a micrometre
+    active    selection to begin with, of the shots and what follows: no wrong ones are searched for from the start
     predicted the priors know where everything is to a few of the shots' sigmas: wrong shots are searched for only where
               one stands out, since none can hide behind another
 
@@ -218,18 +280,20 @@ def settle_network(
     free = np.array(layout.free)
     points = [layout.columns(name) for name in network.places if name in layout.points]
     coordinates = np.concatenate(points)
-    active, solution = None, None
+    solution = None
     advice: list[Linear] = []
     solver, names = SolverSettings(border=network.border), layout.names
     for turn in range(PASSES):
         if progress is not None:
             progress("adjustment", min(turn + FIRST * (turn > 0), PASSES - 1), PASSES)
         shots = [shot_group(network.seen_from(name), name, x) for name in network.rangers]
-        groups: list[ObservationGroup] = [group for group, _ in shots] + network.priors
-        removable = [
-            np.full(len(g.observed), i < len(shots) or g.name in (THERMOMETERS, ZEROS, SOUND))
-            for i, g in enumerate(groups)
-        ]
+        searching = not turn and not predicted and active is None
+        priors = [_while_searching(p) for p in network.priors] if searching else network.priors
+        groups: list[ObservationGroup] = [group for group, _ in shots] + priors
+        removable = [_removable(g, network, i < len(shots)) for i, g in enumerate(groups)]
+        if searching:
+            for g, may in zip(groups, removable, strict=True):
+                may &= g.name != THERMOMETERS
         before, solution = x, None  # its covariance is large
         if predicted and turn < TESTED and (active is None or all(a.all() for a in active)):
             solution = adjust(x, groups, free=free, names=names, solver=solver)
@@ -257,16 +321,48 @@ def settle_network(
         x, active = solution.require_converged().x, [f.active for f in solution.fits]
         if not turn:
             advice = dish_advice(network, x, solution.q)
+            network = _holding_unknown(network, solution) if searching else network
+        steady = True
+        if turn < STRENGTHENED:
+            strength = network.processes.estimated(solution, network.strength, [p.distance for _, p in shots])
+            steady = strength.near(network.strength)
+            network = network if steady else network.with_strength(strength)
         moved = np.abs(x - before)[coordinates]
         u = np.sqrt(solution.q.diagonal()[coordinates])
-        if turn and np.all(moved < np.maximum(SETTLED + keep, SETTLED_U * u)):
+        if turn and steady and np.all(moved < np.maximum(SETTLED + keep, SETTLED_U * u)):
             break
     else:
         raise _unsettled(layout.parameters[coordinates[np.argmax(moved)]], float(moved.max()))
     if progress is not None:
         progress("adjustment", PASSES, PASSES)
     assert solution is not None
-    return solution, shots
+    return SettledNetwork(network, solution, shots)
+
+
+def _while_searching(prior: ObservationGroup) -> ObservationGroup:
+    """A prior as the first search has it: thermometers loose, but none so far off that air could not be."""
+    if prior.name != THERMOMETERS or not isinstance(prior, Linear):
+        return prior
+    return replace(prior, covariance=np.maximum(prior.covariance, SEARCHED_C**2))
+
+
+def _holding_unknown(network: CampaignNetwork, solution: LeastSquaresSolution) -> CampaignNetwork:
+    """The network that keeps the priors of thermometers of which the ranges know less than their records do."""
+    variance, air = solution.q.diagonal(), network.field
+    unknown = {
+        Parameter(ParameterKind.THERMOMETER, station)
+        for station, column, sigma in zip(air.stations, network.layout.air, air.sigmas, strict=False)
+        if variance[column] > sigma**2
+    }
+    return replace(network, allowance=replace(network.allowance, held=network.allowance.held | unknown))
+
+
+def _removable(group: ObservationGroup, network: CampaignNetwork, shots: bool) -> np.ndarray:
+    """(m,) bool: which observations of a group may be left out."""
+    if shots or group.name not in (THERMOMETERS, ZEROS, SOUND):
+        return np.full(len(group.observed), shots)
+    owners = [network.layout.parameters[c] for c in np.ravel(group.columns).tolist()]
+    return np.array([owner not in network.allowance.held for owner in owners])
 
 
 def _unsettled(worst: Parameter, moved: float) -> EstimationError:
@@ -285,18 +381,13 @@ def _unsuspicious(solution: LeastSquaresSolution, removable: Sequence[np.ndarray
     return not any(each.any() for each in large) and factor < UNSUSPICIOUS
 
 
-def coordinates_of(
-    network: CampaignNetwork,
-    solution: LeastSquaresSolution,
-    shots: list[tuple[ShotGroup, ShotParts]],
-    *,
-    resolved: Resolved,
-) -> AdjustedCoordinates:
+def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCoordinates:
     """What an adjusted network says of points, ranges, heads and air.
 
-    network, solution, shots   as `settle_network` took and gave them
-    resolved                   what was known of whole cycles before
+    settled    as `settle_network` gave it
+    resolved   what was known of whole cycles before
     """
+    network, solution, shots = settled
     layout, campaign = network.layout, network.campaign
     names = sorted([*network.places, *(str(Parameter(ParameterKind.FIXED_POINT, m)) for m in campaign.monuments)])
     columns = np.array([layout.columns(n) for n in names])
@@ -313,7 +404,8 @@ def coordinates_of(
     def estimate(column: int) -> tuple[float, float]:
         return float(solution.x[column]), float(np.sqrt(variance[column]))
 
-    every = {n: estimate(int(k)) for k, n in zip(layout.air, network.field.names, strict=True)}
+    lasting = zip(layout.air, network.field.names, strict=False)  # what follows are errors in time
+    every = {n: estimate(int(k)) for k, n in lasting}
     sound = {line.name: every[line.name] for line in network.field.lines}
     air = {n: value for n, value in every.items() if n not in sound}
     leakage_at = {n: layout.columns(Parameter(ParameterKind.LEAKAGE, n), 2) for n in network.rangers}
@@ -349,6 +441,8 @@ def coordinates_of(
         ),
         unresolved=resolved.rejected,
         sound=sound,
+        strength=network.strength,
+        doubts=_doubts(network, solution),
     )
 
 
@@ -496,7 +590,7 @@ def _notes(
             for station, active in zip(owners, fit.active, strict=True):
                 value, u = air[station]
                 if not active:
-                    notes.append(f"{station}'s thermometer lies: it reads {value:+.2f} °C too high (u {u:.2f} °C)")
+                    notes.append(f"{station}'s thermometer is biased: it reads {value:+.2f} °C too high (u {u:.2f} °C)")
         if fit.name == ZEROS:
             for ranger, active, off, u in zip(owners, fit.active, fit.residual, fit.sigma, strict=True):
                 if not active:
@@ -511,12 +605,7 @@ def _notes(
                 f"{called}: not the mirror sheet's, the ranges contradict it (w {fit.standardised[worst]:.1f}, limit "
                 f"{network.settings.critical}); check the sheet's value and u"
             )
-    steepest = network.field.steepest(np.array([air[n][0] for n in network.field.stations]))
-    if abs(steepest) > STEEP:
-        notes.append(
-            f"the stations' thermometers differ by {steepest:+.3f} °C a metre of height: a strong inversion, "
-            "or one lies where no benchmark path passes"
-        )
+    notes += network.allowance.texts
     typed = [n for n, p in sorted(network.places.items()) if p.typed and count[n] >= 3]  # fewer do not place a point
     moved = np.array([np.linalg.norm(solution.x[network.layout.columns(n)] - network.places[n].start) for n in typed])
     unit = {t: triplet.triplet for triplet in network.campaign.triplets.values() for t in triplet.targets}
@@ -531,6 +620,17 @@ def _notes(
         for n, d in wrong.items()
     ]
     return notes
+
+
+def _doubts(network: CampaignNetwork, solution: LeastSquaresSolution) -> tuple[str, ...]:
+    """Why the answer is not good: what had to be allowed for, and thermometers at the end of their priors."""
+    doubts = list(network.allowance.texts)
+    air = network.field
+    for i, (station, column) in enumerate(zip(air.stations, network.layout.air, strict=False)):
+        value, sigma = float(solution.x[column]), float(air.sigmas[i])
+        if abs(value) > DOUBTED_C * sigma:
+            doubts.append(f"{station}'s thermometer is biased by {value:+.2f} °C, {abs(value) / sigma:.1f} of its u")
+    return tuple(doubts)
 
 
 def _sound_notes(

@@ -28,9 +28,21 @@ class ParameterKind(Enum):
     THERMOMETER = "the air {of}"  # of a weather station
     PROFILE = "the air {part}"  # "bend" or "gradient"
     SOUND = "the air {of} - {part}"  # of a line whose temperature sound measured: from, to
+    LAG = "lag {of}"  # s, of a weather station's thermometer
+    RADIATION = "sunshine on {of}"  # °C that its thermometer reads too warm, for the Sun in the zenith
+    AIR = "air's {of} {part}"  # a knot of the process in time: of its level, slope, east, north
+    FAMILY = "unexplained {of} {part}"  # of a bin of `self_check`: of a family of shots, its number
+    TELESCOPE = "telescope's {of} {part}"  # a knot of how the telescope moves and expands during a campaign
 
 
-AIR_KINDS = (ParameterKind.THERMOMETER, ParameterKind.PROFILE, ParameterKind.SOUND)
+AIR_KINDS = (
+    ParameterKind.THERMOMETER,
+    ParameterKind.PROFILE,
+    ParameterKind.SOUND,
+    ParameterKind.LAG,
+    ParameterKind.RADIATION,
+    ParameterKind.AIR,
+)
 POINT_KINDS = (ParameterKind.POINT, ParameterKind.FIXED_POINT)
 
 

@@ -5,13 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
+from catseye.constants import MILLIMETRE, PPM, SECONDS_PER_DAY, SPEED_OF_LIGHT, TWO_PI
 from catseye.estimation.least_squares.conflict import SharedErrors
 from catseye.estimation.observations.kinds import Distances, MovingDistances
 from catseye.optics.retroreflector.prism import obliquity_correction, obliquity_slope
+from catseye.reduction.epoch.air import PathAir
 from catseye.reduction.epoch.head import HeadCorrections, head_corrections
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import ElectronicsPhase
+from catseye.reduction.epoch.self_check import unit_of
 from catseye.reduction.epoch.unknowns import CampaignNetwork, path_ppm
 from catseye.signal.cycles.whole import fraction, unwrapped_length, whole_cycles
 
@@ -31,6 +33,7 @@ class ShotParts:
     glass, obliquity   Pc and dPc, m
     leakage_slope      (m, 2) m/V, of the observed optical length by the rest of leakage
     head               what the ranger's head asks to add to the range: `head.at(x)` with the estimated parameters
+    distance           m, of the adjusted points
     variance           m^2, of the optical length, with all that it shares with other shots
     shared             parameters that stand for what it shares, -1 for none; and the derivatives of the optical length
                        by them, m: of a large campaign, else none
@@ -48,6 +51,7 @@ class ShotParts:
     obliquity: np.ndarray
     leakage_slope: np.ndarray
     head: HeadCorrections
+    distance: np.ndarray
     variance: np.ndarray
     shared: tuple[np.ndarray, np.ndarray]
 
@@ -140,7 +144,9 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
         index=n,
     )
     zero = x[layout.at[Parameter(ParameterKind.ZERO, name)]]
-    coarse = n * (distance - glass - obliquity - d0 - zero - head.at(x))
+    moving, moved = _expansion(network, name, targets, sights)
+    expansion = np.sum(np.where(moving < 0, 0.0, x[moving]) * moved, axis=1)
+    coarse = n * (distance + expansion - glass - obliquity - d0 - zero - head.at(x))
     cycles, margin = whole_cycles(coarse, phase, half)
     observed = unwrapped_length(cycles, phase, half)
     per_radian = -half / TWO_PI
@@ -160,15 +166,16 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
         obliquity=obliquity,
         leakage_slope=_leakage_slope(per_radian, lit, cube),
         head=head,
+        distance=distance,
         variance=variance + jitter,
         shared=shared,
     )
     offset = (
         -n * (glass + obliquity + d0 + head.value)
-        - distance * (air.slopes @ x[layout.air])
+        - distance * air_parameters(network, air, x)
         + n * np.sum(normal_slopes * x[normal_columns], axis=1)
     )
-    nuisance, coefficient = _nuisance(network, parts, distance, air.slopes, (normal_columns, normal_slopes))
+    nuisance, coefficient = _nuisance(network, parts, sights, air, (normal_columns, normal_slopes))
     covariance += jitter if covariance.ndim == 1 else np.diag(jitter)
     origin, target = sights.origin, sights.target
     if sights.turns is None:
@@ -202,6 +209,8 @@ def _covariance(
     electronics = network.electronics[name]
     noise = (per_radian * network.phases.u_phase[electronics.shots]) ** 2
     path = path_ppm(network) * PPM * distance
+    eddies = (network.strength.eddies_ppm * PPM * distance) ** 2
+    noise = noise + eddies
     if electronics.walk is not None:
         alone = np.array([Parameter(ParameterKind.REPEATS, name, t) not in network.layout.at for t in targets])
         own = noise + per_radian**2 * network.states[name].own + np.where(alone, path**2, 0.0)
@@ -230,18 +239,20 @@ def _shared(
 def _nuisance(
     network: CampaignNetwork,
     parts: ShotParts,
-    distance: np.ndarray,
-    air_slopes: np.ndarray,
+    sights: "_Sights",
+    air: PathAir,
     normals: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Columns (m, q) of all parameters but the points, and the derivatives of the optical lengths by them.
 
-    air_slopes   (m, k), of the index by the air's parameters
-    normals      columns (m, 2) of the faces' tilts, and slopes of dPc by them
+    normals   columns (m, 2) of the faces' tilts, and slopes of dPc by them
     """
+    distance, lasting = sights.distance, air.slopes.shape[1]
     layout, targets, m = network.layout, parts.target, len(parts.target)
     n = 1.0 + parts.refractivity
     paths = np.array([[layout.at.get(Parameter(ParameterKind.PATH, parts.name, t), -1)] for t in targets])  # -1: none
+    moving, moved = _expansion(network, parts.name, targets, sights)
+    families = _families(network, parts.name, n, distance)
     constants = [Parameter(ParameterKind.GLASS, t) for t in targets]
     has_rest = np.array([c in layout.at for c in constants])
     rest = np.array([layout.at.get(c, -1) for c in constants])
@@ -249,7 +260,10 @@ def _nuisance(
         paths,
         np.full((m, 1), layout.at[Parameter(ParameterKind.ZERO, parts.name)]),
         np.broadcast_to(layout.columns(Parameter(ParameterKind.LEAKAGE, parts.name), 2), (m, 2)),
-        np.broadcast_to(layout.air, (m, len(layout.air))),
+        np.broadcast_to(layout.air[:lasting], (m, lasting)),
+        layout.air[air.columns],
+        moving,
+        families[0],
         normals[0],
         rest[:, None],
         parts.head.columns,
@@ -259,13 +273,55 @@ def _nuisance(
         PPM * distance[:, None] * (paths >= 0),
         -n[:, None],
         parts.leakage_slope,
-        distance[:, None] * air_slopes,
+        distance[:, None] * air.slopes,
+        distance[:, None] * air.column_slopes,
+        n[:, None] * moved,
+        families[1],
         -n[:, None] * normals[1],
         (-n * has_rest)[:, None],
         -n[:, None] * parts.head.slopes,
         parts.shared[1],
     ]
     return np.concatenate(columns, axis=1), np.concatenate(slopes, axis=1)
+
+
+def air_parameters(network: CampaignNetwork, air: PathAir, x: np.ndarray) -> np.ndarray:
+    """(m,) what the air's parameters x add to the index, by its slopes."""
+    values = x[network.layout.air]
+    return np.asarray(
+        air.slopes @ values[: air.slopes.shape[1]] + np.sum(values[air.columns] * air.column_slopes, axis=1)
+    )
+
+
+def _families(
+    network: CampaignNetwork, name: str, index: np.ndarray, distance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Parameters (m, f) of what bins of shots have in common beyond the model, -1 for none, and their derivatives."""
+    m = len(distance)
+    columns, slopes = np.full((m, len(network.sortings)), -1), np.zeros((m, len(network.sortings)))
+    for i, sorting in enumerate(network.sortings):
+        bins = sorting.bins(name, network.electronics[name].shots)
+        first = network.layout.at[Parameter(ParameterKind.FAMILY, sorting.family.name)]
+        columns[:, i] = np.where(bins < 0, -1, first + bins)
+        slopes[:, i] = np.where(bins < 0, 0.0, unit_of(sorting.family, index, distance))
+    return columns, slopes
+
+
+def _expansion(
+    network: CampaignNetwork, name: str, targets: tuple[str, ...], sights: _Sights
+) -> tuple[np.ndarray, np.ndarray]:
+    """Parameters (m, 2 parts) of how the telescope has moved at each shot, and derivatives of the distance by them."""
+    knots, m = network.processes.telescope, len(targets)
+    if knots is None:
+        return np.zeros((m, 0), dtype=int), np.zeros((m, 0))
+    shots = network.electronics[name].shots
+    seconds = (network.campaign.shots.mjd_utc[shots] - network.middle_mjd) * SECONDS_PER_DAY
+    at, share = knots.columns(seconds)
+    by_part = knots.slopes(name, targets, sights.a, sights.b, sights.towards)
+    slopes = by_part[:, :, None] * share[:, None]
+    columns = network.processes.moving.T[at].transpose(0, 2, 1)
+    columns = np.where((slopes == 0.0) | (at < 0)[:, None], -1, columns)
+    return columns.reshape(m, -1), slopes.reshape(m, -1)
 
 
 def other_ends(group: ShotGroup, row: int, own: int, *, x: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
+from catseye.constants import MILLIMETRE, PPM, SECONDS_PER_DAY, SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import InputError
 from catseye.estimation.least_squares.bordered import Border
 from catseye.estimation.observations.kinds import Distances, Linear, ObservationGroup
@@ -16,10 +16,14 @@ from catseye.geometry.frames.rotation import skew
 from catseye.records.night.campaign import REFERENCE, ObservedSite
 from catseye.records.site.triplet import TripletRecord
 from catseye.reduction.epoch.air import AirField
+from catseye.reduction.epoch.allowance import NOTHING, Allowance
 from catseye.reduction.epoch.head import head_unknowns
 from catseye.reduction.epoch.parameter import AIR_KINDS, POINT_KINDS, XYZ, Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases
+from catseye.reduction.epoch.self_check import Sorting, sortings
 from catseye.reduction.epoch.settings import ReductionSettings
+from catseye.reduction.epoch.strengths import Processes, ProcessStrength, with_processes
+from catseye.reduction.epoch.telescope_motion import PARTS, TelescopeKnots
 from catseye.reduction.site.motion import CarriedMotion
 from catseye.reduction.site.places import RangedPoint, places_of, unit
 from catseye.signal.drift.states import DriftStates
@@ -28,6 +32,8 @@ APPROXIMATE = "approximate positions"
 THERMOMETERS = "thermometers"
 SOUND = "path temperatures"
 ZEROS = "ranger zeros"
+LIMITS = "instruments' limits"
+FAMILIES_PRIOR = "unexplained averages"
 HEADS = "head effects"
 PATHS = "lasting paths"
 POSTURE = "bodies off their posture"
@@ -38,6 +44,9 @@ APART = 600  # parameters known one by one from which each is a row of its own, 
 BLOCK_KINDS = (ParameterKind.POINT, ParameterKind.NORMAL, ParameterKind.GLASS)
 BUSY = 40  # shots on a target, beyond which it is no block
 U_BODY, U_BODY_TURN = 0.03, 5e-4  # m and rad: more than a telescope stands off, so that shots alone say it
+WEAK = 0.2  # variance of a mode of the electronics over its shots' noise, below which it is left to these,
+SOME_MODES = 500  # beyond so many
+WORST_THERMOMETER_C, WORST_ZERO = 3.0, 0.005  # °C and m: one sigma of what an instrument can have at the worst
 LONGEST_TIE = 30  # parameters of one prior: those of a longer one are no block
 
 
@@ -92,7 +101,11 @@ class UnknownsLayout:
 class CampaignNetwork:
     """The fixed part of the problem: what is unknown, what is known beforehand, which shots see what.
 
-    states   of a large campaign: ranger's errors between its reference shots as parameters
+    states      of a large campaign: ranger's errors between its reference shots as parameters
+    processes   of the air, and of the telescope where it is a campaign's, and
+    strength    of them, as the priors have it
+    allowance   beyond the records
+    sortings    of the families that it allows for
     """
 
     campaign: ObservedSite
@@ -105,6 +118,10 @@ class CampaignNetwork:
     priors: list[ObservationGroup]
     motion: CarriedMotion | None
     states: dict[str, DriftStates]
+    processes: Processes
+    strength: ProcessStrength
+    allowance: Allowance = NOTHING
+    sortings: tuple[Sorting, ...] = ()
 
     @cached_property
     def border(self) -> Border | None:
@@ -143,6 +160,15 @@ class CampaignNetwork:
             name for name in self.campaign.rangers if name in self.electronics and len(self.electronics[name].shots)
         ]
 
+    def with_strength(self, strength: ProcessStrength) -> "CampaignNetwork":
+        """The network with other strengths of its processes."""
+        return replace(self, priors=with_processes(self.priors, self.processes, strength), strength=strength)
+
+    @property
+    def middle_mjd(self) -> float:
+        """Middle of the campaign, for which its points hold."""
+        return middle_of(self.campaign.shots.mjd_utc)
+
     def of_shots(self, shots: Collection[int]) -> "CampaignNetwork":
         """The network with the same unknowns and some of the shots, by their index in the campaign."""
         kept = {name: np.isin(e.shots, sorted(shots)) for name, e in self.electronics.items()}
@@ -170,12 +196,14 @@ def build_network(
     motion: CarriedMotion | None = None,
     also: Collection[str] = (),
     known: Collection[str] = (),
+    allowance: Allowance = NOTHING,
 ) -> CampaignNetwork:
     """The unknowns and priors of a campaign.
 
     motion   where the telescope moves between the shots; its points are then those of the motion's epoch
     also     rangers and targets that take part as if they had fired or been fired at
     known    points whose typed positions have been used before
+    allowance   beyond what the records say
 
     Unknown are the points that were fired at or from (all of a triplet when one of it was), the monuments' fixed
     points, each firing ranger's zero and rest of leakage and what else its sheet knows of its head, the air's offsets
@@ -207,11 +235,25 @@ def build_network(
     air = AirField.of(campaign, settings)
     for parameter in air.parameters:
         layout.add(parameter, [""], [0.0])
+    span = float(np.ptp(campaign.shots.mjd_utc)) * SECONDS_PER_DAY
+    telescope = TelescopeKnots.of(span, seen) if motion is None else None
+    if telescope is not None:
+        count = len(telescope.knots)
+        for part in PARTS:
+            layout.add(Parameter(ParameterKind.TELESCOPE, part), [str(i) for i in range(count)], np.zeros(count))
+    processes, strength = Processes.of(air, telescope, layout.at), ProcessStrength()
     for group in sorted({p.group for n, p in seen.items() if p.group and n in fired}):
         layout.add(Parameter(ParameterKind.NORMAL, group), ["1", "2"], [0.0, 0.0])
     for name in sorted(fired):
         if seen[name].u_constant > 0.0:
             layout.add(Parameter(ParameterKind.GLASS, name), [""], [0.0])
+    ours = {n: e.shots for n, e in electronics.items() if len(e.shots)}
+    sorts = (
+        [s for s in sortings(campaign, places, ours) if s.family in allowance.families] if allowance.families else []
+    )
+    for sorting in sorts:
+        bins = [str(i) for i in range(len(sorting.labels))]
+        layout.add(Parameter(ParameterKind.FAMILY, sorting.family.name), bins, np.zeros(len(bins)))
     u_path = 0.0 if motion is None else motion.lasting * campaign.site.ranging.path_index_fluctuation_ppm
     fired_lines = {
         Parameter(ParameterKind.PATH, n, campaign.shots.target[k]) for n, e in electronics.items() for k in e.shots
@@ -219,15 +261,40 @@ def build_network(
     lines = sorted(fired_lines, key=str) if u_path > 0.0 else []
     for line in lines:
         layout.add(line, [""], [0.0])
-    priors = [*_priors(campaign, settings, seen, layout, air), *_typed(settings, typed, layout)]
+    priors = [
+        *_priors(campaign, settings, seen, layout, air, allowance),
+        *_families(layout, sorts, allowance),
+        *processes.priors(strength),
+        *_typed(settings, typed, layout),
+    ]
     if lines:
         columns = [layout.at[line] for line in lines]
         priors.append(_independent(PATHS, columns, np.zeros(len(lines)), np.full(len(lines), u_path)))
-    network = CampaignNetwork(campaign, settings, phases, electronics, seen, layout, air, priors, motion, {})
+    network = CampaignNetwork(
+        campaign,
+        settings,
+        phases,
+        electronics,
+        seen,
+        layout,
+        air,
+        priors,
+        motion,
+        {},
+        processes,
+        strength,
+        allowance,
+        tuple(sorts),
+    )
     if any(e.walk is not None for e in electronics.values()):
         network.priors[:] = [_apart(prior) for prior in priors]
         _share_by_states(network)
     return network
+
+
+def middle_of(mjd_utc: np.ndarray) -> float:
+    """Half-way between the first shot and the last, MJD."""
+    return float(0.5 * (mjd_utc.min() + mjd_utc.max()))
 
 
 def path_ppm(network: CampaignNetwork) -> float:
@@ -251,7 +318,9 @@ def _share_by_states(network: CampaignNetwork) -> None:
         every[name] = electronics.walk.states(noise)
     strongest = np.sort(np.concatenate([s.strength for s in every.values()]))[::-1]
     room = max(settings.most_states - sum(s.count - len(s.strength) for s in every.values()), 0)
-    left = strongest[room] if room < len(strongest) else 0.0
+    wanted = max(int(np.count_nonzero(strongest > WEAK)), SOME_MODES)
+    kept = min(room, wanted)
+    left = strongest[kept] if kept < len(strongest) else 0.0
     repeated = []
     for name in network.rangers:
         electronics = network.electronics[name]
@@ -304,15 +373,17 @@ def _priors(
     seen: dict[str, RangedPoint],
     layout: UnknownsLayout,
     air: AirField,
+    allowance: Allowance,
 ) -> list[ObservationGroup]:
     count = len(air.stations)
-    at = layout.air
+    at, sigmas = layout.air, allowance.sigmas(air)
     priors = [
         *_survey(campaign, seen, layout),
         *_heads(campaign, layout),
-        _independent(THERMOMETERS, at[:count], np.zeros(count), air.sigmas[:count]),
-        _independent("air profile", at[count : count + 1], [0.0], air.sigmas[count : count + 1]),
-        *_sound(air, at[count + 1 :]),
+        _independent(THERMOMETERS, at[:count], np.zeros(count), sigmas[:count]),
+        _independent(LIMITS, at[:count], np.zeros(count), np.full(count, WORST_THERMOMETER_C)),
+        _independent("air profile", at[count : count + 1], [0.0], sigmas[count : count + 1]),
+        *_sound(air, at[count + 1 : count + 1 + len(air.lines)]),
         *_directions(campaign, settings, layout),
         *_glass(seen, layout),
     ]
@@ -324,6 +395,17 @@ def _priors(
             u = _positive(benchmark.u_mm * MILLIMETRE, f"benchmarks.csv: {benchmark.target}, u_mm")
             length = benchmark.certified_distance_mm * MILLIMETRE
             priors.append(_length("benchmarks", length, u, layout, benchmark.ranger, benchmark.target))
+    return priors
+
+
+def _families(layout: UnknownsLayout, sorts: Sequence[Sorting], allowance: Allowance) -> list[ObservationGroup]:
+    """Errors that each bin's shots share: as large as they showed."""
+    priors: list[ObservationGroup] = []
+    for sorting in sorts:
+        count = len(sorting.labels)
+        columns = layout.columns(Parameter(ParameterKind.FAMILY, sorting.family.name), count)
+        sigma = np.full(count, allowance.families[sorting.family])
+        priors.append(_independent(FAMILIES_PRIOR, columns, np.zeros(count), sigma))
     return priors
 
 
@@ -404,6 +486,7 @@ def _heads(campaign: ObservedSite, layout: UnknownsLayout) -> list[ObservationGr
     u_leakage = [_positive(m.u_leakage_volt, f"mirrors/{m.zp}.toml: u_leakage_volt") for m in mirrors]
     return [
         _independent(ZEROS, zeros, np.zeros(len(zeros)), u_zero),
+        _independent(LIMITS, zeros, np.zeros(len(zeros)), np.full(len(zeros), WORST_ZERO)),
         _independent("leakage", quadratures, np.zeros(len(quadratures)), np.repeat(u_leakage, 2)),
         *(_head(campaign, n, layout) for n in rangers if head_unknowns(campaign, n)),
     ]

@@ -31,6 +31,13 @@ from catseye.reduction.live.shots import PhasedShot
 from catseye.reduction.live.state import Carried, from_ground, to_ground, with_unseen
 from catseye.reduction.site.motion import CarriedMotion, ground_from
 
+SHARED_BY_AN_EPOCH = (
+    ParameterKind.ELECTRONICS,
+    ParameterKind.REPEATS,
+    ParameterKind.BODY,
+    ParameterKind.AIR,
+    ParameterKind.RADIATION,
+)
 SETTLED = 2e-6  # m: an epoch is one of many; a micrometre more is a thousandth of what a round claims
 
 
@@ -134,8 +141,8 @@ def solve_epoch(
     frames = frames_at(network, motion)
     if carried is not None:
         network = _with_carried(network, carried, frames)
-    solution, shots = settle_network(network, resolved.starts, keep=SETTLED, predicted=carried is not None)
-    coordinates = coordinates_of(network, solution, shots, resolved=resolved)
+    settled = settle_network(network, resolved.starts, keep=SETTLED, predicted=carried is not None)
+    solution, coordinates = settled.solution, coordinates_of(settled, resolved=resolved)
     reasons |= resolved.rejected
     layout = network.layout
     lasts = np.array(
@@ -170,7 +177,7 @@ def _lasts(parameter: Parameter, lasting: Sequence[str], triplets: Mapping[str, 
     Errors that an epoch's shots share do not, nor by how much a body's table is off: its points that last say it.
     """
     kind, of, part = parameter
-    if kind in (ParameterKind.ELECTRONICS, ParameterKind.REPEATS, ParameterKind.BODY):
+    if kind in SHARED_BY_AN_EPOCH:
         return False
     if kind in (ParameterKind.POINT, ParameterKind.GLASS):
         return of in lasting

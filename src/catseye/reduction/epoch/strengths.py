@@ -1,0 +1,243 @@
+"""What is known beforehand of the processes of a campaign, and how strong they are, by the ranges themselves.
+
+A process is a Gaussian of known shape and unknown strength. Its estimate from the ranges, as large as it came out and
+as uncertain, says how strong it was; a strength of experience counts as some observations more, so that a campaign of
+few shots keeps it.
+
+Source: restricted maximum likelihood ([PATTERSON71]; variance components in [FOERSTNER16] chapter 4): of a component G
+of a prior C with estimate x and covariance Q the score by ln s^2 is (w'Gw - tr(G M)) / 2 and its information
+tr((G M)^2) / 2, with w = C^-1 x and M = C^-1 - C^-1 Q C^-1.
+"""
+
+from collections.abc import Iterator
+from dataclasses import astuple, dataclass
+
+import numpy as np
+
+from catseye.constants import PPM
+from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
+from catseye.estimation.observations.kinds import Linear
+from catseye.reduction.epoch.air import AirField
+from catseye.reduction.epoch.air_process import LEAST, MOST, USUAL, WIDE, AirStrength
+from catseye.reduction.epoch.parameter import Parameter, ParameterKind
+from catseye.reduction.epoch.telescope_motion import LEAST_WALK, MOST_WALK, PARTS, WALK, TelescopeKnots
+
+AIR_BETWEEN = "air between stations and paths"
+AIR_ACROSS = "air across the site"
+ERRORS = "thermometers' lag and sunshine"
+EXPANSION = "telescope's expansion"
+PROCESSES = (AIR_BETWEEN, AIR_ACROSS, ERRORS, EXPANSION)
+U_LAG, U_RADIATION = 60.0, 0.5  # s, of a thermometer in its shield: 0 to 120 s; °C, in calm sunshine
+EXPERIENCE = 6.0  # observations that the strength of experience is worth
+LITTLE_PPM, MOST_PPM = 0.05, 2.0  # of eddies: with less, little changes; more, no air holds
+SURE = 2.0  # standard uncertainties by which eddies must stand out
+SAME = 0.25  # relative change of a strength that is none
+BISECTIONS = 40
+LONGEST = 2.0  # step in the logarithm of a variance
+STEPS = 12  # cap of steps; it takes some five
+
+
+@dataclass(frozen=True)
+class ProcessStrength:
+    """Strengths of a campaign's processes.
+
+    air         between stations and paths
+    telescope   of each of `telescope_motion.PARTS`, in units of its `WALK`
+    eddies_ppm  of a path's index, anew at each shot: what is faster than the knots, or smaller than the site
+    """
+
+    air: AirStrength = WIDE
+    telescope: tuple[float, ...] = (1.0,) * len(PARTS)
+    eddies_ppm: float = 0.0
+
+    def near(self, other: "ProcessStrength") -> bool:
+        """Whether no strength differs by more than a quarter."""
+        pairs = [
+            *zip(astuple(self.air), astuple(other.air), strict=True),
+            *zip(self.telescope, other.telescope, strict=True),
+            (self.eddies_ppm + LITTLE_PPM, other.eddies_ppm + LITTLE_PPM),
+        ]
+        return all(abs(a - b) <= SAME * max(a, b) for a, b in pairs)
+
+
+@dataclass(frozen=True, eq=False)
+class Processes:
+    """The processes of a campaign and where their parameters stand.
+
+    air         of the field
+    columns     of its level and slope (2k,), of east and north (2, j)
+    telescope   None where it is taken to stand still, and
+    moving      (parts, k) columns of its knots
+    errors      columns of lags, and of sunshine where there is any
+    """
+
+    air: AirField
+    columns: tuple[np.ndarray, np.ndarray]
+    errors: np.ndarray
+    telescope: TelescopeKnots | None
+    moving: np.ndarray
+
+    @staticmethod
+    def of(air: AirField, telescope: TelescopeKnots | None, at: dict[Parameter, int]) -> "Processes":
+        """Of the parameters of a layout."""
+        knots = np.array([at[Parameter(ParameterKind.AIR, *label)] for label in air.knots.labels], dtype=int)
+        k = 2 * len(air.knots.knots)
+        errors = [at[Parameter(kind, station)] for kind in air.errors for station in air.stations]
+        count = 0 if telescope is None else len(telescope.knots)
+        moving = [at[Parameter(ParameterKind.TELESCOPE, part)] + np.arange(count) for part in PARTS if count]
+        return Processes(
+            air,
+            (knots[:k], knots[k:].reshape(2, -1)),
+            np.array(errors, dtype=int),
+            telescope,
+            np.array(moving, dtype=int).reshape(-1, count),
+        )
+
+    def priors(self, strength: ProcessStrength) -> list[Linear]:
+        """What is known before a shot is fired."""
+        between, across = self.air.knots.covariances(strength.air)
+        s = len(self.air.heights)
+        u = np.repeat([U_LAG, U_RADIATION][: len(self.errors) // s], s)
+        priors = [
+            _gaussian(AIR_BETWEEN, self.columns[0], between),
+            *(_gaussian(AIR_ACROSS, columns, across) for columns in self.columns[1]),
+            Linear(ERRORS, np.zeros(len(u)), u**2, self.errors[:, None], np.ones((len(u), 1))),
+        ]
+        if self.telescope is not None:
+            scales = np.array(strength.telescope) * WALK
+            priors += [
+                _gaussian(EXPANSION, columns, scale**2 * self.telescope.covariance)
+                for columns, scale in zip(self.moving, scales, strict=True)
+            ]
+        return priors
+
+    def estimated(
+        self, solution: LeastSquaresSolution, before: ProcessStrength, lengths: list[np.ndarray]
+    ) -> ProcessStrength:
+        """Strengths as the estimates of an adjustment have them, which took those before.
+
+        lengths   (m,) m of each of the first groups' paths
+        """
+        knots, (*usual, usual_across) = self.air.knots, astuple(USUAL)
+        between, across = knots.covariances(before.air)
+        shapes, across_shape = knots.shapes()
+        *now, now_across = astuple(before.air)
+        own = _Shown.of(solution, self.columns[0], between, knots.known, shapes)
+        level = _climbed([own], np.array(now), np.array(usual), low=astuple(LEAST)[:4], high=astuple(MOST)[:4])
+        none = np.zeros_like(across)
+        ways = [_Shown.of(solution, c, across, none, [across_shape]) for c in self.columns[1]]
+        by_metre = _climbed(
+            ways,
+            np.array([now_across]),
+            np.array([usual_across]),
+            low=(LEAST.across_c_per_m,),
+            high=(MOST.across_c_per_m,),
+        )
+        return ProcessStrength(
+            AirStrength(*level, *by_metre),
+            tuple(self._moving(solution, before)),
+            _eddies(solution, before.eddies_ppm, lengths),
+        )
+
+    def _moving(self, solution: LeastSquaresSolution, before: ProcessStrength) -> Iterator[float]:
+        if self.telescope is None:
+            yield from before.telescope
+            return
+        shape = self.telescope.covariance
+        for columns, factor, walk in zip(self.moving, before.telescope, WALK, strict=True):
+            own = _Shown.of(solution, columns, (factor * walk) ** 2 * shape, 0.0 * shape, [walk**2 * shape])
+            yield from _climbed([own], np.array([factor]), np.ones(1), low=(LEAST_WALK,), high=(MOST_WALK,))
+
+
+def with_processes(priors: list, processes: Processes, strength: ProcessStrength) -> list:
+    """Priors of a network with those of its processes at other strengths."""
+    new = iter(processes.priors(strength))
+    return [next(new) if prior.name in PROCESSES else prior for prior in priors]
+
+
+def _gaussian(name: str, columns: np.ndarray, covariance: np.ndarray) -> Linear:
+    k = len(columns)
+    return Linear(name, np.zeros(k), covariance, columns, np.eye(k))
+
+
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """What the ranges say of a process by themselves: F of its parameters, and F times their estimate.
+
+    known    (k, k) of the prior that no strength changes
+    shapes   of each strength
+    """
+
+    information: np.ndarray
+    force: np.ndarray
+    known: np.ndarray
+    shapes: list[np.ndarray]
+
+    @staticmethod
+    def of(
+        solution: LeastSquaresSolution,
+        columns: np.ndarray,
+        prior: np.ndarray,
+        known: np.ndarray,
+        shapes: list[np.ndarray],
+    ) -> "_Shown":
+        """From an adjustment that took a prior."""
+        precision = np.linalg.inv(solution.q.within(columns))
+        information = precision - np.linalg.inv(prior)
+        return _Shown(0.5 * (information + information.T), precision @ solution.x[columns], known, shapes)
+
+    def scores(self, strength: np.ndarray) -> np.ndarray:
+        """(3, s): w'Gw, tr(G M) and tr((G M)^2) of each strength's part G of the prior."""
+        parts = [s**2 * shape for s, shape in zip(strength, self.shapes, strict=True)]
+        inverse = np.linalg.inv(self.known + sum(parts))
+        spread = np.linalg.inv(self.information + inverse)
+        w = inverse @ (spread @ self.force)
+        m = inverse - inverse @ spread @ inverse
+        found = []
+        for part in parts:
+            both = part @ m
+            found.append((w @ part @ w, np.trace(both), np.sum(both * both.T)))
+        return np.array(found).T
+
+
+def _climbed(
+    shown: list[_Shown], strength: np.ndarray, usual: np.ndarray, *, low: tuple[float, ...], high: tuple[float, ...]
+) -> tuple[float, ...]:
+    """Strengths (s,) that processes of one kind have in common: Fisher's scoring in the logarithms of variances."""
+    for _ in range(STEPS):
+        seen, expected, information = sum(each.scores(strength) for each in shown)
+        step = seen - expected + EXPERIENCE * ((usual / strength) ** 2 - 1.0)
+        step = np.clip(step / (information + EXPERIENCE), -LONGEST, LONGEST)
+        strength = np.clip(strength * np.exp(0.5 * step), low, high)
+        if np.all(np.abs(step) < 0.1):
+            break
+    return tuple(float(s) for s in strength)
+
+
+def _eddies(solution: LeastSquaresSolution, before_ppm: float, lengths: list[np.ndarray]) -> float:
+    """ppm by which each shot's index departs anew, from the shots' own tests.
+
+    With a variance v more than the sigma^2 of a shot, its w^2 is expected as (sigma^2 + v) / sigma^2, as if all had so
+    much more; the likeliest is sought.
+    """
+    fits = [(f, length, f.active) for f, length in zip(solution.fits, lengths, strict=False)]
+    per_ppm = np.concatenate([(PPM * length[on] / f.sigma[on]) ** 2 for f, length, on in fits])
+    w2 = np.concatenate([f.standardised[on] ** 2 for f, _, on in fits])
+    tried = np.linspace(-(before_ppm**2), MOST_PPM**2, 2)
+
+    def slope(more: float) -> float:
+        factor = 1.0 + more * per_ppm
+        return float(np.sum(per_ppm / factor - w2 * per_ppm / factor**2))
+
+    low, high = tried
+    if not len(w2) or slope(low) >= 0.0:
+        more = float(low)
+    else:
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if slope(middle) > 0.0 else (middle, high)
+        more = float(0.5 * (low + high))
+    gain = np.sum(w2 - w2 / (1.0 + more * per_ppm) - np.log1p(more * per_ppm))
+    if before_ppm == 0.0 and gain < SURE**2:
+        return 0.0
+    return float(np.clip(np.sqrt(max(before_ppm**2 + more, 0.0)), 0.0, MOST_PPM))
