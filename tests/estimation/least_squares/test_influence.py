@@ -56,3 +56,51 @@ def test_what_hangs_on_the_one_that_left_is_no_longer_checked():
     assert abs(tests.standardised[1]) == pytest.approx(1 / np.sqrt(2))
     tests.leave_out(0, np.array([0]))
     assert tests.detectable[1] > 1e4
+
+
+def with_parameter(every, pattern):
+    """The groups with a further parameter, of which each observation holds its share of a pattern."""
+    shares = np.split(pattern, np.cumsum([len(g.observed) for g in every])[:-1])
+    more = []
+    for group, share in zip(every, shares, strict=True):
+        own = group.columns.ndim == 2
+        columns = np.full((len(share), 1), 3) if own else np.array([3])
+        more.append(
+            Linear(
+                group.name,
+                group.observed,
+                group.covariance,
+                np.concatenate([group.columns, columns], axis=-1),
+                np.concatenate([group.matrix, share[:, None]], axis=1),
+            )
+        )
+    return more
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("out", [0, 5])
+def test_an_error_of_a_pattern_is_what_a_parameter_more_is_found_to_be(seed, out):
+    every = groups(seed)
+    rng = np.random.default_rng(seed + 100)
+    total = sum(len(g.observed) for g in every)
+    on = np.ones(total, dtype=bool)
+    on[rng.permutation(total - 3)[:out]] = False
+    active = np.split(on, np.cumsum([len(g.observed) for g in every])[:-1])
+    patterns = np.where(on[:, None], rng.uniform(-1, 1, (total, 4)), 0.0)
+    patterns[8:, 1] = 0.0  # of one group alone
+    patterns[:, 2] = 0.0
+    patterns[np.flatnonzero(on)[[3, 12, 20]], 2] = [1.0, 2.0, -1.0]  # of a few
+    estimate, u = Influence(every, adjust(np.zeros(3), every, active=active)).errors_of(patterns)
+    for k, pattern in enumerate(patterns.T):
+        plain = adjust(np.zeros(4), with_parameter(every, pattern), active=active)
+        assert estimate[k] == pytest.approx(plain.x[3], rel=1e-6, abs=1e-9)
+        assert u[k] == pytest.approx(np.sqrt(plain.covariance[3, 3]), rel=1e-6)
+
+
+def test_a_pattern_that_the_parameters_take_up_wholly_has_an_infinite_u_and_says_nothing():
+    every = groups(0)[:1]
+    patterns = np.stack([every[0].matrix @ [1.0, -2.0, 0.5], np.arange(8.0)], axis=1)
+    estimate, u = Influence(every, adjust(np.zeros(3), every)).errors_of(patterns)
+    assert np.isinf(u[0])
+    assert estimate[0] == 0.0
+    assert np.isfinite(u[1])

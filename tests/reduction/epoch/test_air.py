@@ -1,4 +1,4 @@
-"""The air of a campaign: smoothing in time, profile in height, derivatives."""
+"""The air of a campaign: states in time, profile in height, derivatives."""
 
 import dataclasses
 
@@ -53,15 +53,20 @@ def test_a_line_in_time_is_left_a_line_right_up_to_its_ends(night_01):
     np.testing.assert_allclose(smooth[:, :, 0], expected, atol=1e-6)
 
 
-def test_noise_of_a_reading_every_30_s_falls_to_a_sixth(night_01):
+@pytest.mark.parametrize("wander", [0.0, 0.3])
+def test_noise_of_readings_falls_to_what_the_record_claims(night_01, wander):
+    """Of air that stands still far below a reading's 0.05 °C, of air that wanders by 0.3 °C a root hour by a half."""
     rng = np.random.default_rng(5)
-    noise = {}
-    campaign, start = weathered(
-        night_01, [0.0, 40.0], np.arange(0.0, 36001.0, 30.0), lambda s, i: noise.setdefault((s, i), rng.normal())
-    )
-    smooth = AirField.of(campaign, ReductionSettings()).smoothed(at(start, *np.arange(3000.0, 33000.0, 100.0)))[:, :, 0]
-    # theory: sqrt(30 / (2 sqrt(pi) 300)) = 0.168; 2 x 30000 s / 1060 s of independent values: 10 % of scatter
-    assert smooth.std() == pytest.approx(0.168, rel=0.25)
+    seconds = np.arange(0.0, 36001.0, 30.0)
+    walk = 10.0 + np.cumsum(wander * np.sqrt(30.0 / 3600.0) * rng.standard_normal((len(seconds), 2)), axis=0)
+    read = walk + 0.05 * rng.standard_normal(walk.shape)
+    campaign, start = weathered(night_01, [0.0, 40.0], seconds, lambda s, i: read[int(s) // 30, i])
+    field = AirField.of(campaign, ReductionSettings())
+    error = field.smoothed(at(start, *seconds))[:, :, 0] - walk
+    claimed = np.array([np.diag(r.temperature_c.covariance(seconds)) for r in field.records]).T
+    # errors hang together over an hour of still air, and over five minutes of air that wanders: 20 and 240 of them
+    assert np.sqrt(np.mean(error**2) / np.mean(claimed)) == pytest.approx(1.0, abs=0.12 if wander else 0.5)
+    assert np.sqrt(np.mean(claimed)) < (0.6 if wander else 0.1) * 0.05
 
 
 def test_beyond_the_samples_the_air_stays_as_it_was_last_without_a_jump(night_01):

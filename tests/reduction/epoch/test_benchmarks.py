@@ -35,7 +35,8 @@ def test_with_benchmarks_a_lying_thermometer_is_found_and_without_them_it_is_bel
     found, u = reduction.coordinates.air["WX1"]
     assert abs(true) > 1.0
     assert abs(found - true) < 4.0 * u
-    assert u < 0.15
+    # air between station and paths is off by 0.1 °C for a quarter of an hour, and more across the site: 0.19 in all
+    assert u < 0.22
     blind, u_blind = without.coordinates.air["WX1"]
     assert u_blind > 0.2  # the prior's 0.3, less what the monuments' net says of the scale
     assert abs(blind - true) > 0.8

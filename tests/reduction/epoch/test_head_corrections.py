@@ -221,7 +221,7 @@ def open_minded(few_01, reduced_few_01, effects):
 def linear(campaign, phases, start):
     """Adjustment about given coordinates with every usable shot of night-01: layout, answer."""
     electronics, _ = follow_electronics(campaign, phases)
-    network = build_network(campaign, phases, electronics, settings=ReductionSettings())
+    network = build_network(campaign, phases, electronics, settings=ReductionSettings()).with_strength(start.strength)
     x = np.array(network.layout.start)
     for row, name in enumerate(start.points):
         x[network.layout.columns(name)] = start.x[row]

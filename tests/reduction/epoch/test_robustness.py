@@ -29,12 +29,16 @@ def honest(reduction, *, factor=True):
 
 
 def agrees(c, whole, names, sigmas=5.0):
-    """What is left agrees with the whole night within the variance of the difference, and is less certain."""
+    """What is left agrees with the whole night within the variance of the difference, and is less certain.
+
+    How strong the processes of air and telescope are is estimated anew of what is left, to a fifth or so at best, and
+    what they make of a variance is a tenth of it: 2 %.
+    """
     for name in names:
         u2, less2 = np.diag(whole.block([name])), np.diag(c.block([name]))
-        assert np.all(less2 > u2 * (1 - 1e-4)), name  # the derivatives are taken at another place
+        assert np.all(less2 > u2 * (1 - 0.02)), name
         difference = np.abs(c.x[c.index(name)] - whole.x[whole.index(name)])
-        assert np.all(difference < sigmas * np.sqrt(less2 - u2 + (2e-6) ** 2)), name
+        assert np.all(difference < sigmas * np.sqrt(np.maximum(less2 - u2, 0.02 * u2) + (2e-6) ** 2)), name
 
 
 @pytest.fixture(scope="module")

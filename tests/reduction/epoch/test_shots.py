@@ -8,7 +8,7 @@ import pytest
 from catseye.constants import SPEED_OF_LIGHT
 from catseye.estimation.least_squares.rows import full_jacobian
 from catseye.optics.retroreflector.prism import obliquity_correction
-from catseye.reduction.epoch.parameter import Parameter, ParameterKind
+from catseye.reduction.epoch.parameter import AIR_KINDS, Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
 from catseye.reduction.epoch.shots import _obliquity, shot_group
 from catseye.reduction.site.places import RangedPoint
@@ -32,8 +32,26 @@ def state(network_01, reduced_night_01):
             x[layout.at[quantity]] = rng.normal(0, 1e-5)
         elif quantity.kind is ParameterKind.LEAKAGE:
             x[layout.columns(quantity, 2)] = rng.normal(0, 8e-4, 2)
-    x[layout.air] = [0.2, -0.1, 0.02]
+    x[layout.air[:3]] = [0.2, -0.1, 0.02]
+    sizes = {"level": 0.1, "slope": 0.05, "east": 2e-3, "north": 2e-3}
+    for parameter, column in zip(network_01.field.parameters, layout.air, strict=True):
+        if parameter.kind is ParameterKind.AIR:
+            x[column] = rng.normal(0, sizes[parameter.of])
+        elif parameter.kind is ParameterKind.LAG:
+            x[column] = rng.normal(0, 30.0)
+    for column, parameter in enumerate(layout.parameters):
+        if parameter.kind is ParameterKind.TELESCOPE:
+            x[column] = rng.normal(0, 1.0 if "scale" in parameter.of else 0.05)
     return x
+
+
+STEPS = {  # of the difference quotient, in a parameter's own unit; of any other 1e-4
+    ParameterKind.THERMOMETER: 1e-2,  # °C
+    ParameterKind.PROFILE: 1e-2,  # °C
+    ParameterKind.LAG: 10.0,  # s
+    ParameterKind.AIR: 1e-2,  # °C; °C/m of east and north: 1e-4
+    ParameterKind.TELESCOPE: 0.1,  # ppm, mm
+}
 
 
 @pytest.mark.parametrize("name", ["ZY104", "ZY116"])
@@ -53,17 +71,22 @@ def test_every_derivative_of_a_rangers_shots_is_a_finite_difference(network_01, 
         renewed, _ = shot_group(network_01, name, x)
         return renewed.predict(x)[0] - renewed.observed
 
-    names = network_01.layout.names  # a feed-arm ranger has 400 parameters: some 60 of them, of every kind
-    for column in columns[:: len(columns) // 60 + 1]:
-        kind = names[column].split()[0]
-        h = 1e-2 if kind == "the" else 1e-4  # "the air": degrees
+    every = network_01.layout.parameters  # a feed-arm ranger has 500: a dozen of every kind
+    by_kind = {kind: [c for c in columns if every[c].kind is kind] for kind in ParameterKind}
+    some = [c for own in by_kind.values() for c in own[:: len(own) // 12 + 1]]
+    assert {ParameterKind.AIR, ParameterKind.TELESCOPE, ParameterKind.LAG} <= {every[c].kind for c in some}
+    for column in some:
+        kind = every[column].kind
+        h = 1e-4 if every[column].of in ("east", "north") and kind is ParameterKind.AIR else STEPS.get(kind, 1e-4)
         step = np.zeros(len(state))
         step[column] = h
         slope = (misclosure(state + step) - misclosure(state - step)) / (2 * h)
         size = np.abs(jacobian[:, column])
-        special = {"the": 0.45 * np.max(size / distance), "leakage": 1e-9, "normal": 1e-5}
-        tolerance = special.get(kind, 5e-5)
-        np.testing.assert_allclose(jacobian[:, column], slope, atol=tolerance, rtol=0, err_msg=names[column])
+        air = 0.45 * np.max(size / distance)
+        # a ppm of 100 m is 1e-4 m; rounding of an optical length, 3e-14 m, over twice the step
+        special = {ParameterKind.LEAKAGE: 1e-9, ParameterKind.NORMAL: 1e-5, ParameterKind.TELESCOPE: 1e-12}
+        tolerance = air if kind in AIR_KINDS else special.get(kind, 5e-5)
+        np.testing.assert_allclose(jacobian[:, column], slope, atol=tolerance, rtol=0, err_msg=str(every[column]))
 
 
 def test_the_slope_of_obliquity_by_tilt_is_a_finite_difference(network_01, state):

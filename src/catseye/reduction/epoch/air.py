@@ -6,6 +6,7 @@ index of the line's shots near in time; pressure and vapour stay the stations'.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -28,6 +29,7 @@ MOST_KEPT = 64  # sets of times whose states are kept: one a ranger, and more
 MUCH_C = 2.0  # °C, an offset of a thermometer worth telling
 LEAST_HPA = 600.0
 NODES = 5  # of the quadrature along a path: 1e-12 for straight profiles over 200 m
+FAIR_SHARE = 0.3  # of a station's temperature in a path's, from which the path knows it
 HALF = 0.5  # °C on either side, over which slopes are taken
 DAY = (3.0, 21.0)  # hours of local mean solar time, outside which no Sun stands above 60° of latitude's horizon
 
@@ -221,14 +223,7 @@ class AirField:
             if len(rows):
                 warm, own = line.at(mjd_utc[rows])
                 warm = warm - own * values[s + 1 + i]
-                by_sound = self._into(
-                    path,
-                    rows,
-                    state.of_rows(rows),
-                    lambda w, n, warm=warm: self._by_sound(w, n, warm),
-                    a[rows],
-                    b[rows],
-                )
+                by_sound = self._into(path, rows, state.of_rows(rows), partial(self._by_sound, warm), a[rows], b[rows])
                 path.slopes[rows, s + 1 + i] = -own * by_sound
         return path
 
@@ -298,7 +293,7 @@ class AirField:
         )
         return index, above - below
 
-    def _by_sound(self, state: "_Weather", nodes: "_Nodes", warm: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _by_sound(self, warm: np.ndarray, state: "_Weather", nodes: "_Nodes") -> tuple[np.ndarray, ...]:
         """The same at the temperature `warm` (m,) °C all along the path, and then its derivative by that temperature.
 
         The vapour pressure stays what the stations' thermometers and hygrometers say: warming air does not wet it. In
@@ -311,11 +306,10 @@ class AirField:
             vapour_pressure_hpa(temperature + step, pressure, humidity, chosen.vapour_formula)
             for step in (0.0, HALF, -HALF)
         )
-        light = {"wavelength_um": self.wavelength_um, "co2_ppm": chosen.co2_ppm}
         at = (np.broadcast_to(warm[:, None], temperature.shape), pressure, vapour)
-        partials = chosen.partials(*at, **light)
-        by_vapour = partials.vapour_pressure_hpa * (above - below)
-        return chosen.refractivity(*at, **light), by_vapour, partials.temperature_c
+        partials = chosen.partials(*at, wavelength_um=self.wavelength_um, co2_ppm=chosen.co2_ppm)
+        index = chosen.refractivity(*at, wavelength_um=self.wavelength_um, co2_ppm=chosen.co2_ppm)
+        return index, partials.vapour_pressure_hpa * (above - below), partials.temperature_c
 
     def steepest(self, values: np.ndarray) -> float:
         """Mean temperature gradient from lowest to highest station, °C/m; 0 at one height.
@@ -330,9 +324,15 @@ class AirField:
         low, high = int(np.argmin(self.heights)), int(np.argmax(self.heights))
         return float((mean[high] - mean[low]) / (self.heights[high] - self.heights[low]))
 
+    def seen_from(self, heights: np.ndarray) -> np.ndarray:
+        """(stations,) bool: whether paths at heights (k,) m have a fair share of each station's air."""
+        if not len(heights):
+            return np.zeros(len(self.heights), dtype=bool)
+        return np.asarray(np.max(self._shares(heights[None])[0][0], axis=0) > FAIR_SHARE)
+
     def across(self, values: np.ndarray) -> np.ndarray:
         """(2,) °C/m, mean gradient towards the east and the north; values (p,) of `parameters`."""
-        knots = values[self.first_knot :][2 * len(self.knots.knots) :]
+        knots = values[self.first_knot :][-2 * len(self.knots.across) :]
         return np.asarray(knots.reshape(2, -1).mean(axis=1))
 
     def _shares(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

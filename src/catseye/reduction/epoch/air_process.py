@@ -21,8 +21,8 @@ import numpy as np
 from catseye.estimation.series.trend import Trend
 
 LEVEL_TIME, FAST_TIME, ACROSS_TIME = 900.0, 100.0, 1800.0  # s, in which parts of the process forget
-LEAST_STEP, ACROSS_STEP = 120.0, 300.0  # s between knots
-SHOTS_A_KNOT, FEWEST_KNOTS, MOST_KNOTS = 30, 2, 150
+LEVEL_STEP, SLOPE_STEP, ACROSS_STEP = 75.0, 150.0, 300.0  # s between knots at least: a quarter of the shortest waves
+SHOTS_A_KNOT, FEWEST_KNOTS, MOST_KNOTS = 30, 2, 400
 LEVEL_HEIGHT = 50.0  # m, of zeta = 1 where all stations are at one height
 PARTS = ("level", "slope", "east", "north")
 
@@ -53,11 +53,12 @@ MOST = AirStrength(3.0, 1.0, 1.0, 0.5, 0.05)  # more in minutes, or across a sit
 class AirKnots:
     """Where the process has its knots, and what the stations' readings leave unknown of it.
 
-    knots, across   (k,), (j,) s of level and slope, and of east and north
-    record          (2k, 2k) °C^2, of levels then slopes: errors of the stations' records
+    level, slope, across   (k,), (l,), (j,) s; across both of east and north
+    record                 (k + l, k + l) °C^2, of levels then slopes: errors of the stations' records
     """
 
-    knots: np.ndarray
+    level: np.ndarray
+    slope: np.ndarray
     across: np.ndarray
     record: np.ndarray
 
@@ -77,49 +78,50 @@ class AirKnots:
         others         pressures and humidities, and what a unit of each is worth in °C of the level
         zeta           (stations,) heights in units of the slope's; None where they stand at one height
         """
-        seconds = span[1] - span[0]
-        count = int(np.clip(shots // SHOTS_A_KNOT, FEWEST_KNOTS, MOST_KNOTS))
-        count = min(count, max(FEWEST_KNOTS, int(np.ceil(seconds / LEAST_STEP)) + 1))
-        knots = np.linspace(*span, count)
-        across = np.linspace(*span, min(count, max(FEWEST_KNOTS, int(np.ceil(seconds / ACROSS_STEP)) + 1)))
+        seconds, most = span[1] - span[0], int(np.clip(shots // SHOTS_A_KNOT, FEWEST_KNOTS, MOST_KNOTS))
+        level, slope, across = (
+            np.linspace(*span, int(np.clip(np.ceil(seconds / step) + 1, FEWEST_KNOTS, max(FEWEST_KNOTS, most // per))))
+            for step, per in ((LEVEL_STEP, 1), (SLOPE_STEP, 2), (ACROSS_STEP, 2))
+        )
         design = np.ones((len(temperatures), 1)) if zeta is None else np.stack([np.ones(len(zeta)), zeta], axis=1)
         gain = np.linalg.pinv(design)
-        k = len(knots)
-        record = np.zeros((2 * k, 2 * k))
+        k, times = len(level), np.concatenate([level, slope])
+        part = np.repeat([0, 1], [k, len(slope)])
+        record = np.zeros((len(times), len(times)))
         for own, trend in zip(gain.T, temperatures, strict=True):
-            record[: len(own) * k, : len(own) * k] += np.kron(np.outer(own, own), trend.covariance(knots))
+            by = np.append(own, 0.0)[part]
+            record += by[:, None] * by * trend.covariance(times)
         for trend, worth in others:
-            record[:k, :k] += (worth / len(temperatures)) ** 2 * trend.covariance(knots)
-        return AirKnots(knots, across, record)
+            record[:k, :k] += (worth / len(temperatures)) ** 2 * trend.covariance(level)
+        return AirKnots(level, slope, across, record)
 
     @property
     def count(self) -> int:
         """Parameters of the process: level, slope, east, north."""
-        return 2 * (len(self.knots) + len(self.across))
+        return len(self.level) + len(self.slope) + 2 * len(self.across)
 
     @property
     def labels(self) -> list[tuple[str, str]]:
         """Part and number of each parameter."""
         return [
             (part, str(i))
-            for part, at in zip(PARTS, (self.knots, self.knots, self.across, self.across), strict=True)
+            for part, at in zip(PARTS, (self.level, self.slope, self.across, self.across), strict=True)
             for i in range(len(at))
         ]
 
     def shapes(self) -> tuple[list[np.ndarray], np.ndarray]:
-        """Covariances of unit strength: (2k, 2k) of each of the first four strengths, and (j, j) across the site."""
-        k = len(self.knots)
+        """Covariances of unit strength: of levels and slopes by each of the first four, and (j, j) across the site."""
+        k, both = len(self.level), len(self.level) + len(self.slope)
         shapes = []
         for time in (LEVEL_TIME, FAST_TIME):
-            own = _forgetting(self.knots, time)
-            for part in (slice(0, k), slice(k, 2 * k)):
-                shape = np.zeros((2 * k, 2 * k))
-                shape[part, part] = own
+            for knots, part in ((self.level, slice(0, k)), (self.slope, slice(k, both))):
+                shape = np.zeros((both, both))
+                shape[part, part] = _forgetting(knots, time)
                 shapes.append(shape)
         return shapes, _forgetting(self.across, ACROSS_TIME) + 1e-9 * np.eye(len(self.across))
 
     def covariances(self, strength: AirStrength) -> tuple[np.ndarray, np.ndarray]:
-        """Prior (2k, 2k) of level and slope, °C^2, and (j, j) of each gradient, (°C/m)^2."""
+        """Prior of levels and slopes, °C^2, and (j, j) of each gradient, (°C/m)^2."""
         shapes, across = self.shapes()
         *own, by_metre = astuple(strength)
         prior = self.known + sum(s**2 * shape for s, shape in zip(own, shapes, strict=True))
@@ -127,17 +129,18 @@ class AirKnots:
 
     @property
     def known(self) -> np.ndarray:
-        """(2k, 2k) °C^2, of what the readings leave alone; 0.1 mK more, which keeps it positive definite."""
+        """°C^2, of levels and slopes, what the readings leave alone; 0.1 mK more, which keeps it positive definite."""
         return self.record + 1e-8 * np.eye(len(self.record))
 
     def columns(self, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Parameters (m, 8) on which each time hangs, two knots a part in the order of `PARTS`, and shares (m, 4)."""
-        first, share = hats(self.knots, seconds)
-        far, far_share = hats(self.across, seconds)
-        k, j = len(self.knots), len(self.across)
-        at = np.stack([first, first + k, far + 2 * k, far + 2 * k + j], axis=1)
-        columns = np.stack([at, at + 1], axis=2).reshape(len(first), 8)
-        return columns, np.stack([share, share, far_share, far_share], axis=1)
+        columns, shares, begin = [], [], 0
+        for knots in (self.level, self.slope, self.across, self.across):
+            first, share = hats(knots, seconds)
+            columns += [begin + first, begin + first + 1]
+            shares.append(share)
+            begin += len(knots)
+        return np.stack(columns, axis=1), np.stack(shares, axis=1)
 
 
 def hats(knots: np.ndarray, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -18,7 +18,7 @@ from catseye.reduction.epoch.self_check import Family, FamilyCheck
 
 LARGEST_OFFSET_C = 8.0  # of a thermometer that is still one; a broken one reads nothing near
 MOST_ZEROS = 0.25  # share of the rangers whose zeros may be wrong at once; more is no matter of zeros
-STEEPEST_UP, STEEPEST_DOWN = 0.02, -0.02  # °C/m between the stations: of most nights; near the adiabatic lapse
+STEEPEST_UP, STEEPEST_DOWN = 0.025, -0.02  # °C/m between the stations: of most nights; near the adiabatic lapse
 USUAL_GRADIENT = -0.0065  # °C/m, of the standard atmosphere
 BEND_OF_GRADIENT = 0.1  # share of a strong inversion's temperature by which its profile may bend
 UNSURE = 0.7  # of a thermometer's prior u that the ranges leave: they know nothing of it
@@ -77,9 +77,10 @@ def refused(
     zeros = [p for p in dropped if p.kind is ParameterKind.ZERO]
     if len(zeros) > max(1, MOST_ZEROS * rangers):
         held |= set(zeros)
+        names = ", ".join(p.of for p in zeros)
         texts.append(
-            f"the ranges would explain their misfit by {len(zeros)} wrong zeros at once ({', '.join(p.of for p in zeros)}"
-            "): the sheets are kept, something else is wrong"
+            f"the ranges would explain their misfit by {len(zeros)} wrong zeros at once ({names}): the sheets are "
+            "kept, something else is wrong"
         )
     for parameter, value in dropped.items():
         if parameter.kind is not ParameterKind.THERMOMETER:

@@ -125,6 +125,7 @@ class AdjustedCoordinates:
     unresolved   index into the campaign's shots: why its whole cycles cannot be known; such shots are not in `ranges`
     strength     of the processes in time, as the ranges have them
     doubts       why the answer is not good although its tests passed, a sentence each
+    refuted      whose priors the ranges contradict, so that they are left out: thermometers, zeros, sounded lines
     """
 
     points: tuple[str, ...]
@@ -148,6 +149,7 @@ class AdjustedCoordinates:
     sound: dict[str, tuple[float, float]] = field(default_factory=dict)
     strength: ProcessStrength = field(default_factory=ProcessStrength)
     doubts: tuple[str, ...] = ()
+    refuted: tuple[Parameter, ...] = ()
 
     def index(self, name: str) -> int:
         """Row of a point by its name."""
@@ -224,6 +226,17 @@ def adjust_coordinates(
     return coordinates_of(settled, resolved=resolved)
 
 
+def _refuted(settled: SettledNetwork) -> dict[Parameter, float]:
+    """Parameters whose priors were left out, and the values that the ranges give them."""
+    network, solution, shots = settled
+    found: dict[Parameter, float] = {}
+    for group, fit in zip(network.priors, solution.fits[len(shots) :], strict=True):
+        if fit.name in (THERMOMETERS, ZEROS, SOUND):
+            columns = np.ravel(group.columns)[~fit.active].tolist()
+            found |= {network.layout.parameters[c]: float(solution.x[c]) for c in columns}
+    return found
+
+
 def _selection(settled: SettledNetwork, network: CampaignNetwork) -> list[np.ndarray]:
     """What takes part in a network with the shots of one that has settled: the shots that took part there."""
     count = len(settled.shots)
@@ -235,11 +248,7 @@ def allowed(settled: SettledNetwork) -> Allowance:
     """What is to be allowed for after an adjustment: its explanations judged, its residuals averaged."""
     network, solution, shots = settled
     air, layout = network.field, network.layout
-    dropped, variance = {}, solution.q.diagonal()
-    for group, fit in zip(network.priors, solution.fits[len(shots) :], strict=True):
-        if fit.name in (THERMOMETERS, ZEROS, SOUND):
-            columns = np.ravel(group.columns)[~fit.active].tolist()
-            dropped |= {layout.parameters[c]: float(solution.x[c]) for c in columns}
+    dropped, variance = _refuted(settled), solution.q.diagonal()
     u = {n: float(np.sqrt(variance[c])) for n, c in zip(air.stations, layout.air, strict=False)}
     allowance = refused(network.allowance, dropped, air, u, len(network.rangers))
     if allowance.held != network.allowance.held:
@@ -272,6 +281,7 @@ def settle_network(
 
     Raises EstimationError where it finds no answer.
     """
+    network = _holding_unseen(network)
     layout, settings = network.layout, network.settings
     x = np.array(layout.start)
     for name, where in starts.items():
@@ -288,9 +298,9 @@ def settle_network(
             progress("adjustment", min(turn + FIRST * (turn > 0), PASSES - 1), PASSES)
         shots = [shot_group(network.seen_from(name), name, x) for name in network.rangers]
         searching = not turn and not predicted and active is None
-        priors = [_while_searching(p) for p in network.priors] if searching else network.priors
+        priors = [_while_searching(p, network) for p in network.priors] if searching else network.priors
         groups: list[ObservationGroup] = [group for group, _ in shots] + priors
-        removable = [_removable(g, network, i < len(shots)) for i, g in enumerate(groups)]
+        removable = [_removable(g, network, shots=i < len(shots)) for i, g in enumerate(groups)]
         if searching:
             for g, may in zip(groups, removable, strict=True):
                 may &= g.name != THERMOMETERS
@@ -321,7 +331,6 @@ def settle_network(
         x, active = solution.require_converged().x, [f.active for f in solution.fits]
         if not turn:
             advice = dish_advice(network, x, solution.q)
-            network = _holding_unknown(network, solution) if searching else network
         steady = True
         if turn < STRENGTHENED:
             strength = network.processes.estimated(solution, network.strength, [p.distance for _, p in shots])
@@ -339,25 +348,30 @@ def settle_network(
     return SettledNetwork(network, solution, shots)
 
 
-def _while_searching(prior: ObservationGroup) -> ObservationGroup:
-    """A prior as the first search has it: thermometers loose, but none so far off that air could not be."""
+def _while_searching(prior: ObservationGroup, network: CampaignNetwork) -> ObservationGroup:
+    """A prior as the first search has it: thermometers that may be wrong are loose, not as wrong as no air could be."""
     if prior.name != THERMOMETERS or not isinstance(prior, Linear):
         return prior
-    return replace(prior, covariance=np.maximum(prior.covariance, SEARCHED_C**2))
+    loose = _removable(prior, network, shots=False)
+    return replace(prior, covariance=np.where(loose, np.maximum(prior.covariance, SEARCHED_C**2), prior.covariance))
 
 
-def _holding_unknown(network: CampaignNetwork, solution: LeastSquaresSolution) -> CampaignNetwork:
-    """The network that keeps the priors of thermometers of which the ranges know less than their records do."""
-    variance, air = solution.q.diagonal(), network.field
-    unknown = {
-        Parameter(ParameterKind.THERMOMETER, station)
-        for station, column, sigma in zip(air.stations, network.layout.air, air.sigmas, strict=False)
-        if variance[column] > sigma**2
-    }
-    return replace(network, allowance=replace(network.allowance, held=network.allowance.held | unknown))
+def _holding_unseen(network: CampaignNetwork) -> CampaignNetwork:
+    """The network that keeps the priors of thermometers whose air no certified path crosses.
+
+    Nothing else knows a scale: what the ranges seem to say of such a thermometer is what the air does that the model
+    does not know.
+    """
+    air, targets = network.field, network.campaign.shots.target
+    fired = {(name, targets[k]) for name in network.rangers for k in network.electronics[name].shots}
+    marks = [b for b in network.campaign.benchmarks if (b.ranger, b.target) in fired]
+    heights = [0.5 * (network.places[b.ranger].start[2] + network.places[b.target].start[2]) for b in marks]
+    seen = air.seen_from(np.array(heights))
+    unseen = {Parameter(ParameterKind.THERMOMETER, s) for s, on in zip(air.stations, seen, strict=True) if not on}
+    return replace(network, allowance=replace(network.allowance, held=network.allowance.held | unseen))
 
 
-def _removable(group: ObservationGroup, network: CampaignNetwork, shots: bool) -> np.ndarray:
+def _removable(group: ObservationGroup, network: CampaignNetwork, *, shots: bool) -> np.ndarray:
     """(m,) bool: which observations of a group may be left out."""
     if shots or group.name not in (THERMOMETERS, ZEROS, SOUND):
         return np.full(len(group.observed), shots)
@@ -443,6 +457,7 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCo
         sound=sound,
         strength=network.strength,
         doubts=_doubts(network, solution),
+        refuted=tuple(_refuted(settled)),
     )
 
 
@@ -626,8 +641,9 @@ def _doubts(network: CampaignNetwork, solution: LeastSquaresSolution) -> tuple[s
     """Why the answer is not good: what had to be allowed for, and thermometers at the end of their priors."""
     doubts = list(network.allowance.texts)
     air = network.field
-    for i, (station, column) in enumerate(zip(air.stations, network.layout.air, strict=False)):
-        value, sigma = float(solution.x[column]), float(air.sigmas[i])
+    sigmas = network.allowance.sigmas(air)
+    for station, column, sigma in zip(air.stations, network.layout.air, sigmas, strict=False):
+        value = float(solution.x[column])
         if abs(value) > DOUBTED_C * sigma:
             doubts.append(f"{station}'s thermometer is biased by {value:+.2f} °C, {abs(value) / sigma:.1f} of its u")
     return tuple(doubts)

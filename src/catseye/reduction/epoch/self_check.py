@@ -7,6 +7,7 @@ the spread that they show, so that what is claimed covers it.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -45,8 +46,8 @@ class Sorting:
     """Bins of one family.
 
     family   which
-    edges    of the values, ascending; rangers have none
     labels   of the bins, for people
+    of       from a ranger and its shots to their bins
     """
 
     family: Family
@@ -99,7 +100,7 @@ def _by_value(
 ) -> Sorting:
     inside = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
     bin_of = dict(zip(rows.tolist(), np.where(np.isfinite(values), inside, -1).tolist(), strict=True))
-    labels = tuple(f"{a / unit[0]:.0f} to {b / unit[0]:.0f} {unit[1]}" for a, b in zip(edges, edges[1:], strict=False))
+    labels = tuple(f"{a / unit[0]:.0f} to {b / unit[0]:.0f} {unit[1]}" for a, b in pairwise(edges))
     return Sorting(family, labels, lambda ranger, own: np.array([bin_of[int(k)] for k in own], dtype=int))
 
 
@@ -190,11 +191,10 @@ def self_checks(
     estimate, u = influence.errors_of(np.concatenate(columns, axis=1))
     checks, at = [], 0
     for sorting, enough, shots in owners:
-        own = slice(at, at + len(enough))
+        mine = at + np.flatnonzero(np.isfinite(u[at : at + len(enough)]))
+        if len(mine):
+            checks.append(_judged(sorting, enough[mine - at], shots, estimate[mine], u[mine]))
         at += len(enough)
-        seen = np.isfinite(u[own])
-        if seen.any():
-            checks.append(_judged(sorting, enough[seen], shots, estimate[own][seen], u[own][seen]))
     return checks
 
 

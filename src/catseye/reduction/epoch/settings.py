@@ -40,4 +40,4 @@ class ReductionSettings:
     u_surface: float = 0.001
     u_position: float = 0.010
     dense_shots: int = 1500
-    most_states: int = 4500
+    most_states: int = 3900

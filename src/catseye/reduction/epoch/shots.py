@@ -144,8 +144,8 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
         index=n,
     )
     zero = x[layout.at[Parameter(ParameterKind.ZERO, name)]]
-    moving, moved = _expansion(network, name, targets, sights)
-    expansion = np.sum(np.where(moving < 0, 0.0, x[moving]) * moved, axis=1)
+    expanding, grown = _expansion(network, name, targets, sights)
+    expansion = np.sum(np.where(expanding < 0, 0.0, x[expanding]) * grown, axis=1)
     coarse = n * (distance + expansion - glass - obliquity - d0 - zero - head.at(x))
     cycles, margin = whole_cycles(coarse, phase, half)
     observed = unwrapped_length(cycles, phase, half)

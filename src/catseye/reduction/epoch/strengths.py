@@ -29,8 +29,8 @@ EXPANSION = "telescope's expansion"
 PROCESSES = (AIR_BETWEEN, AIR_ACROSS, ERRORS, EXPANSION)
 U_LAG, U_RADIATION = 60.0, 0.5  # s, of a thermometer in its shield: 0 to 120 s; °C, in calm sunshine
 EXPERIENCE = 6.0  # observations that the strength of experience is worth
+WIDE_PPM = 0.1  # of eddies, where nothing is known yet
 LITTLE_PPM, MOST_PPM = 0.05, 2.0  # of eddies: with less, little changes; more, no air holds
-SURE = 2.0  # standard uncertainties by which eddies must stand out
 SAME = 0.25  # relative change of a strength that is none
 BISECTIONS = 40
 LONGEST = 2.0  # step in the logarithm of a variance
@@ -48,7 +48,7 @@ class ProcessStrength:
 
     air: AirStrength = WIDE
     telescope: tuple[float, ...] = (1.0,) * len(PARTS)
-    eddies_ppm: float = 0.0
+    eddies_ppm: float = WIDE_PPM
 
     def near(self, other: "ProcessStrength") -> bool:
         """Whether no strength differs by more than a quarter."""
@@ -65,7 +65,7 @@ class Processes:
     """The processes of a campaign and where their parameters stand.
 
     air         of the field
-    columns     of its level and slope (2k,), of east and north (2, j)
+    columns     of its levels and slopes, and of east and north (2, j)
     telescope   None where it is taken to stand still, and
     moving      (parts, k) columns of its knots
     errors      columns of lags, and of sunshine where there is any
@@ -81,7 +81,7 @@ class Processes:
     def of(air: AirField, telescope: TelescopeKnots | None, at: dict[Parameter, int]) -> "Processes":
         """Of the parameters of a layout."""
         knots = np.array([at[Parameter(ParameterKind.AIR, *label)] for label in air.knots.labels], dtype=int)
-        k = 2 * len(air.knots.knots)
+        k = len(air.knots.level) + len(air.knots.slope)
         errors = [at[Parameter(kind, station)] for kind in air.errors for station in air.stations]
         count = 0 if telescope is None else len(telescope.knots)
         moving = [at[Parameter(ParameterKind.TELESCOPE, part)] + np.arange(count) for part in PARTS if count]
@@ -205,7 +205,7 @@ def _climbed(
 ) -> tuple[float, ...]:
     """Strengths (s,) that processes of one kind have in common: Fisher's scoring in the logarithms of variances."""
     for _ in range(STEPS):
-        seen, expected, information = sum(each.scores(strength) for each in shown)
+        seen, expected, information = np.sum([each.scores(strength) for each in shown], axis=0)
         step = seen - expected + EXPERIENCE * ((usual / strength) ** 2 - 1.0)
         step = np.clip(step / (information + EXPERIENCE), -LONGEST, LONGEST)
         strength = np.clip(strength * np.exp(0.5 * step), low, high)
@@ -237,7 +237,4 @@ def _eddies(solution: LeastSquaresSolution, before_ppm: float, lengths: list[np.
             middle = 0.5 * (low + high)
             low, high = (low, middle) if slope(middle) > 0.0 else (middle, high)
         more = float(0.5 * (low + high))
-    gain = np.sum(w2 - w2 / (1.0 + more * per_ppm) - np.log1p(more * per_ppm))
-    if before_ppm == 0.0 and gain < SURE**2:
-        return 0.0
     return float(np.clip(np.sqrt(max(before_ppm**2 + more, 0.0)), 0.0, MOST_PPM))

@@ -45,7 +45,7 @@ BLOCK_KINDS = (ParameterKind.POINT, ParameterKind.NORMAL, ParameterKind.GLASS)
 BUSY = 40  # shots on a target, beyond which it is no block
 U_BODY, U_BODY_TURN = 0.03, 5e-4  # m and rad: more than a telescope stands off, so that shots alone say it
 WEAK = 0.2  # variance of a mode of the electronics over its shots' noise, below which it is left to these,
-SOME_MODES = 500  # beyond so many
+SOME_MODES = 1000  # beyond so many
 WORST_THERMOMETER_C, WORST_ZERO = 3.0, 0.005  # °C and m: one sigma of what an instrument can have at the worst
 LONGEST_TIE = 30  # parameters of one prior: those of a longer one are no block
 
@@ -235,12 +235,7 @@ def build_network(
     air = AirField.of(campaign, settings)
     for parameter in air.parameters:
         layout.add(parameter, [""], [0.0])
-    span = float(np.ptp(campaign.shots.mjd_utc)) * SECONDS_PER_DAY
-    telescope = TelescopeKnots.of(span, seen) if motion is None else None
-    if telescope is not None:
-        count = len(telescope.knots)
-        for part in PARTS:
-            layout.add(Parameter(ParameterKind.TELESCOPE, part), [str(i) for i in range(count)], np.zeros(count))
+    telescope = _telescope(campaign, seen, layout) if motion is None else None
     processes, strength = Processes.of(air, telescope, layout.at), ProcessStrength()
     for group in sorted({p.group for n, p in seen.items() if p.group and n in fired}):
         layout.add(Parameter(ParameterKind.NORMAL, group), ["1", "2"], [0.0, 0.0])
@@ -248,12 +243,7 @@ def build_network(
         if seen[name].u_constant > 0.0:
             layout.add(Parameter(ParameterKind.GLASS, name), [""], [0.0])
     ours = {n: e.shots for n, e in electronics.items() if len(e.shots)}
-    sorts = (
-        [s for s in sortings(campaign, places, ours) if s.family in allowance.families] if allowance.families else []
-    )
-    for sorting in sorts:
-        bins = [str(i) for i in range(len(sorting.labels))]
-        layout.add(Parameter(ParameterKind.FAMILY, sorting.family.name), bins, np.zeros(len(bins)))
+    sorts = _sorted(campaign, places, ours, layout, allowance=allowance)
     u_path = 0.0 if motion is None else motion.lasting * campaign.site.ranging.path_index_fluctuation_ppm
     fired_lines = {
         Parameter(ParameterKind.PATH, n, campaign.shots.target[k]) for n, e in electronics.items() for k in e.shots
@@ -295,6 +285,34 @@ def build_network(
 def middle_of(mjd_utc: np.ndarray) -> float:
     """Half-way between the first shot and the last, MJD."""
     return float(0.5 * (mjd_utc.min() + mjd_utc.max()))
+
+
+def _telescope(campaign: ObservedSite, seen: dict[str, RangedPoint], layout: UnknownsLayout) -> TelescopeKnots | None:
+    """Knots of the telescope's expansion, their parameters added to the layout."""
+    telescope = TelescopeKnots.of(float(np.ptp(campaign.shots.mjd_utc)) * SECONDS_PER_DAY, seen)
+    if telescope is not None:
+        numbers = [str(i) for i in range(len(telescope.knots))]
+        for part in PARTS:
+            layout.add(Parameter(ParameterKind.TELESCOPE, part), numbers, np.zeros(len(numbers)))
+    return telescope
+
+
+def _sorted(
+    campaign: ObservedSite,
+    places: dict[str, RangedPoint],
+    shots: dict[str, np.ndarray],
+    layout: UnknownsLayout,
+    *,
+    allowance: Allowance,
+) -> list[Sorting]:
+    """Bins of the families that are allowed for, their parameters added to the layout."""
+    if not allowance.families:
+        return []
+    sorts = [s for s in sortings(campaign, places, shots) if s.family in allowance.families]
+    for sorting in sorts:
+        bins = [str(i) for i in range(len(sorting.labels))]
+        layout.add(Parameter(ParameterKind.FAMILY, sorting.family.name), bins, np.zeros(len(bins)))
+    return sorts
 
 
 def path_ppm(network: CampaignNetwork) -> float:

@@ -1,0 +1,241 @@
+"""Explanations judged: what cannot be is refused, what nothing tells apart is allowed for."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from catseye.estimation.least_squares.adjustment import adjust
+from catseye.estimation.observations.kinds import Linear
+from catseye.reduction.epoch.air import AirField
+from catseye.reduction.epoch.air_process import AirKnots
+from catseye.reduction.epoch.allowance import (
+    BEND_OF_GRADIENT,
+    NOTHING,
+    STEEPEST_DOWN,
+    STEEPEST_UP,
+    UNPLACED,
+    Allowance,
+    for_the_air,
+    refused,
+)
+from catseye.reduction.epoch.parameter import Parameter, ParameterKind
+from catseye.reduction.epoch.self_check import HEIGHT, TIME
+from catseye.reduction.epoch.station_record import StationRecord
+
+HEIGHTS = np.array([-2.6, 47.4])  # m, 50 apart
+SIGMA_C, SIGMA_BEND = 0.3, 0.03
+
+
+def field(temperatures=(10.0, 10.0), *, placed=True, heights=HEIGHTS, profile="bend"):
+    """Two stations that read constant temperatures for an hour."""
+    seconds = np.arange(0.0, 3601.0, 60.0)
+    records = tuple(StationRecord.of(seconds, np.tile([t, 900.0, 50.0], (len(seconds), 1))) for t in temperatures)
+    return AirField(
+        names=("WX1", "WX2", profile),
+        sigmas=np.array([SIGMA_C, SIGMA_C, SIGMA_BEND]),
+        heights=np.asarray(heights, dtype=float),
+        places=np.zeros((2, 2)),
+        placed=np.full(2, placed),
+        records=records,
+        knots=AirKnots.of((0.0, 3600.0), 100, [r.temperature_c for r in records], [], zeta=np.array([-1.0, 1.0])),
+        sun=np.zeros((2, 0)),
+        start_mjd=60000.0,
+        wavelength_um=0.78,
+        model="rueger1990",
+    )
+
+
+def thermometer(station):
+    return Parameter(ParameterKind.THERMOMETER, station)
+
+
+def zeros(count):
+    return {Parameter(ParameterKind.ZERO, f"ZY{101 + i}"): 1e-4 for i in range(count)}
+
+
+def known(air, values=(), u=()):
+    """An adjustment that says the air's first parameters with their u; the others are zero and little known."""
+    x, sigma = np.zeros(air.count), np.full(air.count, 1e-3)
+    x[: len(values)], sigma[: len(u)] = values, u
+    every = np.arange(air.count)
+    return adjust(np.zeros(air.count), [Linear("all", x, sigma**2, every, np.eye(air.count))]), every
+
+
+KNOWN = {"WX1": 0.05, "WX2": 0.05}
+
+
+# -- explanations that cannot be --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("value", [1.2, -2.5, 7.9])
+def test_a_proper_explanation_stays(value):
+    """WX1 is 1.2 °C off and the ranges know that to 0.05 °C: its prior stays out, and nothing is said of it here."""
+    found = refused(NOTHING, {thermometer("WX1"): value, **zeros(1)}, field(), KNOWN, 12)
+    assert found.held == frozenset()
+    assert found.texts == ()
+    assert found.same(NOTHING)
+
+
+@pytest.mark.parametrize("value", [10.0, -8.1])
+def test_a_thermometer_that_is_ten_degrees_off_is_none(value):
+    found = refused(NOTHING, {thermometer("WX1"): value}, field(), KNOWN, 12)
+    assert found.held == {thermometer("WX1")}
+    (text,) = found.texts
+    assert f"WX1's thermometer read {value:+.1f} °C too high" in text
+    assert "its record is kept" in text
+    assert not found.same(NOTHING)
+
+
+def test_a_thermometer_that_the_ranges_know_worse_than_its_record_is_not_theirs_to_correct():
+    dropped = {thermometer("WX1"): 1.5, thermometer("WX2"): 1.5}
+    found = refused(NOTHING, dropped, field(), {"WX1": 1.01 * SIGMA_C, "WX2": 0.99 * SIGMA_C}, 12)
+    assert found.held == {thermometer("WX1")}
+    assert len(found.texts) == 1
+
+
+@pytest.mark.parametrize(
+    ("wrong", "rangers", "held"), [(1, 12, 0), (3, 12, 0), (4, 12, 4), (6, 12, 6), (1, 2, 0), (2, 4, 2)]
+)
+def test_half_of_all_zeros_are_not_wrong_at_once_but_one_may_be(wrong, rangers, held):
+    found = refused(NOTHING, zeros(wrong), field(), KNOWN, rangers)
+    assert len(found.held) == held
+    if held:
+        (text,) = found.texts
+        assert f"{wrong} wrong zeros at once" in text
+        assert "ZY101, ZY102" in text
+
+
+def test_what_was_refused_before_stays_refused():
+    before = Allowance(held=frozenset([thermometer("WX2")]), texts=("before",), families={TIME: 0.2})
+    found = refused(before, {thermometer("WX1"): 10.0}, field(), KNOWN, 12)
+    assert found.held == {thermometer("WX1"), thermometer("WX2")}
+    assert found.texts[0] == "before"
+    assert found.families == {TIME: 0.2}
+
+
+# -- gradients that few nights have -----------------------------------------------------------------------------------
+
+
+def test_an_ordinary_gradient_asks_for_nothing():
+    for gradient in (0.9 * STEEPEST_DOWN, -0.0065, 0.0, 0.9 * STEEPEST_UP):
+        air = field((10.0, 10.0 + 50.0 * gradient))
+        found = for_the_air(NOTHING, air, *known(air, u=(SIGMA_C, SIGMA_C)))
+        assert found.same(NOTHING)
+        assert found.texts == ()
+        assert found.profile == 0.0
+
+
+def test_a_steep_inversion_widens_the_thermometer_of_which_the_ranges_know_nothing():
+    """By hand: 3 °C over 50 m are an inversion of 0.06 °C/m, or WX2, which nothing checks, is 3 °C off."""
+    air = field((10.0, 13.0))
+    found = for_the_air(NOTHING, air, *known(air, u=(0.05, 0.29)))
+    assert set(found.thermometers) == {"WX2"}
+    assert found.thermometers["WX2"] == pytest.approx(np.hypot(0.3, 3.0), rel=1e-6)
+    assert found.profile == pytest.approx(np.hypot(SIGMA_BEND, BEND_OF_GRADIENT * 3.0), rel=1e-6)
+    (text,) = found.texts
+    assert text.startswith("the stations differ by +0.060 °C a metre of height")
+    assert "a strong inversion" in text  # the one candidate
+    assert "WX2's thermometer is off by some 3.0 °C" in text  # the other
+    assert not found.same(NOTHING)
+    np.testing.assert_allclose(found.sigmas(air), [0.3, np.hypot(0.3, 3.0), np.hypot(0.03, 0.3)], rtol=1e-6)
+
+
+def test_of_air_too_cold_above_what_is_beyond_the_usual_lapse_is_in_doubt():
+    """By hand: -2.5 °C over 50 m, of which the standard atmosphere has -0.325: 2.175 °C are left."""
+    air = field((10.0, 7.5))
+    found = for_the_air(NOTHING, air, *known(air, u=(0.28, 0.29)))
+    assert set(found.thermometers) == {"WX1", "WX2"}
+    for u in found.thermometers.values():
+        assert u == pytest.approx(np.hypot(0.3, 2.175), rel=1e-6)
+    (text,) = found.texts
+    assert text.startswith("the stations differ by -0.050 °C a metre of height")
+    assert "WX1's thermometer or WX2's thermometer is off by some 2.2 °C" in text
+
+
+def test_a_thermometer_that_is_found_biased_makes_no_gradient():
+    air = field((10.0, 13.0))
+    found = for_the_air(NOTHING, air, *known(air, values=(0.0, 2.9), u=(0.05, 0.05)))
+    assert found.same(NOTHING)
+    assert found.texts == ()
+
+
+def test_stations_at_one_height_show_no_gradient_to_judge():
+    air = field((10.0, 13.0), heights=(10.0, 10.0), profile="gradient")
+    found = for_the_air(NOTHING, air, *known(air, u=(SIGMA_C, SIGMA_C)))
+    assert found.same(NOTHING)
+
+
+def test_a_steep_gradient_of_which_both_thermometers_are_known_still_bends_and_is_told():
+    """Nobody doubts the thermometers, so it is an inversion; and an inversion's profile is no straight line."""
+    air = field((10.0, 13.0))
+    found = for_the_air(NOTHING, air, *known(air, u=(0.05, 0.05)))
+    assert found.thermometers == {}
+    assert found.profile == pytest.approx(np.hypot(SIGMA_BEND, BEND_OF_GRADIENT * 3.0), rel=1e-6)
+    assert found.texts
+    assert not found.same(NOTHING)  # else the adjustment goes on without either
+
+
+def test_judged_again_the_text_is_the_newer_and_no_uncertainty_shrinks():
+    air = field((10.0, 13.0))
+    first = for_the_air(NOTHING, air, *known(air, u=(0.05, 0.29)))
+    again = for_the_air(first, air, *known(air, values=(0.0, 0.5), u=(0.05, 0.29)))
+    assert len(again.texts) == 1
+    assert again.texts[0].startswith("the stations differ by +0.050 °C")
+    assert again.thermometers["WX2"] == first.thermometers["WX2"]
+    assert again.profile == first.profile
+    assert again.same(first)
+
+
+# -- stations that stand nobody knows where ---------------------------------------------------------------------------
+
+
+def sloping(air, east, north=0.0):
+    """The solution of a site whose air is warmer by so much, °C/m, all the time."""
+    values = np.zeros(air.count)
+    j = len(air.knots.across)
+    values[air.count - 2 * j : air.count - j], values[air.count - j :] = east, north
+    return known(air, values=values)
+
+
+def test_a_station_whose_place_nobody_said_is_off_by_the_gradient_over_the_site():
+    air = field(placed=False)
+    found = for_the_air(NOTHING, air, *sloping(air, 0.003, -0.004))
+    expected = np.hypot(SIGMA_C, 0.005 * UNPLACED)
+    assert found.thermometers == pytest.approx({"WX1": expected, "WX2": expected})
+    assert not found.same(NOTHING)
+    assert for_the_air(found, air, *sloping(air, 0.003, -0.004)).same(found)
+
+
+def test_a_station_whose_place_is_said_is_not_and_neither_is_any_in_even_air():
+    air = field()
+    assert for_the_air(NOTHING, air, *sloping(air, 0.005)).same(NOTHING)
+    air = field(placed=False)
+    assert for_the_air(NOTHING, air, *sloping(air, 0.0005)).same(NOTHING)  # 0.04 °C beside 0.3: 1 % more
+
+
+# -- the same allowance -----------------------------------------------------------------------------------------------
+
+
+def test_allowances_are_the_same_where_nothing_more_is_allowed_for():
+    one = Allowance(
+        held=frozenset([thermometer("WX1")]), thermometers={"WX2": 1.0}, profile=0.3, families={HEIGHT: 0.5}
+    )
+    assert one.same(one)
+    assert dataclasses.replace(one, thermometers={"WX2": 1.09}).same(one)  # to a tenth
+    assert dataclasses.replace(one, thermometers={"WX2": 0.5}).same(one)
+    assert not dataclasses.replace(one, thermometers={"WX2": 1.2}).same(one)
+    assert not dataclasses.replace(one, thermometers={"WX2": 1.0, "WX1": 0.4}).same(one)
+    assert not dataclasses.replace(one, held=frozenset()).same(one)
+    assert not dataclasses.replace(one, families={HEIGHT: 0.5, TIME: 0.1}).same(one)
+    assert not dataclasses.replace(one, profile=0.6).same(one)
+
+
+def test_an_allowance_never_claims_less_than_the_records():
+    air = field()
+    small = Allowance(thermometers={"WX1": 0.1, "elsewhere": 9.0}, profile=0.001)
+    np.testing.assert_array_equal(small.sigmas(air), air.sigmas)
+    assert air.sigmas[0] == SIGMA_C
+    large = Allowance(thermometers={"WX1": 2.0}, profile=0.2)
+    np.testing.assert_array_equal(large.sigmas(air), [2.0, SIGMA_C, 0.2])
+    np.testing.assert_array_equal(air.sigmas, [SIGMA_C, SIGMA_C, SIGMA_BEND])  # its own are not changed
