@@ -173,7 +173,7 @@ def one_night(prisms: int, place: Path) -> None:
         import shutil
 
         shutil.rmtree(place, ignore_errors=True)
-        night(place, dish_prisms=abs(prisms), again=0.43 if prisms < 0 else 0.0)
+        night(place, dish_prisms=abs(prisms), again=0.43 if prisms < 0 else 0.0, nature=0.0)
     took = {}
     settle = coordinates.settle_network
 

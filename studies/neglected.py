@@ -335,6 +335,8 @@ def air_effects(s: Night) -> Iterator[Effect]:
     yield Effect("humidity even in % upwards", "even in hPa", fixed(percent * s.mean(wet - humidity)), "nothing")
 
     yield Effect("hygrometers, in common", "2 %", fixed(2.0 * percent), "thermometers' offsets")
+    yield Effect("humidity of fog", "1 % above 100", fixed(percent), "nothing")
+    yield Effect("droplets of fog", "0.05 g/m³", fixed(1.5 * 5e-8 * 0.206 * s.distance), "thermometers' offsets")
     yield Effect("barometers, in common", "0.1 hPa", fixed(0.1 * hpa), "thermometers' offsets")
     yield Effect("stations' heights", "0.1 m", fixed(0.1 * LAPSE_HPA_PER_M * hpa), "nothing")
     yield Effect("formula of the index", "5e-8", fixed(5e-8 * s.distance), "thermometers' offsets")
@@ -543,6 +545,10 @@ def signal_effects(s: Night) -> Iterator[Effect]:
     yield Effect("warm-up between references", "20 mrad, 300 s, 1 in 3", fixed(_warming(s)), "nothing")
     yield Effect("each shot weighed by its own scatter", "127 degrees", lambda n: _weights(n, s), "no")
     bow = 2.0 * 2.0 ** -(s.campaign.site.adc.bits - 1) * 0.002 * np.abs(s.phasor) / s.campaign.site.adc.full_scale_volt
+    step = s.campaign.site.adc.full_scale_volt / 2.0 ** (s.campaign.site.adc.bits - 1)
+    spread = s.noise_volt * np.sqrt(128 * 64 / 2.0)  # of single samples
+    steps = step / np.abs(s.phasor) * np.exp(-2.0 * (np.pi * spread / step) ** 2)  # noise smears the staircase
+    yield Effect("converter's steps", "0.3 mV", fixed(s.per_radian * steps), "nothing")
     yield Effect("converter's bow", "2 steps", fixed(s.per_radian * bow), "nothing")
     yield Effect("modulation frequency", "1e-9", fixed(1e-9 * s.index * s.distance), "thermometers' offsets")
     stray = 0.01 * np.concatenate([f.sigma for f in s.solution.fits[: len(s.parts)]])

@@ -136,7 +136,7 @@ def _index(scene: ShotScene, v: DrawnInputs) -> np.ndarray:
     ends = (np.full(len(v.x), scene.a[2]), np.full(len(v.x), scene.b[2]))
     mean_refractivity = mean_over_height(profile, *ends, nodes=NODES)
     beyond = best * (humidity - legal)
-    return 1.0 + mean_refractivity + beyond + (v("formula") + v("fluctuation")) * PPM
+    return 1.0 + mean_refractivity + beyond + (v("formula") + v("unread") + v("fluctuation")) * PPM
 
 
 def _glass(scene: ShotScene, v: DrawnInputs) -> np.ndarray:

@@ -18,7 +18,7 @@ from catseye.errors import InputError, ValidityError
 from catseye.estimation.series.trend import Trend
 from catseye.records.night.campaign import ObservedSite
 from catseye.records.site.site import Location
-from catseye.reduction.epoch.air_process import LEVEL_HEIGHT, AirKnots
+from catseye.reduction.epoch.air_process import LEVEL_HEIGHT, U_LAG, U_RADIATION, USUAL, AirKnots
 from catseye.reduction.epoch.parameter import BEND, GRADIENT, Parameter, ParameterKind
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.sounded import SoundedLine, sounded_lines
@@ -231,6 +231,22 @@ class AirField:
     def count(self) -> int:
         """Number p of all parameters."""
         return self.first_knot + self.knots.count
+
+    def u_unread(self, path: PathAir) -> np.ndarray:
+        """(m,) standard uncertainty of paths' refractivity by all errors in time, as experience has their strengths."""
+        errors = self.first_knot - len(self.names)
+        u = np.repeat([U_LAG, U_RADIATION][: len(self.errors)], len(self.heights))
+        variance = np.sum((path.column_slopes[:, :errors] * u) ** 2, axis=1)
+        between, across = self.knots.covariances(USUAL)
+        columns, slopes = path.columns[:, errors:] - self.first_knot, path.column_slopes[:, errors:]
+        both = columns[:, :4, None], columns[:, None, :4]
+        variance += np.einsum("mi,mij,mj->m", slopes[:, :4], between[both], slopes[:, :4])
+        for k in (4, 6):  # east, north
+            at = columns[:, k : k + 2] - columns[:, k : k + 1] + self.knots.first_across(columns[:, k], k == 6)[:, None]
+            variance += np.einsum(
+                "mi,mij,mj->m", slopes[:, k : k + 2], across[at[:, :, None], at[:, None]], slopes[:, k : k + 2]
+            )
+        return np.asarray(np.sqrt(variance))
 
     def _into(
         self,

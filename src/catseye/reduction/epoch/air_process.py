@@ -100,6 +100,10 @@ class AirKnots:
         """Parameters of the process: level, slope, east, north."""
         return len(self.level) + len(self.slope) + 2 * len(self.across)
 
+    def first_across(self, columns: np.ndarray, north: bool) -> np.ndarray:
+        """Knots of a gradient, counted from its own first, by columns of the process."""
+        return columns - len(self.level) - len(self.slope) - (len(self.across) if north else 0)
+
     @property
     def labels(self) -> list[tuple[str, str]]:
         """Part and number of each parameter."""
@@ -141,6 +145,9 @@ class AirKnots:
             shares.append(share)
             begin += len(knots)
         return np.stack(columns, axis=1), np.stack(shares, axis=1)
+
+
+U_LAG, U_RADIATION = 60.0, 0.5  # s, of a thermometer in its shield: 0 to 120 s; °C, in calm sunshine
 
 
 def hats(knots: np.ndarray, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

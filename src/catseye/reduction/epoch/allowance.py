@@ -97,7 +97,8 @@ def refused(
 
 
 def for_the_air(before: Allowance, air: AirField, solution: LeastSquaresSolution, columns: np.ndarray) -> Allowance:
-    """The allowance for a gradient that few nights have, and for stations that stand nobody knows where.
+    """The allowance for a gradient that few nights have, for stations that stand nobody knows where, and for
+    thermometers that certified paths all but refute.
 
     columns   of the air's parameters
     """
@@ -110,6 +111,17 @@ def for_the_air(before: Allowance, air: AirField, solution: LeastSquaresSolution
             u = float(np.hypot(air.sigmas[i], slope * UNPLACED))
             if u > 1.1 * max(air.sigmas[i], thermometers.get(station, 0.0)):
                 thermometers[station] = u
+        off = abs(float(values[i]))
+        if (
+            off > DOUBTED_C * air.sigmas[i]
+            and station not in thermometers
+            and Parameter(ParameterKind.THERMOMETER, station) not in before.held
+        ):
+            thermometers[station] = float(np.hypot(air.sigmas[i], off))  # all but refuted: its record pulls no more
+            texts.append(
+                f"{station}'s thermometer is biased by {values[i]:+.2f} °C by the ranges, {off / air.sigmas[i]:.1f} of "
+                "its record's u: the uncertainties allow for that"
+            )
     gradient = air.steepest(values)
     if air.profile == BEND.part and not STEEPEST_DOWN <= gradient <= STEEPEST_UP:
         apart = abs(gradient - (0.0 if gradient > 0.0 else USUAL_GRADIENT)) * float(np.ptp(air.heights))

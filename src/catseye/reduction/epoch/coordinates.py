@@ -35,6 +35,7 @@ from catseye.reduction.epoch.unknowns import (
     HEADS,
     SOUND,
     THERMOMETERS,
+    WEAK,
     ZEROS,
     CampaignNetwork,
     build_network,
@@ -621,6 +622,12 @@ def _notes(
                 f"{network.settings.critical}); check the sheet's value and u"
             )
     notes += network.allowance.texts
+    left_out = max((states.neglected for states in network.states.values()), default=0.0)
+    if left_out > WEAK:
+        notes.append(
+            f"so many shots leave modes of the electronics to the shots' own errors, the strongest with "
+            f"{100.0 * left_out:.0f} % of their variance: shots between the same two references share that"
+        )
     typed = [n for n, p in sorted(network.places.items()) if p.typed and count[n] >= 3]  # fewer do not place a point
     moved = np.array([np.linalg.norm(solution.x[network.layout.columns(n)] - network.places[n].start) for n in typed])
     unit = {t: triplet.triplet for triplet in network.campaign.triplets.values() for t in triplet.targets}

@@ -18,7 +18,7 @@ from catseye.constants import PPM
 from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
 from catseye.estimation.observations.kinds import Linear
 from catseye.reduction.epoch.air import AirField
-from catseye.reduction.epoch.air_process import LEAST, MOST, USUAL, WIDE, AirStrength
+from catseye.reduction.epoch.air_process import LEAST, MOST, U_LAG, U_RADIATION, USUAL, WIDE, AirStrength
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.telescope_motion import LEAST_WALK, MOST_WALK, PARTS, WALK, TelescopeKnots
 
@@ -27,7 +27,6 @@ AIR_ACROSS = "air across the site"
 ERRORS = "thermometers' lag and sunshine"
 EXPANSION = "telescope's expansion"
 PROCESSES = (AIR_BETWEEN, AIR_ACROSS, ERRORS, EXPANSION)
-U_LAG, U_RADIATION = 60.0, 0.5  # s, of a thermometer in its shield: 0 to 120 s; °C, in calm sunshine
 EXPERIENCE = 6.0  # observations that the strength of experience is worth
 WIDE_PPM = 0.1  # of eddies, where nothing is known yet
 LITTLE_PPM, MOST_PPM = 0.05, 2.0  # of eddies: with less, little changes; more, no air holds
