@@ -117,6 +117,20 @@ def test_what_was_refused_before_stays_refused():
 # -- gradients that few nights have -----------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(("off_c", "loose"), [(0.7, False), (0.8, True), (-0.9, True)])
+def test_a_thermometer_all_but_refuted_pulls_no_more_where_certified_paths_know_it(off_c, loose):
+    """2.5 of its u are 0.75 °C; one whose air nothing certified crosses is held to its record and only told."""
+    air = field((10.0 + off_c, 10.0))
+    adjusted = known(air, values=(off_c, 0.0), u=(0.15, 0.05))
+    found = for_the_air(NOTHING, air, *adjusted)
+    assert ("WX1" in found.thermometers) == loose
+    if loose:
+        assert found.thermometers["WX1"] == pytest.approx(np.hypot(SIGMA_C, off_c))
+        assert "WX1" in found.texts[0]
+    held = Allowance(held=frozenset([thermometer("WX1")]))
+    assert for_the_air(held, air, *adjusted).thermometers == {}
+
+
 def test_an_ordinary_gradient_asks_for_nothing():
     for gradient in (0.9 * STEEPEST_DOWN, -0.0065, 0.0, 0.9 * STEEPEST_UP):
         air = field((10.0, 10.0 + 50.0 * gradient))
@@ -155,7 +169,8 @@ def test_of_air_too_cold_above_what_is_beyond_the_usual_lapse_is_in_doubt():
 
 def test_a_thermometer_that_is_found_biased_makes_no_gradient():
     air = field((10.0, 13.0))
-    found = for_the_air(NOTHING, air, *known(air, values=(0.0, 2.9), u=(0.05, 0.05)))
+    adjusted = known(air, values=(0.0, 2.9), u=(0.05, 0.05))
+    found = for_the_air(NOTHING, air, *adjusted, dropped=[thermometer("WX2")])
     assert found.same(NOTHING)
     assert found.texts == ()
 

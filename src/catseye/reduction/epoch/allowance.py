@@ -6,7 +6,7 @@ its record, air that can be so. Where it is not, the prior stays, and what the r
 for: a family of `self_check`, or the air between the stations.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -50,6 +50,7 @@ class Allowance:
             and self.families.keys() == other.families.keys()
             and self.thermometers.keys() == other.thermometers.keys()
             and all(v <= 1.1 * other.thermometers[n] for n, v in self.thermometers.items())
+            and self.profile <= 1.1 * other.profile
         )
 
     def sigmas(self, air: AirField) -> np.ndarray:
@@ -96,11 +97,19 @@ def refused(
     return replace(before, held=frozenset(held), texts=tuple(texts))
 
 
-def for_the_air(before: Allowance, air: AirField, solution: LeastSquaresSolution, columns: np.ndarray) -> Allowance:
+def for_the_air(
+    before: Allowance,
+    air: AirField,
+    solution: LeastSquaresSolution,
+    columns: np.ndarray,
+    *,
+    dropped: Collection[Parameter] = (),
+) -> Allowance:
     """The allowance for a gradient that few nights have, for stations that stand nobody knows where, and for
     thermometers that certified paths all but refute.
 
     columns   of the air's parameters
+    dropped   parameters whose priors the adjustment left out
     """
     values, variance = solution.x[columns], solution.q.diagonal()[columns]
     count = len(air.stations)
@@ -115,7 +124,7 @@ def for_the_air(before: Allowance, air: AirField, solution: LeastSquaresSolution
         if (
             off > DOUBTED_C * air.sigmas[i]
             and station not in thermometers
-            and Parameter(ParameterKind.THERMOMETER, station) not in before.held
+            and Parameter(ParameterKind.THERMOMETER, station) not in {*before.held, *dropped}
         ):
             thermometers[station] = float(np.hypot(air.sigmas[i], off))  # all but refuted: its record pulls no more
             texts.append(

@@ -254,7 +254,7 @@ def allowed(settled: SettledNetwork) -> Allowance:
     allowance = refused(network.allowance, dropped, air, u, len(network.rangers))
     if allowance.held != network.allowance.held:
         return allowance
-    allowance = for_the_air(allowance, air, solution, layout.air)
+    allowance = for_the_air(allowance, air, solution, layout.air, dropped=dropped)
     own = {name: network.electronics[name].shots for name in network.rangers}
     lines = [(p.name, p.electronics.shots, 1.0 + p.refractivity, p.distance) for _, p in shots]
     groups = [*(g for g, _ in shots), *network.priors]
