@@ -324,3 +324,10 @@ def test_a_shot_after_the_last_reading_is_ranged_in_the_last_air_and_one_before_
     expected = group_refractivity(8.0, 905.2, 70.0, wavelength_um=0.78, model="rueger1990")
     assert index[5400.0] == pytest.approx(float(expected), abs=1e-11)
     assert 1e6 * (index[5400.0] - index[-1800.0]) == pytest.approx(2.0 * 0.92 + 3.0 * 0.285, rel=0.05)
+
+
+@pytest.mark.parametrize("humidity", [0.0, 0.2, 99.9, 100.0])
+def test_air_at_the_ends_of_humidity_has_a_field(night_01, humidity):
+    """What a percent is worth was asked at 100.4 %, which no formula knows; found among natural nights."""
+    campaign, _ = weathered(night_01, [0.0, 40.0], np.arange(0.0, 3601.0, 60.0), lambda s, i: 10.0, humidity=humidity)
+    assert np.all(np.isfinite(AirField.of(campaign, ReductionSettings()).knots.record))

@@ -13,16 +13,14 @@ import numpy as np
 from catseye.atmosphere.index.air import MODELS, group_refractivity
 from catseye.atmosphere.path.mean import nodes_along, pressure_at
 from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
-from catseye.constants import DEGREE, SECONDS_PER_DAY
+from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import InputError, ValidityError
-from catseye.estimation.series.trend import Trend
 from catseye.records.night.campaign import ObservedSite
-from catseye.records.site.site import Location
 from catseye.reduction.epoch.air_process import LEVEL_HEIGHT, U_LAG, U_RADIATION, USUAL, AirKnots
 from catseye.reduction.epoch.parameter import BEND, GRADIENT, Parameter, ParameterKind
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.sounded import SoundedLine, sounded_lines
-from catseye.reduction.epoch.station_record import StationRecord, states_at
+from catseye.reduction.epoch.station_record import StationRecord, states_at, sunshine, worth_of_others
 
 DISTINCT_HEIGHTS = 5.0  # m, stations closer in height than this show no gradient
 MOST_KEPT = 64  # sets of times whose states are kept: one a ranger, and more
@@ -31,7 +29,6 @@ LEAST_HPA = 600.0
 NODES = 5  # of the quadrature along a path: 1e-12 for straight profiles over 200 m
 FAIR_SHARE = 0.3  # of a station's temperature in a path's, from which the path knows it
 HALF = 0.5  # °C on either side, over which slopes are taken
-DAY = (3.0, 21.0)  # hours of local mean solar time, outside which no Sun stands above 60° of latitude's horizon
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,12 +109,12 @@ class AirField:
                 (float(shots.min()), float(shots.max())),
                 len(shots),
                 [r.temperature_c for r in records],
-                _worth(
+                worth_of_others(
                     records, float(shots.mean()), wavelength_um=site.ranging.wavelength_um, model=settings.air_model
                 ),
                 zeta=None if flat else _zeta(heights, heights),
             ),
-            sun=_sun(site.site, campaign.shots.mjd_utc, start),
+            sun=sunshine(site.site, campaign.shots.mjd_utc, start),
             start_mjd=start,
             wavelength_um=site.ranging.wavelength_um,
             model=settings.air_model,
@@ -453,31 +450,3 @@ class _Weather:
 def _zeta(z: np.ndarray, heights: np.ndarray) -> np.ndarray:
     """Height in units of the slope's: 1 at the highest station, -1 at the lowest."""
     return np.asarray((z - 0.5 * (heights.min() + heights.max())) / (0.5 * np.ptp(heights)))
-
-
-def _sun(where: Location, mjd_utc: np.ndarray, start: float) -> np.ndarray:
-    """(2, n) s since the start and sine of the Sun's altitude, 0 below the horizon; (2, 0) where it is night."""
-    hours = 24.0 * (mjd_utc + where.longitude_deg / 360.0) % 24.0
-    if np.all((hours < DAY[0]) | (hours > DAY[1])):
-        return np.zeros((2, 0))
-    from catseye.geometry.sky.sun import sun_direction
-
-    times = np.linspace(mjd_utc.min(), mjd_utc.max(), max(2, int(np.ptp(mjd_utc) * 96.0) + 1))
-    high = sun_direction(times, where.latitude_deg * DEGREE, where.longitude_deg * DEGREE)[:, 2]
-    if np.all(high <= 0.0):
-        return np.zeros((2, 0))
-    return np.stack([(times - start) * SECONDS_PER_DAY, np.maximum(high, 0.0)])
-
-
-def _worth(
-    records: Sequence[StationRecord], seconds: float, *, wavelength_um: float, model: str
-) -> list[tuple[Trend, float]]:
-    """Pressure and humidity records, and what a hPa or a % of each is worth in °C: the same change of the index."""
-    state = states_at(records, np.array([seconds]))[0].mean(axis=0)
-    light = {"wavelength_um": wavelength_um, "model": model}
-    by = []
-    for k, step in enumerate((HALF, 0.5, 0.5)):
-        up, down = state.copy(), state.copy()
-        up[k], down[k] = up[k] + step, max(down[k] - step, 0.0) if k else down[k] - step
-        by.append(float(group_refractivity(*up, **light) - group_refractivity(*down, **light)) / (up[k] - down[k]))
-    return [(r.trends[k], by[k] / by[0]) for r in records for k in (1, 2)]

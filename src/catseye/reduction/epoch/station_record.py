@@ -5,7 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from catseye.atmosphere.index.air import group_refractivity
+from catseye.constants import DEGREE, SECONDS_PER_DAY
 from catseye.estimation.series.trend import Trend, TrendStrength, trend_of, trend_strength
+from catseye.records.site.site import Location
 
 GRID = 60.0  # s between the states kept beside the readings
 MOST_STATES = 2000  # of them at most
@@ -16,6 +19,8 @@ USUAL = (
     TrendStrength(0.05, 0.2 / 60.0, 1e-6),  # hPa
     TrendStrength(0.5, 2.0 / 60.0, 1e-5),  # %
 )
+DAY = (3.0, 21.0)  # hours of local mean solar time, outside which no Sun stands above 60° of latitude's horizon
+STEP = 0.5  # °C, hPa, % on either side, over which slopes are taken
 LEAST_NOISE = (0.003, 0.003, 0.03)  # of a reading, as files round it: 0.01 °C, 0.01 hPa, 0.1 %
 
 
@@ -60,3 +65,32 @@ def states_at(records: Sequence[StationRecord], seconds: np.ndarray) -> np.ndarr
     state = np.stack([np.stack([t.at(seconds) for t in r.trends], axis=-1) for r in records], axis=-2)
     state[..., 2] = np.clip(state[..., 2], 0.0, 100.0)
     return np.asarray(state)
+
+
+def sunshine(where: Location, mjd_utc: np.ndarray, start: float) -> np.ndarray:
+    """(2, n) s since the start and sine of the Sun's altitude, 0 below the horizon; (2, 0) where it is night."""
+    hours = 24.0 * (mjd_utc + where.longitude_deg / 360.0) % 24.0
+    if np.all((hours < DAY[0]) | (hours > DAY[1])):
+        return np.zeros((2, 0))
+    from catseye.geometry.sky.sun import sun_direction
+
+    times = np.linspace(mjd_utc.min(), mjd_utc.max(), max(2, int(np.ptp(mjd_utc) * 96.0) + 1))
+    high = sun_direction(times, where.latitude_deg * DEGREE, where.longitude_deg * DEGREE)[:, 2]
+    if np.all(high <= 0.0):
+        return np.zeros((2, 0))
+    return np.stack([(times - start) * SECONDS_PER_DAY, np.maximum(high, 0.0)])
+
+
+def worth_of_others(
+    records: Sequence[StationRecord], seconds: float, *, wavelength_um: float, model: str
+) -> list[tuple[Trend, float]]:
+    """Pressure and humidity records, and what a hPa or a % of each is worth in °C: the same change of the index."""
+    state = states_at(records, np.array([seconds]))[0].mean(axis=0)
+    light = {"wavelength_um": wavelength_um, "model": model}
+    by = []
+    for k in range(3):
+        up, down = state.copy(), state.copy()
+        up[k], down[k] = up[k] + STEP, down[k] - STEP
+        up[2], down[2] = min(up[2], 100.0), max(down[2], 0.0)
+        by.append(float(group_refractivity(*up, **light) - group_refractivity(*down, **light)) / (up[k] - down[k]))
+    return [(r.trends[k], by[k] / by[0]) for r in records for k in (1, 2)]
