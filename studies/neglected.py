@@ -1,6 +1,6 @@
 """What the reduction of a night neglects, beside 20 000 shots: prints the table of docs/studies/neglected.md, draws it.
 
-python studies/neglected.py [--prisms 2209] [--out DIRECTORY] [--night DIRECTORY]
+python studies/neglected.py [--prisms 2209] [--out DIRECTORY] [--night DIRECTORY] [--span SECONDS]
 
 A night of the whole dish is simulated and adjusted. An effect changes each shot's optical length by d; what that does
 to the answer is Q A' P d, with the covariance, derivatives and weights of the network as it settled. Of what all points
@@ -36,6 +36,7 @@ from catseye.reduction.epoch import coordinates
 from catseye.reduction.epoch.parameter import BEND, Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
 from catseye.reduction.epoch.settings import ReductionSettings
+from catseye.reduction.epoch.settling import SettledNetwork
 from catseye.reduction.epoch.shots import shot_group
 from catseye.reduction.epoch.unknowns import CampaignNetwork, path_ppm
 from catseye.signal.drift.reference import drift_along
@@ -136,7 +137,7 @@ class Network:
 class Night:
     """A night as it settled: the network, and every shot in the order of its rows."""
 
-    def __init__(self, settled: coordinates.SettledNetwork):
+    def __init__(self, settled: SettledNetwork):
         self.network, solution, self.groups_shots = settled
         network, x = self.network, solution.x
         self.x, self.solution, self.campaign = x, solution, network.campaign
@@ -315,7 +316,7 @@ def air_effects(s: Night) -> Iterator[Effect]:
     z = s.nodes[0][..., 2]
     temperature, pressure, humidity = s.state(z)
     heights = s.network.field.heights
-    level = "level of the air, 120 s knots"
+    level = "level of the air"
 
     nodes, air_module.NODES = air_module.NODES, NODES
     fine = s.along()
@@ -326,7 +327,12 @@ def air_effects(s: Night) -> Iterator[Effect]:
     at = -np.exp(-np.maximum(heights, heights.min()) / 10.0)
     low, high = np.argmin(heights), np.argmax(heights)
     line = at[low] + (z - heights[low]) * (at[high] - at[low]) / (heights[high] - heights[low])
-    yield Effect("cold layer, 10 m", "1 °C at the ground", fixed(c * s.mean(layer - line)), "no: the bend has 0.03 °C")
+    yield Effect(
+        "cold layer, 10 m",
+        "1 °C at the ground",
+        fixed(c * s.mean(layer - line)),
+        "no, the bend has 0.03 °C: a shape exp(-z/10 m), 0.5 °C",
+    )
 
     yield Effect("pressure by 0.11 hPa/m", "1.5 % at 0 °C", fixed(_lapse(s, temperature, hpa)), "nothing")
 
@@ -339,20 +345,25 @@ def air_effects(s: Night) -> Iterator[Effect]:
     yield Effect("droplets of fog", "0.05 g/m³", fixed(1.5 * 5e-8 * 0.206 * s.distance), "thermometers' offsets")
     yield Effect("barometers, in common", "0.1 hPa", fixed(0.1 * hpa), "thermometers' offsets")
     yield Effect("stations' heights", "0.1 m", fixed(0.1 * LAPSE_HPA_PER_M * hpa), "nothing")
-    yield Effect("formula of the index", "5e-8", fixed(5e-8 * s.distance), "thermometers' offsets")
+    yield Effect("formula of the index", "5·10⁻⁸", fixed(5e-8 * s.distance), "thermometers' offsets")
     other = s.along(model="ciddor_hill1999") - s.along()
     yield Effect("Ciddor's air for Rüeger's", _ppm(other), fixed(s.distance * other), "thermometers' offsets")
     redder = s.along(wavelength_um=s.network.field.wavelength_um + 1e-4) - s.along()
     yield Effect("wavelength", "0.1 nm", fixed(s.distance * redder), "thermometers' offsets")
     warmer = s.along(wavelength_um=s.network.field.wavelength_um + 2.5e-3) - s.along()
-    yield Effect("wavelength, each head its own", "2.5 nm", in_groups(s.distance * warmer, s.ranger), "no")
+    yield Effect(
+        "wavelength, each head its own",
+        f"2.5 nm, {_ppm(warmer)}",
+        in_groups(s.distance * warmer, s.ranger),
+        "no: a scale of each head",
+    )
     middle = s.state(0.5 * (s.a[:, 2] + s.b[:, 2]))
     more, less = (s.refractivity(*middle, model="ciddor_hill1999", co2_ppm=v) for v in (500.0, 450.0))
     yield Effect("carbon dioxide", "50 ppm", fixed(s.distance * (more - less)), "thermometers' offsets")
     uneven = 0.5 * 0.5**2 * s.distance * sum(s.refractivity(middle[0] + t, *middle[1:]) * f for t, f in _SECOND)
     yield Effect("index of the mean for the mean", "0.5 °C along the path", fixed(uneven), "nothing")
 
-    knots = s.network.field.knots.knots
+    knots = s.network.field.knots.level
     yield Effect(
         "air between the knots", "0.1 °C, 10 min", either([0.1 * c * w for w in s.wave(600.0, knots)]), "eddies"
     )
@@ -372,14 +383,20 @@ def air_effects(s: Night) -> Iterator[Effect]:
     square = np.sum(s.nodes[0][..., :2] ** 2, axis=2) / 100.0**2
     where = np.sum(s.network.field.places**2, axis=1) / 100.0**2
     bowl = s.mean(square) - where.mean()
-    yield Effect("air warmer all around", "0.1 °C at 100 m", fixed(0.1 * c * bowl), "no: east and north are even")
+    yield Effect("air warmer all around", "0.1 °C at 100 m", fixed(0.1 * c * bowl), "no: x² + y² beside east and north")
     plate = np.isin(s.body, ["dish"]) * 5.0 / s.distance * (1.0 - np.exp(-s.distance / 5.0))
     yield Effect("air cold on the dish", "0.3 °C, within 5 m", fixed(-0.3 * c * plate), "no")
     within = (s.own_body == "arm") & np.isin(s.body, ["dish", "arm"])
-    yield Effect("air within the dish another", "0.05 °C", fixed(0.05 * c * within), "no")
+    yield Effect(
+        "air within the dish another", "0.05 °C", fixed(0.05 * c * within), "no: a level of the air within the dish"
+    )
     yield Effect("eddies that last", "0.03 ppm for 60 s", lambda n: _lasting(n, s), "independent at each shot")
-    yield Effect("lines that are neighbours", "5 m", lambda n: _neighbours(n, s), "no: each line its own")
-    yield Effect("strength of the lines' fluctuation", "20 %", lambda n: _lines(n, s, 0.2), "no: as site.toml says")
+    yield Effect(
+        "lines that are neighbours", "5 m", lambda n: _neighbours(n, s), "no: a field over the dish for each ranger"
+    )
+    yield Effect(
+        "strength of the lines' fluctuation", "20 %", lambda n: _lines(n, s, 0.2), "no: a strength that the ranges tell"
+    )
     bent = excess_bound(index_gradient(0.1), s.distance)
     yield Effect("bending of the ray", "0.1 °C/m", fixed(-bent), "nothing")
     curved = np.sum(s.nodes[0][..., :2] ** 2, axis=2) / (2.0 * 6.371e6)
@@ -393,8 +410,12 @@ def air_effects(s: Night) -> Iterator[Effect]:
 _SECOND = ((1.0, 1.0), (0.0, -2.0), (-1.0, 1.0))  # °C and weights of a second difference
 
 
+def _signed(value: float, unit: str, digits: int = 2) -> str:
+    return f"{value:+.{digits}f} {unit}".replace("-", "−")
+
+
 def _ppm(change: np.ndarray) -> str:
-    return f"{np.mean(change) / PPM:+.3f} ppm"
+    return _signed(float(np.mean(change)) / PPM, "ppm")
 
 
 def _lapse(s: Night, temperature: np.ndarray, hpa: np.ndarray) -> np.ndarray:
@@ -457,14 +478,17 @@ def time_effects(s: Night) -> Iterator[Effect]:
     within = np.full(len(s.k), abs(s.per_radian) * walk * np.sqrt(2.0 * long / 3.0))
     yield Effect("walk within a buffer", f"{within[0] * 1e6:.2f} µm a shot", at_random(within, anew=True), "nothing")
     cooling = np.full(len(s.k), 1e-9 * SECONDS_PER_DAY * UNIFORM) * np.abs(s.per_unit["c"]) / 3600.0
-    yield Effect("times of shots as rounded", "1e-9 d", at_random(cooling, anew=True), "nothing")
+    yield Effect("times of shots as rounded", "10⁻⁹ d", at_random(cooling, anew=True), "nothing")
     yield Effect("clock of the stations", "2 s, 1 °C/h", fixed(2.0 / 3600.0 * s.per_unit["c"]), "lag of a thermometer")
 
 
 def telescope_effects(s: Night) -> Iterator[Effect]:
     steel = STEEL_PER_K * s.hours[:, None]  # an hour of a clear night: 1 °C
     yield Effect(
-        "arm expands 10 % more", "1 °C/h", fixed(s.by_body(lambda p, b: 0.1 * steel * p * (b == "arm")[:, None])), "no"
+        "arm expands 10 % more",
+        "1 °C/h",
+        fixed(s.by_body(lambda p, b: 0.1 * steel * p * (b == "arm")[:, None])),
+        "no: a scale of the arm, as the dish has one",
     )
     turn = 0.05 * ARCSECOND * s.hours[:, None]
     on = ("dish", "arm", "alidade")
@@ -473,7 +497,7 @@ def telescope_effects(s: Night) -> Iterator[Effect]:
         "telescope turns",
         "0.05″/h",
         fixed(s.by_body(lambda p, b: turn * np.cross(about, p) * np.isin(b, on)[:, None])),
-        "no",
+        "no: turns as parts of the telescope's motion",
     )
     azimuth = s.campaign.site.campaign.azimuth_deg * DEGREE
     axis, height = np.array([np.cos(azimuth), -np.sin(azimuth), 0.0]), np.array([0.0, 0.0, 48.26])
@@ -481,7 +505,7 @@ def telescope_effects(s: Night) -> Iterator[Effect]:
         "telescope sinks in elevation",
         "0.05″/h",
         fixed(s.by_body(lambda p, b: turn * np.cross(axis, p - height) * np.isin(b, on[:2])[:, None])),
-        "no",
+        "no: turns as parts of the telescope's motion",
     )
     dish = s.b[s.body == "dish"]
     axes = np.linalg.svd(dish - dish.mean(axis=0), full_matrices=False)[2]
@@ -490,7 +514,7 @@ def telescope_effects(s: Night) -> Iterator[Effect]:
         u, v = ((p - dish.mean(axis=0)) @ axes[:2].T / 50.0).T
         return (20e-6 * s.hours * (u**2 - v**2) * (b == "dish"))[:, None] * axes[2]
 
-    yield Effect("dish bends", "20 µm/h at the rim", fixed(s.by_body(bends)), "no")
+    yield Effect("dish bends", "20 µm/h at the rim", fixed(s.by_body(bends)), "no: parts of the telescope's motion")
     knots = s.network.processes.telescope
     if knots is not None:
         at = np.sort(np.append(knots.knots, 0.0)) + s.network.field.seconds(np.array([s.network.middle_mjd]))
@@ -498,7 +522,12 @@ def telescope_effects(s: Night) -> Iterator[Effect]:
             s.by_body(lambda p, b, w=w: 0.04 * STEEL_PER_K * w[:, None] * p * np.isin(b, on)[:, None])
             for w in s.wave(2400.0, at)
         ]
-        yield Effect("expansion between its knots", "0.04 °C of steel, 40 min", either(waves), "no: knots of 1800 s")
+        yield Effect(
+            "expansion between its knots",
+            "0.04 °C of steel, 40 min",
+            either(waves),
+            "no: knots of 600 s, or what is between as a variance",
+        )
     sway = np.where(s.body != s.own_body, 20e-6, 0.0)
     yield Effect("sway of the arm", "20 µm", at_random(sway, anew=True), "eddies' strength takes it, in ppm")
 
@@ -516,18 +545,18 @@ def signal_effects(s: Night) -> Iterator[Effect]:
         "amplitude to phase, no sheet",
         "0.1 mrad a factor e",
         in_groups(1e-4 * s.per_radian * strong, s.ranger),
-        "no, but where the sheet says u_amplitude_to_phase_rad",
+        "no, unless u_amplitude_to_phase_rad is given",
     )
     yield Effect(
         "cyclic, no sheet",
         "1 µm",
         lambda n: np.hypot(*(n.in_groups(1e-6 * f(s.phase), s.ranger) for f in (np.cos, np.sin))),
-        "no, but where the sheet says u_cyclic_mm",
+        "no, unless u_cyclic_mm is given",
     )
     slopes = _axes(s)
     for size, name, done in (
         (1e-6 * UNIFORM, "axes that do not meet, as rounded", "nothing"),
-        (10e-6, "axes that do not meet, no sheet", "no, but where the sheet says u_axis_mm"),
+        (10e-6, "axes that do not meet, no sheet", "no, unless u_axis_mm is given: 10 µm by itself"),
     ):
         yield Effect(
             name,
@@ -539,18 +568,25 @@ def signal_effects(s: Night) -> Iterator[Effect]:
         "electronics' weak modes",
         f"{_weakest(s):.2f} of the noise",
         lambda n: _modes(n, s),
-        "no: variance yes, correlation no",
+        "no, their variance alone: more states",
     )
-    yield Effect("strength of the electronics' walk", "20 %", lambda n: _walk(n, s, 0.2), "no: walk_test only tells")
+    yield Effect(
+        "strength of the electronics' walk", "20 %", lambda n: _walk(n, s, 0.2), "no, walk_test only tells: a strength"
+    )
     yield Effect("warm-up between references", "20 mrad, 300 s, 1 in 3", fixed(_warming(s)), "nothing")
-    yield Effect("each shot weighed by its own scatter", "127 degrees", lambda n: _weights(n, s), "no")
+    yield Effect(
+        "each shot weighed by its own scatter",
+        "127 degrees",
+        lambda n: _weights(n, s),
+        "no: one noise of a ranger, from all its shots",
+    )
     bow = 2.0 * 2.0 ** -(s.campaign.site.adc.bits - 1) * 0.002 * np.abs(s.phasor) / s.campaign.site.adc.full_scale_volt
     step = s.campaign.site.adc.full_scale_volt / 2.0 ** (s.campaign.site.adc.bits - 1)
     spread = s.noise_volt * np.sqrt(128 * 64 / 2.0)  # of single samples
     steps = step / np.abs(s.phasor) * np.exp(-2.0 * (np.pi * spread / step) ** 2)  # noise smears the staircase
     yield Effect("converter's steps", "0.3 mV", fixed(s.per_radian * steps), "nothing")
     yield Effect("converter's bow", "2 steps", fixed(s.per_radian * bow), "nothing")
-    yield Effect("modulation frequency", "1e-9", fixed(1e-9 * s.index * s.distance), "thermometers' offsets")
+    yield Effect("modulation frequency", "10⁻⁹", fixed(1e-9 * s.index * s.distance), "thermometers' offsets")
     stray = 0.01 * np.concatenate([f.sigma for f in s.solution.fits[: len(s.parts)]])
     yield Effect("stray light below the limit", "2 % of shots, +0.5 σ", fixed(stray), "self_check")
 
@@ -644,11 +680,21 @@ def target_effects(s: Night) -> Iterator[Effect]:
     glass = glass_named("BK7-old")
     per_k = s.glass * (float(temperature_slopes(ranging.wavelength_um).group) + ratio * glass.expansion)
     warm = s.weather[0] - glass.reference_c
-    yield Effect("glass colder than its sheet's", f"{np.mean(warm):+.0f} K", fixed(per_k * warm), "no")
+    yield Effect(
+        "glass colder than its sheet's",
+        _signed(np.mean(warm), "K", 0),
+        fixed(per_k * warm),
+        "no: corrected, `optics.glass` knows how",
+    )
     standard = s.refractivity(np.array(20.0), np.array(933.0), np.array(50.0))
     thin = s.index - 1.0 - standard
     yield Effect("glass over air of 20 °C, 933 hPa", _ppm(thin), fixed(-ratio * s.glass * thin), "no")
-    yield Effect("index ratio of the memo", "4.3e-4 too low", fixed(4.3e-4 * s.glass), "no: site.toml's number")
+    yield Effect(
+        "index ratio of the memo",
+        "4.3·10⁻⁴ too low",
+        fixed(4.3e-4 * s.glass),
+        "no, it is site.toml's: one index of all glass, with its u",
+    )
     at = [s.refractivity(*s.state(p[:, 2])) for p in (s.a, s.b)]
     path = s.mean(s.refractivity(*s.state(s.nodes[0][..., 2])))
     d0 = np.array([s.campaign.mirror_of(r).d0_mm for r in s.ranger]) * MILLIMETRE
@@ -668,7 +714,7 @@ def target_effects(s: Night) -> Iterator[Effect]:
     rounding = 1e-5 * UNIFORM * first
     label = np.where(s.prism, np.unique(s.target, return_inverse=True)[1], -1)
     yield Effect(
-        "normals as rounded", "1e-5", lambda n: np.sqrt(sum(n.in_groups(d, label) ** 2 for d in rounding)), "nothing"
+        "normals as rounded", "10⁻⁵", lambda n: np.sqrt(sum(n.in_groups(d, label) ** 2 for d in rounding)), "nothing"
     )
     across = np.array(
         [s.network.places[t].across if on else np.zeros((2, 3)) for t, on in zip(s.target, s.prism, strict=True)]
@@ -676,7 +722,9 @@ def target_effects(s: Night) -> Iterator[Effect]:
     up = 0.1 * DEGREE * np.sum(first * across[:, :, 2].T, axis=0)
     yield Effect("normals higher, in common", "0.1°", fixed(up), "each its own")
     yield Effect("tilts to second order", "0.1°", fixed(bend), "nothing")
-    yield Effect("heights of glass, 100 prisms in common", "2 µm", in_groups(*_batches(s, ratio)), "no: each its own")
+    yield Effect(
+        "heights of glass, 100 prisms in common", "2 µm", in_groups(*_batches(s, ratio)), "no: an error of each batch"
+    )
     each = np.unique(s.target, return_inverse=True)[1]
     yield Effect(
         "constants of glass as rounded", "0.1 µm", in_groups(s.index * 1e-7 * UNIFORM * (s.glass > 0.0), each), "glass"
@@ -684,11 +732,19 @@ def target_effects(s: Night) -> Iterator[Effect]:
     radius = s.index * 3e-6 * np.hypot(ratio - 1.0, ratio) * (~s.prism & (s.glass > 0.0))
     yield Effect("radii of balls, in common", "3 µm", fixed(radius), "no: each its own")
     yield Effect("heights of all glass, in common", "2 µm", fixed(s.index * ratio * 2e-6 * s.prism), "no: each its own")
-    yield Effect("D0 of one bench, in common", "10 µm", fixed(s.index * 1e-5), "no: each its own")
-    yield Effect("D0 colder than calibrated", f"{np.mean(warm):+.0f} K", fixed(s.index * d0 * STEEL_PER_K * warm), "no")
+    yield Effect("D0 of one bench, in common", "10 µm", fixed(s.index * 1e-5), "no: one zero of all")
+    yield Effect(
+        "D0 colder than calibrated",
+        _signed(np.mean(warm), "K", 0),
+        fixed(s.index * d0 * STEEL_PER_K * warm),
+        "no: one expansion of all D0, its temperature on the sheet",
+    )
     yield Effect("D0 as rounded", "1 µm", in_groups(s.index * 1e-6 * UNIFORM, s.ranger), "zeros")
     yield Effect(
-        "D0 expands with its head", "1 °C/h", fixed(s.index * d0 * STEEL_PER_K * s.hours), "no: zeros take its mean"
+        "D0 expands with its head",
+        "1 °C/h",
+        fixed(s.index * d0 * STEEL_PER_K * s.hours),
+        "no: one expansion of all D0, times the temperature",
     )
 
 
@@ -734,19 +790,21 @@ def survey_effects(s: Night) -> Iterator[Effect]:
     micron = 1e-6 * UNIFORM
     yield Effect("monuments as rounded", "1 µm", at_random(on(survey, micron)), "monuments' u")
     yield Effect("mirror offsets as rounded", "1 µm", at_random(on(offsets, micron)), "offsets' u")
-    yield Effect("angles of mounts as rounded", "1e-7 rad", at_random(on(offsets, 0.25e-7 * UNIFORM)), "offsets' u")
+    yield Effect("angles of mounts as rounded", "10⁻⁷ rad", at_random(on(offsets, 0.25e-7 * UNIFORM)), "offsets' u")
     yield Effect("angles of mounts", "2″", at_random(on(offsets, 0.25 * 2.0 * ARCSECOND)), "offsets' u, 5 µm")
     cold = s.weather[0].mean() - 20.0
     arm = on(offsets[2::3], 0.25 * STEEL_PER_K * cold)
-    yield Effect("mirror offsets colder than measured", f"{cold:+.0f} K", fixed(arm), "no: u 5 µm each")
+    yield Effect(
+        "mirror offsets colder than measured", _signed(cold, "K", 0), fixed(arm), "no: corrected, with one u of all"
+    )
     yield Effect("certificates as rounded", "1 µm", at_random(on(marks, micron)), "benchmarks' u")
     lengths = np.array([g.observed[0] for g in s.groups if g.name == "benchmarks"])
-    yield Effect("certificates, in common", "1e-7", fixed(on(marks, 1e-7 * lengths)), "no: each its own")
+    yield Effect("certificates, in common", "10⁻⁷", fixed(on(marks, 1e-7 * lengths)), "no: a scale of the benchmarks")
     lengths = on(survey, 0.5e-6 * np.concatenate([g.observed for g in s.groups if g.name == "monuments"]))
-    yield Effect("survey's scale", "0.5 ppm", fixed(lengths), "no: each monument its own")
+    yield Effect("survey's scale", "0.5 ppm", fixed(lengths), "no: a scale of the monuments")
     units = [s.network.places[t.left_prism.target] for t in s.campaign.triplets.values()]
     along = on(s.rows("triplet balls"), 2e-5 * np.concatenate([p.normal for p in units]))
-    yield Effect("triplets' heights, in common", "20 µm", fixed(along), "no: each its own")
+    yield Effect("triplets' heights, in common", "20 µm", fixed(along), "no: one error of all")
     typed = s.rows("approximate positions")
     yield Effect("positions as typed", "0.1 mm", at_random(on(typed, 1e-4 * UNIFORM)), "positions' u")
 
@@ -782,20 +840,20 @@ def rows_of(effects: Sequence[Effect], networks: Sequence[Network], common: Comm
     return sorted(table, key=lambda r: -r.worst[0])
 
 
-def settled_night(prisms: int, directory: str) -> coordinates.SettledNetwork:
+def settled_night(prisms: int, directory: str, span: float) -> SettledNetwork:
     """A simulated night, calm, as the reduction settles it."""
-    where = Path(directory) / f"night-{prisms}"
+    where = Path(directory) / f"night-{prisms}-{span:.0f}"
     if not where.exists():
         night = simulate_night(
             SEED,
             telescope=SimulatedTelescope(dish_prisms=prisms),
-            schedule=Schedule(interval_s=8.0, again=0.43),
+            schedule=Schedule(interval_s=8.0, again=0.43, span_s=span),
         )
         write_night(night, where)
         del night
     campaign, settings = read_campaign(where), ReductionSettings()
     phases = measure_phases(campaign, settings)
-    caught: list[coordinates.SettledNetwork] = []
+    caught: list[SettledNetwork] = []
     told, coordinates.coordinates_of = coordinates.coordinates_of, lambda settled, resolved: caught.append(settled)
     with threadpool_limits(limits=1, user_api="blas"):
         electronics, _ = follow_electronics(campaign, phases, settings.dense_shots)
@@ -804,16 +862,25 @@ def settled_night(prisms: int, directory: str) -> coordinates.SettledNetwork:
     return caught[-1]
 
 
-def table_of(rows: Sequence[Row], form: str = "{:>9.2g}") -> str:
-    lines = [f"{'':38s}{'':26s}{'|dx|/u, run':>12s}  {'':16s}{'ten times':>10s}  {'':16s}{'places':>8s}  what is done"]
+def table_of(rows: Sequence[Row]) -> str:
+    """As the page has it."""
+    lines = [
+        "| effect | size | run | of | computed | of | places alone | what is done |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
     for r in rows:
-        mark = "!" if r.open else "*" if r.worst[0] > LIMIT else " "
-        a, b = (form.format(v) for v in r.worst)
-        lines.append(
-            f"{mark} {r.effect.name:38s}{r.effect.size:24s}{a:>12s}  {r.which[0]:16s}{b:>10s}  {r.which[1]:16s}"
-            f"{form.format(r.place[0]):>8s}  {r.effect.done}"
-        )
+        name = f"**{r.effect.name}**" if r.open else r.effect.name
+        run, computed, place = (_share(v) for v in (*r.worst, r.place[0]))
+        cells = (name, r.effect.size, run, r.which[0], computed, r.which[1], place, r.effect.done)
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
+
+
+def _share(value: float) -> str:
+    """Two digits, and not more than four decimals."""
+    if value < 1e-4:
+        return "0"
+    return f"{value:.{max(0, 1 - int(np.floor(np.log10(value))))}f}" if value >= 1e-2 else f"{value:.1g}"
 
 
 def figure(rows: Sequence[Row]) -> str:
@@ -837,7 +904,7 @@ def figure(rows: Sequence[Row]) -> str:
         ax.tick_params(axis="y", length=0, labelcolor=INK, labelsize=7.5)
         for label, r in zip(ax.get_yticklabels(), shown, strict=True):
             label.set_color(BAD if r.open else INK)
-        ax.set_xlabel("largest change of a common parameter, in its u")
+        ax.set_xlabel("largest change of a common parameter, in its u (at the left: 0.000 01 and less)")
         ax.set_title("What the reduction of a night neglects\ndashed: a tenth of u; red: above it, and not modelled")
         ax.legend(loc="lower right")
         return svg(drawn)
@@ -848,12 +915,13 @@ def main() -> None:
     asked.add_argument("--prisms", type=int, default=2209)
     asked.add_argument("--out", default=str(Path(__file__).parents[1] / "docs" / "studies"))
     asked.add_argument("--night", help="where to keep the simulated night, or where it is")
+    asked.add_argument("--span", type=float, default=3300.0, help="s, within which the ground's rangers begin")
     options = asked.parse_args()
     with tempfile.TemporaryDirectory() as own:
-        study(settled_night(options.prisms, options.night or own), options.out)
+        study(settled_night(options.prisms, options.night or own, options.span), options.out)
 
 
-def study(settled: coordinates.SettledNetwork, out: str) -> list[Row]:
+def study(settled: SettledNetwork, out: str) -> list[Row]:
     """The table printed, the figure drawn."""
     night = Night(settled)
     common = Common.of_network(night.network, night.x)

@@ -1,4 +1,4 @@
-"""Nights with all that nature does, reduced and held against their truth; and what the claims themselves would scatter."""
+"""Nights with all that nature does, reduced, held against their truth and against what their claims scatter by."""
 
 from collections import Counter
 

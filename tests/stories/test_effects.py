@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from catseye.reduction.epoch import shots
-from catseye.reduction.epoch.air import AirField
+from catseye.reduction.epoch.air.field import AirField
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.reduction.site import places
 from catseye.simulator.night.faults import Faults, Planted
@@ -108,7 +108,9 @@ def test_air_taken_as_the_stations_mean_spoils_the_scale(few_clear, monkeypatch)
         return np.full((*z.shape, len(field.heights)), 1.0 / len(field.heights)), np.zeros(z.shape)
 
     monkeypatch.setattr(AirField, "_shares", averaged)
-    monkeypatch.setattr("catseye.reduction.epoch.air.pressure_at", lambda pressure, z_from, z_to: pressure + 0.0 * z_to)
+    monkeypatch.setattr(
+        "catseye.reduction.epoch.air.field.pressure_at", lambda pressure, z_from, z_to: pressure + 0.0 * z_to
+    )
     wrong = reduce_epoch(few_clear[0])
     assert 50e-6 < moved(few_clear[1], wrong, "ball") < 500e-6
     assert 50e-6 < moved(few_clear[1], wrong, "dish") < 500e-6
@@ -135,7 +137,7 @@ def test_a_sheets_zero_wrong_by_0_3_mm_is_found_and_named_and_nothing_goes_wrong
 
 def test_a_zero_wrong_by_0_3_mm_and_held_to_its_sheet_spoils_its_ranger(few_clear, written_few, monkeypatch):
     night = simulate_night(SEED, faults=CLEAR, planted=Planted(d0_error_mm={"ZY114": 0.3}))
-    monkeypatch.setattr("catseye.reduction.epoch.coordinates.ZEROS", "held")
+    monkeypatch.setattr("catseye.reduction.epoch.settling.ZEROS", "held")
     held = reduce_epoch(written_few(night))
     assert 50e-6 < moved(few_clear[1], held, "arm") < 500e-6
     assert held.coordinates.variance_factor > few_clear[1].coordinates.variance_factor + 0.1 or held.rejected

@@ -8,7 +8,7 @@ import pytest
 from catseye.errors import InputError
 from catseye.records.night.weather import Weather
 from catseye.reduction.air.path_air import site_air, site_readings
-from catseye.reduction.epoch.air import AirField
+from catseye.reduction.epoch.air.field import AirField
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.site.places import places_of
 from catseye.simulator.night.air import NIGHT, SUMMER_DAY, WINTER, TrueAir

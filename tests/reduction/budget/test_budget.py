@@ -17,9 +17,9 @@ from catseye.reduction.budget.chain import measurement
 from catseye.reduction.budget.explanation import _cycles, _places, budget_of, explain_shot, scatter_of
 from catseye.reduction.budget.inputs import items_of
 from catseye.reduction.budget.scene import Assumptions, scene_of, walk_of
-from catseye.reduction.epoch.coordinates import settle_network
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
 from catseye.reduction.epoch.settings import ReductionSettings
+from catseye.reduction.epoch.settling import settle_network
 from catseye.reduction.epoch.shots import shot_group
 from catseye.reduction.epoch.unknowns import build_network
 from catseye.signal.detection.buffers import inspect_buffers
@@ -389,8 +389,8 @@ def test_the_coarse_length_is_that_of_an_adjustment_without_the_shot(night_01, r
     without = adjust(solution.x, groups, free=np.array(network.layout.free), active=active)
     predicted_less_seen = -without.fits[number].residual[at] / (1.0 + shots[number][1].refractivity[at])
     assert abs(predicted_less_seen) > 1.5 * abs(found.adjusted.residual)
-    # 5 %: the shot's electronics are shared with others, of which the one adjustment knows and the other need not
-    assert float(found.cycles.misfit) == pytest.approx(predicted_less_seen, rel=0.05)
+    # a tenth: a residual over its redundancy is that but for the electronics that the shot shares with others
+    assert float(found.cycles.misfit) == pytest.approx(predicted_less_seen, rel=0.1)
     expected = found.adjusted.u_range / np.sqrt(found.adjusted.redundancy)
     assert float(found.cycles.u) == pytest.approx(expected, rel=0.05)
 

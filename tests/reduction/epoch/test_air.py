@@ -10,7 +10,7 @@ from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import SECONDS_PER_DAY
 from catseye.records.night.path_temperature import PathTemperature, path_temperature_columns
 from catseye.records.night.weather import Weather
-from catseye.reduction.epoch.air import AirField
+from catseye.reduction.epoch.air.field import AirField
 from catseye.reduction.epoch.settings import ReductionSettings
 
 Z0 = 806.42  # m above sea level, night-01's

@@ -9,7 +9,7 @@ from catseye.atmosphere.index.air import group_refractivity
 from catseye.constants import SECONDS_PER_DAY
 from catseye.records.night.path_temperature import PathTemperature, path_temperature_columns
 from catseye.records.night.weather import Weather
-from catseye.reduction.epoch.air import AirField
+from catseye.reduction.epoch.air.field import AirField
 from catseye.reduction.epoch.parameter import ParameterKind
 from catseye.reduction.epoch.settings import ReductionSettings
 

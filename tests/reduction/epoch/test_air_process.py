@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from catseye.reduction.epoch.air_process import (
+from catseye.reduction.epoch.air.process import (
     ACROSS_TIME,
     FAST_TIME,
     LEAST,

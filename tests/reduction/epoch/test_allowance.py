@@ -7,8 +7,9 @@ import pytest
 
 from catseye.estimation.least_squares.adjustment import adjust
 from catseye.estimation.observations.kinds import Linear
-from catseye.reduction.epoch.air import AirField
-from catseye.reduction.epoch.air_process import AirKnots
+from catseye.reduction.epoch.air.field import AirField
+from catseye.reduction.epoch.air.process import AirKnots
+from catseye.reduction.epoch.air.stations import StationRecord
 from catseye.reduction.epoch.allowance import (
     BEND_OF_GRADIENT,
     NOTHING,
@@ -21,7 +22,6 @@ from catseye.reduction.epoch.allowance import (
 )
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.self_check import HEIGHT, TIME
-from catseye.reduction.epoch.station_record import StationRecord
 
 HEIGHTS = np.array([-2.6, 47.4])  # m, 50 apart
 SIGMA_C, SIGMA_BEND = 0.3, 0.03

@@ -188,6 +188,15 @@ def test_a_planted_error_is_found_and_named_with_its_size(family, number, size):
     assert max(checks.values(), key=lambda c: abs(c.worst.w)).family is family  # no other family shows it as well
 
 
+def test_what_is_allowed_for_is_the_spread_of_all_bins_and_not_of_the_worst_alone():
+    """Half a ppm either way in turn. By hand: the points take up what bins have in common, so each is judged against
+    the mean of the other five, 0.1 ppm of the other sign: 0.6 ppm. A sixth of the worst's square would be 0.24.
+    """
+    rng = np.random.default_rng(19)
+    check = SCENE.checks(*SCENE.adjusted(rng, SCENE.errors(TIME, 0.5 * (-1.0) ** np.arange(6))))[TIME]
+    assert check.spread == pytest.approx(0.6, rel=0.2)  # a bin has two thirds of the lines, which ties bins to some
+
+
 def test_what_a_bin_is_found_to_be_off_is_as_uncertain_as_is_said():
     rng = np.random.default_rng(20)
     by_bin = np.array([0.0, 0.4, 0.0, 0.0, 0.0, 0.0])

@@ -9,7 +9,7 @@ import pytest
 from catseye.constants import PPM
 from catseye.estimation.least_squares.adjustment import adjust
 from catseye.estimation.observations.kinds import Linear
-from catseye.reduction.epoch.air_process import LEAST, MOST, USUAL, WIDE, AirKnots, AirStrength
+from catseye.reduction.epoch.air.process import LEAST, MOST, USUAL, WIDE, AirKnots, AirStrength
 from catseye.reduction.epoch.strengths import (
     ERRORS,
     EXPERIENCE,

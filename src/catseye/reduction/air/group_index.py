@@ -16,7 +16,7 @@ from catseye.atmosphere.index.air import MODELS
 from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import ValidityError
-from catseye.reduction.epoch.air import AirField
+from catseye.reduction.epoch.air.field import AirField
 from catseye.signal.cycles.whole import CycleStatus, decision, fraction, unwrapped_length
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from catseye.constants import MILLIMETRE, SECONDS_PER_DAY, SPEED_OF_LIGHT
 from catseye.errors import InputError
 from catseye.records.night.campaign import REFERENCE, Campaign
 from catseye.records.site.mirror import Mirror
-from catseye.reduction.epoch.air import AirField, PathAir
+from catseye.reduction.epoch.air.field import AirField, PathAir
 from catseye.reduction.epoch.head import head_corrections, head_unknowns
 from catseye.reduction.epoch.parameter import Parameter
 from catseye.reduction.epoch.ranges import Phases

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
-from catseye.reduction.epoch.air import AirField
+from catseye.reduction.epoch.air.field import AirField
 from catseye.reduction.epoch.parameter import BEND, Parameter, ParameterKind
 from catseye.reduction.epoch.self_check import Family, FamilyCheck
 

@@ -121,7 +121,7 @@ class Average:
 
     @property
     def w(self) -> float:
-        """The average over its u."""
+        """Estimate over its standard uncertainty."""
         return self.estimate / self.u
 
 
@@ -143,7 +143,7 @@ class FamilyCheck:
 
     @property
     def passed(self) -> bool:
-        """Whether none stands out."""
+        """Whether no average stands out."""
         return abs(self.worst.w) <= CRITICAL
 
     def text(self) -> str:

@@ -9,7 +9,7 @@ from catseye.constants import MILLIMETRE, PPM, SECONDS_PER_DAY, SPEED_OF_LIGHT, 
 from catseye.estimation.least_squares.conflict import SharedErrors
 from catseye.estimation.observations.kinds import Distances, MovingDistances
 from catseye.optics.retroreflector.prism import obliquity_correction, obliquity_slope
-from catseye.reduction.epoch.air import PathAir
+from catseye.reduction.epoch.air.field import PathAir
 from catseye.reduction.epoch.head import HeadCorrections, head_corrections
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import ElectronicsPhase

@@ -17,8 +17,8 @@ import numpy as np
 from catseye.constants import PPM
 from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
 from catseye.estimation.observations.kinds import Linear
-from catseye.reduction.epoch.air import AirField
-from catseye.reduction.epoch.air_process import LEAST, MOST, U_LAG, U_RADIATION, USUAL, WIDE, AirStrength
+from catseye.reduction.epoch.air.field import AirField
+from catseye.reduction.epoch.air.process import LEAST, MOST, U_LAG, U_RADIATION, USUAL, WIDE, AirStrength
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.telescope_motion import LEAST_WALK, MOST_WALK, PARTS, WALK, TelescopeKnots
 

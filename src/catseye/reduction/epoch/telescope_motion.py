@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM
-from catseye.reduction.epoch.air_process import hats
+from catseye.reduction.epoch.air.process import hats
 from catseye.reduction.site.places import RangedPoint
 
 STEP = 1800.0  # s between knots

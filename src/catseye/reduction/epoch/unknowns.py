@@ -15,7 +15,7 @@ from catseye.estimation.observations.kinds import Distances, Linear, Observation
 from catseye.geometry.frames.rotation import skew
 from catseye.records.night.campaign import REFERENCE, ObservedSite
 from catseye.records.site.triplet import TripletRecord
-from catseye.reduction.epoch.air import AirField
+from catseye.reduction.epoch.air.field import AirField
 from catseye.reduction.epoch.allowance import NOTHING, Allowance
 from catseye.reduction.epoch.head import head_unknowns
 from catseye.reduction.epoch.parameter import AIR_KINDS, POINT_KINDS, XYZ, Parameter, ParameterKind

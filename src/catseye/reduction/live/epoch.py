@@ -20,12 +20,13 @@ from catseye.records.night.shot import ShotColumns
 from catseye.records.night.weather import Weather
 from catseye.records.site.folder import SiteFolder
 from catseye.records.site.triplet import TripletRecord
-from catseye.reduction.epoch.coordinates import AdjustedCoordinates, coordinates_of, settle_network
+from catseye.reduction.epoch.coordinates import AdjustedCoordinates, coordinates_of
 from catseye.reduction.epoch.cycles import Resolved, resolve_cycles, without_shots
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import Phases, follow_electronics
 from catseye.reduction.epoch.reason import Reason
 from catseye.reduction.epoch.settings import ReductionSettings
+from catseye.reduction.epoch.settling import settle_network
 from catseye.reduction.epoch.unknowns import CampaignNetwork, build_network
 from catseye.reduction.live.shots import PhasedShot
 from catseye.reduction.live.state import Carried, from_ground, to_ground, with_unseen

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.reduction.epoch.coordinates import RangeShots
+from catseye.reduction.epoch.range_shots import RangeShots
 
 PRIOR_DEGREES = 20.0  # redundant shots that the setting is worth at first
 FORGETTING = 0.9  # an epoch

@@ -16,11 +16,11 @@ from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import InputError, ValidityError
 from catseye.records.night.campaign import ObservedSite
-from catseye.reduction.epoch.air_process import LEVEL_HEIGHT, U_LAG, U_RADIATION, USUAL, AirKnots
+from catseye.reduction.epoch.air.process import LEVEL_HEIGHT, U_LAG, U_RADIATION, USUAL, AirKnots
+from catseye.reduction.epoch.air.sounded import SoundedLine, sounded_lines
+from catseye.reduction.epoch.air.stations import StationRecord, states_at, sunshine, worth_of_others
 from catseye.reduction.epoch.parameter import BEND, GRADIENT, Parameter, ParameterKind
 from catseye.reduction.epoch.settings import ReductionSettings
-from catseye.reduction.epoch.sounded import SoundedLine, sounded_lines
-from catseye.reduction.epoch.station_record import StationRecord, states_at, sunshine, worth_of_others
 
 DISTINCT_HEIGHTS = 5.0  # m, stations closer in height than this show no gradient
 MOST_KEPT = 64  # sets of times whose states are kept: one a ranger, and more
@@ -200,7 +200,7 @@ class AirField:
 
         Source: README of the campaign layout: temperature linear between the stations and beyond, pressure falling
         by 0.11 hPa a metre ([PARKER04] section 1.4.2), relative humidity independent of height; the process of
-        `air_process` on top.
+        `air.process` on top.
         """
         values = np.zeros(self.count)
         values[: len(parameters)] = parameters

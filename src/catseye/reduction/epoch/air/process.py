@@ -1,7 +1,7 @@
 """The air that no station reads, as a process in time: its level, its slope with height, its gradients across the site.
 
 Each is a chain of knots with straight lines between. What is known of it before a shot is fired is a covariance: what
-the stations' readings leave of their own air (`station_record`), and the air between stations and paths, whose
+the stations' readings leave of their own air (`air.stations`), and the air between stations and paths, whose
 strengths the ranges tell.
 
     temperature(x, y, z, t) = line through the stations + level(t) + slope(t) zeta(z) + east(t) x + north(t) y

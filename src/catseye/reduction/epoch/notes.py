@@ -1,0 +1,161 @@
+"""What an adjustment noticed about records and shots, a line each."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE
+from catseye.estimation.least_squares.adjustment import (
+    LeastSquaresSolution,
+)
+from catseye.estimation.least_squares.robust import CHECKED
+from catseye.reduction.epoch.allowance import DOUBTED_C
+from catseye.reduction.epoch.cycles import MANY
+from catseye.reduction.epoch.range_shots import RangeShots
+from catseye.reduction.epoch.unknowns import (
+    HEADS,
+    SOUND,
+    THERMOMETERS,
+    WEAK,
+    ZEROS,
+    CampaignNetwork,
+)
+
+
+def cycle_notes(ranges: RangeShots) -> list[str]:
+    """Points on which the whole cycles of used shots hang on little."""
+    thin = {}
+    for name, rows in _by_target(ranges):
+        used = ranges.used[rows]
+        doubtful = int((used & ranges.thin[rows]).sum())
+        if doubtful:
+            thin[name] = (
+                f"{name}: the whole cycles of {doubtful} of its {used.sum()} shots are not beyond doubt: without "
+                "each, position and other shots do not say its range to a quarter wavelength at five sigma"
+            )
+    what = "points have shots whose whole cycles are not beyond doubt without them, to a quarter wavelength at 5 sigma"
+    return _together(thin, what)
+
+
+def _by_target(ranges: RangeShots) -> list[tuple[str, np.ndarray]]:
+    """Each target with its rows, sorted by name."""
+    names, number = np.unique(np.array(ranges.target), return_inverse=True)
+    rows = np.split(np.argsort(number, kind="stable"), np.cumsum(np.bincount(number))[:-1])
+    return list(zip(names.tolist(), rows, strict=True))
+
+
+def _together(notes: Mapping[str, str], what: str) -> list[str]:
+    """A note a point; of many one line for all."""
+    if len(notes) <= MANY:
+        return list(notes.values())
+    return [f"{len(notes)} {what}: {', '.join(list(notes)[:MANY])} ..."]
+
+
+def loss_notes(ranges: RangeShots) -> list[str]:
+    """Targets that lost all shots, or hang on one that no other checks; rangers that lost most of theirs."""
+    unmeasured, unchecked = {}, {}
+    for name, mine in _by_target(ranges):
+        used = ranges.used[mine]
+        alone = used & (ranges.detectable[mine] >= CHECKED * ranges.u_range[mine])
+        if not used.any():
+            unmeasured[name] = (
+                f"{name}: none of its {len(mine)} shots fits the others and its typed position: its coordinates here "
+                "are not measured; check its typed position or say how bad it is (u_position_mm)"
+            )
+        elif not used.all() and alone.any():
+            unchecked[name] = (
+                f"{name}: {(~used).sum()} of its {len(mine)} shots contradict the rest and nothing checks "
+                f"{alone.sum()} of those left: it may be further off than its uncertainty says; range it again"
+            )
+    notes = [
+        *_together(unmeasured, "points have no shot that fits the others and their typed positions: not measured here"),
+        *_together(
+            unchecked,
+            "points lost shots that contradict the rest, and nothing checks those left: they may be further off than "
+            "their uncertainties say; range them again",
+        ),
+    ]
+    ranger = np.array(ranges.ranger)
+    for name in sorted(set(ranges.ranger)):
+        mine = ranger == name
+        if mine.sum() > 2 and (mine & ~ranges.used).sum() > mine.sum() / 2:
+            notes.append(
+                f"{name}: {(mine & ~ranges.used).sum()} of its {mine.sum()} shots do not fit: rather its survey, its "
+                "mirror sheet or its samples than light from elsewhere"
+            )
+    return notes
+
+
+def record_notes(
+    network: CampaignNetwork, solution: LeastSquaresSolution, air: dict[str, tuple[float, float]], count: dict[str, int]
+) -> list[str]:
+    """What the adjustment noticed about the records, one line each; `count` are the used shots at each point."""
+    notes = []
+    for group, fit in zip(network.priors, solution.fits[-len(network.priors) :], strict=True):
+        if fit.name in (THERMOMETERS, ZEROS):  # not of all, where earlier epochs know some already
+            owners = [network.layout.parameters[c].of for c in np.ravel(group.columns).tolist()]
+        if fit.name == THERMOMETERS:
+            for station, active in zip(owners, fit.active, strict=True):
+                value, u = air[station]
+                if not active:
+                    notes.append(f"{station}'s thermometer is biased: it reads {value:+.2f} °C too high (u {u:.2f} °C)")
+        if fit.name == ZEROS:
+            for ranger, active, off, u in zip(owners, fit.active, fit.residual, fit.sigma, strict=True):
+                if not active:
+                    notes.append(
+                        f"{ranger}'s zero is not the sheet's: its ranges ask for {-off / MILLIMETRE:+.3f} mm, "
+                        f"{abs(off) / u:.0f} u_d0: see d0_mm of {network.campaign.mirror_of(ranger).zp}"
+                    )
+        if fit.name == HEADS and np.any(np.abs(fit.standardised) > network.settings.critical):
+            worst = int(np.argmax(np.abs(fit.standardised)))
+            called = network.layout.parameters[int(np.ravel(group.columns)[worst])]
+            notes.append(
+                f"{called}: not the mirror sheet's, the ranges contradict it (w {fit.standardised[worst]:.1f}, limit "
+                f"{network.settings.critical}); check the sheet's value and u"
+            )
+    notes += network.allowance.texts
+    left_out = max((states.neglected for states in network.states.values()), default=0.0)
+    if left_out > WEAK:
+        notes.append(
+            f"so many shots leave modes of the electronics to the shots' own errors, the strongest with "
+            f"{100.0 * left_out:.0f} % of their variance: shots between the same two references share that"
+        )
+    typed = [n for n, p in sorted(network.places.items()) if p.typed and count[n] >= 3]  # fewer do not place a point
+    moved = np.array([np.linalg.norm(solution.x[network.layout.columns(n)] - network.places[n].start) for n in typed])
+    unit = {t: triplet.triplet for triplet in network.campaign.triplets.values() for t in triplet.targets}
+    usual = float(np.median(moved)) / 1.538 if len(moved) > 5 else np.inf  # median of chi with 3 degrees of freedom
+    wrong = {
+        unit.get(n, n): d
+        for n, d in zip(typed, moved, strict=True)
+        if d > 4.0 * max(usual, network.places[n].u_start or 0.0)
+    }
+    notes += [
+        f"{n}: its typed position is {d / MILLIMETRE:.0f} mm off, the others' some {np.median(moved) / MILLIMETRE:.0f}"
+        for n, d in wrong.items()
+    ]
+    return notes
+
+
+def doubts_of(network: CampaignNetwork, solution: LeastSquaresSolution) -> tuple[str, ...]:
+    """Why the answer is not good: what had to be allowed for, and thermometers at the end of their priors."""
+    doubts = list(network.allowance.texts)
+    air = network.field
+    sigmas = network.allowance.sigmas(air)
+    for station, column, sigma in zip(air.stations, network.layout.air, sigmas, strict=False):
+        value = float(solution.x[column])
+        if abs(value) > DOUBTED_C * sigma:
+            doubts.append(f"{station}'s thermometer is biased by {value:+.2f} °C, {abs(value) / sigma:.1f} of its u")
+    return tuple(doubts)
+
+
+def sound_notes(
+    network: CampaignNetwork, solution: LeastSquaresSolution, ranges: RangeShots, sound: dict[str, tuple[float, float]]
+) -> list[str]:
+    """What each sounded line did to the index of its shots, and whether the ranges believe it."""
+    w = next((f.standardised for f in solution.fits if f.name == SOUND), np.zeros(0))
+    mjd = network.campaign.shots.mjd_utc[ranges.shot]
+    pairs = [frozenset(pair) for pair in zip(ranges.ranger, ranges.target, strict=True)]
+    return [
+        line.note(mjd[[pair == line.ends for pair in pairs]], sound[line.name], w_line, network.settings.critical)
+        for line, w_line in zip(network.field.lines, w, strict=True)
+    ]

@@ -1,0 +1,223 @@
+"""An adjustment repeated until it settles: cycles, air and strengths renewed, explanations judged."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from catseye.constants import MILLIMETRE
+from catseye.errors import EstimationError
+from catseye.estimation.least_squares.adjustment import (
+    CONVERGED,
+    LeastSquaresSolution,
+    SolverSettings,
+    adjust,
+)
+from catseye.estimation.least_squares.robust import OutlierSearch, adjust_robustly
+from catseye.estimation.observations.kinds import Linear, ObservationGroup
+from catseye.reduction.epoch.allowance import Allowance, for_families, for_the_air, refused
+from catseye.reduction.epoch.dish import dish_advice
+from catseye.reduction.epoch.parameter import Parameter, ParameterKind
+from catseye.reduction.epoch.ranges import Progress
+from catseye.reduction.epoch.self_check import self_checks, sortings
+from catseye.reduction.epoch.shots import ShotGroup, ShotParts, shot_group
+from catseye.reduction.epoch.unknowns import (
+    APPROXIMATE,
+    SOUND,
+    THERMOMETERS,
+    ZEROS,
+    CampaignNetwork,
+)
+
+PASSES = 6  # cap of passes in which cycles, incidence and air are renewed from the adjusted coordinates
+FIRST = 3  # passes that the first takes as long as, more
+TESTED = 2  # passes that search for wrong shots; later ones keep the choice, so that it cannot swing to and fro
+SEARCHED_C = 1.0  # °C, standard uncertainty of a thermometer's offset while wrong shots are searched for first
+JUDGED = 3  # times that what an adjustment says is judged, and adjusted again with what is allowed for
+STRENGTHENED = 2  # passes that look how strong the processes are; later ones keep the strengths
+SETTLED = 1e-6  # m, no coordinate moves further in the last pass,
+SETTLED_U = 0.1  # or than this share of its standard uncertainty: what is linearised there changes by its square
+UNSUSPICIOUS = 1.5  # variance factor, beyond which somebody is wrong though none stands out
+
+
+class SettledNetwork(NamedTuple):
+    """An adjustment that has settled.
+
+    network    with the strengths of its processes as they came out
+    solution   of all parameters
+    shots      of each ranger, as last seen
+    """
+
+    network: CampaignNetwork
+    solution: LeastSquaresSolution
+    shots: list[tuple[ShotGroup, ShotParts]]
+
+
+def settle_network(
+    network: CampaignNetwork,
+    starts: Mapping[str, np.ndarray],
+    progress: Progress | None = None,
+    *,
+    keep: float = 0.0,
+    predicted: bool = False,
+    active: list[np.ndarray] | None = None,
+) -> SettledNetwork:
+    """The adjustment repeated until cycles, incidence and air no longer change, with the shots as last seen.
+
+    network   with priors for whatever its shots do not hold
+    starts    point: (3,) m, where to begin instead of the layout's start
+    keep      m, added to what counts as settled: an epoch that is one of many need not be settled to a micrometre
+    active    selection to begin with, of the shots and what follows: no wrong ones are searched for from the start
+    predicted the priors know where everything is to a few of the shots' sigmas: wrong shots are searched for only where
+              one stands out, since none can hide behind another
+
+    Raises EstimationError where it finds no answer.
+    """
+    network = _holding_unseen(network)
+    layout, settings = network.layout, network.settings
+    x = np.array(layout.start)
+    for name, where in starts.items():
+        if name in layout.points:
+            x[layout.columns(name)] = where
+    free = np.array(layout.free)
+    points = [layout.columns(name) for name in network.places if name in layout.points]
+    coordinates = np.concatenate(points)
+    solution = None
+    advice: list[Linear] = []
+    solver, names = SolverSettings(border=network.border), layout.names
+    for turn in range(PASSES):
+        if progress is not None:
+            progress("adjustment", min(turn + FIRST * (turn > 0), PASSES - 1), PASSES)
+        shots = [shot_group(network.seen_from(name), name, x) for name in network.rangers]
+        searching = not turn and not predicted and active is None
+        priors = [_while_searching(p, network) for p in network.priors] if searching else network.priors
+        groups: list[ObservationGroup] = [group for group, _ in shots] + priors
+        removable = [_removable(g, network, shots=i < len(shots)) for i, g in enumerate(groups)]
+        if searching:
+            for g, may in zip(groups, removable, strict=True):
+                may &= g.name != THERMOMETERS
+        before, solution = x, None  # its covariance is large
+        if predicted and turn < TESTED and (active is None or all(a.all() for a in active)):
+            solution = adjust(x, groups, free=free, names=names, solver=solver)
+            predicted = _unsuspicious(solution, removable, settings.critical)
+            active = None
+        if turn < TESTED and not predicted:
+            solution = adjust_robustly(
+                x,
+                groups,
+                removable,
+                outliers=OutlierSearch(
+                    points=points,
+                    advice=advice,
+                    critical=settings.critical,
+                    shared=[part.shared_errors for _, part in shots],
+                ),
+                free=free,
+                active=active,
+                names=names,
+                border=network.border,
+            )
+        elif turn >= TESTED:
+            solution = adjust(x, groups, free=free, active=active, names=names, solver=solver)
+        assert solution is not None
+        x, active = solution.require_converged().x, [f.active for f in solution.fits]
+        if not turn:
+            advice = dish_advice(network, x, solution.q)
+        steady = True
+        if turn < STRENGTHENED:
+            strength = network.processes.estimated(solution, network.strength, [p.distance for _, p in shots])
+            steady = strength.near(network.strength)
+            network = network if steady else network.with_strength(strength)
+        moved = np.abs(x - before)[coordinates]
+        u = np.sqrt(solution.q.diagonal()[coordinates])
+        if turn and steady and np.all(moved < np.maximum(SETTLED + keep, SETTLED_U * u)):
+            break
+    else:
+        raise _unsettled(layout.parameters[coordinates[np.argmax(moved)]], float(moved.max()))
+    if progress is not None:
+        progress("adjustment", PASSES, PASSES)
+    assert solution is not None
+    return SettledNetwork(network, solution, shots)
+
+
+def _while_searching(prior: ObservationGroup, network: CampaignNetwork) -> ObservationGroup:
+    """A prior as the first search has it: thermometers that may be wrong are loose, not as wrong as no air could be."""
+    if prior.name != THERMOMETERS or not isinstance(prior, Linear):
+        return prior
+    loose = _removable(prior, network, shots=False)
+    return replace(prior, covariance=np.where(loose, np.maximum(prior.covariance, SEARCHED_C**2), prior.covariance))
+
+
+def _holding_unseen(network: CampaignNetwork) -> CampaignNetwork:
+    """The network that keeps the priors of thermometers whose air no certified path crosses.
+
+    Nothing else knows a scale: what the ranges seem to say of such a thermometer is what the air does that the model
+    does not know.
+    """
+    air, targets = network.field, network.campaign.shots.target
+    fired = {(name, targets[k]) for name in network.rangers for k in network.electronics[name].shots}
+    marks = [b for b in network.campaign.benchmarks if (b.ranger, b.target) in fired]
+    heights = [0.5 * (network.places[b.ranger].start[2] + network.places[b.target].start[2]) for b in marks]
+    seen = air.seen_from(np.array(heights))
+    unseen = {Parameter(ParameterKind.THERMOMETER, s) for s, on in zip(air.stations, seen, strict=True) if not on}
+    return replace(network, allowance=replace(network.allowance, held=network.allowance.held | unseen))
+
+
+def _removable(group: ObservationGroup, network: CampaignNetwork, *, shots: bool) -> np.ndarray:
+    """(m,) bool: which observations of a group may be left out."""
+    if shots or group.name not in (THERMOMETERS, ZEROS, SOUND):
+        return np.full(len(group.observed), shots)
+    owners = [network.layout.parameters[c] for c in np.ravel(group.columns).tolist()]
+    return np.array([owner not in network.allowance.held for owner in owners])
+
+
+def _unsettled(worst: Parameter, moved: float) -> EstimationError:
+    return EstimationError(
+        f"not settled: cycles, air and incidence still move {worst} by {moved / MILLIMETRE:.3f} mm after {PASSES} "
+        "passes; check its typed position"
+    )
+
+
+def _unsuspicious(solution: LeastSquaresSolution, removable: Sequence[np.ndarray], critical: float) -> bool:
+    """Whether every observation that may be wrong passes its test by half a sigma, and all together theirs."""
+    if not solution.solved or solution.status != CONVERGED:
+        return False
+    large = [np.abs(f.standardised[may]) > critical - 0.5 for f, may in zip(solution.fits, removable, strict=True)]
+    factor, _ = solution.variance_factor([f.name for f in solution.fits if f.name != APPROXIMATE])
+    return not any(each.any() for each in large) and factor < UNSUSPICIOUS
+
+
+def refuted_priors(settled: SettledNetwork) -> dict[Parameter, float]:
+    """Parameters whose priors were left out, and the values that the ranges give them."""
+    network, solution, shots = settled
+    found: dict[Parameter, float] = {}
+    for group, fit in zip(network.priors, solution.fits[len(shots) :], strict=True):
+        if fit.name in (THERMOMETERS, ZEROS, SOUND):
+            columns = np.ravel(group.columns)[~fit.active].tolist()
+            found |= {network.layout.parameters[c]: float(solution.x[c]) for c in columns}
+    return found
+
+
+def selection_of(settled: SettledNetwork, network: CampaignNetwork) -> list[np.ndarray]:
+    """What takes part in a network with the shots of one that has settled: the shots that took part there."""
+    count = len(settled.shots)
+    shots = [fit.active for fit in settled.solution.fits[:count]]
+    return [*shots, *(np.ones(len(prior.observed), dtype=bool) for prior in network.priors)]
+
+
+def allowed(settled: SettledNetwork) -> Allowance:
+    """What is to be allowed for after an adjustment: its explanations judged, its residuals averaged."""
+    network, solution, shots = settled
+    air, layout = network.field, network.layout
+    dropped, variance = refuted_priors(settled), solution.q.diagonal()
+    u = {n: float(np.sqrt(variance[c])) for n, c in zip(air.stations, layout.air, strict=False)}
+    allowance = refused(network.allowance, dropped, air, u, len(network.rangers))
+    if allowance.held != network.allowance.held:
+        return allowance
+    allowance = for_the_air(allowance, air, solution, layout.air, dropped=dropped)
+    own = {name: network.electronics[name].shots for name in network.rangers}
+    lines = [(p.name, p.electronics.shots, 1.0 + p.refractivity, p.distance) for _, p in shots]
+    groups = [*(g for g, _ in shots), *network.priors]
+    sorts = sortings(network.campaign, network.places, own)
+    return for_families(allowance, self_checks(groups, solution, sorts, lines))
