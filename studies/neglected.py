@@ -334,11 +334,18 @@ def air_effects(s: Night) -> Iterator[Effect]:
         "no, the bend has 0.03 °C: a shape exp(-z/10 m), 0.5 °C",
     )
 
-    yield Effect("pressure by 0.11 hPa/m", "1.5 % at 0 °C", fixed(_lapse(s, temperature, hpa)), "nothing")
+    yield Effect(
+        "pressure by 0.11 hPa/m", "1.5 % at 0 °C", fixed(_lapse(s, temperature, hpa)), "no: `hydrostatic_pressure_hpa`"
+    )
 
     vapour = vapour_pressure_hpa(*s.state(np.full(len(z), heights.mean())))
     wet = relative_humidity_percent(np.broadcast_to(vapour[:, None], z.shape), temperature, pressure)
-    yield Effect("humidity even in % upwards", "even in hPa", fixed(percent * s.mean(wet - humidity)), "nothing")
+    yield Effect(
+        "humidity even in % upwards",
+        "even in hPa",
+        fixed(percent * s.mean(wet - humidity)),
+        "no: even in vapour pressure",
+    )
 
     yield Effect("hygrometers, in common", "2 %", fixed(2.0 * percent), "thermometers' offsets")
     yield Effect("humidity of fog", "1 % above 100", fixed(percent), "nothing")

@@ -76,7 +76,8 @@ class Influence:
     def errors_of(self, patterns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """An error of each of k patterns (rows, k) in the observations, by itself: estimate (k,) and its u (k,).
 
-        Of the solution itself, before any row is left out. What the parameters take up wholly has an infinite u.
+        Of the solution itself, before any row is left out; patterns are 0 in inactive rows. What the parameters take up
+        wholly has an infinite u.
         """
         seen = np.sum(patterns * self._through(patterns).T, axis=0)
         usual = np.sum(patterns**2 * self.visible[:, None], axis=0)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
+LEAST_SHARE = 0.5  # of the usual noise: few readings far apart tell noise and wander apart badly
 FEWEST = 6  # readings that show strengths of their own
 STEPS = (2, 3)  # refinements of the likelihood's grid: each divides its step
 GRID = 5  # values of each time scale tried at first
@@ -130,7 +131,7 @@ def trend_strength(seconds: ArrayLike, values: ArrayLike, *, usual: TrendStrengt
     seconds       (n,) s, any order
     values        (n,)
     usual         what is taken of fewer than six readings
-    least_noise   of a reading: by rounding
+    least_noise   of a reading: by rounding; nor is it taken as less than half the usual
 
     Restricted maximum likelihood over two time scales, on a grid that is refined; the noise follows in closed form.
 
@@ -155,7 +156,7 @@ def trend_strength(seconds: ArrayLike, values: ArrayLike, *, usual: TrendStrengt
         width /= by
         near = [(best[0] + i * width, best[1] + j * width) for i in (-1, 0, 1) for j in (-1, 0, 1)]
         best = min((p for p in near if p[1] <= axes[1][-1]), key=lambda p: cost(*p))
-    variance = max(tried[best][1], least_noise**2)
+    variance = max(tried[best][1], least_noise**2, (LEAST_SHARE * usual.noise) ** 2)
     level, rate = (np.sqrt(variance * step / np.exp(k * v)) for k, v in zip((2.0, 4.0), best, strict=True))
     return TrendStrength(float(np.sqrt(variance)), float(level), float(rate))
 

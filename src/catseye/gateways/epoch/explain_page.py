@@ -30,7 +30,11 @@ GROUPS = (
     ("the samples", SERIES[0], ("noise", "amplitude", "steps")),
     ("the electronics", SERIES[1], ("reference", "references", "walk")),
     ("the head", SERIES[3], ("leakage", "d0", "axes", "coupling", "cyclic", "frequency")),
-    ("the air", SERIES[2], ("thermometer", "profile", "sound", "pressure", "humidity", "formula", "fluctuation")),
+    (
+        "the air",
+        SERIES[2],
+        ("thermometer", "profile", "sound", "pressure", "humidity", "formula", "unread", "fluctuation"),
+    ),
     ("the glass", SERIES[4], ("height", "ratio", "r1", "r2", "incidence", "across")),
 )
 

@@ -3,7 +3,7 @@
 `AirField` of `reduction.epoch.air.field` is the campaign's own air, a line in height and a mean over minutes, whose
 thermometer offsets the adjustment estimates. This is the independent one: no range enters, and what it does not know is
 in its covariance. On night-01, with the same formula, this one's paths are 0.13 ppm above AirField's in the mean and
-0.31 ppm at most: with two heights it cannot tell a lapse from a layer at the ground, and gives each its share where the
+0.35 ppm at most: with two heights it cannot tell a lapse from a layer at the ground, and gives each its share where the
 other takes a line. It claims 0.63 ppm a path, 0.57 ppm of that common to all (`tests/reduction/air/test_path_air.py`).
 """
 

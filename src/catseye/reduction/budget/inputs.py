@@ -274,7 +274,7 @@ def _air(scene: ShotScene) -> list[Item]:
         Item("formula", Input("formula of the index", 0.0, formula), "ppm", by_index * PPM, scene.settings.air_model),
         Item(
             "unread",
-            Input("air that no station reads, lag of the thermometers", 0.0, field.u_unread(scene.path)[0] / PPM),
+            Input("air that no station reads", 0.0, field.u_unread(scene.path)[0] / PPM),
             "ppm",
             by_index * PPM,
             "experience, before the ranges tell: docs/decisions/0017-air-as-a-process.md",

@@ -30,7 +30,6 @@ from catseye.reduction.epoch.settling import (
 )
 from catseye.reduction.epoch.strengths import ProcessStrength
 from catseye.reduction.epoch.unknowns import (
-    APPROXIMATE,
     build_network,
 )
 from catseye.reduction.site.places import RangedPoint
@@ -52,7 +51,7 @@ class AdjustedCoordinates:
     air          name: estimate and standard uncertainty of thermometer offsets (°C) and profile
     sound        line: what it is found to read too warm, °C, and u; for lines of path_temperatures.csv
     refractivity_ppm   mean group refractivity over the used paths
-    variance_factor, degrees_of_freedom   of everything but the typed positions
+    variance_factor, degrees_of_freedom   of everything but typed positions and instruments' limits
     fits         of all groups, for reports
     notes        what a person should know, one line each
     unresolved   index into the campaign's shots: why its whole cycles cannot be known; such shots are not in `ranges`
@@ -161,7 +160,7 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCo
     for ranger, target, used in zip(ranges.ranger, ranges.target, ranges.used, strict=True):
         count[ranger] += int(used)
         count[target] += int(used)
-    judged = [f.name for f in solution.fits if f.name != APPROXIMATE]
+    judged = [f.name for f in solution.fits if f.name not in UNJUDGED]
     factor, degrees = solution.variance_factor(judged)
 
     variance = solution.q.diagonal()

@@ -23,7 +23,6 @@ from catseye.reduction.epoch.ranges import Progress
 from catseye.reduction.epoch.self_check import self_checks, sortings
 from catseye.reduction.epoch.shots import ShotGroup, ShotParts, shot_group
 from catseye.reduction.epoch.unknowns import (
-    APPROXIMATE,
     SOUND,
     THERMOMETERS,
     ZEROS,
@@ -184,7 +183,7 @@ def _unsuspicious(solution: LeastSquaresSolution, removable: Sequence[np.ndarray
     if not solution.solved or solution.status != CONVERGED:
         return False
     large = [np.abs(f.standardised[may]) > critical - 0.5 for f, may in zip(solution.fits, removable, strict=True)]
-    factor, _ = solution.variance_factor([f.name for f in solution.fits if f.name != APPROXIMATE])
+    factor, _ = solution.variance_factor([f.name for f in solution.fits if f.name not in UNJUDGED])
     return not any(each.any() for each in large) and factor < UNSUSPICIOUS
 
 

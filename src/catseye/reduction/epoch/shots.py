@@ -35,6 +35,8 @@ class ShotParts:
     head               what the ranger's head asks to add to the range: `head.at(x)` with the estimated parameters
     distance           m, of the adjusted points
     variance           m^2, of the optical length, with all that it shares with other shots
+    lasting            parameters of the telescope's motion since the middle and of averages that are allowed for, -1 for
+                       none; and the derivatives of the optical length by them, m
     shared             parameters that stand for what it shares, -1 for none; and the derivatives of the optical length
                        by them, m: of a large campaign, else none
     """
@@ -53,7 +55,13 @@ class ShotParts:
     head: HeadCorrections
     distance: np.ndarray
     variance: np.ndarray
+    lasting: tuple[np.ndarray, np.ndarray]
     shared: tuple[np.ndarray, np.ndarray]
+
+    def lasting_error(self, x: np.ndarray) -> np.ndarray:
+        """(m,) m, that the optical lengths have beyond the points, as the parameters x have it."""
+        columns, slopes = self.lasting
+        return np.asarray(np.sum(np.where(columns < 0, 0.0, x[columns]) * slopes, axis=1))
 
     @property
     def shared_errors(self) -> SharedErrors | None:
@@ -145,6 +153,7 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
     )
     zero = x[layout.at[Parameter(ParameterKind.ZERO, name)]]
     expanding, grown = _expansion(network, name, targets, sights)
+    families = _families(network, name, n, distance)
     expansion = np.sum(np.where(expanding < 0, 0.0, x[expanding]) * grown, axis=1)
     coarse = n * (distance + expansion - glass - obliquity - d0 - zero - head.at(x))
     cycles, margin = whole_cycles(coarse, phase, half)
@@ -168,6 +177,10 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
         head=head,
         distance=distance,
         variance=variance + jitter,
+        lasting=(
+            np.concatenate([expanding, families[0]], axis=1),
+            np.concatenate([n[:, None] * grown, families[1]], axis=1),
+        ),
         shared=shared,
     )
     offset = (
@@ -251,8 +264,6 @@ def _nuisance(
     layout, targets, m = network.layout, parts.target, len(parts.target)
     n = 1.0 + parts.refractivity
     paths = np.array([[layout.at.get(Parameter(ParameterKind.PATH, parts.name, t), -1)] for t in targets])  # -1: none
-    moving, moved = _expansion(network, parts.name, targets, sights)
-    families = _families(network, parts.name, n, distance)
     constants = [Parameter(ParameterKind.GLASS, t) for t in targets]
     has_rest = np.array([c in layout.at for c in constants])
     rest = np.array([layout.at.get(c, -1) for c in constants])
@@ -262,8 +273,7 @@ def _nuisance(
         np.broadcast_to(layout.columns(Parameter(ParameterKind.LEAKAGE, parts.name), 2), (m, 2)),
         np.broadcast_to(layout.air[:lasting], (m, lasting)),
         layout.air[air.columns],
-        moving,
-        families[0],
+        parts.lasting[0],
         normals[0],
         rest[:, None],
         parts.head.columns,
@@ -275,8 +285,7 @@ def _nuisance(
         parts.leakage_slope,
         distance[:, None] * air.slopes,
         distance[:, None] * air.column_slopes,
-        n[:, None] * moved,
-        families[1],
+        parts.lasting[1],
         -n[:, None] * normals[1],
         (-n * has_rest)[:, None],
         -n[:, None] * parts.head.slopes,

@@ -26,7 +26,7 @@ AIR_BETWEEN = "air between stations and paths"
 AIR_ACROSS = "air across the site"
 ERRORS = "thermometers' lag and sunshine"
 EXPANSION = "telescope's expansion"
-PROCESSES = (AIR_BETWEEN, AIR_ACROSS, ERRORS, EXPANSION)
+PROCESSES = (AIR_BETWEEN, AIR_ACROSS, EXPANSION)  # of estimated strength
 EXPERIENCE = 6.0  # observations that the strength of experience is worth
 WIDE_PPM = 0.1  # of eddies, where nothing is known yet
 LITTLE_PPM, MOST_PPM = 0.05, 2.0  # of eddies: with less, little changes; more, no air holds
@@ -89,7 +89,7 @@ class Processes:
             (knots[:k], knots[k:].reshape(2, -1)),
             np.array(errors, dtype=int),
             telescope,
-            np.array(moving, dtype=int).reshape(-1, count),
+            np.array(moving, dtype=int).reshape(len(moving), count),
         )
 
     def priors(self, strength: ProcessStrength) -> list[Linear]:
@@ -150,7 +150,7 @@ class Processes:
 
 def with_processes(priors: list, processes: Processes, strength: ProcessStrength) -> list:
     """Priors of a network with those of its processes at other strengths."""
-    new = iter(processes.priors(strength))
+    new = iter([prior for prior in processes.priors(strength) if prior.name in PROCESSES])
     return [next(new) if prior.name in PROCESSES else prior for prior in priors]
 
 

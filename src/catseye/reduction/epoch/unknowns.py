@@ -34,6 +34,7 @@ SOUND = "path temperatures"
 ZEROS = "ranger zeros"
 LIMITS = "instruments' limits"
 FAMILIES_PRIOR = "unexplained averages"
+UNJUDGED = (APPROXIMATE, LIMITS)  # priors that say little on purpose and count in no variance factor
 HEADS = "head effects"
 PATHS = "lasting paths"
 POSTURE = "bodies off their posture"

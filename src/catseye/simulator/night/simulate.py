@@ -195,7 +195,7 @@ def _site(
 
 
 def _plan(site: NightSite, rule: Schedule, faults: Faults, streams: Streams) -> dict[str, list[ScheduledShot]]:
-    """Shots of every ranger."""
+    """Shots that every ranger is to fire, in its own time."""
     telescope = site.telescope
     lists = ground_targets(
         rule, monuments=site.monuments, telescope=telescope, marks=site.marks, pose=site.pose, streams=streams

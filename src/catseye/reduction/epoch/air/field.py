@@ -27,7 +27,7 @@ MOST_KEPT = 64  # sets of times whose states are kept: one a ranger, and more
 MUCH_C = 2.0  # °C, an offset of a thermometer worth telling
 LEAST_HPA = 600.0
 NODES = 5  # of the quadrature along a path: 1e-12 for straight profiles over 200 m
-FAIR_SHARE = 0.3  # of a station's temperature in a path's, from which the path knows it
+FAIR_SHARE = 0.3  # of a station's temperature in a path's, of two stations, from which the path knows it
 HALF = 0.5  # °C on either side, over which slopes are taken
 
 
@@ -341,7 +341,9 @@ class AirField:
         """(stations,) bool: whether paths at heights (k,) m have a fair share of each station's air."""
         if not len(heights):
             return np.zeros(len(self.heights), dtype=bool)
-        return np.asarray(np.max(self._shares(heights[None])[0][0], axis=0) > FAIR_SHARE)
+        return np.asarray(
+            np.max(self._shares(heights[None])[0][0], axis=0) > FAIR_SHARE * min(1.0, 2.0 / len(self.heights))
+        )
 
     def across(self, values: np.ndarray) -> np.ndarray:
         """(2,) °C/m, mean gradient towards the east and the north; values (p,) of `parameters`."""
