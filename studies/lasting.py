@@ -113,7 +113,7 @@ def draw(memory: Path, late: Path, folder: Path) -> None:
         right.annotate(f"limit {limit:.0f} ms", (0.0, limit), color=BAD, va="bottom")
         right.set(xlabel="time, min", ylabel="end of a buffer to durable, ms, of each 10 s", yscale="log")
         right.set_title(
-            f"{len(ms)} shots: p99 {np.percentile(ms, 99):.1f} ms, {np.percentile(quiet, 99):.1f} where little is stolen",
+            f"{len(ms)} shots: p99 {np.percentile(ms, 99):.1f} ms, {np.percentile(quiet, 99):.1f} little stolen",
             loc="left",
         )
         right.legend(loc="upper right")

@@ -31,8 +31,8 @@ from catseye.geometry.mirror.mirror_path import direction_angles, path_change
 from catseye.optics.glass import glass_named, temperature_slopes
 from catseye.optics.retroreflector.prism import obliquity_correction
 from catseye.records.night.campaign import REFERENCE, read_campaign
-from catseye.reduction.epoch import air as air_module
 from catseye.reduction.epoch import coordinates
+from catseye.reduction.epoch.air import field as air_module
 from catseye.reduction.epoch.parameter import BEND, Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
 from catseye.reduction.epoch.settings import ReductionSettings
@@ -930,6 +930,8 @@ def main() -> None:
 
 def study(settled: SettledNetwork, out: str) -> list[Row]:
     """The table printed, the figure drawn."""
+    if not settled.network.states:
+        sys.exit("errors that shots share are no parameters of so few shots: take 200 prisms or more")
     night = Night(settled)
     common = Common.of_network(night.network, night.x)
     networks, moved = [], np.zeros(len(common.names))

@@ -30,6 +30,7 @@ from catseye.reduction.epoch.settling import (
 )
 from catseye.reduction.epoch.strengths import ProcessStrength
 from catseye.reduction.epoch.unknowns import (
+    UNJUDGED,
     build_network,
 )
 from catseye.reduction.site.places import RangedPoint

@@ -30,8 +30,8 @@ class RangeShots:
     incidence         rad, on a prism's face; 0 for others
     glass, obliquity  Pc (with what was estimated of it) and dPc, metres
     zero, leakage     estimated corrections of the ranger's zero and of the rest of its leakage, to the range
-    moved             what brings the range to the campaign's middle: the telescope's expansion and shift, and averages of
-                      many shots that are allowed for
+    moved             what brings the range to the campaign's middle: the telescope's expansion and shift, and averages
+                      of many shots that are allowed for
     head              what the mirror's axes, the coupling of amplitude to phase and cyclic terms add to the range
     range_            distance scan point to target as this shot gives it, all corrections applied
     u_range           its standard uncertainty: noise, electronics and path; systematic parameters not counted

@@ -25,6 +25,7 @@ from catseye.reduction.epoch.shots import ShotGroup, ShotParts, shot_group
 from catseye.reduction.epoch.unknowns import (
     SOUND,
     THERMOMETERS,
+    UNJUDGED,
     ZEROS,
     CampaignNetwork,
 )

@@ -35,8 +35,8 @@ class ShotParts:
     head               what the ranger's head asks to add to the range: `head.at(x)` with the estimated parameters
     distance           m, of the adjusted points
     variance           m^2, of the optical length, with all that it shares with other shots
-    lasting            parameters of the telescope's motion since the middle and of averages that are allowed for, -1 for
-                       none; and the derivatives of the optical length by them, m
+    lasting            parameters of the telescope's motion since the middle and of averages that are allowed for, -1
+                       for none; and the derivatives of the optical length by them, m
     shared             parameters that stand for what it shares, -1 for none; and the derivatives of the optical length
                        by them, m: of a large campaign, else none
     """
