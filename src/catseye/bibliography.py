@@ -304,6 +304,11 @@ SOURCES: dict[str, Source] = {
         locator="Allgemeine Vermessungs-Nachrichten 86, pages 446-453",
         used="the fixed point of variance components",
     ),
+    "SCHMIDT66": Source(
+        title="S. F. Schmidt, Application of state-space methods to navigation problems, 1966",
+        locator="doi:10.1016/B978-1-4831-6716-9.50011-4",
+        used="consider parameters: a covariance that takes in what is not estimated",
+    ),
     "PATTERSON71": Source(
         title="H. D. Patterson and R. Thompson, Recovery of inter-block information, 1971",
         locator="doi:10.1093/biomet/58.3.545",

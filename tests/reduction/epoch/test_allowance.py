@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 from catseye.estimation.least_squares.adjustment import adjust
 from catseye.estimation.observations.kinds import Linear
@@ -232,7 +233,7 @@ def test_a_station_whose_place_is_said_is_not_and_neither_is_any_in_even_air():
 # -- the same allowance -----------------------------------------------------------------------------------------------
 
 
-def test_allowances_are_the_same_where_nothing_more_is_allowed_for():
+def test_another_adjustment_is_asked_for_by_priors_and_families_and_by_no_doubt_that_is_only_considered():
     one = Allowance(
         held=frozenset([thermometer("WX1")]), thermometers={"WX2": 1.0}, profile=0.3, families={HEIGHT: 0.5}
     )
@@ -240,10 +241,43 @@ def test_allowances_are_the_same_where_nothing_more_is_allowed_for():
     assert dataclasses.replace(one, thermometers={"WX2": 1.09}).same(one)  # to a tenth
     assert dataclasses.replace(one, thermometers={"WX2": 0.5}).same(one)
     assert not dataclasses.replace(one, thermometers={"WX2": 1.2}).same(one)
-    assert not dataclasses.replace(one, thermometers={"WX2": 1.0, "WX1": 0.4}).same(one)
+    assert dataclasses.replace(one, thermometers={"WX2": 1.0, "WX1": 4.0}).same(one)  # held: its record stays
+    assert dataclasses.replace(one, profile=0.6).same(one)
     assert not dataclasses.replace(one, held=frozenset()).same(one)
     assert not dataclasses.replace(one, families={HEIGHT: 0.5, TIME: 0.1}).same(one)
-    assert not dataclasses.replace(one, profile=0.6).same(one)
+
+
+def test_a_doubt_that_is_considered_widens_by_what_a_prior_moves_the_answer():
+    """Against adjusting again with the prior's value moved by one standard uncertainty of the doubt."""
+    air = field()
+    every, rng = np.arange(air.count), np.random.default_rng(4)
+    ranges = Linear(
+        "ranges", rng.normal(size=40), np.full(40, 0.04), every, rng.normal(size=(40, air.count)) / np.sqrt(air.count)
+    )
+
+    def adjusted(offset_c):
+        values, sigma = np.zeros(air.count), np.full(air.count, 0.5)
+        values[1], sigma[:3] = offset_c, air.sigmas
+        return adjust(np.zeros(air.count), [ranges, Linear("all", values, sigma**2, every, np.eye(air.count))])
+
+    doubted = Allowance(held=frozenset([thermometer("WX2")]), thermometers={"WX2": 1.5})
+    np.testing.assert_array_equal(doubted.priors(air), air.sigmas)
+    plain, moved = adjusted(0.0), adjusted(np.sqrt(1.5**2 - SIGMA_C**2))
+    shift = moved.x - plain.x
+    found = doubted.considered(air, plain, every)
+    whole = plain.q.matrix() + np.outer(shift, shift)
+    np.testing.assert_allclose(found.q.matrix(), whole, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.q.diagonal(), np.diag(whole), rtol=1e-9)
+    some = np.array([0, 1, 5])
+    np.testing.assert_allclose(found.q.within(some), whole[np.ix_(some, some)], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.q.across(some), whole[:, some], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.q.blocks(np.array([2]))[0], whole[2:5, 2:5], rtol=1e-9, atol=1e-12)
+    rows, a = np.array([[1, 4, -1]]), np.array([[0.5, -2.0, 7.0]])
+    np.testing.assert_allclose(found.q.products(rows, a)[0, :2], whole[[1, 4]][:, [1, 4]] @ a[0, :2], rtol=1e-9)
+    np.testing.assert_allclose(found.q.solve(np.ones(air.count)), whole @ np.ones(air.count), rtol=1e-9)
+    sparse = csr_array(np.eye(air.count)[some])
+    np.testing.assert_allclose(found.q.carried(sparse), whole[np.ix_(some, some)], rtol=1e-9, atol=1e-12)
+    assert NOTHING.considered(air, plain, every) is plain
 
 
 def test_an_allowance_never_claims_less_than_the_records():

@@ -220,6 +220,46 @@ class Transformed:
 
 
 @dataclass(frozen=True, eq=False)
+class Widened:
+    """A covariance and what else is considered: Q + R R'.
+
+    inner   Q
+    reach   (n, d): what all parameters move by, for one standard uncertainty of each thing considered
+    """
+
+    inner: Covariance
+    reach: np.ndarray
+
+    def matrix(self) -> np.ndarray:
+        return self.inner.matrix() + self.reach @ self.reach.T
+
+    def across(self, columns: np.ndarray) -> np.ndarray:
+        return self.inner.across(columns) + self.reach @ self.reach[columns].T
+
+    def within(self, columns: np.ndarray) -> np.ndarray:
+        return self.inner.within(columns) + self.reach[columns] @ self.reach[columns].T
+
+    def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
+        part = np.where((columns < 0)[..., None], 0.0, self.reach[columns])
+        both = np.einsum("mw,mwd->md", np.where(columns < 0, 0.0, a), part)
+        return self.inner.products(columns, a) + np.einsum("mwd,md->mw", part, both)
+
+    def blocks(self, first: np.ndarray) -> np.ndarray:
+        part = self.reach[first[:, None] + np.arange(3)]
+        return self.inner.blocks(first) + np.einsum("kid,kjd->kij", part, part)
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        return np.asarray(self.inner.solve(b) + self.reach @ (self.reach.T @ b))
+
+    def carried(self, matrix: sparray) -> np.ndarray:
+        moved = np.asarray(matrix @ self.reach)
+        return self.inner.carried(matrix) + moved @ moved.T
+
+    def diagonal(self) -> np.ndarray:
+        return self.inner.diagonal() + np.sum(self.reach**2, axis=1)
+
+
+@dataclass(frozen=True, eq=False)
 class JointPoints:
     """The joint covariance of p points, of which only what is asked for is computed.
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
+from catseye.estimation.least_squares.covariance import Widened
 from catseye.reduction.epoch.air.field import AirField
 from catseye.reduction.epoch.parameter import BEND, Parameter, ParameterKind
 from catseye.reduction.epoch.self_check import Family, FamilyCheck
@@ -31,8 +32,8 @@ class Allowance:
     """What is allowed for beyond the records.
 
     held           priors that stay, whatever the ranges say
-    thermometers   station: °C, standard uncertainty of its offset
-    profile        of the profile's parameter; 0: as the settings say
+    thermometers   station: °C, standard uncertainty of its offset with what is doubted of it
+    profile        the same of the profile's parameter; 0: as the settings say
     families       of `self_check`: standard deviation of the error that each bin's shots share, unit of the family
     texts          why, a sentence each
     """
@@ -44,23 +45,55 @@ class Allowance:
     texts: tuple[str, ...] = ()
 
     def same(self, other: "Allowance") -> bool:
-        """Whether nothing more is allowed for, to a tenth."""
+        """Whether no other adjustment is asked for, to a tenth: what is only considered moves none."""
         return (
             self.held == other.held
             and self.families.keys() == other.families.keys()
-            and self.thermometers.keys() == other.thermometers.keys()
-            and all(v <= 1.1 * other.thermometers[n] for n, v in self.thermometers.items())
-            and self.profile <= 1.1 * other.profile
+            and all(u <= 1.1 * other.thermometers.get(n, 0.0) for n, u in self._loose.items())
         )
 
+    @property
+    def _loose(self) -> dict[str, float]:
+        """Thermometers whose priors are loosened: of the others the records stay, and their doubt is considered."""
+        kept = {p.of for p in self.held if p.kind is ParameterKind.THERMOMETER}
+        return {n: u for n, u in self.thermometers.items() if n not in kept}
+
     def sigmas(self, air: AirField) -> np.ndarray:
-        """Standard uncertainties of the air's lasting parameters."""
-        sigmas = air.sigmas.copy()
+        """Standard uncertainties of the air's lasting parameters with all that is doubted of them."""
+        sigmas = self.priors(air)
         for i, station in enumerate(air.stations):
             sigmas[i] = max(sigmas[i], self.thermometers.get(station, 0.0))
         at = len(air.stations)
         sigmas[at] = max(sigmas[at], self.profile)
         return sigmas
+
+    def priors(self, air: AirField) -> np.ndarray:
+        """The same as an adjustment takes them.
+
+        A doubt of what the ranges do not know would let them say it: by what the model does not know of the air. So
+        the answer keeps to the record, and its covariance takes the doubt in.
+        """
+        sigmas = air.sigmas.copy()
+        for i, station in enumerate(air.stations):
+            sigmas[i] = max(sigmas[i], self._loose.get(station, 0.0))
+        return sigmas
+
+    def considered(self, air: AirField, solution: LeastSquaresSolution, columns: np.ndarray) -> LeastSquaresSolution:
+        """The solution whose covariance takes in what the priors' own values may be off by.
+
+        columns   of the air's parameters
+
+        A prior of sigma s that is off by d moves all parameters by Q d / s^2.
+
+        Source: consider parameters, [SCHMIDT66].
+        """
+        taken = self.priors(air)
+        doubt = np.sqrt(np.maximum(self.sigmas(air) ** 2 - taken**2, 0.0))
+        at = np.flatnonzero(doubt > 0.0)
+        if not len(at):
+            return solution
+        reach = solution.q.across(columns[at]) * (doubt[at] / taken[at] ** 2)
+        return replace(solution, q=Widened(solution.q, reach))
 
 
 NOTHING = Allowance()

@@ -1,7 +1,7 @@
 """From phases to coordinates: one adjustment of points, ranger zeros, leakage, air and prism normals together."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -135,8 +135,9 @@ def adjust_coordinates(
         raise InputError(f"shots.csv: {why}; nothing to adjust")
     settled = settle_network(network, resolved.starts, progress)
     for _ in range(JUDGED):
-        allowance = allowed(settled)
-        if allowance.same(settled.network.allowance):
+        allowance, before = allowed(settled), settled.network.allowance
+        settled = settled._replace(network=replace(settled.network, allowance=allowance))
+        if allowance.same(before):
             break
         network = build_network(
             campaign, phases, settled.network.electronics, settings=settings, allowance=allowance
@@ -153,10 +154,11 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCo
     resolved   what was known of whole cycles before
     """
     network, solution, shots = settled
+    ranges = ranges_of(network, solution, shots)
+    solution = network.allowance.considered(network.field, solution, network.layout.air)
     layout, campaign = network.layout, network.campaign
     names = sorted([*network.places, *(str(Parameter(ParameterKind.FIXED_POINT, m)) for m in campaign.monuments)])
     columns = np.array([layout.columns(n) for n in names])
-    ranges = ranges_of(network, solution, shots)
     count = dict.fromkeys(names, 0)
     for ranger, target, used in zip(ranges.ranger, ranges.target, ranges.used, strict=True):
         count[ranger] += int(used)

@@ -395,7 +395,7 @@ def _priors(
     allowance: Allowance,
 ) -> list[ObservationGroup]:
     count = len(air.stations)
-    at, sigmas = layout.air, allowance.sigmas(air)
+    at, sigmas = layout.air, allowance.priors(air)
     priors = [
         *_survey(campaign, seen, layout),
         *_heads(campaign, layout),
