@@ -189,7 +189,7 @@ def test_a_steep_gradient_of_which_both_thermometers_are_known_still_bends_and_i
     assert found.thermometers == {}
     assert found.profile == pytest.approx(np.hypot(SIGMA_BEND, BEND_OF_GRADIENT * 3.0), rel=1e-6)
     assert found.texts
-    assert not found.same(NOTHING)  # else the adjustment goes on without either
+    assert found.same(NOTHING)  # the answer keeps to the records, its covariance takes the doubt in
 
 
 def test_judged_again_the_text_is_the_newer_and_no_uncertainty_shrinks():
