@@ -139,13 +139,13 @@ def test_few_readings_show_no_strength_of_their_own():
     assert trend_strength(again, again**2, usual=USUAL, least_noise=0.003) is USUAL
 
 
-def test_constant_readings_have_the_noise_of_their_rounding_and_stay_constant():
+def test_constant_readings_have_seven_tenths_of_the_usual_noise_and_stay_constant():
     seconds = np.arange(0.0, 3600.0, 30.0)
     strength = trend_strength(seconds, np.full(len(seconds), 11.3), usual=USUAL, least_noise=0.003)
-    assert strength.noise == pytest.approx(0.003)
+    assert strength.noise == pytest.approx(0.7 * USUAL.noise)
     found = trend_of(seconds, np.full(len(seconds), 11.3), strength)
     np.testing.assert_allclose(found.at(seconds + 7.0), 11.3, rtol=0, atol=1e-12)
-    assert np.all(np.diag(found.covariance(seconds)) <= 0.003**2 * (1 + 1e-6))
+    assert np.all(np.diag(found.covariance(seconds)) <= strength.noise**2 * (1 + 1e-6))
 
 
 def drawn(rng, seconds, strength):

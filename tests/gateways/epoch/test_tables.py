@@ -122,6 +122,7 @@ def test_every_column_of_the_ranges_has_the_unit_of_its_name(reduction):
         "obliquity_mm": ranged(lambda k: ranges.obliquity[k]),
         "leakage_mm": ranged(lambda k: ranges.leakage[k]),
         "head_mm": ranged(lambda k: ranges.head[k]),
+        "moved_mm": ranged(lambda k: ranges.moved[k]),
         "range_m": ranged(lambda k: ranges.range_[k]),
         "u_range_mm": ranged(lambda k: ranges.u_range[k]),
         "residual_mm": ranged(lambda k: ranges.residual[k]),

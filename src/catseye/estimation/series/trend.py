@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
-LEAST_SHARE = 0.5  # of the usual noise: few readings far apart tell noise and wander apart badly
+LEAST_SHARE = 0.7  # of the usual noise: few readings far apart tell noise and wander apart badly
 FEWEST = 6  # readings that show strengths of their own
 STEPS = (2, 3)  # refinements of the likelihood's grid: each divides its step
 GRID = 5  # values of each time scale tried at first
@@ -131,7 +131,7 @@ def trend_strength(seconds: ArrayLike, values: ArrayLike, *, usual: TrendStrengt
     seconds       (n,) s, any order
     values        (n,)
     usual         what is taken of fewer than six readings
-    least_noise   of a reading: by rounding; nor is it taken as less than half the usual
+    least_noise   of a reading: by rounding; nor is it taken as less than seven tenths of the usual
 
     Restricted maximum likelihood over two time scales, on a grid that is refined; the noise follows in closed form.
 

@@ -37,7 +37,7 @@ SEARCHED_C = 1.0  # °C, standard uncertainty of a thermometer's offset while wr
 JUDGED = 3  # times that what an adjustment says is judged, and adjusted again with what is allowed for
 STRENGTHENED = 2  # passes that look how strong the processes are; later ones keep the strengths
 SETTLED = 1e-6  # m, no coordinate moves further in the last pass,
-SETTLED_U = 0.1  # or than this share of its standard uncertainty: what is linearised there changes by its square
+SETTLED_U = 0.02  # or than this share of its standard uncertainty: what is linearised there changes by its square
 UNSUSPICIOUS = 1.5  # variance factor, beyond which somebody is wrong though none stands out
 
 
@@ -138,6 +138,7 @@ def settle_network(
     if progress is not None:
         progress("adjustment", PASSES, PASSES)
     assert solution is not None
+    shots = [shot_group(network.seen_from(name), name, x) for name in network.rangers]  # as they are told
     return SettledNetwork(network, solution, shots)
 
 
