@@ -239,7 +239,7 @@ def estimated(every, group, count, before):
 
 def test_a_campaigns_strengths_are_recovered_where_everything_is_seen():
     rng = np.random.default_rng(8)
-    truth = ProcessStrength(AirStrength(0.25, 0.1, 0.08, 0.04, 0.008), telescope=(2.0, 3.0, 1.0, 4.0, 0.5))
+    truth = ProcessStrength(AirStrength(0.25, 0.1, 0.08, 0.04, 0.008), telescope=(2.0, 3.0, 4.0, 4.0, 0.5))
     found, spread = [], []
     for _ in range(12):
         every, group, count = seen_processes(rng, truth, sigma=0.01)
@@ -249,8 +249,9 @@ def test_a_campaigns_strengths_are_recovered_where_everything_is_seen():
     # Parts of minutes and of quarters of an hour hide each other; what both make from knot to knot does not. Fifty
     # knots and six of experience at a third of the strength: 15 % low, and a tenth of scatter over three.
     np.testing.assert_allclose(np.mean(spread, axis=0), spreads(every, truth), rtol=0.25)
-    # twice 25 knots that forget in six, and four steps of each walk, beside six of experience at the usual strength
-    seen = np.array([24, 4, 4, 4, 4, 4], dtype=float)
+    # twice 25 knots that forget in six, and four steps of each walk, beside six of experience at the usual strength;
+    # east and north are of one strength
+    seen = np.array([24, 4, 4, 8, 8, 4], dtype=float)
     true, usual = np.array([0.008, *truth.telescope]), np.array([USUAL.across_c_per_m, *(1.0,) * 5])
     expected = np.sqrt((seen * true**2 + EXPERIENCE * usual**2) / (seen + EXPERIENCE))
     # the mean square of twelve times four steps scatters by a fifth, its root by a tenth

@@ -20,7 +20,7 @@ from catseye.estimation.observations.kinds import Linear
 from catseye.reduction.epoch.air.field import AirField
 from catseye.reduction.epoch.air.process import LEAST, MOST, U_LAG, U_RADIATION, USUAL, WIDE, AirStrength
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
-from catseye.reduction.epoch.telescope_motion import LEAST_WALK, MOST_WALK, PARTS, WALK, TelescopeKnots
+from catseye.reduction.epoch.telescope_motion import ALIKE, LEAST_WALK, MOST_WALK, PARTS, WALK, TelescopeKnots
 
 AIR_BETWEEN = "air between stations and paths"
 AIR_ACROSS = "air across the site"
@@ -143,9 +143,20 @@ class Processes:
             yield from before.telescope
             return
         shape = self.telescope.covariance
-        for columns, factor, walk in zip(self.moving, before.telescope, WALK, strict=True):
-            own = _Shown.of(solution, columns, (factor * walk) ** 2 * shape, 0.0 * shape, [walk**2 * shape])
-            yield from _climbed([own], np.array([factor]), np.ones(1), low=(LEAST_WALK,), high=(MOST_WALK,))
+        for together in ALIKE:
+            factor = before.telescope[together[0]]
+            own = [
+                _Shown.of(
+                    solution,
+                    self.moving[i],
+                    (factor * WALK[i]) ** 2 * shape,
+                    np.zeros_like(shape),
+                    [WALK[i] ** 2 * shape],
+                )
+                for i in together
+            ]
+            (found,) = _climbed(own, np.array([factor]), np.ones(1), low=(LEAST_WALK,), high=(MOST_WALK,))
+            yield from [found] * len(together)
 
 
 def with_processes(priors: list, processes: Processes, strength: ProcessStrength) -> list:

@@ -22,6 +22,7 @@ SHORTEST = 900.0  # s, of a campaign in which nothing expands that a range sees
 PARTS = ("scale", "dish scale", "east", "north", "up")
 UNITS = (PPM, PPM, MILLIMETRE, MILLIMETRE, MILLIMETRE)
 WALK = (3.0, 1.0, 0.05, 0.05, 0.05)  # a root hour, ppm and mm: a quarter of a degree of steel; a foundation
+ALIKE = ((0,), (1,), (2, 3), (4,))  # parts of one strength: no direction on the ground is another
 LEAST_WALK, MOST_WALK = 0.02, 30.0  # factors on these
 
 
