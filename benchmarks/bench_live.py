@@ -212,7 +212,7 @@ async def measured(options: argparse.Namespace, folder: Path) -> list[Result]:
 
 
 class Machine(threading.Thread):
-    """What the machine does meanwhile, until stopped: (kind, `time.monotonic`, ms)."""
+    """Record of the machine's own delays until stopped: (kind, `time.monotonic`, ms)."""
 
     def __init__(self, path: Path):
         super().__init__(daemon=True)

@@ -1,4 +1,4 @@
-"""How far new answers are from the stored ones: in their unit, and in their stored standard uncertainties."""
+"""Distance of new answers from the stored ones, in their unit and in their stored standard uncertainties."""
 
 import math
 from collections import defaultdict
@@ -29,7 +29,7 @@ class Moving(Enum):
 
 @dataclass(frozen=True)
 class Furthest:
-    """What moved furthest: how far, of what, in which epoch (None: behind the last)."""
+    """Largest movement of a kind: size, name, epoch (None: after the last)."""
 
     size: float
     name: str

@@ -66,7 +66,7 @@ class ShotComparisons:
 
     @property
     def sameness(self) -> Sameness:
-        """Of the one that is least the same."""
+        """Sameness of the least similar shot."""
         if self.differing:
             return Sameness.DIFFERENT
         return Sameness.TEXTS if self.reworded else Sameness.IDENTICAL
@@ -91,12 +91,12 @@ class Replayed:
 
     @property
     def sameness(self) -> Sameness:
-        """Of the solution and its shots together."""
+        """Sameness of the solution and its shots together."""
         return least_same((self.solution.sameness, self.shots.sameness))
 
     @property
     def same(self) -> bool:
-        """Whether all numbers, reason codes and statuses are as they were, to the last bit; texts apart."""
+        """True where all numbers, reason codes and statuses are unchanged to the last bit; texts apart."""
         return self.sameness is not Sameness.DIFFERENT
 
 

@@ -21,7 +21,7 @@ COVARIANCE = "covariance"
 
 
 class Sameness(StrEnum):
-    """How an answer that was made again is like the stored one; the value is what people read."""
+    """Likeness of a repeated answer to the stored one; the value is the text for people."""
 
     IDENTICAL = "identical to the last bit, texts included"
     TEXTS = "same numbers, texts of another version"
@@ -55,7 +55,7 @@ class SolutionComparison:
 
 
 def compare_solutions(stored: EpochSolution, new: EpochSolution) -> SolutionComparison:
-    """What differs between a stored solution and a new one."""
+    """Differences between a stored solution and a new one."""
     bits = _bits_of(stored.covariance) == _bits_of(new.covariance)
     if bits and stored.ticks == new.ticks and stored.text == new.text:
         return SolutionComparison(Sameness.IDENTICAL)
@@ -71,14 +71,14 @@ def compare_solutions(stored: EpochSolution, new: EpochSolution) -> SolutionComp
 
 
 def compare_shots(stored: AnsweredShot, new: AnsweredShot) -> Sameness:
-    """How a shot's new answer is like the stored one: its status and numbers count, NaN is NaN."""
+    """Likeness of a shot's new answer to the stored one, by status and numbers; NaN equals NaN."""
     if (stored.status, *_numbers(stored)) != (new.status, *_numbers(new)):
         return Sameness.DIFFERENT
     return Sameness.IDENTICAL if stored.text == new.text else Sameness.TEXTS
 
 
 def _numbers(shot: AnsweredShot) -> tuple[str, ...]:
-    """As text, in which every bit shows."""
+    """Numbers of a shot as text that shows every bit."""
     return tuple(repr(float(value)) for value in (shot.range_, shot.u_range, shot.misfit))
 
 

@@ -250,7 +250,7 @@ def _reweighted(
 
 
 def _steady(solution: LeastSquaresSolution, before: Sequence[np.ndarray]) -> bool:
-    """Whether no residual still moves by what a choice of weights would feel."""
+    """True where no residual still changes enough to change a weight."""
     return all(
         np.all(np.abs(f.residual - old) < STEADY * np.maximum(f.sigma, np.abs(old)))
         for f, old in zip(solution.fits, before, strict=False)

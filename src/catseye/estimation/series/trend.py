@@ -21,7 +21,7 @@ GRID = 5  # values of each time scale tried at first
 
 @dataclass(frozen=True)
 class TrendStrength:
-    """How noisy a record is and how what it reads wanders.
+    """Noise of a record, and random walks of its level and rate.
 
     noise   standard deviation of a reading
     level   wander of the level, a unit per root second

@@ -143,7 +143,7 @@ class FamilyCheck:
 
     @property
     def passed(self) -> bool:
-        """Whether no average stands out."""
+        """True where no average stands out."""
         return abs(self.worst.w) <= CRITICAL
 
     def text(self) -> str:

@@ -201,14 +201,14 @@ def refuted_priors(settled: SettledNetwork) -> dict[Parameter, float]:
 
 
 def selection_of(settled: SettledNetwork, network: CampaignNetwork) -> list[np.ndarray]:
-    """What takes part in a network with the shots of one that has settled: the shots that took part there."""
+    """Selection for another network with the same shots: those that took part in a settled one."""
     count = len(settled.shots)
     shots = [fit.active for fit in settled.solution.fits[:count]]
     return [*shots, *(np.ones(len(prior.observed), dtype=bool) for prior in network.priors)]
 
 
 def allowed(settled: SettledNetwork) -> Allowance:
-    """What is to be allowed for after an adjustment: its explanations judged, its residuals averaged."""
+    """Allowance after an adjustment: its explanations judged, its residuals averaged."""
     network, solution, shots = settled
     air, layout = network.field, network.layout
     dropped, variance = refuted_priors(settled), solution.q.diagonal()
