@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from catseye.records.night.campaign import REFERENCE
+from catseye.reduction.epoch.air.process import AirKnots
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.reduction.epoch.strengths import Processes
 from few_scene import with_shots
@@ -43,8 +44,10 @@ def test_a_channel_removed_moves_nothing_beyond_the_uncertainties(few_clear, cha
     """The variance of such a difference is u_without^2 - u_with^2; five of its roots, 3 um for linearisation."""
     campaign, reduction = few_clear
     whole = reduction.coordinates
-    # of fewer shots the strengths of processes are estimated anew: another model, not less knowledge
+    # fewer shots estimate strengths of processes anew and have fewer knots: another model, not less knowledge
     monkeypatch.setattr(Processes, "estimated", lambda *_: whole.strength)
+    knots, count = AirKnots.of, len(campaign.shots.mjd_utc)
+    monkeypatch.setattr(AirKnots, "of", lambda span, _, *rest, **named: knots(span, count, *rest, **named))
     rest = reduce_epoch(removals(campaign)[channel]).coordinates
     names = [n for n in rest.places if n in whole.places]
     assert len(names) > 55

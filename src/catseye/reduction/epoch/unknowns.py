@@ -236,7 +236,9 @@ def build_network(
     air = AirField.of(campaign, settings)
     for parameter in air.parameters:
         layout.add(parameter, [""], [0.0])
-    telescope = _telescope(campaign, seen, layout) if motion is None else None
+    telescope = None
+    if motion is None and any(p.body == "dish" for p in seen.values()):
+        telescope = _telescope(campaign, places, layout)
     processes, strength = Processes.of(air, telescope, layout.at), ProcessStrength()
     for group in sorted({p.group for n, p in seen.items() if p.group and n in fired}):
         layout.add(Parameter(ParameterKind.NORMAL, group), ["1", "2"], [0.0, 0.0])
@@ -288,9 +290,9 @@ def middle_of(mjd_utc: np.ndarray) -> float:
     return float(0.5 * (mjd_utc.min() + mjd_utc.max()))
 
 
-def _telescope(campaign: ObservedSite, seen: dict[str, RangedPoint], layout: UnknownsLayout) -> TelescopeKnots | None:
+def _telescope(campaign: ObservedSite, places: dict[str, RangedPoint], layout: UnknownsLayout) -> TelescopeKnots | None:
     """Knots of the telescope's expansion, their parameters added to the layout."""
-    telescope = TelescopeKnots.of(float(np.ptp(campaign.shots.mjd_utc)) * SECONDS_PER_DAY, seen)
+    telescope = TelescopeKnots.of(float(np.ptp(campaign.shots.mjd_utc)) * SECONDS_PER_DAY, places)
     if telescope is not None:
         numbers = [str(i) for i in range(len(telescope.knots))]
         for part in PARTS:
