@@ -34,8 +34,8 @@ class AdjustmentResult(Result):
     """A network adjusted: n points and m observations, in the axes and the order of its file.
 
     names                of the points
-    x                    (n, 3) m
-    covariances          (n, 3, 3) m² of each point; `covariance` is that of all together
+    x                    (n, 3) m; nan where a coordinate is absent: nobody gave it and nothing measures it
+    covariances          (n, 3, 3) m² of each point; `covariance` is that of all together; nan likewise
     u                    (n, 3) m, standard uncertainties
     status               "converged", or what is wrong and what to do
     variance_factor      [pvv] / degrees of freedom, expectation 1; nan where nothing is redundant
@@ -69,10 +69,12 @@ class AdjustmentResult(Result):
     @cached_property
     def covariance(self) -> np.ndarray:
         """Covariance of all coordinates, (3n, 3n) m², x, y, z of each point in turn; computed when asked for."""
-        axes = self.findings.network.axes
-        block = self.findings.solution.block(self.names).reshape(len(self.names), 3, len(self.names), 3)
-        turned = np.einsum("ka,ikjl,lb->iajb", axes, block, axes, optimize=True) * self.findings.factor
-        return turned.reshape(3 * len(self.names), -1)
+        axes = self.findings.network.axes  # a signed permutation: an unknown row leaves the others known
+        at, n = np.argmax(np.abs(axes), axis=0), len(self.names)
+        sign = np.tile(axes[at, np.arange(3)], n)
+        rows = (3 * np.arange(n)[:, None] + at).ravel()
+        block = self.findings.solution.block(self.names)[np.ix_(rows, rows)]
+        return np.asarray(np.outer(sign, sign) * block * self.findings.factor)
 
     def passages(self) -> "Sequence[Passage]":
         """The network, its points, the fit, the checks, and what was left out."""
@@ -366,7 +368,7 @@ class PlanResult(Result):
         from catseye.gateways.network.figures import network_figures
 
         drawn = network_figures(self.planned.findings)
-        return {name: drawn[name].figure for name in ("plan", "elevation")}
+        return {name: drawn[name].figure for name in ("plan", "elevation") if name in drawn}
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """As `catseye plan --out`."""

@@ -97,7 +97,7 @@ def adjusted(
     sizes = [len(g.observed) for g in network.groups]
     nothing = tuple(np.zeros(m, dtype=bool) for m in sizes)
     result = AdjustedNetwork(plain, "plain", tuple(np.ones(m) for m in sizes), nothing, nothing, likely=nothing)
-    if not np.isfinite(plain.covariance).all():
+    if not plain.answered:
         return result
     count, engine = 0, _engine(plain)
     near = plain.status == CONVERGED and plain.variance_factor < NEAR and not plain.replaced
@@ -181,7 +181,7 @@ def _places(network: ObservationNetwork) -> list[np.ndarray]:
 
 def _placed(network: ObservationNetwork) -> tuple[ObservationNetwork, Placed]:
     """The network with places found once for points that have none, and who these are."""
-    if np.isfinite(network.points.xyz).all():
+    if not network.points.unplaced.any():
         return network, ((), ())
     begin, nothing = approximate(network), not np.isfinite(network.points.xyz).any()
     parameters = tuple(replace(p, start=float(v)) for p, v in zip(network.parameters, begin.parameters, strict=True))

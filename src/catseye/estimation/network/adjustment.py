@@ -61,7 +61,7 @@ def with_datum(network: ObservationNetwork, datum: str | None) -> ObservationNet
         return replace(network, points=replace(points, fixed=marked, datum=nothing))
     chosen = marked if marked.any() else np.isfinite(points.xyz)
     if not chosen.any():
-        chosen = np.ones_like(marked)
+        chosen = points.existing
     return replace(network, points=replace(points, fixed=nothing, datum=chosen))
 
 
@@ -134,7 +134,7 @@ def adjust_network(
     sparse = None if engine is None else engine == "sparse"
     solver = SolverSettings(settings.iterations, settings.tests, sparse)
     solution = problem.solve(active, (inflation, alone), solver)
-    if diagnose and np.isfinite(solution.covariance).all():
+    if diagnose and solution.answered:
         return replace(solution, status=diagnosed(solution, _factor_alone))
     return solution
 
@@ -238,7 +238,8 @@ class _Problem:
         if len(known):
             observed = np.array([parameters[k].start for k in known])
             groups.append(Linear("priors", observed, sigma[known] ** 2, offset + known, np.eye(len(known))))
-        free = np.concatenate([~points.fixed.ravel(), sigma > 0.0])
+        free = np.concatenate([points.free.ravel(), sigma > 0.0])
+        xyz = np.where(points.absent, 0.0, xyz)  # any value: no observation depends on it
         return cls(network, np.concatenate([xyz.ravel(), values]), free, groups, found, missing, assumed, replaced)
 
     @property
@@ -288,14 +289,14 @@ class _Problem:
             settled = not len(conditions)
             if not solution.solved or settled:
                 break
-            floating = floating_motions(rows, x, x[:n].reshape(-1, 3), free=self.free)
+            floating = self._floating(rows, x)
             if floating.motions.shape[1] != len(conditions):  # told wrongly from a poor start: once more from here
                 continue
             conditions, _ = datum_conditions(floating, datum, points.xyz)
             moved, t = to_datum(x, points.xyz.ravel(), floating.motions, conditions=conditions)
             x = x + moved
             u = np.sqrt(np.maximum(solution.q.diagonal()[:n][held[:n]], 0.0)) if solver.tests else np.zeros(0)
-            settled = bool(np.abs(moved[:n]).max() <= _motion_limit(x[:n].reshape(-1, 3), u))
+            settled = bool(np.abs(moved[:n]).max() <= _motion_limit(x[:n].reshape(-1, 3), points.existing, u))
             if settled and solver.tests:
                 solution = replace(solution, q=transformed(solution.q, t, conditions))
             if settled:
@@ -312,10 +313,14 @@ class _Problem:
         answer = self.answer(solution, solution.q, self._datum_words(floating, datum))
         return replace(answer, degrees_of_freedom=float(degrees), variance_factor=factor)
 
+    def _floating(self, rows: list[ActiveRows], x: np.ndarray) -> Floating:
+        absent = self.network.points.absent
+        return floating_motions(rows, x, x[: absent.size].reshape(-1, 3), free=self.free, absent=absent)
+
     def _motions(self, rows: list[ActiveRows], x: np.ndarray) -> Floating:
         """Motions at x that nothing holds; none where the start is too poor to tell them."""
         try:
-            return floating_motions(rows, x, x[: 3 * len(self.network.points.names)].reshape(-1, 3), free=self.free)
+            return self._floating(rows, x)
         except np.linalg.LinAlgError:
             return Floating(np.zeros((len(x), 0)), np.zeros((7, 0)), np.zeros(3), 1.0)
 
@@ -339,13 +344,15 @@ class _Problem:
         return "; ".join(words) or "held by observations and priors"
 
     def answer(self, solution: LeastSquaresSolution, q: Covariance, datum: str) -> NetworkSolution:
-        count = len(self.network.points.names)
+        absent = self.network.points.absent
+        count = len(absent)
         own = solution.fits[: len(self.network.groups)]
         factor, degrees = solution.variance_factor()
+        covariance = q.blocks(3 * np.arange(count)) if count else np.zeros((0, 3, 3))
         return NetworkSolution(
             network=self.network,
-            x=solution.x[: 3 * count].reshape(-1, 3),
-            covariance=q.blocks(3 * np.arange(count)) if count else np.zeros((0, 3, 3)),
+            x=np.where(absent, np.nan, solution.x[: 3 * count].reshape(-1, 3)),
+            covariance=np.where(absent[:, :, None] | absent[:, None, :], np.nan, covariance),
             parameters=solution.x[3 * count :],
             u_parameters=np.sqrt(np.maximum(q.diagonal()[3 * count :], 0.0)),
             status=solution.status,
@@ -376,12 +383,13 @@ class _Problem:
         )
 
 
-def _motion_limit(points: np.ndarray, u: np.ndarray) -> float:
+def _motion_limit(points: np.ndarray, existing: np.ndarray, u: np.ndarray) -> float:
     """Motion of the datum that points (n, 3) m may make in a last pass; u (k,) m of coordinates, empty if not known.
 
     What a motion s leaves undone is s^2 / size: nothing beside the standard uncertainties.
     """
-    size = float(np.ptp(points, axis=0).max())
+    low, high = np.where(existing, points, np.inf).min(axis=0), np.where(existing, points, -np.inf).max(axis=0)
+    size = float(np.max(high - low, where=existing.any(axis=0), initial=0.0))
     return max(SETTLED * size, float(np.sqrt(UNDONE * np.median(u) * size)) if len(u) else 0.0)
 
 

@@ -53,23 +53,28 @@ def _largest(kinds: np.ndarray, first: int) -> list[str]:
     return [MOTIONS[first + i] for i in sorted(np.argsort(-share, kind="stable")[:count])]
 
 
-def floating_motions(rows: Sequence[ActiveRows], x: np.ndarray, xyz: np.ndarray, *, free: np.ndarray) -> Floating:
+def floating_motions(
+    rows: Sequence[ActiveRows], x: np.ndarray, xyz: np.ndarray, *, free: np.ndarray, absent: np.ndarray | None = None
+) -> Floating:
     """The motions of the network that no observation, prior or held coordinate holds.
 
-    rows   groups of observations, priors among them
-    x      (n,) parameters: 3 k coordinates of k points, then others
-    xyz    (k, 3) coordinates in x
-    free   (n,) bool: False where held
+    rows     groups of observations, priors among them
+    x        (n,) parameters: 3 k coordinates of k points, then others
+    xyz      (k, 3) coordinates in x
+    free     (n,) bool: False where held or absent
+    absent   (k, 3) bool: coordinates that do not exist, which neither move nor hold a motion; none if None
 
     A motion floats when |A v|^2 < FLOATS |v|^2, columns of A scaled to unit length.
     """
     n, coordinates = len(x), 3 * len(xyz)
     linear = [(r, *_row_form(r, x)) for r in rows]
     norms = sum((np.bincount(at.ravel(), (j**2).ravel(), n) for _, at, j in linear), np.zeros(n))
-    centre = xyz.mean(axis=0)
+    gone = np.zeros(xyz.shape, dtype=bool) if absent is None else absent
+    centre = np.sum(np.where(gone, 0.0, xyz), axis=0) / np.maximum(np.sum(~gone, axis=0), 1)
+    xyz = np.where(gone, centre, xyz)  # without an arm about the centre
     size = figure_size(xyz - centre)
-    h, allowed = motions(xyz, centre, size), np.eye(7)
-    still = ~free[:coordinates]
+    h, allowed = np.where(gone.ravel()[:, None], 0.0, motions(xyz, centre, size)), np.eye(7)
+    still = ~free[:coordinates] & ~gone.ravel()
     if still.any():  # a held coordinate must not move
         _, singular, turned = np.linalg.svd(h[still], full_matrices=True)
         allowed = turned[int(np.sum(singular > 1e-9 * np.sqrt(len(xyz)))) :].T

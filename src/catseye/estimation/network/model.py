@@ -25,6 +25,8 @@ class NetworkPoints:
     xyz     (n, 3) m, where the file puts them; nan where unknown: an approximation is then searched for
     fixed   (n, 3) bool: coordinates held at xyz
     datum   (n, 3) bool: coordinates that take part in the inner constraints, relative to xyz
+    absent  (n, 3) bool: coordinates that do not exist, which nobody gave and nothing measures: heights of a plane
+            network, places of a levelling network. Their xyz is nan; they are neither held nor datum nor free
 
     A stochastic point is a free one with an observation of its coordinates, of kind `ObservedCoordinates`.
     """
@@ -33,6 +35,45 @@ class NetworkPoints:
     xyz: np.ndarray
     fixed: np.ndarray
     datum: np.ndarray
+    absent: np.ndarray = None  # type: ignore[assignment]  # none absent, once made
+
+    def __post_init__(self) -> None:
+        if self.absent is None:
+            object.__setattr__(self, "absent", np.zeros(self.xyz.shape, dtype=bool))
+        for state, wrong in (("held", self.fixed), ("datum", self.datum), ("given", np.isfinite(self.xyz))):
+            if np.any(self.absent & wrong):
+                row, axis = np.argwhere(self.absent & wrong)[0]
+                raise EstimationError(
+                    f"{'xyz'[axis]} of {self.names[row]} is absent and {state} (expected one of both)"
+                )
+
+    @property
+    def existing(self) -> np.ndarray:
+        """(n, 3) bool: coordinates that the network has."""
+        return ~self.absent
+
+    @property
+    def free(self) -> np.ndarray:
+        """(n, 3) bool: coordinates that an adjustment may change."""
+        return ~(self.fixed | self.absent)
+
+    @property
+    def unplaced(self) -> np.ndarray:
+        """(n, 3) bool: coordinates of the network that have no value yet."""
+        return self.existing & ~np.isfinite(self.xyz)
+
+
+def absent_coordinates(xyz: np.ndarray, marked: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    """Coordinates (n, 3) that do not exist: nobody gave them, nothing measures them, nobody marked them.
+
+    xyz        (n, 3) m, nan where not given
+    marked     (n, 3) bool: held or datum
+    measured   (n, 3) bool: an observation depends on it
+
+    A point of which nothing at all is given or measured exists: it is not a levelled or a plane one, but unobserved.
+    """
+    known = np.isfinite(xyz) | marked | measured
+    return ~known & known.any(axis=1, keepdims=True)
 
 
 @dataclass(frozen=True)
@@ -84,8 +125,9 @@ class NetworkSolution:
     """The adjusted network, in the axes of this package (`network.axes` turns it into the file's).
 
     network              what was adjusted
-    x                    (n, 3) m
+    x                    (n, 3) m; nan where a coordinate is absent
     covariance           (n, 3, 3) m^2 of each point, a priori (variance factor 1); zero where held; nan without answer
+                         and in the rows and columns of absent coordinates
     parameters           (p,) values of network.parameters
     u_parameters         (p,) their standard uncertainties
     status               "converged", or one line that says what is wrong, where, and what to do
@@ -98,7 +140,7 @@ class NetworkSolution:
     assumed              names of those placed on a side that nothing decides
     replaced             names of those whose given coordinates the observations contradict grossly: the iteration began
                          where they put them instead
-    q                    covariance of the whole parameter vector, for what is not above
+    q                    covariance of the whole parameter vector, for what is not above; zero where held or absent
     """
 
     network: ObservationNetwork
@@ -122,13 +164,30 @@ class NetworkSolution:
         """Row of each point by its name."""
         return {name: i for i, name in enumerate(self.network.points.names)}
 
+    @cached_property
+    def state(self) -> np.ndarray:
+        """The whole parameter vector, for `predict`: finite, 0 in the place of an absent coordinate."""
+        return np.concatenate([np.where(self.network.points.absent, 0.0, self.x).ravel(), self.parameters])
+
+    @cached_property
+    def answered(self) -> bool:
+        """Whether every coordinate of the network has a covariance."""
+        points = self.network.points
+        known = np.isfinite(self.covariance) | points.absent[:, :, None] | points.absent[:, None, :]
+        return bool(known.all())
+
     def block(self, names: Sequence[str]) -> np.ndarray:
-        """Joint covariance (3k, 3k) of some points, m^2, in the order given; raises EstimationError for a stranger."""
+        """Joint covariance (3k, 3k) of some points, m^2, in the order given; nan in rows of absent coordinates.
+
+        Raises EstimationError for a name that is not in the network.
+        """
         strange = [name for name in names if name not in self.index]
         if strange:
             raise EstimationError(f"point {strange[0]!r} is not in the network (expected one of its names)")
         first = 3 * np.array([self.index[name] for name in names], dtype=int)
-        return self.q.within((first[:, None] + np.arange(3)).ravel())
+        at = (first[:, None] + np.arange(3)).ravel()
+        absent = self.network.points.absent.ravel()[at]
+        return np.where(absent | absent[:, None], np.nan, self.q.within(at))
 
 
 def points_of(group: ObservationGroup) -> tuple[np.ndarray, ...]:

@@ -18,7 +18,7 @@ from catseye.gateways.network.objects import network_object
 from catseye.gateways.network.summary import direction_words, quantity
 from catseye.gateways.network.tables import coordinates_csv
 from catseye.gateways.writers.objects import json_page, plain
-from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.page import card, page, paragraph, section, table
 from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.verdict import Verdict, verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
@@ -230,7 +230,7 @@ def _cell(text: str) -> str:
 def plan_report(plan_findings: PlanFindings, when: datetime, inputs: Mapping[str, str]) -> str:
     """The whole page of a plan, HTML."""
     from catseye.gateways.network.figures import network_figures
-    from catseye.gateways.network.report import provenance_section
+    from catseye.gateways.network.report import provenance_section, view_pictures
 
     findings, plan = plan_findings.findings, plan_findings.plan
     drawn = network_figures(findings)
@@ -263,9 +263,7 @@ def plan_report(plan_findings: PlanFindings, when: datetime, inputs: Mapping[str
             f'<div class="cards">{"".join(_cards(plan_findings))}</div>',
             f"<dl>{words}</dl>",
         ),
-        section(
-            "network", CONTENTS["network"], *(picture(drawn[k].svg, drawn[k].caption) for k in ("plan", "elevation"))
-        ),
+        section("network", CONTENTS["network"], *view_pictures(drawn)),
         section("weakest", CONTENTS["weakest"], _weakest(plan_findings)),
         section(
             "next",

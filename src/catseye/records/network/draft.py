@@ -9,7 +9,12 @@ import numpy as np
 
 from catseye.constants import TWO_PI
 from catseye.errors import InputError
-from catseye.estimation.network.model import NetworkParameter, NetworkPoints, ObservationNetwork
+from catseye.estimation.network.model import (
+    NetworkParameter,
+    NetworkPoints,
+    ObservationNetwork,
+    absent_coordinates,
+)
 from catseye.estimation.observations.kinds import ObservationGroup, Reported
 from catseye.records.files.refusal import refusal, shown
 from catseye.records.network.kinds import TOUCHES, Row, blocks_of, group_of
@@ -134,19 +139,15 @@ class NetworkDraft:
             raise self.refuse(place, "names a point twice (expected points that differ)")
         self.more.append((points, place, make))
 
-    def network(self, *, hold_untouched: bool = False) -> ObservationNetwork:
-        """The network; InputError for a point that the file does not have.
-
-        hold_untouched   unknown coordinates that no observation depends on are held at 0: heights of a plane network
-        """
+    def network(self) -> ObservationNetwork:
+        """The network, with the coordinates that do not exist; InputError for a point that the file does not have."""
         self._resolve()
         if not self.names:
             raise refusal(self.file, "has no points (expected at least one)")
         xyz, fixed = np.array(self.xyz).reshape(-1, 3), np.array(self.fixed).reshape(-1, 3)
-        if hold_untouched:
-            untouched = np.isnan(xyz) & ~self._touched(len(xyz))
-            xyz[untouched], fixed = 0.0, fixed | untouched
-        points = NetworkPoints(tuple(self.names), xyz, fixed, np.array(self.datum).reshape(-1, 3))
+        datum = np.array(self.datum).reshape(-1, 3)
+        absent = absent_coordinates(xyz, fixed | datum, self._touched(len(xyz)))
+        points = NetworkPoints(tuple(self.names), xyz, fixed, datum, absent)
         self._start_orientations(xyz)
         groups, places = self._groups()
         return ObservationNetwork(
@@ -181,6 +182,8 @@ class NetworkDraft:
             for name in row.ends:
                 axes = row.component or TOUCHES.get(row.kind, "xyz")
                 touched[self.names[name], ["xyz".index(axis) for axis in axes]] = True
+        for points, _, _ in self.more:  # bodies and surfaces
+            touched[[self.names[name] for name in points]] = True
         return touched
 
     def _start_orientations(self, xyz: np.ndarray) -> None:

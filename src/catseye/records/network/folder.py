@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from catseye.estimation.network.model import NetworkPoints, ObservationNetwork
+from catseye.estimation.network.model import NetworkPoints, ObservationNetwork, absent_coordinates
 from catseye.estimation.observations.kinds import Distances, ObservationGroup, ObservedCoordinates
 from catseye.records.files.columns import TextColumns, columns_of
 from catseye.records.files.reading import Folder
@@ -47,6 +47,9 @@ def read_network_folder(path: Path, claim: RangeClaim = NO_CLAIM) -> Observation
         xyz, priors = (np.vstack([rows, np.full((len(unlisted), 3), np.nan)]) for rows in (xyz, priors))
         fixed, datum = (np.vstack([rows, np.zeros((len(unlisted), 3), dtype=bool)]) for rows in (fixed, datum))
     groups: list[ObservationGroup] = [_distances(ranges, names, claim)]
+    ranged = np.zeros((len(names), 1), dtype=bool)
+    ranged[[groups[0].origin // 3, groups[0].target // 3]] = True  # type: ignore[attr-defined]
+    absent = absent_coordinates(xyz, fixed | datum, np.broadcast_to(ranged, xyz.shape))
     places = [ranges.where()]
     if np.any(priors > 0.0):
         row, axis = np.nonzero(priors > 0.0)
@@ -54,7 +57,7 @@ def read_network_folder(path: Path, claim: RangeClaim = NO_CLAIM) -> Observation
         groups.append(ObservedCoordinates("coordinates", observed, variance, 3 * row, axis))
         places.append(tuple(f"points.csv line {points.lines[int(i)]}" for i in row))
     return ObservationNetwork(
-        NetworkPoints(tuple(names), xyz, fixed, datum), (), tuple(groups), tuple(places), source=path.name
+        NetworkPoints(tuple(names), xyz, fixed, datum, absent), (), tuple(groups), tuple(places), source=path.name
     )
 
 

@@ -6,8 +6,9 @@ only where a levelled section has its length instead of a stdev: sigma-apr sqrt(
 
 x points where the first letter of `axes-xy` says, y where the second. `angles="left-handed"` are clockwise.
 Fixed coordinates are held. Upper case in `adj` takes part in the inner constraints of a free network, relative to the
-coordinates of the file; where the file gives none it does not. Coordinates of neither kind are held, and an observation
-that depends on them is refused (Gama leaves it out without a word). Heights of instruments are along the plumb line:
+coordinates of the file; where the file gives none it does not. Coordinates of neither kind are held where the file
+gives them and do not exist where it does not; an observation that depends on either is refused (Gama leaves it out
+without a word). Heights of instruments are along the plumb line:
 no curvature, no refraction; a file that asks for an ellipsoid is refused.
 """
 
@@ -160,9 +161,7 @@ class _Reader:
         for name, point in self.points.items():
             xyz = [point.get(key, np.nan) for key in "xyz"]
             status = [point.get(f"is {key}") for key in "xyz"]
-            held = [s is None and np.isnan(value) for s, value in zip(status, xyz, strict=True)]
-            xyz = [0.0 if hold else value for hold, value in zip(held, xyz, strict=True)]
-            fixed = [s in (None, "fix") for s in status]
+            fixed = [s == "fix" or (s is None and not np.isnan(v)) for s, v in zip(status, xyz, strict=True)]
             datum = [s == "ADJ" and not np.isnan(value) for s, value in zip(status, xyz, strict=True)]
             self.draft.point(name, xyz, fixed=fixed, datum=datum, place=point["place"])
 

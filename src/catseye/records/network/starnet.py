@@ -135,7 +135,7 @@ class _Reader:
             bent = {"refraction": self.settings.refraction, "curved": 1.0}
             rows = self.draft.rows
             self.draft.rows = [replace(row, known=bent) if row.kind == "zenith_angle" else row for row in rows]
-        return self.draft.network(hold_untouched=True)
+        return self.draft.network()
 
     def _refuse_without(self) -> InputError:
         """All standard errors that are missing, in the words of STAR*NET's project options."""

@@ -1,8 +1,9 @@
 """Our own file of a network: TOML with `format = "catseye-network-1"`, every number's unit in its key.
 
     description        free text
-    [[point]]          name; xyz_m (else it is found); fixed and datum = "xyz" or some of it; u_mm, one or three, or
-                       covariance_mm2: a prior about xyz, zero holds the coordinate
+    [[point]]          name; xyz_m, or x_m, y_m, z_m or some of them: what is measured and not given is found, what is
+                       neither does not exist (x and y of a levelled point); fixed and datum = "xyz" or some of it;
+                       u_mm, one or three, or covariance_mm2: a prior about xyz, zero holds the coordinate
     [[points]]         many: columns and rows, or file; keys of [[point]], x_m y_m z_m, and role = free, fixed or datum
     [[ranger]]         name of a point; its zero and scale: zero_mm, scale_ppm known, with u_zero_mm, u_scale_ppm priors
                        about them, or zero = "free", scale = "free"
@@ -137,26 +138,29 @@ class _Reader:
     def point(self, fields: Fields) -> None:
         name = fields.text("name")
         if fields.has("x_m") or fields.has("y_m") or fields.has("z_m"):
-            xyz = np.array([fields.number(f"{axis}_m") for axis in "xyz"])
+            xyz = np.array([fields.number(f"{axis}_m", np.nan) for axis in "xyz"])
         else:
             xyz = fields.vector("xyz", LENGTH, default=(np.nan,) * 3)
         role = fields.text("role", "free")
         if role not in ("free", "fixed", "datum"):
             raise fields.refuse(f"role = {shown(role)} (expected free, fixed or datum)")
         held, in_datum = (self._axes(fields, key) for key in ("fixed", "datum"))
-        held |= role == "fixed"
-        in_datum |= role == "datum"
+        given = np.isfinite(xyz)
+        some = given if given.any() else np.ones(3, dtype=bool)  # a levelled point has a height alone
+        held |= (role == "fixed") & some
+        in_datum |= (role == "datum") & some
         covariance = fields.uncertainties(3, or_zero=True)
         if covariance is not None:
-            if np.isnan(xyz).any():
+            each = fields.has("covariance_mm2") or any(isinstance(fields.values.get(f"u_{k}"), list) for k in LENGTH)
+            if not (given.all() or (given.any() and not each)):
                 raise fields.refuse(f"point {shown(name)} has a prior and no xyz (expected both)")
-            exact = np.diag(covariance) == 0.0
+            exact = (np.diag(covariance) == 0.0) & given
             if np.any(covariance[exact]):
                 raise fields.refuse("covariance_mm2 has a zero variance with covariances (expected them zero too)")
             held |= exact  # a prior without error holds the coordinate
         self.draft.point(name, xyz, fixed=held, datum=in_datum, place=fields.place)
-        if covariance is not None and not held.all():
-            at = np.flatnonzero(~held)
+        if covariance is not None and not held[given].all():
+            at = np.flatnonzero(~held & given)
             start = len(self.draft.rows)
             for axis in at:
                 self.draft.observe(Row("coordinates", (name,), xyz[axis], 1.0, fields.place, component="xyz"[axis]))
