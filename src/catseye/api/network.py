@@ -211,7 +211,7 @@ class ComparisonResult(Result):
     covariances     (k, 3, 3) m² of each displacement
     u               (k, 3) m
     p               (k,) chance of a displacement as large if the point stands still
-    words           (k) "moved", "stable", "held" or "not checked"
+    words           (k) "moved", "stable", "held", "undecided" or "not checked"
     compared        everything else
     first, second   the epochs
     """
@@ -278,6 +278,7 @@ def compare(
     *,
     points: Sequence[str] | None = None,
     level: float = 0.05,
+    scale_by_variance_factor: bool = False,
     progress: Progress | None = None,
 ) -> ComparisonResult:
     """What moved between two epochs of a network.
@@ -285,8 +286,10 @@ def compare(
     first, second   networks as for `adjust`, or what it gave
     points          names to compare; all common ones without
     level           of the tests
+    scale_by_variance_factor   multiply covariances by the variance factor of both epochs together; F tests
 
-    Raises EstimationError where an epoch has no answer or the two have too little in common.
+    Every common point is in the answer, with displacement, covariance and test; one that moved so far that it may be
+    another point under the same name makes the verdict doubtful. A coordinate absent in either epoch is nan. Raises EstimationError where an epoch has no answer or the two have too little in common.
     """
     from catseye.estimation.deformation.comparison import ComparisonOptions
     from catseye.estimation.deformation.comparison import compare as moved_between
@@ -299,7 +302,8 @@ def compare(
     for epoch in epochs:
         require_answer(epoch)
     solutions = [epoch.findings.solution for epoch in epochs]
-    moved = moved_between(*solutions, points=points, options=ComparisonOptions(level=level))
+    chosen = ComparisonOptions(level=level, scale_by_variance_factor=scale_by_variance_factor)
+    moved = moved_between(*solutions, points=points, options=chosen)
     compared = ComparedEpochs(epochs[0].findings, epochs[1].findings, moved)
     return ComparisonResult(
         comparison_verdict(compared),

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -19,10 +20,12 @@ from catseye.estimation.deformation.congruence import (
 CONGRUENT = "congruent: no point moved (p = {p:.2g}, level {level:g})"
 MOVED = "moved: {moved}; the other {stable} points are congruent (p = {p:.2g}, level {level:g})"
 MAJORITY = "moved: {moved}; but only {stable} points are congruent (p = {p:.2g}): it may be those that moved"
+EVERY = "moved: {moved}, all that are compared (level {level:g})"
 UNDECIDED = "undecided: without {moved} the rest is still not congruent (p = {p:.2g}), and no more points can be spared"
 CIRCLES = "undecided: the search went in circles for {rounds} rounds, the last without {moved}"
 TIE = "undecided: {one} or {other} moved, the observations cannot tell which"
 UNCHECKED = 1e-9  # of the largest precision, each in its coordinate's sigmas: with less nothing else checks it
+SINGLE = 1e-3  # of the level, spent on single points beside the global test: one far move drowns among hundreds
 SEARCHES = 10
 TIED = 1e-6  # of a statistic: nearer than this two explanations are the same one
 
@@ -45,7 +48,8 @@ class Deformation:
     names          n
     displacement   (n, 3) m, second less first, relative to the stable points other than itself, those taken as
                    unmoved: the best estimate from all of them with all correlations. 0 for held points; nan in
-                   coordinates not compared, and for points that the stable points do not check
+                   coordinates not compared. Of a point that these do not check: in the datum of inner constraints on
+                   all stable points, itself among them, where the covariance may be singular
     covariance     (n, 3, 3) m^2 of each (variance factor included); nan likewise
     statistic      (n,) displacement' covariance^-1 displacement over compared coordinates
     p              (n,) chance of such a statistic or a larger one if the point did not move, the stable set given
@@ -58,6 +62,7 @@ class Deformation:
     level, power   of the tests
     datum          what the two datums may differ by
     steps          the removals in order, also of points that came back in the end
+    conclusive     bool: False where the search did not end with a congruent majority
     status         one line: congruent, who moved, or why it is undecided
     """
 
@@ -77,6 +82,7 @@ class Deformation:
     power: float
     datum: str
     steps: tuple[Step, ...]
+    conclusive: bool
     status: str
 
 
@@ -100,10 +106,11 @@ class _State:
     rest_p: float
 
     def passed(self, out: Sequence[int], level: float, rule: str) -> bool:
-        if rule == "global":
-            return self.rest_p >= level
         p = [t.p for i, t in enumerate(self.tests) if t is not None and i not in out]
-        return min(p, default=1.0) * len(p) >= level
+        single = min(p, default=1.0) * max(len(p), 1)
+        if rule == "global":
+            return self.rest_p >= level and single >= SINGLE * level
+        return single >= level
 
 
 class _Search:
@@ -115,7 +122,9 @@ class _Search:
 
     def __init__(self, between: Differences, variance_factor: VarianceFactor) -> None:
         fit = between.fit()
+        self.between = between
         self.precision, self.weighted, self.pvv = fit.weight, fit.weighted_residual, fit.pvv
+        self.absolute = len(fit.estimate) == 0  # held coordinates, or both datums alike: nothing floats
         self.degrees, self.variance_factor = fit.degrees_of_freedom, variance_factor
         spread = np.diag(between.q)[between.used]  # of a coordinate by itself: P times it is 1 or about it
         self.scale = np.sqrt(spread / max(float(np.max(spread * np.diag(fit.weight))), 1e-300))
@@ -129,9 +138,11 @@ class _Search:
         return len(rows) == 0 or bool(np.linalg.eigvalsh(own * scale[:, None] * scale)[0] > UNCHECKED)
 
     def spares(self, out: Sequence[int]) -> bool:
-        """True if the datum holds and a test remains without these points."""
+        """True if the datum holds without these points, and a test remains; none need where nothing floats."""
         rows = np.concatenate([self.rows[i] for i in out])
-        return len(rows) < self.degrees and self._holds(self.precision[np.ix_(rows, rows)], rows)
+        left = self.degrees - len(rows)
+        enough = left > 0 or (left == 0 and self.absolute)
+        return enough and self._holds(self.precision[np.ix_(rows, rows)], rows)
 
     def without(self, out: Sequence[int]) -> _State:
         """The state with points `out` left out; each of those is itself tested against the rest."""
@@ -153,7 +164,25 @@ class _Search:
             else:
                 tests.append(None)
         pvv, degrees = self.pvv - float(self.weighted[rows] @ displacement), self.degrees - len(rows)
-        return _State(tests, pvv, degrees, float(self.variance_factor.p(pvv, degrees)))
+        return _State(tests, pvv, degrees, float(self.variance_factor.p(pvv, degrees)) if degrees else 1.0)
+
+    def unchecked(self, stable: np.ndarray) -> list[_PointTest]:
+        """Each point in the datum of inner constraints on the stable points (n,) bool, where these hold it."""
+        between = self.between
+        d, q = between.seen_from(stable if between.holds(stable) else np.ones(len(self.rows), dtype=bool))
+        at = np.flatnonzero(between.used)
+        return [self._singular_test(d[at[rows]], q[np.ix_(at[rows], at[rows])]) for rows in self.rows]
+
+    def _singular_test(self, displacement: np.ndarray, covariance: np.ndarray) -> _PointTest:
+        """The test in the directions that have a variance, each coordinate in its own sigma."""
+        sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        sigma = np.where(sigma > 0.0, sigma, 1.0)
+        values, vectors = np.linalg.eigh(covariance / sigma[:, None] / sigma)
+        seen = values > UNCHECKED
+        statistic = float(np.sum((displacement / sigma @ vectors[:, seen]) ** 2 / values[seen]))
+        p = float(self.variance_factor.p(statistic, int(seen.sum()))) if seen.any() else np.nan
+        factor = self.variance_factor.value
+        return _PointTest(displacement, covariance * factor, statistic / factor, p)
 
     def _test(self, displacement: np.ndarray, covariance: np.ndarray) -> _PointTest:
         statistic = float(displacement @ np.linalg.solve(covariance, displacement))
@@ -254,6 +283,7 @@ def moved_points(
     power: float = 0.8,
     rule: str = "global",
     variance_factor: VarianceFactor = KNOWN,
+    far: Sequence[int] = (),
 ) -> Deformation:
     """Which common points moved, how far, and how sure that is.
 
@@ -264,22 +294,24 @@ def moved_points(
     rule              "global": points go until the congruence test of the rest passes. "local": until no single point
                       is significant at level / points; finds one small movement among many points better
     variance_factor   known or estimated
+    far               points that the datums are not first aligned on, from `far_points`
 
     Backward search: the point whose movement explains most of the quadratic form goes, the datum is then that of the
     others, and so on; points left out in the shadow of others come back if they are not significant after all. Many
-    tests: under "global" the first test alone decides if anything moved, so its level is that of the whole search;
-    under "local" Bonferroni's bound holds it. p and p_adjusted are those of one point, the stable set given. The two
-    datums are aligned exactly on the stable points, so they may lie any turn apart.
+    tests: under "global" the first test alone decides if anything moved, so its level is that of the whole search
+    (and `SINGLE` of it, for single points); under "local" Bonferroni's bound holds it. p and p_adjusted are those of
+    one point, the stable set given. The two datums are aligned exactly on the stable points, so they may lie any turn
+    apart. Where held points define the datum every other may have moved.
 
     Source: [PELZER71], [CASPARY87] (global test and localisation); [BAARDA73]. The return of points is ours.
     """
     if rule not in ("global", "local"):
         raise EstimationError(f"rule {rule!r} is none of global, local")
     n = len(epochs.names)
-    search = _Search(differences(epochs, datum, np.ones(n, dtype=bool)), variance_factor)
+    aligned = sorted(far)  # left out when the datums were aligned
+    search = _Search(differences(epochs, datum, ~np.isin(np.arange(n), aligned)), variance_factor)
     before = global_test(search.pvv, search.degrees, variance_factor)
     detectable = search.detectable(variance_factor.noncentrality(search.degrees, level, power))[0]
-    aligned: list[int] = []  # left out when the datums were aligned
     for _ in range(SEARCHES):
         out, steps, stopped = _backward(search, epochs.names, level, rule)
         out = out if stopped else sorted(_returned(search, out, level, rule))
@@ -291,37 +323,59 @@ def moved_points(
         stopped = CIRCLES.format(rounds=SEARCHES, moved=", ".join(epochs.names[i] for i in out))
     state = search.without(out)
     moved = np.isin(np.arange(n), out)
-    called = ", ".join(epochs.names[i] for i in sorted(out))
-    text = CONGRUENT if not out else MOVED if 2 * len(out) < n else MAJORITY
     return Deformation(
         names=epochs.names,
-        **_point_arrays(epochs, search, state),
+        **_point_arrays(epochs, search, state, ~moved),
         moved=moved,
         stable=~moved,
         before=before,
-        after=global_test(state.pvv, state.degrees, variance_factor),
+        after=_after(state, variance_factor),
         detectable=detectable,
         level=level,
         power=power,
         datum=datum,
         steps=tuple(steps),
-        status=stopped or text.format(moved=called, stable=n - len(out), p=state.rest_p, level=level),
+        **_outcome(search, epochs.names, out, state, stopped=stopped, level=level),
     )
 
 
-def _point_arrays(epochs: Epochs, search: _Search, state: _State) -> dict[str, np.ndarray]:
-    """Tests of the points spread over arrays: 0 where held, nan where not compared or not checked."""
+def _after(state: _State, variance_factor: VarianceFactor) -> CongruenceTest:
+    """The test of the stable points; of no degree of freedom where all that are compared moved."""
+    if state.degrees == 0:
+        return CongruenceTest(0.0, 0, np.nan)
+    return global_test(state.pvv, state.degrees, variance_factor)
+
+
+def _outcome(
+    search: _Search, names: Sequence[str], out: Sequence[int], state: _State, *, stopped: str | None, level: float
+) -> dict[str, Any]:
+    """If the search is conclusive, and its status; beside points held in both epochs any number may have moved."""
+    n, known = len(names), search.absolute and bool(search.between.held.any())
+    text = CONGRUENT if not out else MOVED if known or 2 * len(out) < n else MAJORITY
+    text = EVERY if search.degrees and not state.degrees else text
+    words = text.format(
+        moved=", ".join(names[i] for i in sorted(out)), stable=n - len(out), p=state.rest_p, level=level
+    )
+    return {"conclusive": stopped is None and text != MAJORITY, "status": stopped or words}
+
+
+def _point_arrays(epochs: Epochs, search: _Search, state: _State, stable: np.ndarray) -> dict[str, np.ndarray]:
+    """Tests of the points spread over arrays: 0 where held, nan where not compared."""
     n = len(epochs.names)
     compared = np.ones((n, 3), dtype=bool) if epochs.compared is None else np.asarray(epochs.compared, dtype=bool)
     displacement, covariance = np.where(compared, 0.0, np.nan), np.zeros((n, 3, 3))
     covariance[~(compared[:, :, None] & compared[:, None, :])] = np.nan
     statistic, p = np.full(n, np.nan), np.full(n, np.nan)
-    for i, (test, rows) in enumerate(zip(state.tests, search.rows, strict=True)):
+    unchecked = search.unchecked(stable) if None in state.tests else state.tests
+    for i, rows in enumerate(search.rows):
+        if not len(rows):
+            continue
+        test = state.tests[i] or unchecked[i]
+        assert test is not None
         axes = search.axes[rows]
-        displacement[i, axes] = np.nan if test is None else test.displacement
-        covariance[i][np.ix_(axes, axes)] = np.nan if test is None else test.covariance
-        if test is not None:
-            statistic[i], p[i] = test.statistic, test.p
+        displacement[i, axes] = test.displacement
+        covariance[i][np.ix_(axes, axes)] = test.covariance
+        statistic[i], p[i] = test.statistic, test.p
     return {
         "displacement": displacement,
         "covariance": covariance,
