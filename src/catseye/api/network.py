@@ -289,7 +289,9 @@ def compare(
     scale_by_variance_factor   multiply covariances by the variance factor of both epochs together; F tests
 
     Every common point is in the answer, with displacement, covariance and test; one that moved so far that it may be
-    another point under the same name makes the verdict doubtful. A coordinate absent in either epoch is nan. Raises EstimationError where an epoch has no answer or the two have too little in common.
+    another point under the same name makes the verdict doubtful. A coordinate absent in either epoch is nan.
+
+    Raises EstimationError where an epoch has no answer or the two have too little in common.
     """
     from catseye.estimation.deformation.comparison import ComparisonOptions
     from catseye.estimation.deformation.comparison import compare as moved_between

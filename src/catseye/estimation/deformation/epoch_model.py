@@ -6,7 +6,6 @@ its coordinates follow the held ones by J = -(A_f' P A_f)^-1 A_f' P A_d, and the
 Q_1 + J Q_dd J' + Q_0 - J Q_d0 - Q_0d J', Q_0 of the first epoch, Q_1 of the second with its datum taken as exact.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np

@@ -16,7 +16,6 @@ from catseye.gateways.network.comparison import UNTESTED, ComparedEpochs, compar
 from catseye.gateways.network.figures import (
     CaptionedFigure,
     file_ticks,
-    looking,
     point_names,
     scale_bar,
     thousands,
