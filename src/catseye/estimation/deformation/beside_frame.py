@@ -177,7 +177,7 @@ def _predicted(
     own, q, d = model.of_points(others, between.turned), between.q[np.ix_(used, used)], between.d[used]
 
     def by(gain: np.ndarray) -> _Others:
-        g, c = (a.reshape(-1, 3, int(used.sum())) for a in (gain, across))
+        g, c = (a.reshape(len(others), 3, int(used.sum())) for a in (gain, across))
         mixed = c @ g.transpose(0, 2, 1)
         spread = own - mixed - mixed.transpose(0, 2, 1) + g @ q @ g.transpose(0, 2, 1)
         return _tested(step - g @ d, spread, compared, _spread(model, others))

@@ -137,7 +137,7 @@ def moved_points(
     n = len(epochs.names)
     options: dict[str, Any] = {"level": level, "rule": rule, "far": far}
     found = find_moved(epochs, datum, variance_factor, **options)
-    if far and (found.out or found.stopped):
+    if far and (found.stopped or (found.out and found.out != sorted(far))):
         found = min(found, find_moved(epochs, datum, variance_factor, **options, without=True), key=lambda f: f.rank)
     search, out = found.search, found.out
     before = global_test(search.pvv, search.degrees, variance_factor)

@@ -6,6 +6,7 @@ its coordinates follow the held ones by J = -(A_f' P A_f)^-1 A_f' P A_d, and the
 Q_1 + J Q_dd J' + Q_0 - J Q_d0 - Q_0d J', Q_0 of the first epoch, Q_1 of the second with its datum taken as exact.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,8 +29,8 @@ FOREIGN = (
     "adjust it free (datum 'free'), or say what the datums may differ by (datum=)"
 )
 STRANGE = (
-    "the {which} epoch holds {names}, which the other epoch does not have; adjust it free (datum 'free'), or say what "
-    "the datums may differ by (datum=)"
+    "the {which} epoch holds {names}, which the other epoch does not have{alike}; adjust it free (datum 'free'), or say "
+    "what the datums may differ by (datum=)"
 )
 PARTLY = "{names} are held in the second epoch {apart:.3g} m from the first's result, others at it; hold all at it"
 REWEIGHTED = (
@@ -80,9 +81,14 @@ class DatumConnection:
 
     @classmethod
     def of(
-        cls, first: NetworkSolution, second: NetworkSolution, datum: str | None, rounding: float
+        cls,
+        first: NetworkSolution,
+        second: NetworkSolution,
+        datum: str | None,
+        rounding: float,
+        alike: Sequence[tuple[str, str]] = (),
     ) -> "DatumConnection":
-        """Of two adjusted epochs; arguments as of `compare`."""
+        """Of two adjusted epochs; arguments as of `compare`, and pairs of names that differ only by case."""
         if datum is not None and datum not in DATUMS:
             raise EstimationError(f"datum {datum!r} is none of {', '.join(DATUMS)}")
         floats = [_floating(s) for s in (first, second)]
@@ -103,7 +109,7 @@ class DatumConnection:
                 by = abs(value - there)
                 (carried if of_second and by <= max(rounding, HELD_APART) else strange)[name, axis] = by
         if datum is None:
-            _refuse_foreign(foreign, carried, max(rounding, HELD_APART))
+            _refuse_foreign(foreign, carried, max(rounding, HELD_APART), alike)
             datum = _least_datum(np.concatenate([f.kinds for f in floats], axis=1))
         departure = max(carried.values(), default=0.0)
         same = dict.fromkeys(name for name, axis in owns[1] if (name, axis) in owns[0])
@@ -134,7 +140,10 @@ def _minimal(floating: Floating, fixed: np.ndarray) -> bool:
 
 
 def _refuse_foreign(
-    foreign: list[dict[tuple[str, int], float]], carried: dict[tuple[str, int], float], tolerance: float
+    foreign: list[dict[tuple[str, int], float]],
+    carried: dict[tuple[str, int], float],
+    tolerance: float,
+    alike: Sequence[tuple[str, str]],
 ) -> None:
     if foreign[0] and max(foreign[0].values()) <= tolerance:
         raise EstimationError(EXCHANGED.format(names=listed([name for name, _ in foreign[0]])))
@@ -143,9 +152,16 @@ def _refuse_foreign(
             known = [by for by in strange.values() if np.isfinite(by)]
             names = listed([name for name, _ in strange])
             if not known:
-                raise EstimationError(STRANGE.format(which=which, names=names))
+                raise EstimationError(STRANGE.format(which=which, names=names, alike=_alike(alike, strange)))
             text = PARTLY if which == "second" and carried else FOREIGN
             raise EstimationError(text.format(which=which, names=names, apart=max(known)))
+
+
+def _alike(alike: Sequence[tuple[str, str]], strange: dict[tuple[str, int], float]) -> str:
+    """Of these points those whose name stands in the other epoch in other case, in words."""
+    held = {name for name, _ in strange}
+    pairs = [f"{a} and {b}" for a, b in alike if held & {a, b}]
+    return f" (names that differ only by upper and lower case: {listed(pairs)})" if pairs else ""
 
 
 def _least_datum(kinds: np.ndarray) -> str:
