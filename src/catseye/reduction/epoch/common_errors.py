@@ -28,7 +28,6 @@ from catseye.reduction.epoch.unknowns import BENCHMARKS, MONUMENTS, OFFSETS, TRI
 from catseye.reduction.site.stations import station_in
 
 STEEL_PER_K = 12e-6
-U_AXIS = 10e-6  # m, by which axes and beam of a mirror miss each other, where its sheet says nothing
 U_WAVELENGTH_UM = 2.5e-3  # laser diodes of one type, each its own
 U_AMPLITUDE = 1e-4  # rad a factor e, where the sheet says nothing
 BATCH = 100  # prisms of one melt and one polishing, by serial order
@@ -146,9 +145,10 @@ def _of_heads(network: CampaignNetwork, parts: list[ShotParts], sights: list[_Si
     half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz
     for part, sight in zip(parts, sights, strict=True):
         name, mirror = part.name, mirrors[part.name]
-        if mirror.u_axis_mm is None:
+        if mirror.u_axis_mm is None:  # axes and beam then miss each other as the mirror's place is known: alike aligned
             for i, slope in enumerate(_axes(network, sight).T):
-                yield CommonError(f"axes of {name} {i + 1}", {name: U_AXIS * sight.index * slope})
+                size = mirror.u_offset_mm * MILLIMETRE * sight.index
+                yield CommonError(f"axes of {name} {i + 1}", {name: size * slope})
         if mirror.u_amplitude_to_phase_rad is None:
             lit = network.phases.phasor[part.electronics.shots]
             strong = np.log(np.abs(lit) / np.abs(part.electronics.reference))
@@ -268,11 +268,11 @@ def _slopes(network: CampaignNetwork, s: _Sight, z: np.ndarray) -> tuple[np.ndar
     air = network.field
     above = z - air.heights.mean()
     state = (s.temperature + s.gradient * above, s.pressure - LAPSE_HPA_PER_M * above, s.humidity)
-    found = []
-    for i in (0, 2):
-        up, down = ([v + half * (j == i) for j, v in enumerate(state)] for half in (0.5, -0.5))
-        found.append(air.refractivity_of(*up) - air.refractivity_of(*down))
-    return found[0], found[1]
+    here, colder, drier = (
+        air.refractivity_of(*(v - (i == j) for j, v in enumerate(state)))  # downwards: fog is no wetter
+        for i in (None, 0, 2)
+    )
+    return here - colder, here - drier
 
 
 def _smooth(ends: np.ndarray) -> np.ndarray:
