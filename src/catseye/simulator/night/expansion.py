@@ -40,7 +40,7 @@ class MovingPoints:
     """Points of a night at any time; without a law they stay where they are.
 
     points        m, ground frame, at `reference_s`
-    own           by name how much more than itself a point expands about the dish's middle: of dish and arm, 0 elsewhere;
+    own           by name how much more than itself a point expands about the dish's middle; 0 off dish and arm, and
                   what is not in it stands on the ground
     dish_middle   (3,) m
     """
