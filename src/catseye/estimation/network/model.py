@@ -193,3 +193,11 @@ class NetworkSolution:
 def points_of(group: ObservationGroup) -> tuple[np.ndarray, ...]:
     """For each role of an observation, from, to and so on, the rows (m,) of its points in the network; -1 for none."""
     return tuple(np.where(end < 0, -1, end // 3) for end in getattr(group, "ends", ()))
+
+
+def label(network: ObservationNetwork, group: int, row: int) -> str:
+    """What an observation is called: its kind, its points, and its place in the file."""
+    kind = getattr(network.groups[group], "kind", network.groups[group].name).replace("_", " ")
+    ends = [network.points.names[int(end[row])] for end in points_of(network.groups[group]) if end[row] >= 0]
+    where = network.places[group][row] if network.places and network.places[group] else ""
+    return f"{kind} {' - '.join(ends)}" + (f", {where}" if where else "")

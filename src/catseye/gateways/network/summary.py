@@ -6,7 +6,7 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.estimation.least_squares.adjustment import CONVERGED
-from catseye.estimation.quality.reliability import TOO_LARGE, TOO_SMALL
+from catseye.estimation.quality.reliability import TOO_LARGE, TOO_SMALL, too_good
 from catseye.gateways.network.findings import Findings
 from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.verdict import Verdict
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from catseye.reduction.network import AdjustedNetwork
 
 NAMED = 5  # names in a sentence at most
+UNIT = 300.0  # times too large: from half way (in powers) between 100 and 1000 on, mm for m is the likely cause
 WEAK = 5.0  # times the usual uncertainty: such a point is named
 
 
@@ -50,6 +51,8 @@ def verdict(findings: Findings) -> Verdict:
     if len(findings.suspects):
         text = "the whole agrees with the claimed uncertainties, single observations do not"
         return Verdict("doubtful", f"{text}; {_suspects(findings)}")
+    if too_good(whole.factor * findings.solution.degrees_of_freedom, findings.solution.degrees_of_freedom):
+        return Verdict("doubtful", _too_good(findings))
     if whole.outcome == TOO_SMALL:
         less = 100.0 * (1.0 - np.sqrt(whole.factor))
         text = f"better than claimed: the observations scatter {less:.0f} % less than their uncertainties claim"
@@ -58,6 +61,17 @@ def verdict(findings: Findings) -> Verdict:
     unchecked, out = int(np.sum(findings.table.active & ~findings.table.checked)), int(np.sum(~findings.table.active))
     text += f", {out} left out" if out else ""
     return Verdict("good", text + (f", but {unchecked} of them are checked by no other" if unchecked else ""))
+
+
+def _too_good(findings: Findings) -> str:
+    """Why a variance factor that chance does not make so small is no good sign, with the factor of the sigmas."""
+    factor = findings.whole.factor
+    times = 1.0 / np.sqrt(factor) if factor > 0.0 else np.inf
+    text = f"the variance factor {factor:.3g} is too small for chance: the uncertainties are "
+    text += f"about {times:.2g} times too large" if np.isfinite(times) else "not those of these observations"
+    if times >= UNIT:
+        return f"{text}; most likely their unit: sigmas in mm typed as m, or in the wrong column"
+    return f"{text}; most likely their unit, or the claim of another instrument"
 
 
 def _suspects(findings: Findings) -> str:
