@@ -138,7 +138,7 @@ class _Reader:
     def point(self, fields: Fields) -> None:
         name = fields.text("name")
         if fields.has("x_m") or fields.has("y_m") or fields.has("z_m"):
-            xyz = np.array([fields.number(f"{axis}_m", np.nan) for axis in "xyz"])
+            xyz = np.array([fields.number(f"{axis}_m") if fields.has(f"{axis}_m") else np.nan for axis in "xyz"])
         else:
             xyz = fields.vector("xyz", LENGTH, default=(np.nan,) * 3)
         role = fields.text("role", "free")
