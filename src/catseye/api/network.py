@@ -405,7 +405,8 @@ def plan(
 ) -> PlanResult:
     """A network before it is measured: what it will be worth, where it is weak, what to measure next.
 
-    network    as for `adjust`; observed values are not used
+    network    as for `adjust`; observed values are not used, and may be missing: an empty cell, no column `distance`,
+               no value in TOML. What of a sigma grows with the distance follows the planned one
     datum      as for `adjust`
     interest   points that matter; all that are not held without
     budget_s   time of every ranger for further ranges, s: gives a schedule
@@ -426,7 +427,7 @@ def plan(
     from catseye.gateways.network.plan import PlanFindings, plan_verdict
     from catseye.reduction.network import measured_on_paper
 
-    read, path = _network_of(network, sigma_mm, sigma_ppm)
+    read, path = _network_of(network, sigma_mm, sigma_ppm, planned=True)
     worth = planned(read, datum=datum, interest=interest, most=most)
     picked = () if budget_s is None else schedule(worth, budget_s=budget_s, shot_s=shot_s)
     scatter = None
@@ -559,7 +560,11 @@ def require_answer(result: AdjustmentResult) -> AdjustmentResult:
 
 
 def _network_of(
-    network: "str | os.PathLike[str] | ObservationNetwork", sigma_mm: float | None, sigma_ppm: float | None
+    network: "str | os.PathLike[str] | ObservationNetwork",
+    sigma_mm: float | None,
+    sigma_ppm: float | None,
+    *,
+    planned: bool = False,
 ) -> "tuple[ObservationNetwork, Path | None]":
     """The network itself and the path it was read from."""
     from catseye.estimation.network.model import ObservationNetwork
@@ -570,7 +575,7 @@ def _network_of(
     path = place_of(network)
     if not path.exists():
         raise InputError(f"{path}: missing (expected {NETWORKS})")
-    return read_network(path, sigma_mm=sigma_mm, sigma_ppm=sigma_ppm), path
+    return read_network(path, sigma_mm=sigma_mm, sigma_ppm=sigma_ppm, planned=planned), path
 
 
 def _hashes(path: Path | None) -> dict[str, str]:

@@ -15,7 +15,7 @@ from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import CONVERGED
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, label, points_of
 from catseye.estimation.observations.kinds import Distances, ObservationGroup
-from catseye.estimation.quality.reliability import TOO_LARGE, global_test, too_good
+from catseye.estimation.quality.reliability import TOO_LARGE, global_test
 from catseye.estimation.quality.robustness import MOST_INFLATION, SnoopingOptions, estimate_robustly, snoop
 
 # How a copy is adjusted: the network, and an inflation of its sigmas (none if None).
@@ -25,6 +25,9 @@ LEVEL = 0.05  # of the limits of the variance factor, as reports print them
 EXCHANGE_FROM, EXCHANGE_GAIN = 1e3, 1e-2  # variance factor from which exchanged points are tried, and its fall if true
 EXCHANGE_ALL = 300  # points up to which all pairs are tried, and observations are searched one by one
 EXCHANGEABLE = 20  # points with the most observations, that are tried: 190 pairs
+SEARCHED = 60  # points up to which several wrong observations are searched for: some hundred adjustments
+SINGLES = 60  # observations with the largest residuals, that are left out one at a time
+NAMED = 3  # observations in a sentence
 NEARER = 10.0  # times in squares: of several exchanges that fit, the one that leaves the points where they are given
 HALF_TURN = 0.01  # rad beside pi, within which an angle's error counts as half a turn
 TURNING = ("direction", "angle", "azimuth")  # kinds with a sense, clockwise or not
@@ -57,7 +60,10 @@ def reason(solution: NetworkSolution, adjust: Adjust) -> Reason:
     solution   an answer that its observations contradict, or that did not converge
     adjust     how copies of its network are adjusted, without tests
     """
-    cures = [*_mirrored(solution, adjust), *_exchanged(solution, adjust), *_without_wrong(solution, adjust)]
+    cures = [*_mirrored(solution, adjust), *_exchanged(solution, adjust)]
+    if solution.status != CONVERGED or _one_explains(solution):
+        cures += _without_one(solution, adjust)
+    cures = cures or list(_without_several(solution, adjust))
     if cures:
         least = min(cure.changes for cure in cures)
         best = [cure for cure in cures if cure.changes == least]
@@ -67,12 +73,11 @@ def reason(solution: NetworkSolution, adjust: Adjust) -> Reason:
 
 
 def fits(solution: NetworkSolution) -> bool:
-    """Whether a solution converged inside the limits of its variance factor."""
+    """Whether a solution converged, and no further off than the limits of its variance factor allow."""
     degrees = solution.degrees_of_freedom
     if solution.status != CONVERGED or not degrees > 0.5:
         return False
-    squares = solution.variance_factor * degrees
-    return global_test(squares, degrees, LEVEL).outcome != TOO_LARGE and not too_good(squares, degrees)
+    return global_test(solution.variance_factor * degrees, degrees, LEVEL).outcome != TOO_LARGE
 
 
 def turned_round(network: ObservationNetwork) -> ObservationNetwork | None:
@@ -125,10 +130,29 @@ def _exchanged(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure]:
         yield Cure(EXCHANGED.replace("{first}", names[i]).replace("{second}", names[j]), 1, factor)
 
 
-def _without_wrong(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure]:
-    """The observations that data snooping from a robust start leaves out, in networks that are not too large."""
+def _without_one(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure]:
+    """Single observations without which the others agree, tried one by one from the largest residual on."""
     network = solution.network
     if len(network.points.names) > EXCHANGE_ALL:
+        return
+    size = [np.where(f.active, np.abs(f.residual) / f.sigma, 0.0) for f in solution.fits]
+    place = [(g, r) for g, part in enumerate(size) for r in range(len(part))]
+    for k in np.argsort(-np.concatenate([[], *size]), kind="stable")[:SINGLES]:
+        g, r = place[k]
+        inflation = [np.ones(len(part)) for part in size]
+        inflation[g][r] = np.inf
+        trial = _tried(network, inflation, adjust)
+        if trial is not None and fits(trial):
+            error, unit = abs(trial.fits[g].residual[r]), np.asarray(getattr(network.groups[g], "units", [""]))
+            opposite = unit[r % len(unit)] == "rad" and abs(error - np.pi) < HALF_TURN
+            text = (OPPOSITE if opposite else WITHOUT).replace("{names}", label(network, g, r))
+            yield Cure(text, 1, trial.variance_factor)
+
+
+def _without_several(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure]:
+    """The observations that data snooping from a robust start leaves out, in networks that are not too large."""
+    network = solution.network
+    if len(network.points.names) > SEARCHED:
         return
     sizes = [len(g.observed) for g in network.groups]
 
@@ -137,22 +161,26 @@ def _without_wrong(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure]:
 
     try:
         start = estimate_robustly(solve, sizes, places=targets_of_ranges(network))
-        found = snoop(
-            solve, sizes, options=SnoopingOptions(level=LEVEL), start=start.rejected, doubtful=start.undecided
-        )
+        options = SnoopingOptions(level=LEVEL)
+        found = snoop(solve, sizes, options=options, start=start.rejected, doubtful=start.undecided)
     except EstimationError:  # what is left does not hold the network
         return
     out = [(g, int(r)) for g, part in enumerate(found.rejected) for r in np.flatnonzero(part)]
     if not out or any(part.any() for part in found.undecided):
         return
-    trial = adjust(network, [np.where(part, np.inf, 1.0) for part in found.rejected])
-    if not fits(trial):
-        return
-    named = ", ".join(label(network, g, r) for g, r in out[:3]) + (f" and {len(out) - 3} more" if len(out) > 3 else "")
-    error = abs(trial.fits[out[0][0]].residual[out[0][1]])
-    unit = np.asarray(getattr(network.groups[out[0][0]], "units", [""]))
-    opposite = len(out) == 1 and unit[out[0][1] % len(unit)] == "rad" and abs(error - np.pi) < HALF_TURN
-    yield Cure((OPPOSITE if opposite else WITHOUT).replace("{names}", named), len(out), trial.variance_factor)
+    trial = _tried(network, [np.where(part, np.inf, 1.0) for part in found.rejected], adjust)
+    if trial is not None and fits(trial):
+        more = f" and {len(out) - NAMED} more" if len(out) > NAMED else ""
+        named = ", ".join(label(network, g, r) for g, r in out[:NAMED]) + more
+        yield Cure(WITHOUT.replace("{names}", named), len(out), trial.variance_factor)
+
+
+def _tried(network: ObservationNetwork, inflation: list[np.ndarray], adjust: Adjust) -> NetworkSolution | None:
+    """A trial; None where what is left does not hold the network."""
+    try:
+        return adjust(network, inflation)
+    except EstimationError:
+        return None
 
 
 def targets_of_ranges(network: ObservationNetwork) -> list[np.ndarray]:

@@ -100,6 +100,8 @@ class ObservationNetwork:
     parameters   beside the points, in the order of the parameter vector after 3 n coordinates
     groups       of observations, over columns of the parameter vector; see `catseye.estimation.observations`
     places       one tuple a group with where each of its rows stands in the file ("line 12"), or () where unknown
+    claims       one (m, 3) a group, or None: a, b, c of standard uncertainties a + b D^c (m, m, 1) of lengths D, which
+                 a plan computes from the points; where b is 0 the covariance says all. () where there are none
     axes         (3, 3) signed permutation: coordinates here = axes @ coordinates of the file
     axis_names   what the file calls its axes, in its order
     source       the file's name, for reports
@@ -114,6 +116,7 @@ class ObservationNetwork:
     axis_names: tuple[str, str, str] = ("x", "y", "z")
     source: str = ""
     description: str = ""
+    claims: tuple[np.ndarray | None, ...] = ()
 
     def __repr__(self) -> str:
         observed = ", ".join(f"{len(group.observed)} {group.name}" for group in self.groups)

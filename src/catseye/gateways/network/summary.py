@@ -63,11 +63,22 @@ def verdict(findings: Findings) -> Verdict:
     return Verdict("good", text + (f", but {unchecked} of them are checked by no other" if unchecked else ""))
 
 
+def factor_words(factor: float) -> str:
+    """A variance factor with three decimals, or three digits where it is so small that they say nothing.
+
+    >>> factor_words(1.01842), factor_words(2.24e-7)
+    ('1.018', '2.24e-07')
+    """
+    return f"{factor:.3f}" if not 0.0 < factor < 0.01 else f"{factor:.3g}"
+
+
 def _too_good(findings: Findings) -> str:
     """Why a variance factor that chance does not make so small is no good sign, with the factor of the sigmas."""
     factor = findings.whole.factor
     times = 1.0 / np.sqrt(factor) if factor > 0.0 else np.inf
-    text = f"the variance factor {factor:.3g} is too small for chance: the uncertainties are "
+    less = 100.0 * (1.0 - np.sqrt(factor))
+    text = f"the observations scatter {less:.0f} % less than their uncertainties claim, too little for chance "
+    text += f"(variance factor {factor:.3g}): the uncertainties are "
     text += f"about {times:.2g} times too large" if np.isfinite(times) else "not those of these observations"
     if times >= UNIT:
         return f"{text}; most likely their unit: sigmas in mm typed as m, or in the wrong column"
@@ -221,8 +232,9 @@ def _observations(findings: Findings) -> str:
     if not np.isfinite(whole.p):
         return "Nothing is left over to compare them with."
     text = (
-        f"Variance factor {whole.factor:.3f} with {findings.solution.degrees_of_freedom:.0f} degrees of freedom; by "
-        f"chance it lies between {whole.lower:.3f} and {whole.upper:.3f} (level {findings.level:g}): {whole.outcome}."
+        f"Variance factor {factor_words(whole.factor)} with {findings.solution.degrees_of_freedom:.0f} degrees of "
+        f"freedom; by chance it lies between {whole.lower:.3f} and {whole.upper:.3f} (level {findings.level:g}): "
+        f"{whole.outcome}."
     )
     text += f" {_suspects(findings)}." if len(findings.suspects) else ""
     if np.isfinite(table.standardised).any() and not len(findings.suspects):

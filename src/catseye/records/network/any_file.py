@@ -25,20 +25,21 @@ READERS = {
 
 
 def read_network(
-    path: Path | str, *, sigma_mm: float | None = None, sigma_ppm: float | None = None
+    path: Path | str, *, sigma_mm: float | None = None, sigma_ppm: float | None = None, planned: bool = False
 ) -> ObservationNetwork:
     """The network of a file, by the end of its name, or of a folder.
 
     path       a folder with points.csv and ranges.csv, or a file .toml, .gkf, .xml, .dat
     sigma_mm, sigma_ppm   standard uncertainty a + b D of a distance that has none, of a folder or a .dat; what the file
                           says counts where it says something
+    planned    observed values may be missing in a folder or a file of ours: the network is to be planned
 
     Raises InputError, one line, for a file that is missing, of another kind, or that cannot be used.
     """
     path = Path(path)
     claim = RangeClaim.given(sigma_mm, sigma_ppm)
     if path.is_dir():
-        return read_network_folder(path, claim)
+        return read_network_folder(path, claim, planned=planned)
     if path.suffix.lower() == ".dat":
         return read_starnet(path, claim)
     if claim:
@@ -47,4 +48,4 @@ def read_network(
     if reader is None:
         kinds = f"expected a folder with points.csv and ranges.csv, or {' '.join(READERS)}"
         raise refusal(path.name, f"ends in {shown(path.suffix)} ({kinds})")
-    return reader(path)
+    return reader(path) if reader is not read_network_toml else read_network_toml(path, planned=planned)

@@ -34,12 +34,14 @@ class NetworkDraft:
     axes         (3, 3) signed permutation: coordinates here = axes @ coordinates of the file
     axis_names   what the file calls its axes
     implied      points that only observations name are free ones (STAR*NET's way), else they are refused
+    planned      observed values may be missing, nan: the network is yet to be measured
     """
 
     file: str
     axes: np.ndarray = field(default_factory=lambda: np.eye(3))
     axis_names: tuple[str, str, str] = ("x", "y", "z")
     implied: bool = False
+    planned: bool = False
     description: str = ""
     names: dict[str, int] = field(default_factory=dict)
     xyz: list[np.ndarray] = field(default_factory=list)
@@ -97,7 +99,7 @@ class NetworkDraft:
     def observe(self, row: Row) -> None:
         """Adds a row; InputError for a value that is not finite, a distance or a sigma that is not positive."""
         wrong = ""
-        if not math.isfinite(row.value):
+        if not math.isfinite(row.value) and not (self.planned and math.isnan(row.value)):
             wrong = f" = {row.value} (expected a finite number)"
         elif row.value <= 0.0 and row.kind in POSITIVE:
             wrong = f" = {row.value:.10g} m (expected above 0)"
@@ -149,7 +151,7 @@ class NetworkDraft:
         absent = absent_coordinates(xyz, fixed | datum, self._touched(len(xyz)))
         points = NetworkPoints(tuple(self.names), xyz, fixed, datum, absent)
         self._start_orientations(xyz)
-        groups, places = self._groups()
+        groups, places, claims = self._groups()
         return ObservationNetwork(
             points,
             tuple(self.parameters),
@@ -159,6 +161,7 @@ class NetworkDraft:
             axis_names=self.axis_names,
             source=self.file,
             description=self.description.strip(),
+            claims=claims,
         )
 
     def _resolve(self) -> None:
@@ -199,8 +202,10 @@ class NetworkDraft:
         for at, mean in turned.items():
             self.parameters[at] = replace(self.parameters[at], start=float(np.angle(mean)) % TWO_PI)
 
-    def _groups(self) -> tuple[tuple[ObservationGroup, ...], tuple[tuple[str, ...], ...]]:
-        """Independent rows of a kind are one group; a correlated set is one."""
+    def _groups(
+        self,
+    ) -> tuple[tuple[ObservationGroup, ...], tuple[tuple[str, ...], ...], tuple[np.ndarray | None, ...]]:
+        """Groups, the places of their rows, their claims: independent rows of a kind are one, a correlated set is."""
         first = 3 * len(self.names)
         in_cluster = {i for rows, _ in self.clusters for i in rows}
         kinds: dict[str, list[Row]] = {}
@@ -212,6 +217,7 @@ class NetworkDraft:
         sets += blocks_of(correlated)
         groups: list[ObservationGroup] = []
         places: list[tuple[str, ...]] = []
+        claims: list[np.ndarray | None] = []
         counts: dict[str, int] = {}
         for rows, covariance in sets:
             name = rows[0].kind if len({row.kind for row in rows}) == 1 else "joint"
@@ -219,11 +225,13 @@ class NetworkDraft:
             label = name.replace("_", " ") + (f" {counts[name]}" if counts[name] > 1 else "")
             groups.append(group_of(label, rows, covariance, names=self.names, first=first))
             places.append(tuple(row.place for row in rows))
+            claims.append(np.array([row.claim for row in rows]) if any(row.claim[1] for row in rows) else None)
         for points, place, make in self.more:
             group = make(np.array([3 * self.names[name] for name in points], dtype=int), first)
             groups.append(group)
             places.append((place,) * len(group.observed))
-        return tuple(groups), tuple(places)
+            claims.append(None)
+        return tuple(groups), tuple(places), tuple(claims)
 
 
 def _together(row: Row) -> list[tuple[str, ...]]:

@@ -210,7 +210,14 @@ class _Reader:
         heights = tuple(self.number(child, f"{name}_dh", 0.0) for name in others)
         instrument = self.number(child, "from_dh", self.number(parent, "from_dh", 0.0))
         parameters = {"orientation": orientation} if child.tag == "direction" else {}
-        row = Row(KINDS[child.tag], tuple(ends), turned * value, u, child.place, (instrument, *heights), parameters)
+        claim = (0.0, 0.0, 1.0)
+        if not has_matrix and "stdev" not in child.attributes and child.tag in ("distance", "s-distance"):
+            a, b, c = self._distance_stdev(section)
+            claim = (a * MILLIMETRE, b * MILLIMETRE * 1e-3**c, c)  # of a length in km
+        row = Row(
+            *(KINDS[child.tag], tuple(ends), turned * value, u, child.place, (instrument, *heights), parameters),
+            claim=claim,
+        )
         self.draft.observe(row)
         return unit * turned
 
@@ -221,16 +228,21 @@ class _Reader:
         if child.tag == "dh" and "dist" in child.attributes:
             return self.sigma_apr * self.number(child, "dist") ** 0.5
         if child.tag in ("distance", "s-distance") and "distance-stdev" in section.attributes:
-            words = section.attributes["distance-stdev"].split()
-            if not 1 <= len(words) <= 3:
-                raise self.refuse(section, f"distance-stdev holds {len(words)} values (expected a, a b or a b c)")
-            given = [number_of(self.draft.file, section, "distance-stdev", word=word) for word in words]
-            a, b, c = [*given, *(0.0, 1.0)[len(given) - 1 :]]
+            a, b, c = self._distance_stdev(section)
             return a + b * (value / 1000.0) ** c
         name = f"{IMPLIED_STDEV.get(child.tag, '')}-stdev"
         if name not in section.attributes:
             raise self.refuse(child, "has no stdev, and neither points-observations nor a cov-mat gives one")
         return self.number(section, name)
+
+    def _distance_stdev(self, section: XmlElement) -> tuple[float, float, float]:
+        """a, b, c of a + b D^c, mm and km."""
+        words = section.attributes["distance-stdev"].split()
+        if not 1 <= len(words) <= 3:
+            raise self.refuse(section, f"distance-stdev holds {len(words)} values (expected a, a b or a b c)")
+        given = [number_of(self.draft.file, section, "distance-stdev", word=word) for word in words]
+        a, b, c = [*given, *(0.0, 1.0)[len(given) - 1 :]]
+        return a, b, c
 
     def _orientation(self, element: XmlElement) -> int:
         """The unknown azimuth of a set's zero; `orientation` in the file is its bearing from the x axis."""

@@ -229,9 +229,14 @@ class _Reader:
             self.left_out.append(f"{kind.replace('_', ' ')} of {line.place}")
             return
         u = self._standard_error(line, kind, error=error, value=value)
+        claim = (0.0, 0.0, 1.0)
+        if error == "&" and kind in DISTANCES:
+            given = self.settings.defaults
+            claim = (given.get("distance_mm", 0.0) * MILLIMETRE, given.get("distance_ppm", 0.0) * PPM, 1.0)
         heights = heights if kind in ("slope_distance", "zenith_angle", "height_difference") else (0.0, 0.0)
         parameters = {"orientation": self.orientation} if kind == "direction" else {}
-        self.draft.observe(Row(kind, ends, value, u, line.place, heights if any(heights) else (), parameters))
+        shifted = heights if any(heights) else ()
+        self.draft.observe(Row(kind, ends, value, u, line.place, shifted, parameters, claim=claim))
 
     def _standard_error(self, line: StarnetLine, kind: str, *, error: str, value: float) -> float:
         length = kind in LENGTHS

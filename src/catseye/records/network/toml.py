@@ -58,22 +58,23 @@ TOP = (
 )
 
 
-def read_network_toml(path: Path) -> ObservationNetwork:
+def read_network_toml(path: Path, *, planned: bool = False) -> ObservationNetwork:
     """The network of a file of ours; InputError, with the table's number, where it cannot be used.
 
-    path   the file; tables that it names stand beside it
+    path      the file; tables that it names stand beside it
+    planned   observed values may be missing, for a plan
     """
     folder = Folder(path.parent)
     document = toml_of(folder.text(path.name), path.name)
-    return _Reader(path.name, folder, document).network()
+    return _Reader(path.name, folder, document, planned).network()
 
 
 class _Reader:
-    def __init__(self, file: str, folder: Folder, document: dict[str, Any]) -> None:
+    def __init__(self, file: str, folder: Folder, document: dict[str, Any], planned: bool) -> None:
         if document.get("format") != FORMAT:
             raise refusal(file, f"format = {shown(document.get('format'))} (expected {FORMAT!r})")
         self.document = Fields(file, "top", document)
-        self.draft, self.folder = NetworkDraft(file), folder
+        self.draft, self.folder = NetworkDraft(file, planned=planned), folder
         self.named: dict[str, int] = {}
         self.rangers: dict[str, dict[str, int]] = {}
         self.sets: dict[tuple[str, str], int] = {}
@@ -226,7 +227,9 @@ class _Reader:
         fields.done()
 
     def _components(self, fields: Fields, kind: str, ends: tuple[str, ...]) -> None:
-        xyz, covariance, start = fields.vector("xyz", LENGTH), fields.uncertainties(3), len(self.draft.rows)
+        unknown = (np.nan,) * 3 if self.draft.planned else None
+        xyz, start = fields.vector("xyz", LENGTH, default=unknown), len(self.draft.rows)
+        covariance = fields.uncertainties(3)
         if covariance is None:
             raise fields.refuse("u is missing (expected u_mm, one or three, or covariance_mm2)")
         for axis, value in zip("xyz", xyz, strict=True):
@@ -235,10 +238,13 @@ class _Reader:
 
     def _single(self, fields: Fields, kind: str, ends: tuple[str, ...]) -> None:
         units = LENGTH if kind in LENGTHS else ANGLE
-        value = fields.quantity("value", units, 0.0 if kind == "level_plane" else None)
+        missing = 0.0 if kind == "level_plane" else np.nan if self.draft.planned else None
+        value = fields.quantity("value", units, missing)
+        claim = (0.0, 0.0, 1.0)
         default = U_FIXED_DISTANCE if kind == "fixed_distance" else None
         if units is LENGTH and fields.has("u_ppm"):
-            u = fields.quantity("u", units, 0.0) + fields.quantity("u", {"ppm": RATIO["ppm"]}) * abs(value)
+            claim = (fields.quantity("u", units, 0.0), fields.quantity("u", {"ppm": RATIO["ppm"]}), 1.0)
+            u = claim[0] + claim[1] * (1.0 if np.isnan(value) else abs(value))  # of a plan: computed there
         else:
             u = fields.quantity("u", units, default)
         heights: tuple[float, ...] = ()
@@ -255,7 +261,7 @@ class _Reader:
             known["height"] = fields.quantity("height", LENGTH, 0.0)
         parameters = self._parameters(fields, kind, ends)
         shifted = heights if any(heights) else ()
-        self.draft.observe(Row(kind, ends, value, u, fields.place, shifted, parameters, known=known))
+        self.draft.observe(Row(kind, ends, value, u, fields.place, shifted, parameters, known=known, claim=claim))
 
     def _parameters(self, fields: Fields, kind: str, ends: tuple[str, ...]) -> dict[str, int]:
         """Role -> parameter: those that the observation names, its ranger's, its set's orientation."""
