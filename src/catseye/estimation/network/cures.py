@@ -61,7 +61,7 @@ def reason(solution: NetworkSolution, adjust: Adjust) -> Reason:
     adjust     how copies of its network are adjusted, without tests
     """
     cures = [*_mirrored(solution, adjust), *_exchanged(solution, adjust)]
-    if solution.status != CONVERGED or _one_explains(solution):
+    if not cures or solution.status != CONVERGED or _one_explains(solution):
         cures += _without_one(solution, adjust)
     cures = cures or list(_without_several(solution, adjust))
     if cures:
