@@ -14,6 +14,7 @@ import numpy as np
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import GroupFit
 from catseye.estimation.least_squares.covariance import Covariance
+from catseye.estimation.network.names import PointIndex
 from catseye.estimation.observations.kinds import ObservationGroup
 
 
@@ -106,6 +107,8 @@ class ObservationNetwork:
     axis_names   what the file calls its axes, in its order
     source       the file's name, for reports
     description  the file's own words
+    notes        what a person should know of how the file was read, one line each
+    doubts       what in it is unlikely, one line each: no answer that rests on it is good
     """
 
     points: NetworkPoints
@@ -117,6 +120,8 @@ class ObservationNetwork:
     source: str = ""
     description: str = ""
     claims: tuple[np.ndarray | None, ...] = ()
+    notes: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         observed = ", ".join(f"{len(group.observed)} {group.name}" for group in self.groups)
@@ -163,9 +168,9 @@ class NetworkSolution:
     q: Covariance = field(kw_only=True)
 
     @cached_property
-    def index(self) -> dict[str, int]:
-        """Row of each point by its name."""
-        return {name: i for i, name in enumerate(self.network.points.names)}
+    def index(self) -> PointIndex:
+        """Row of each point by its name, however it is written."""
+        return PointIndex(self.network.points.names)
 
     @cached_property
     def state(self) -> np.ndarray:

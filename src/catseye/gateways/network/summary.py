@@ -40,8 +40,9 @@ def verdict(findings: Findings) -> Verdict:
     status, whole = findings.solution.status, findings.whole
     if not findings.answered:
         return Verdict("failed", f"no answer: {status}")
-    if status != CONVERGED:
-        return Verdict("doubtful", status)
+    if status != CONVERGED or findings.network.doubts:
+        reasons = [*findings.network.doubts[:NAMED], *([status] if status != CONVERGED else [])]
+        return Verdict("doubtful", "; ".join(reasons))
     if not np.isfinite(whole.p):
         return Verdict("doubtful", "unchecked: nothing was measured twice, so nothing would show an error")
     if whole.outcome == TOO_LARGE:
@@ -181,6 +182,7 @@ def _network(findings: Findings) -> str:
     if solution.replaced:
         named = _listed(solution.replaced)
         text += f" Given coordinates that the observations contradict grossly were no start: {named}."
+    text += "".join(f" {note[0].upper()}{note[1:]}." for note in findings.network.notes)
     lonely = [findings.names[i] for i in np.flatnonzero(findings.seen == 0)]
     return text + (f" Not observed at all: {_listed(lonely)}." if lonely else "")
 

@@ -13,6 +13,7 @@ from catseye.records.files.refusal import refusal, shown
 from catseye.records.network.claim import RangeClaim
 from catseye.records.network.folder import read_network_folder
 from catseye.records.network.gama import read_gama
+from catseye.records.network.plausible import with_lengths_checked
 from catseye.records.network.starnet import read_starnet
 from catseye.records.network.toml import read_network_toml
 
@@ -36,7 +37,11 @@ def read_network(
 
     Raises InputError, one line, for a file that is missing, of another kind, or that cannot be used.
     """
-    path = Path(path)
+    network = _read(Path(path), sigma_mm=sigma_mm, sigma_ppm=sigma_ppm, planned=planned)
+    return network if planned else with_lengths_checked(network)
+
+
+def _read(path: Path, *, sigma_mm: float | None, sigma_ppm: float | None, planned: bool) -> ObservationNetwork:
     claim = RangeClaim.given(sigma_mm, sigma_ppm)
     if path.is_dir():
         return read_network_folder(path, claim, planned=planned)

@@ -15,9 +15,11 @@ from catseye.estimation.network.model import (
     ObservationNetwork,
     absent_coordinates,
 )
+from catseye.estimation.network.names import PointIndex, name_key, spelled
 from catseye.estimation.observations.kinds import ObservationGroup, Reported
 from catseye.records.files.refusal import refusal, shown
-from catseye.records.network.kinds import TOUCHES, Row, blocks_of, group_of
+from catseye.records.network.kinds import ANGLES, TOUCHES, Row, blocks_of, group_of
+from catseye.records.network.plausible import beyond_circle
 
 POSITIVE = ("slope_distance", "horizontal_distance", "fixed_distance")
 SYMMETRY = 1e-12  # of the largest element: what writing and reading a matrix may cost
@@ -43,7 +45,7 @@ class NetworkDraft:
     implied: bool = False
     planned: bool = False
     description: str = ""
-    names: dict[str, int] = field(default_factory=dict)
+    names: PointIndex = field(default_factory=PointIndex)
     xyz: list[np.ndarray] = field(default_factory=list)
     fixed: list[np.ndarray] = field(default_factory=list)
     datum: list[np.ndarray] = field(default_factory=list)
@@ -51,6 +53,7 @@ class NetworkDraft:
     rows: list[Row] = field(default_factory=list)
     clusters: list[tuple[range, np.ndarray]] = field(default_factory=list)
     more: list[tuple[Sequence[str], str, Maker]] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
 
     def refuse(self, place: str, problem: str) -> InputError:
         """The error of one place in the file."""
@@ -75,10 +78,13 @@ class NetworkDraft:
 
         Raises InputError for an empty or double name, an infinite coordinate, a held one that is unknown.
         """
+        written, name = name, spelled(name)
         if not name:
             raise self.refuse(place, "point without a name (expected some text)")
         if name in self.names:
-            raise self.refuse(place, f"point {shown(name)} is there twice (expected each name once)")
+            raise self.refuse(place, f"point {shown(written)} is there twice (expected each name once)")
+        if written != name:
+            self.names.aliases[written] = name
         for axis, value, held, in_datum in zip(self.axis_names, xyz, fixed, datum, strict=True):
             if np.isinf(value):
                 raise self.refuse(place, f"point {shown(name)}, {axis} = {value} (expected a finite number)")
@@ -108,9 +114,22 @@ class NetworkDraft:
             wrong = f" has the sigma {row.u:.6g} (expected above 0: {shame})"
         elif any(len(set(ends)) < len(ends) for ends in _together(row)):
             wrong = " joins a point with itself (expected points that differ)"
+        if not wrong and row.kind in ANGLES and math.isfinite(row.value):
+            wrong = self._beyond(row)
         if wrong:
             raise self.refuse(row.place, f"{row.kind} {' to '.join(shown(end) for end in row.ends[:2])}{wrong}")
         self.rows.append(row)
+
+    def _beyond(self, row: Row) -> str:
+        """Why an angle beyond the circle is refused, or nothing; one that is only unlikely becomes a doubt."""
+        text, impossible = beyond_circle(row.value, row.unit or "rad")
+        if not text:
+            return ""
+        if impossible:
+            return f" is beyond the circle: {text} (expected at most a turn)"
+        names = " to ".join(shown(end) for end in row.ends)
+        self.doubts.append(f"{row.place}, {row.kind} {names} is beyond the circle: {text}")
+        return ""
 
     def correlate(self, start: int, covariance: np.ndarray, place: str) -> None:
         """Gives the rows from `start` on a joint covariance (m, m) in m and rad; InputError where it is none."""
@@ -137,7 +156,7 @@ class NetworkDraft:
 
     def also(self, points: Sequence[str], place: str, make: Maker) -> None:
         """Adds a group that is made when all points are known: a body, a surface."""
-        if len(set(points)) < len(points):
+        if len(set(map(name_key, points))) < len(points):
             raise self.refuse(place, "names a point twice (expected points that differ)")
         self.more.append((points, place, make))
 
@@ -162,6 +181,8 @@ class NetworkDraft:
             source=self.file,
             description=self.description.strip(),
             claims=claims,
+            notes=self.names.notes(),
+            doubts=tuple(self.doubts),
         )
 
     def _resolve(self) -> None:
@@ -236,4 +257,5 @@ class NetworkDraft:
 
 def _together(row: Row) -> list[tuple[str, ...]]:
     """Points of a row that must differ: all, or the ends of each of two distances."""
-    return [row.ends[:2], row.ends[2:]] if row.kind == "distance_difference" else [row.ends]
+    ends = tuple(map(name_key, row.ends))
+    return [ends[:2], ends[2:]] if row.kind == "distance_difference" else [ends]

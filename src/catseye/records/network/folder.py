@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from catseye.estimation.network.model import NetworkPoints, ObservationNetwork, absent_coordinates
+from catseye.estimation.network.names import PointIndex, name_key, spelled
 from catseye.estimation.observations.kinds import Distances, ObservationGroup, ObservedCoordinates
 from catseye.records.files.columns import TextColumns, columns_of
 from catseye.records.files.reading import Folder
@@ -45,7 +46,8 @@ def read_network_folder(path: Path, claim: RangeClaim = NO_CLAIM, *, planned: bo
     xyz, fixed, datum, priors = _places(points)
     unlisted = _unlisted(ranges, names)
     if unlisted:
-        names |= {name: len(names) + k for k, name in enumerate(unlisted)}
+        for name in unlisted:
+            names[spelled(name)] = len(names)
         xyz, priors = (np.vstack([rows, np.full((len(unlisted), 3), np.nan)]) for rows in (xyz, priors))
         fixed, datum = (np.vstack([rows, np.zeros((len(unlisted), 3), dtype=bool)]) for rows in (fixed, datum))
     distances, claims = _distances(ranges, names, claim, planned)
@@ -66,14 +68,18 @@ def read_network_folder(path: Path, claim: RangeClaim = NO_CLAIM, *, planned: bo
         tuple(places),
         source=path.name,
         claims=(claims, *(None for _ in groups[1:])),
+        notes=names.notes(),
     )
 
 
-def names_of(table: TextColumns, column: str) -> dict[str, int]:
+def names_of(table: TextColumns, column: str) -> PointIndex:
     """Name -> row, each name once."""
-    cells = table.cells[column]
-    names = dict(zip(cells, range(len(cells)), strict=True))
-    if len(names) < len(cells) or "" in names:
+    written = table.cells[column]
+    cells = list(map(spelled, written))
+    names = PointIndex(cells)
+    names.aliases |= {was: now for was, now in zip(written, cells, strict=True) if was != now}
+    if len(set(map(name_key, cells))) < len(cells) or "" in names:
+        cells = list(map(name_key, cells))
         seen: dict[str, int] = {}
         for row, name in enumerate(cells):
             if not name:
@@ -107,9 +113,13 @@ def _places(points: TextColumns) -> tuple[np.ndarray, np.ndarray, np.ndarray, np
     return xyz, fixed, datum, np.where(fixed, np.nan, u)
 
 
-def _unlisted(ranges: TextColumns, names: dict[str, int]) -> list[str]:
+def _unlisted(ranges: TextColumns, names: PointIndex) -> list[str]:
     """Targets that points.csv does not list, in the order of ranges.csv: unknown points."""
-    counts = Counter(ranges.cells["to"])
+    written = Counter(ranges.cells["to"])
+    first: dict[str, str] = {}
+    counts: Counter[str] = Counter()
+    for name, count in written.items():
+        counts[first.setdefault(name_key(name), name)] += count
     strangers = [name for name in counts if name and name not in names]
     for name in strangers:
         close = difflib.get_close_matches(name, names, n=1, cutoff=CLOSE) if counts[name] < FEWEST else []
@@ -121,7 +131,7 @@ def _unlisted(ranges: TextColumns, names: dict[str, int]) -> list[str]:
 
 
 def _distances(
-    ranges: TextColumns, names: dict[str, int], claim: RangeClaim, planned: bool
+    ranges: TextColumns, names: PointIndex, claim: RangeClaim, planned: bool
 ) -> tuple[Distances, np.ndarray | None]:
     """The ranges, and a, b, c of their claims; distances that are yet to be measured are nan."""
     origin, target = (_numbered(ranges, end, names) for end in ("from", "to"))
@@ -143,7 +153,7 @@ def _distances(
     return Distances("slope distance", distance, sigma**2, 3 * origin, 3 * target), claims if without.any() else None
 
 
-def _numbered(ranges: TextColumns, end: str, names: dict[str, int]) -> np.ndarray:
+def _numbered(ranges: TextColumns, end: str, names: PointIndex) -> np.ndarray:
     cells = ranges.cells[end]
     try:
         return np.array(list(map(names.__getitem__, cells)))

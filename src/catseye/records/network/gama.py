@@ -20,6 +20,7 @@ import numpy as np
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.errors import InputError
 from catseye.estimation.network.model import ObservationNetwork
+from catseye.estimation.network.names import name_key
 from catseye.records.files.refusal import refusal, shown, unreadable
 from catseye.records.network.draft import NetworkDraft
 from catseye.records.network.gama_xml import GON, XmlElement, angle_of, band_matrix, number_of, tree_of
@@ -135,8 +136,8 @@ class _Reader:
 
     def note_point(self, element: XmlElement, *, observed: bool) -> None:
         """Coordinates and status of a point; a point may be told in parts, but nothing twice."""
-        name = element.attributes["id"].strip()
-        point = self.points.setdefault(name, {"place": element.place})
+        name = element.attributes["id"]
+        point = self.points.setdefault(name_key(name), {"place": element.place, "name": name})
         if ("x" in element.attributes) != ("y" in element.attributes):
             raise self.refuse(element, f"{shown(name)} has one of x and y (expected both or none)")
         for key in ("x", "y", "z"):
@@ -153,22 +154,22 @@ class _Reader:
                     point[f"is {letter.lower()}"] = status
 
     def _once(self, element: XmlElement, name: str, key: str) -> None:
-        if key in self.points[name]:
-            first = self.points[name]["place"]
+        if key in self.points[name_key(name)]:
+            first = self.points[name_key(name)]["place"]
             raise self.refuse(element, f"{shown(name)} has its {key} in {first} already (expected each name once)")
 
     def add_points(self) -> None:
-        for name, point in self.points.items():
+        for point in self.points.values():
             xyz = [point.get(key, np.nan) for key in "xyz"]
             status = [point.get(f"is {key}") for key in "xyz"]
             fixed = [s == "fix" or (s is None and not np.isnan(v)) for s, v in zip(status, xyz, strict=True)]
             datum = [s == "ADJ" and not np.isnan(value) for s, value in zip(status, xyz, strict=True)]
-            self.draft.point(name, xyz, fixed=fixed, datum=datum, place=point["place"])
+            self.draft.point(point["name"].strip(), xyz, fixed=fixed, datum=datum, place=point["place"])
 
     def need(self, element: XmlElement, name: str, axes: str) -> str:
         """The point's name, which must have a status for each coordinate that the observation depends on."""
         for axis in axes:
-            if name in self.points and f"is {axis}" not in self.points[name]:
+            if f"is {axis}" not in self.points.get(name_key(name), {f"is {axis}": ""}):
                 raise self.refuse(element, f"needs {axis} of {shown(name)}, which is neither fix nor adj there")
         return name
 
@@ -200,9 +201,10 @@ class _Reader:
         for name in ends:
             self.need(child, name, NEEDS.get(child.tag, "xyz"))
         if child.tag in ("distance", "s-distance", "dh"):
-            value, unit, turned = self.number(child, "val"), MILLIMETRE, 1.0
+            value, unit, turned, written = self.number(child, "val"), MILLIMETRE, 1.0, ""
         else:
             value, degrees = angle_of(self.draft.file, child, "val")
+            written = "deg" if degrees else "gon"
             unit, turned = (ARCSECOND if degrees else CC), (1.0 if child.tag == "z-angle" else self.clockwise)
         if child.tag == "z-angle" and not 0.0 < value < np.pi:
             raise self.refuse(child, f"val = {shown(attributes['val'])} (expected the first face, below half a turn)")
@@ -217,6 +219,7 @@ class _Reader:
         row = Row(
             *(KINDS[child.tag], tuple(ends), turned * value, u, child.place, (instrument, *heights), parameters),
             claim=claim,
+            unit=written,
         )
         self.draft.observe(row)
         return unit * turned

@@ -29,7 +29,8 @@ from typing import Any
 import numpy as np
 
 from catseye.estimation.network.model import ObservationNetwork
-from catseye.records.files.columns import TextColumns, columns_of
+from catseye.estimation.network.names import name_key, spelled
+from catseye.records.files.columns import TextColumns, columns_of, pointed
 from catseye.records.files.reading import Folder, toml_of
 from catseye.records.files.refusal import NUMBER, refusal, shown
 from catseye.records.files.toml_fields import ANGLE, DIMENSIONS, LENGTH, RATIO, Fields
@@ -196,7 +197,7 @@ class _Reader:
             raise fields.refuse(f"is free and has {key} (expected one of them)")
 
     def ranger(self, fields: Fields) -> None:
-        name = fields.text("name")
+        name = name_key(fields.text("name"))
         if name in self.rangers:
             raise fields.refuse(f"ranger {shown(name)} is there twice (expected each once)")
         if name not in self.draft.names:
@@ -261,11 +262,14 @@ class _Reader:
             known["height"] = fields.quantity("height", LENGTH, 0.0)
         parameters = self._parameters(fields, kind, ends)
         shifted = heights if any(heights) else ()
-        self.draft.observe(Row(kind, ends, value, u, fields.place, shifted, parameters, known=known, claim=claim))
+        key = fields.keyed("value", units)
+        unit = "gon" if key is not None and key[0].endswith("gon") else "deg" if units is ANGLE else ""
+        row = Row(kind, ends, value, u, fields.place, shifted, parameters, known=known, claim=claim, unit=unit)
+        self.draft.observe(row)
 
     def _parameters(self, fields: Fields, kind: str, ends: tuple[str, ...]) -> dict[str, int]:
         """Role -> parameter: those that the observation names, its ranger's, its set's orientation."""
-        parameters = dict(self.rangers.get(ends[0], {})) if kind in RANGED else {}
+        parameters = dict(self.rangers.get(name_key(ends[0]), {})) if kind in RANGED else {}
         for role in ALLOWED.get(kind, ()):
             if not fields.has(role):
                 continue
@@ -279,9 +283,9 @@ class _Reader:
                 raise fields.refuse(f"{role} = {shown(name)}, but ranger {shown(ends[0])} has its own (expected one)")
             parameters[role] = self.named[name]
         if kind == "direction" and "orientation" not in parameters:
-            key = (ends[0], fields.text("set", "1"))
+            key = (name_key(ends[0]), fields.text("set", "1"))
             if key not in self.sets:
-                self.sets[key] = self.draft.parameter(f"orientation {key[0]} set {key[1]}", unit="rad")
+                self.sets[key] = self.draft.parameter(f"orientation {spelled(ends[0])} set {key[1]}", unit="rad")
             parameters["orientation"] = self.sets[key]
         return parameters
 
@@ -300,7 +304,9 @@ def _rows_of(table: TextColumns, common: dict[str, Any]) -> list[Fields]:
         if name in common:
             raise refusal(table.file, f"line 1, column {shown(name)} is there twice (expected each key once)")
         is_text: Callable[[str], bool] = TEXT_KEYS.__contains__
-        columns.append(cells if is_text(name) else [float(c) if NUMBER.fullmatch(c) else c for c in cells])
+        numbers = [pointed(c) for c in cells] if table.comma else cells
+        known = [float(n) if NUMBER.fullmatch(n) else c for n, c in zip(numbers, cells, strict=True)]
+        columns.append(cells if is_text(name) else known)
     rows = []
     for line, row in zip(table.lines, zip(*columns, strict=True), strict=True):
         values = {key: value for key, value in zip(table.cells, row, strict=True) if value != ""}
