@@ -36,10 +36,10 @@ class NetworkPoints:
     xyz: np.ndarray
     fixed: np.ndarray
     datum: np.ndarray
-    absent: np.ndarray = None  # type: ignore[assignment]  # none absent, once made
+    absent: np.ndarray = field(default_factory=lambda: np.zeros((0, 3), dtype=bool))  # becomes (n, 3), none absent
 
     def __post_init__(self) -> None:
-        if self.absent is None:
+        if not len(self.absent):
             object.__setattr__(self, "absent", np.zeros(self.xyz.shape, dtype=bool))
         for state, wrong in (("held", self.fixed), ("datum", self.datum), ("given", np.isfinite(self.xyz))):
             if np.any(self.absent & wrong):

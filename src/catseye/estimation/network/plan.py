@@ -80,7 +80,8 @@ def predicted(network: ObservationNetwork) -> ObservationNetwork:
         values = near.predict(x)[0]
         if not np.isfinite(values).all():
             raise EstimationError(f"{group.name}: not defined at the planned coordinates; two points may coincide")
-        groups.append(replace(near, observed=values, covariance=_claimed(group, claim, np.abs(values))))
+        covariance = _claimed(group, claim, np.abs(values))
+        groups.append(replace(near, observed=values, covariance=covariance))  # type: ignore[type-var]
     return replace(network, groups=tuple(groups))
 
 

@@ -94,7 +94,7 @@ def _lengths(network: ObservationNetwork) -> tuple[np.ndarray, np.ndarray, np.nd
         return (np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2), int), np.zeros(0), np.zeros(0, bool))
     joined = tuple(np.concatenate(part) for part in zip(*tables, strict=True))
     finite = np.isfinite(joined[3])
-    return tuple(part[finite] for part in joined)  # type: ignore[return-value]
+    return tuple(part[finite] for part in joined)
 
 
 def _triangles(
