@@ -47,14 +47,14 @@ class Cure:
 
 
 @dataclass(frozen=True)
-class Reason:
+class NetworkReason:
     """The end of a status, "" for none, and whether it names a cause rather than a place."""
 
     text: str
     named: bool
 
 
-def reason(solution: NetworkSolution, adjust: Adjust) -> Reason:
+def reason(solution: NetworkSolution, adjust: Adjust) -> NetworkReason:
     """The one reason whose cure fits, or else where most of the contradiction is.
 
     solution   an answer that its observations contradict, or that did not converge
@@ -68,8 +68,8 @@ def reason(solution: NetworkSolution, adjust: Adjust) -> Reason:
         least = min(cure.changes for cure in cures)
         best = [cure for cure in cures if cure.changes == least]
         if len(best) == 1:
-            return Reason(f"; {best[0].text.replace('{factor}', f'{best[0].factor:.3g}')}", named=True)
-    return Reason(_where(solution), named=False)
+            return NetworkReason(f"; {best[0].text.replace('{factor}', f'{best[0].factor:.3g}')}", named=True)
+    return NetworkReason(_where(solution), named=False)
 
 
 def fits(solution: NetworkSolution) -> bool:
