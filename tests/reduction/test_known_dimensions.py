@@ -3,6 +3,7 @@
 Variance factors of GNU Gama 2.33; heights of [Wolf and Ghilani] example 12.1, worked again in numpy here.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from catseye.api.network import adjust, plan
 from catseye.errors import InputError
+from catseye.gateways.network.summary import verdict
 from command_scene import command_line
 
 HERE = Path(__file__).parents[1] / "vectors" / "networks" / "dimensions"
@@ -112,3 +114,12 @@ def test_reasons_of_known_mistakes():
     assert "Q (2 observations) floats" in unmeasured
     with pytest.raises(InputError, match="packed 45-30-15"):
         adjust(HERE / "packed.dat")
+
+
+@pytest.mark.parametrize(("file", "word"), [("plane-held.gkf", "doubtful"), ("plane-datum.gkf", "good")])
+def test_an_assumed_side_is_a_doubt_where_points_are_held_and_a_convention_in_a_free_network(file, word):
+    found = adjust(HERE / file).findings
+    assumed = replace(found, solution=replace(found.solution, assumed=("4",)))
+    assert verdict(found).word == "good"
+    assert verdict(assumed).word == word
+    assert ("which side these points lie" in verdict(assumed).why) == (word == "doubtful")

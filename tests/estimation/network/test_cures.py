@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from catseye.estimation.network.adjustment import adjust_network
+from catseye.estimation.network.model import NetworkPoints, ObservationNetwork
+from catseye.estimation.observations.kinds import Distances
 from catseye.records.network.gama import gama_network
 from catseye.records.network.starnet import starnet_network
 
@@ -144,3 +146,27 @@ def test_pieces_that_are_held_are_not_blamed_for_a_height_that_nothing_measures(
     status = adjust_network(starnet_network(head + loose + free + polar + angles, "pieces.dat")).status
     assert "in 2 pieces" in status
     assert status.endswith("or hold that of B1, B2, Q")
+
+
+def flat_stations(*, sigma, targets, seed=0):
+    """Exact ranges from six held stations in one plane; nothing else says where the targets are."""
+    rng = np.random.default_rng(seed)
+    stations = np.column_stack([rng.uniform(-50, 50, (6, 2)), np.zeros(6)])
+    there = np.column_stack([rng.uniform(-50, 50, (targets, 2)), rng.uniform(5, 30, targets)])
+    n = 6 + targets
+    held = np.repeat(np.arange(n) < 6, 3).reshape(n, 3)
+    xyz = np.vstack([stations, np.full((targets, 3), np.nan)])
+    pairs = np.array([(i, 6 + j) for i in range(6) for j in range(targets)])
+    length = np.linalg.norm(stations[pairs[:, 0]] - there[pairs[:, 1] - 6], axis=1)
+    ranges = Distances("ranges", length, np.full(len(pairs), sigma**2), 3 * pairs[:, 0], 3 * pairs[:, 1])
+    points = NetworkPoints(tuple(f"P{i}" for i in range(n)), xyz, held, np.zeros((n, 3), dtype=bool))
+    return ObservationNetwork(points, (), (ranges,))
+
+
+@pytest.mark.parametrize("sigma", [1e-3, 1e-9])
+@pytest.mark.parametrize("targets", [1, 4, 8])
+def test_stations_in_one_plane_are_told_of_the_mirror_image_and_no_zero_is_blamed(sigma, targets):
+    status = adjust_network(flat_stations(sigma=sigma, targets=targets)).status
+    assert "mirror image" in status or "two positions fit" in status
+    assert "zero" not in status
+    assert "scale" not in status

@@ -43,6 +43,10 @@ def verdict(findings: Findings) -> Verdict:
     if status != CONVERGED or findings.network.doubts:
         reasons = [*findings.network.doubts[:NAMED], *([status] if status != CONVERGED else [])]
         return Verdict("doubtful", "; ".join(reasons))
+    sides = findings.solution.assumed if findings.network.points.fixed.any() else ()
+    if sides:  # a free network may lie on either side: that is a convention
+        text = f"nothing says on which side these points lie, and a mirror image fits as well: {_listed(sides)}"
+        return Verdict("doubtful", f"{text}; give them a rough place, or measure a zenith angle or a height")
     if not np.isfinite(whole.p):
         return Verdict("doubtful", "unchecked: nothing was measured twice, so nothing would show an error")
     if whole.outcome == TOO_LARGE:
