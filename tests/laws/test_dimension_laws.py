@@ -49,6 +49,19 @@ def test_a_plan_counts_the_coordinates_that_there_are(tmp_path, dimension, datum
 
 
 @pytest.mark.parametrize("dimension", DIMENSIONS)
+def test_runs_of_a_plan_scatter_as_it_claims_over_the_coordinates_that_there_are(tmp_path, dimension):
+    made = scene(5, dimension, "held")
+    made.given = np.where(made.there, made.truth, np.nan)
+    runs = 30
+    told = plan(written(tmp_path, made, "held"), runs=runs, seed=2).to_object()
+    known = made.there & ~made.held
+    variance = np.diag(least_squares(made, "held").covariance).reshape(-1, 3)
+    assert told["monte_carlo"]["predicted"] == pytest.approx(float(np.sqrt(np.mean(variance[known]))), rel=1e-3)
+    spread = 4.0 / np.sqrt(2 * runs * 3)  # four sigmas of a mean square, at least three coordinates independent
+    assert told["monte_carlo"]["ratio"] == pytest.approx(1.0, abs=spread)
+
+
+@pytest.mark.parametrize("dimension", DIMENSIONS)
 def test_what_does_not_exist_is_null_and_an_empty_cell_everywhere(tmp_path, dimension):
     made = scene(9, dimension, "held")
     ours = adjust(written(tmp_path, made, "held"))

@@ -9,9 +9,10 @@ from threadpoolctl import threadpool_limits
 from catseye.constants import PPM
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import CONVERGED, GroupFit
-from catseye.estimation.network.adjustment import NetworkSettings, adjust_network, fits_near, with_datum
+from catseye.estimation.network.adjustment import NetworkSettings, adjust_network, fits_near
 from catseye.estimation.network.approximate.start import approximate
 from catseye.estimation.network.cures import inflation_of, targets_of_ranges
+from catseye.estimation.network.datum import with_datum
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
 from catseye.estimation.network.monte_carlo import Disturbance, MonteCarloScatter, scatter
 from catseye.estimation.network.ranging_engine import RangingCovariance

@@ -110,6 +110,17 @@ def test_a_mirrored_sense_of_angles_is_named_with_the_right_factor(seed):
     assert "exchanged" not in wrong.status
 
 
+@pytest.mark.parametrize(("seed", "first", "second"), [(0, 0, 2), (3, 2, 3), (4, 1, 2)])
+def test_exchanged_held_points_are_named_with_the_factor_of_the_right_places(seed, first, second):
+    right = starnet_network(plane(seed)[0], "plane.dat")
+    at = [right.points.names.index(f"K{k}") for k in (first, second)]
+    xyz = right.points.xyz.copy()
+    xyz[at] = xyz[at[::-1]]
+    status = adjust_network(replace(right, points=replace(right.points, xyz=xyz))).status
+    factor = adjust_network(right).variance_factor
+    assert status.endswith(f"with K{first} and K{second} exchanged the variance factor is {factor:.3g}")
+
+
 @pytest.mark.parametrize("start", ["exchanged", "zero"])
 @pytest.mark.parametrize("seed", range(4))
 def test_poor_approximate_coordinates_lead_to_the_same_answer(seed, start):

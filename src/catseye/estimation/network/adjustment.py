@@ -20,19 +20,19 @@ from catseye.estimation.network.datum import (
     datum_conditions,
     floating_motions,
     minimal_coordinates,
+    motion_limit,
     to_datum,
     transformed,
+    with_datum,
+    with_reference,
 )
 from catseye.estimation.network.diagnosis import contradicted, diagnosed, floating_text, unconnected
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork
 from catseye.estimation.observations.kinds import Linear, ObservationGroup
 
 FEWEST_POINTS = 200  # from which exchanged points are tried only where the ranging engine serves
-DATUMS = ("free", "fixed")
 PASSES = 8  # of solving with the fewest coordinates held and moving into the datum
-SETTLED = 1e-7  # of the network's size: a last motion below it changes nothing to second order,
 REACHED = 0.9  # of the variance factor, from which another start reached nothing better
-UNDONE = 1e-6  # nor does one that leaves less than this share of the usual standard uncertainty undone
 
 NO_DATUM = "rank deficient: the network floats ({motions}) and nothing holds it; hold coordinates, mark datum points, \
 or adjust it free (--datum free)"
@@ -40,30 +40,6 @@ WEAK_DATUM = "rank deficient: the datum's coordinates do not hold the network ag
 NOT_SETTLED = "not converged: the network does not come to rest in its datum after {passes} passes; \
 check the starting coordinates"
 NOT_PLACED = "no approximate coordinates: {points}; give some, or observe more"
-
-
-def with_datum(network: ObservationNetwork, datum: str | None) -> ObservationNetwork:
-    """The network with its datum as asked.
-
-    datum   None: as the file marks it. "fixed": what is marked either way is held. "free": nothing is held, inner
-            constraints on the points marked fixed or datum; where none is, on all with given coordinates; where
-            nothing is given, on all
-    """
-    if datum is None:
-        return network
-    if datum not in DATUMS:
-        raise EstimationError(f"datum {datum!r} is not known (expected one of {', '.join(DATUMS)})")
-    points = network.points
-    marked = points.fixed | points.datum
-    nothing = np.zeros_like(marked)
-    if datum == "fixed":
-        if not marked.any():
-            raise EstimationError("datum 'fixed': no point of the network is marked fixed or datum; mark some")
-        return replace(network, points=replace(points, fixed=marked, datum=nothing))
-    chosen = marked if marked.any() else np.isfinite(points.xyz)
-    if not chosen.any():
-        chosen = points.existing
-    return replace(network, points=replace(points, fixed=nothing, datum=chosen))
 
 
 @dataclass(frozen=True)
@@ -110,7 +86,7 @@ def adjust_network(
 
     Source: [FOERSTNER16] chapter 4; datum by S-transformation, [BAARDA73].
     """
-    network = _with_reference(with_datum(network, datum))
+    network = with_reference(with_datum(network, datum))
     if inflation is not None:
         kept = [np.isfinite(f) for f in inflation]
         active = kept if active is None else [a & k for a, k in zip(active, kept, strict=True)]
@@ -170,19 +146,6 @@ def fits_near(
         return solution.fits[: len(network.groups)] if solution.status == CONVERGED else None
 
     return solve
-
-
-def _with_reference(network: ObservationNetwork) -> ObservationNetwork:
-    """The network, with the places found for its points as their coordinates where not one is given.
-
-    The inner constraints then refer to these; where the network lies is a convention in any case.
-    """
-    points = network.points
-    if np.isfinite(points.xyz).any() or not points.datum.any():
-        return network
-    from catseye.estimation.network.approximate.start import approximate
-
-    return replace(network, points=replace(points, xyz=approximate(network).xyz))
 
 
 def _from_observations(
@@ -330,7 +293,7 @@ class _Problem:
             moved, t = to_datum(x, points.xyz.ravel(), floating.motions, conditions=conditions)
             x = x + moved
             u = np.sqrt(np.maximum(solution.q.diagonal()[:n][held[:n]], 0.0)) if solver.tests else np.zeros(0)
-            settled = bool(np.abs(moved[:n]).max() <= _motion_limit(x[:n].reshape(-1, 3), points.existing, u))
+            settled = bool(np.abs(moved[:n]).max() <= motion_limit(x[:n].reshape(-1, 3), points.existing, u))
             if settled and solver.tests:
                 solution = replace(solution, q=transformed(solution.q, t, conditions))
             if settled:
@@ -428,16 +391,6 @@ class _Problem:
             variance_factor=float("nan"),
             degrees_of_freedom=float("nan"),
         )
-
-
-def _motion_limit(points: np.ndarray, existing: np.ndarray, u: np.ndarray) -> float:
-    """Motion of the datum that points (n, 3) m may make in a last pass; u (k,) m of coordinates, empty if not known.
-
-    What a motion s leaves undone is s^2 / size: nothing beside the standard uncertainties.
-    """
-    low, high = np.where(existing, points, np.inf).min(axis=0), np.where(existing, points, -np.inf).max(axis=0)
-    size = float(np.max(high - low, where=existing.any(axis=0), initial=0.0))
-    return max(SETTLED * size, float(np.sqrt(UNDONE * np.median(u) * size)) if len(u) else 0.0)
 
 
 def _padded(

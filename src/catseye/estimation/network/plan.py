@@ -11,7 +11,8 @@ import numpy as np
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.covariance import LARGEST_MATRIX
 from catseye.estimation.least_squares.rows import variances
-from catseye.estimation.network.adjustment import adjust_network, with_datum
+from catseye.estimation.network.adjustment import adjust_network
+from catseye.estimation.network.datum import with_datum
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
 from catseye.estimation.observations.kinds import Distances, ObservationGroup
 
