@@ -61,7 +61,7 @@ def test_runs_of_a_plan_scatter_as_it_claims_over_the_coordinates_that_there_are
     assert told["monte_carlo"]["ratio"] == pytest.approx(1.0, abs=spread)
 
 
-@pytest.mark.parametrize("dimension", DIMENSIONS)
+@pytest.mark.parametrize("dimension", ["1", "2", "mixed"])
 def test_what_does_not_exist_is_null_and_an_empty_cell_everywhere(tmp_path, dimension):
     made = scene(9, dimension, "held")
     ours = adjust(written(tmp_path, made, "held"))
