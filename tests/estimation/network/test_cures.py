@@ -135,6 +135,16 @@ def test_poor_approximate_coordinates_lead_to_the_same_answer(seed, start):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_sigmas_that_are_too_small_name_no_observation_as_the_reason(seed):
+    network = starnet_network(plane(seed)[0], "plane.dat")
+    groups = tuple(replace(g, covariance=g.covariance / 64.0) for g in network.groups)  # 8 times too small
+    status = adjust_network(replace(network, groups=groups)).status
+    assert status.startswith("converged, but the observations contradict each other")
+    assert "variance factor is" not in status
+
+
+@pytest.mark.slow
 def test_a_reason_whose_cure_does_not_fit_is_not_named():
     network = gama("right-handed")
     spoilt = [

@@ -27,6 +27,7 @@ EXCHANGE_ALL = 300  # points up to which all pairs are tried, and observations a
 EXCHANGEABLE = 20  # points with the most observations, that are tried: 190 pairs
 SEARCHED = 60  # points up to which several wrong observations are searched for: some hundred adjustments
 SINGLES = 60  # observations with the largest residuals, that are left out one at a time
+MANY = 0.1  # of the observations: where more had to go, other weights would explain as well
 NAMED = 3  # observations in a sentence
 NEARER = 10.0  # times in squares: of several exchanges that fit, the one that leaves the points where they are given
 HALF_TURN = 0.01  # rad beside pi, within which an angle's error counts as half a turn
@@ -166,7 +167,7 @@ def _without_several(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure
     except EstimationError:  # what is left does not hold the network
         return
     out = [(g, int(r)) for g, part in enumerate(found.rejected) for r in np.flatnonzero(part)]
-    if not out or any(part.any() for part in found.undecided):
+    if not out or any(part.any() for part in found.undecided) or len(out) > max(2, MANY * sum(sizes)):
         return
     trial = _tried(network, [np.where(part, np.inf, 1.0) for part in found.rejected], adjust)
     if trial is not None and fits(trial):
