@@ -34,8 +34,8 @@ class AdjustmentResult(Result):
     """A network adjusted: n points and m observations, in the axes and the order of its file.
 
     names                of the points
-    x                    (n, 3) m
-    covariances          (n, 3, 3) m² of each point; `covariance` is that of all together
+    x                    (n, 3) m; nan where a coordinate is absent: nobody gave it and nothing measures it
+    covariances          (n, 3, 3) m² of each point; `covariance` is that of all together; nan likewise
     u                    (n, 3) m, standard uncertainties
     status               "converged", or what is wrong and what to do
     variance_factor      [pvv] / degrees of freedom, expectation 1; nan where nothing is redundant
@@ -69,10 +69,12 @@ class AdjustmentResult(Result):
     @cached_property
     def covariance(self) -> np.ndarray:
         """Covariance of all coordinates, (3n, 3n) m², x, y, z of each point in turn; computed when asked for."""
-        axes = self.findings.network.axes
-        block = self.findings.solution.block(self.names).reshape(len(self.names), 3, len(self.names), 3)
-        turned = np.einsum("ka,ikjl,lb->iajb", axes, block, axes, optimize=True) * self.findings.factor
-        return turned.reshape(3 * len(self.names), -1)
+        axes = self.findings.network.axes  # a signed permutation: an unknown row leaves the others known
+        at, n = np.argmax(np.abs(axes), axis=0), len(self.names)
+        sign = np.tile(axes[at, np.arange(3)], n)
+        rows = (3 * np.arange(n)[:, None] + at).ravel()
+        block = self.findings.solution.block(self.names)[np.ix_(rows, rows)]
+        return np.asarray(np.outer(sign, sign) * block * self.findings.factor)
 
     def passages(self) -> "Sequence[Passage]":
         """The network, its points, the fit, the checks, and what was left out."""
@@ -366,7 +368,7 @@ class PlanResult(Result):
         from catseye.gateways.network.figures import network_figures
 
         drawn = network_figures(self.planned.findings)
-        return {name: drawn[name].figure for name in ("plan", "elevation")}
+        return {name: drawn[name].figure for name in ("plan", "elevation") if name in drawn}
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """As `catseye plan --out`."""
@@ -403,7 +405,8 @@ def plan(
 ) -> PlanResult:
     """A network before it is measured: what it will be worth, where it is weak, what to measure next.
 
-    network    as for `adjust`; observed values are not used
+    network    as for `adjust`; observed values are not used, and may be missing: an empty cell, no column `distance`,
+               no value in TOML. What of a sigma grows with the distance follows the planned one
     datum      as for `adjust`
     interest   points that matter; all that are not held without
     budget_s   time of every ranger for further ranges, s: gives a schedule
@@ -424,7 +427,7 @@ def plan(
     from catseye.gateways.network.plan import PlanFindings, plan_verdict
     from catseye.reduction.network import measured_on_paper
 
-    read, path = _network_of(network, sigma_mm, sigma_ppm)
+    read, path = _network_of(network, sigma_mm, sigma_ppm, planned=True)
     worth = planned(read, datum=datum, interest=interest, most=most)
     picked = () if budget_s is None else schedule(worth, budget_s=budget_s, shot_s=shot_s)
     scatter = None
@@ -557,7 +560,11 @@ def require_answer(result: AdjustmentResult) -> AdjustmentResult:
 
 
 def _network_of(
-    network: "str | os.PathLike[str] | ObservationNetwork", sigma_mm: float | None, sigma_ppm: float | None
+    network: "str | os.PathLike[str] | ObservationNetwork",
+    sigma_mm: float | None,
+    sigma_ppm: float | None,
+    *,
+    planned: bool = False,
 ) -> "tuple[ObservationNetwork, Path | None]":
     """The network itself and the path it was read from."""
     from catseye.estimation.network.model import ObservationNetwork
@@ -568,7 +575,7 @@ def _network_of(
     path = place_of(network)
     if not path.exists():
         raise InputError(f"{path}: missing (expected {NETWORKS})")
-    return read_network(path, sigma_mm=sigma_mm, sigma_ppm=sigma_ppm), path
+    return read_network(path, sigma_mm=sigma_mm, sigma_ppm=sigma_ppm, planned=planned), path
 
 
 def _hashes(path: Path | None) -> dict[str, str]:

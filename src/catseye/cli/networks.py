@@ -173,11 +173,15 @@ def _tell_adjusted(result: "AdjustmentResult", out: Path | None, *, json: bool, 
         judge(result.verdict, strict=strict)
         return
     few = result.names if len(result.names) <= FEW else ()
+    there = result.findings.coordinates
     rows = [
         f"{'':<14}{name:<10} "
-        + "  ".join(f"{axis} {v:12.5f}" for axis, v in zip(result.findings.network.axis_names, x, strict=True))
-        + f"   u {', '.join(f'{v * 1e3:.3f}' for v in u)} mm"
-        for name, x, u in zip(few, result.x, result.u, strict=False)
+        + "  ".join(
+            f"{axis} {v:12.5f}" if known else f"{'':14}"
+            for axis, v, known in zip(result.findings.network.axis_names, x, has, strict=True)
+        )
+        + f"   u {', '.join(f'{v * 1e3:.3f}' for v in u[has])} mm"
+        for name, x, u, has in zip(few, result.x, result.u, there, strict=False)
     ]
     files = _written(out, "coordinates.csv, observations.csv, adjustment.json, and more")
     tell(result, json=False, quiet=quiet, strict=strict, rows=rows, written=files)

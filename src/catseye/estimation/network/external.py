@@ -18,11 +18,11 @@ def effects_at_ends(solution: NetworkSolution) -> tuple[np.ndarray, ...]:
 
     Source: [BAARDA68] (external reliability): dx = Q A' P e_i times the detectable error.
     """
-    x = np.concatenate([solution.x.ravel(), solution.parameters])
+    x, answered = solution.state, solution.answered
     result = []
     for group, fit in zip(solution.network.groups, solution.fits, strict=True):
         ends = getattr(group, "ends", ())
-        if not ends or not np.isfinite(solution.covariance).all():
+        if not ends or not answered:
             result.append(np.full(len(group.observed), np.nan))
             continue
         rows = ActiveRows.of(group, fit.active)

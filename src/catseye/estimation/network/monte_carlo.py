@@ -114,14 +114,12 @@ def scatter(
     sigma = np.array([p.sigma if np.isfinite(p.sigma) else 0.0 for p in network.parameters])
     squares, normalised, claims, done = 0.0, 0.0, 0.0, 0
     hit, blunders, lost, good = 0, 0, 0, 0
-    status = ""
+    status, truth = "", np.where(network.points.absent, 0.0, network.points.xyz).ravel()
     for run in range(runs):
         if progress is not None:
             progress("measuring on paper", run, runs)
         values = starts + sigma * generator.standard_normal(len(starts))
-        drawn, wrong = measured(
-            network, np.concatenate([network.points.xyz.ravel(), values]), generator, disturbance=given
-        )
+        drawn, wrong = measured(network, np.concatenate([truth, values]), generator, disturbance=given)
         solution = solve(drawn)
         if not solution.status.startswith(CONVERGED):
             status = solution.status
@@ -130,7 +128,7 @@ def scatter(
         departure = solution.x - network.points.xyz
         claim = np.einsum("nii->ni", solution.covariance)
         squares, claims = squares + departure**2, claims + claim
-        held = claim <= 0.0
+        held = ~(claim > 0.0)  # or absent
         normalised += float(np.mean((departure**2 / np.where(held, 1.0, claim))[~held]))
         for fit, bad in zip(solution.fits, wrong, strict=True):
             hit, blunders = hit + int(np.sum(bad & ~fit.active)), blunders + int(bad.sum())

@@ -11,9 +11,10 @@ import numpy as np
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.covariance import LARGEST_MATRIX
 from catseye.estimation.least_squares.rows import variances
-from catseye.estimation.network.adjustment import adjust_network, with_datum
+from catseye.estimation.network.adjustment import adjust_network
+from catseye.estimation.network.datum import with_datum
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
-from catseye.estimation.observations.kinds import Distances
+from catseye.estimation.observations.kinds import Distances, ObservationGroup
 
 BATCH = 200  # ranges whose effect is computed at once
 
@@ -61,25 +62,41 @@ class Candidate:
 
 
 def predicted(network: ObservationNetwork) -> ObservationNetwork:
-    """The network with every observation replaced by what its points and parameters predict.
+    """The network with every observation replaced by what its points and parameters predict, and its sigma by theirs.
 
+    Observed values may be nan: not measured yet.
     Raises EstimationError where a point has no coordinates: a plan needs a place for everything.
     """
     points = network.points
-    lost = [name for name, xyz in zip(points.names, points.xyz, strict=True) if not np.isfinite(xyz).all()]
+    lost = [points.names[i] for i in np.flatnonzero(points.unplaced.any(axis=1))]
     if lost:
         more = f" and {len(lost) - 4} more" if len(lost) > 4 else ""
         raise EstimationError(
             f"{', '.join(lost[:4])}{more}: no coordinates (expected approximate ones of every point, to plan with)"
         )
-    x = np.concatenate([points.xyz.ravel(), [p.start for p in network.parameters]])
+    x = np.concatenate([np.where(points.absent, 0.0, points.xyz).ravel(), [p.start for p in network.parameters]])
     groups = []
-    for group in network.groups:
-        values = group.predict(x)[0]
+    for group, claim in zip(network.groups, network.claims or (None,) * len(network.groups), strict=True):
+        near = replace(group, observed=np.nan_to_num(group.observed))  # type: ignore[type-var]
+        values = near.predict(x)[0]
         if not np.isfinite(values).all():
             raise EstimationError(f"{group.name}: not defined at the planned coordinates; two points may coincide")
-        groups.append(replace(group, observed=values))  # type: ignore[type-var]
+        covariance = _claimed(group, claim, np.abs(values))
+        groups.append(replace(near, observed=values, covariance=covariance))  # type: ignore[type-var]
     return replace(network, groups=tuple(groups))
+
+
+def _claimed(group: ObservationGroup, claim: np.ndarray | None, length: np.ndarray) -> np.ndarray:
+    """The covariance of a group whose uncertainties grow with its lengths (m,), at the planned ones."""
+    if claim is None or not claim[:, 1].any():
+        return group.covariance
+    a, b, c = claim.T
+    larger = np.where(b > 0.0, (a + b * length**c) / np.sqrt(variances(group)), 1.0)
+    if group.covariance.ndim == 1:
+        return group.covariance * larger**2
+    size = group.covariance.shape[-1]
+    pairs = larger.reshape(-1, size)
+    return group.covariance * (pairs[:, :, None] * pairs[:, None, :]).reshape(group.covariance.shape)
 
 
 def plan(
@@ -97,13 +114,14 @@ def plan(
     """
     problem = predicted(with_datum(network, datum))
     solution = adjust_network(problem)
-    if not np.isfinite(solution.covariance).all():
+    if not solution.answered:
         raise EstimationError(solution.status)
-    chosen = _interest(solution, interest)
-    values, vectors = np.linalg.eigh(solution.covariance)
+    chosen, existing = _interest(solution, interest), solution.network.points.existing
+    blocks = np.where(existing[:, :, None] & existing[:, None, :], solution.covariance, 0.0)
+    values, vectors = np.linalg.eigh(blocks)
     direction = vectors[:, :, 2] * np.where(vectors[:, 2:, 2] < 0.0, -1.0, 1.0)
     full = _full(solution)
-    coordinates = np.flatnonzero(np.repeat(chosen, 3))
+    coordinates = _coordinates(solution, chosen)
     total = float(np.trace(full[np.ix_(coordinates, coordinates)]))
     return Plan(
         solution=solution,
@@ -133,10 +151,10 @@ def schedule(
         raise EstimationError(f"budget {budget_s:g} s, shot {shot_s:g} s (expected both above zero)")
     solution, names = chosen.solution, chosen.solution.network.points.names
     full = _full(solution).copy()
-    coordinates = np.flatnonzero(np.repeat(chosen.interest, 3))
+    coordinates = _coordinates(solution, chosen.interest)
     total = float(np.trace(full[np.ix_(coordinates, coordinates)]))
     pairs, sigma = _pairs(solution, repeats)
-    spent, inside = np.zeros(len(names)), np.repeat(chosen.interest, 3)
+    spent, inside = np.zeros(len(names)), np.isin(np.arange(len(full)), coordinates)
     shown, own = _effects(solution.x, full, coordinates, pairs)
     unit = _unit(solution.x, pairs) if len(pairs) else np.zeros((0, 3))
     open_ = np.full(len(pairs), shot_s <= budget_s)
@@ -167,13 +185,22 @@ def schedule(
 def _interest(solution: NetworkSolution, names: Sequence[str] | None) -> np.ndarray:
     points = solution.network.points
     if names is None:
-        return np.asarray(~points.fixed.all(axis=1))
+        return np.asarray(points.free.any(axis=1))
     strange = [name for name in names if name not in solution.index]
     if strange:
         raise EstimationError(f"point {strange[0]!r} is not in the network (expected one of its names)")
     chosen = np.zeros(len(points.names), dtype=bool)
     chosen[[solution.index[name] for name in names]] = True
     return chosen
+
+
+def _coordinates(solution: NetworkSolution, chosen: np.ndarray) -> np.ndarray:
+    """Columns of the coordinates of some points (n,) bool that can be known better: neither held nor absent."""
+    free = solution.network.points.free & chosen[:, None]
+    if not free.any():
+        names = [solution.network.points.names[i] for i in np.flatnonzero(chosen)]
+        raise EstimationError(f"{', '.join(names[:4]) or 'no point'}: every coordinate is held; nothing is to plan")
+    return np.flatnonzero(free)
 
 
 def _full(solution: NetworkSolution) -> np.ndarray:
@@ -272,7 +299,7 @@ def _worth(
     solution: NetworkSolution, full: np.ndarray, coordinates: np.ndarray, total: float
 ) -> tuple[np.ndarray, ...]:
     """Growth of the mean standard uncertainty were one observation left out, m: |(Q a)_I|^2 / (s^2 r)."""
-    x = np.concatenate([solution.x.ravel(), solution.parameters])
+    x = solution.state
     count, chosen = len(coordinates), np.ascontiguousarray(full[:, coordinates])
     if len(x) > len(full):  # parameters beside the points are seen too
         others = solution.q.across(np.arange(len(full), len(x)))[coordinates]

@@ -1,7 +1,8 @@
 """Standard and confidence ellipsoids of points, their ellipses in plan and elevation, and relative ones of pairs.
 
 Axes are x east, y north, z up. A covariance may be singular (a held coordinate has none): its ellipsoid is then flat.
-Where a point has no answer its covariance is nan, and so is everything here.
+Where a point has no answer its covariance is nan, and so is everything here. A coordinate that does not exist has nan
+in its row and column alone: the ellipsoid is that of the others, and its last semi-axes are nan.
 """
 
 from dataclasses import dataclass
@@ -44,7 +45,7 @@ class Ellipse:
 def _square_roots(values: np.ndarray) -> np.ndarray:
     """Roots of eigenvalues, ascending in the last axis; those that rounding made negative are zero."""
     with np.errstate(invalid="ignore"):
-        negative = values[..., 0] < -ROUNDING * np.abs(values[..., -1])
+        negative = np.fmin.reduce(values, axis=-1) < -ROUNDING * np.abs(values[..., -1])
     if np.any(negative):
         where = np.unravel_index(np.argmax(negative), negative.shape)
         raise EstimationError(
@@ -55,10 +56,17 @@ def _square_roots(values: np.ndarray) -> np.ndarray:
 
 
 def _eigen(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues and vectors, ascending; nan for a matrix that is not finite."""
-    known = np.isfinite(covariance).all(axis=(-2, -1))
-    values, vectors = np.linalg.eigh(np.where(known[..., None, None], covariance, 0.0))
-    return np.where(known[..., None], values, np.nan), np.where(known[..., None, None], vectors, np.nan)
+    """Eigenvalues and vectors, ascending; nan for a matrix that is not finite, and first those of nan rows."""
+    size = covariance.shape[-1]
+    gone = np.isnan(np.diagonal(covariance, axis1=-2, axis2=-1))
+    pairs = ~(gone[..., :, None] | gone[..., None, :])
+    known = (np.isfinite(covariance) | ~pairs).all(axis=(-2, -1))
+    inside = np.where(pairs & known[..., None, None], covariance, 0.0)
+    scale = np.abs(inside).max(axis=(-2, -1))[..., None]
+    last = np.where(gone, np.where(scale > 0.0, scale, 1.0), 0.0)  # below all others, and no larger: rounding
+    values, vectors = np.linalg.eigh(inside - last[..., None] * np.eye(size))
+    there = known[..., None] & (np.arange(size) >= gone.sum(axis=-1)[..., None])
+    return np.where(there, values, np.nan), np.where(there[..., None, :], vectors, np.nan)
 
 
 def ellipsoid(covariance: np.ndarray) -> Ellipsoid:

@@ -39,15 +39,22 @@ class CaptionedFigure:
 
 
 def network_figures(findings: Findings) -> dict[str, CaptionedFigure]:
-    """Plan, elevation, residuals and redundancy by name, in the axes x east, y north, z up.
+    """Plan, elevation, residuals and redundancy by name, those that show anything; x east, y north, z up.
 
     findings   what is told of a solution
     """
     with styled():
-        drawn = {"plan": _view(findings, None), "elevation": _view(findings, looking(findings))}
+        drawn = {name: _view(findings, bearing) for name, bearing in _views(findings).items()}
         if np.isfinite(findings.table.standardised).any():
             drawn |= {"residuals": _residuals(findings), "redundancy": _redundancy(findings)}
         return {name: CaptionedFigure(figure, caption) for name, (figure, caption) in drawn.items()}
+
+
+def _views(findings: Findings) -> dict[str, float | None]:
+    """Bearing of each view that has a point to show; None from above."""
+    there = findings.network.points.existing
+    views = {"plan": None} if there[:, :2].all(axis=1).any() else {}
+    return {**views, **({"elevation": looking(findings)} if there.all(axis=1).any() else {})}
 
 
 def looking(findings: Findings) -> float:
@@ -55,7 +62,9 @@ def looking(findings: Findings) -> float:
 
     findings   what is told of a solution
     """
-    level = findings.solution.x[:, :2] - np.nanmean(findings.solution.x[:, :2], axis=0)
+    level = findings.solution.x[:, :2]
+    level = level[findings.network.points.existing[:, :2].all(axis=1)]
+    level = level - np.nanmean(level, axis=0)
     spread = level.T @ level
     if not np.isfinite(spread).all():
         return 0.0
@@ -77,14 +86,16 @@ def enlargement(findings: Findings) -> float:
     if not len(known):
         return np.nan
     share = SHARE / (1.0 + np.sqrt(len(known) / 150.0))
-    return nice(share * max(float(np.ptp(findings.solution.x, axis=0).max()), 1e-3) / float(np.median(known)))
+    x = findings.solution.x[:, findings.network.points.existing.any(axis=0)]
+    return nice(share * max(float(np.max(np.nanmax(x, axis=0) - np.nanmin(x, axis=0))), 1e-3) / float(np.median(known)))
 
 
 def _view(findings: Findings, bearing: float | None) -> tuple[Figure, str]:
     """Points, lines of observations and ellipses, seen from above or along a bearing."""
     solution = findings.solution
     axes = PLAN if bearing is None else elevation_view(bearing)
-    flat = solution.x @ axes.T
+    there = findings.network.points.existing[:, :2] if bearing is None else findings.network.points.existing
+    flat = np.where(there.all(axis=1, keepdims=True), np.nan_to_num(solution.x) @ axes.T, np.nan)
     known = np.isfinite(flat).all(axis=1)
     if bearing is not None:
         flat[:, 0] -= flat[known, 0].min(initial=np.inf if known.any() else 0.0)
@@ -93,9 +104,10 @@ def _view(findings: Findings, bearing: float | None) -> tuple[Figure, str]:
     figure, ax = view_frame(0.5 * (low + high), high - low + 0.16 * size)
     lines = _lines(ax, findings, flat)
     scale = enlargement(findings)
-    loose, ellipses = _ellipses(
-        ax, findings, flat, ellipse(projected(solution.covariance * findings.factor, axes)), scale
-    )
+    covariance = np.full((len(flat), 2, 2), np.nan)
+    if solution.answered:
+        covariance[known] = projected(np.nan_to_num(solution.covariance[known]) * findings.factor, axes)
+    loose, ellipses = _ellipses(ax, findings, flat, ellipse(covariance), scale)
     scale_bar(ax, nice(0.2 * size), scale)
     _marks(ax, findings, flat, loose)
     point_names(ax, findings, flat)
@@ -157,7 +169,7 @@ def _lines(ax: Any, findings: Findings, flat: np.ndarray) -> str:
 def _ellipses(ax: Any, findings: Findings, flat: np.ndarray, shown: Ellipse, scale: float) -> tuple[np.ndarray, str]:
     """Outlines of the standard ellipsoids to scale; which points (n,) have none, and the caption's sentence."""
     known = np.isfinite(shown.major)
-    if not np.isfinite(scale):
+    if not (np.isfinite(scale) and np.any(shown.major[known] > 0.0)):
         return ~known, "No ellipsoids: nothing is known of the uncertainties."
     usual = float(np.median(shown.major[known & (shown.major > 0.0)]))
     loose = ~known | (shown.major > LOOSE * usual)
@@ -206,7 +218,7 @@ def _length(value: float) -> str:
 
 def _marks(ax: Any, findings: Findings, flat: np.ndarray, loose: np.ndarray) -> None:
     """Stations, targets, held and loose points, each with a mark of its own."""
-    held = findings.network.points.fixed.all(axis=1)
+    held = ~findings.network.points.free.any(axis=1)
     many = len(flat) > DENSE
     for mine, marker, colour, area, name in (
         (~findings.stations & ~held & ~loose, "o", TARGET, 4 if many else 12, "target"),

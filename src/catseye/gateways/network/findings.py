@@ -10,9 +10,8 @@ import numpy as np
 
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import CONVERGED, NONCENTRALITY
-from catseye.estimation.network.diagnosis import label
 from catseye.estimation.network.external import effects_at_ends
-from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
+from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, label, points_of
 from catseye.estimation.quality.ellipsoid import Ellipsoid, ellipsoid, relative_covariance
 from catseye.estimation.quality.reliability import (
     GlobalTest,
@@ -221,8 +220,8 @@ class Findings:
     """A solution and what is said of it, in the axes of its file.
 
     solution      what was adjusted
-    x             (n, 3) m
-    covariance    (n, 3, 3) m^2, times the variance factor where `scaled`
+    x             (n, 3) m; nan where a coordinate is absent
+    covariance    (n, 3, 3) m^2, times the variance factor where `scaled`; nan in rows and columns of absent coordinates
     factor        what the covariances and squared uncertainties were multiplied by; 1 unless `scaled`
     scaled        the variance factor was applied
     ellipsoid     standard ones of the points
@@ -271,6 +270,11 @@ class Findings:
     def u(self) -> np.ndarray:
         """(n, 3) m, standard uncertainties of the coordinates."""
         return np.sqrt(np.maximum(np.diagonal(self.covariance, axis1=1, axis2=2), 0.0))
+
+    @cached_property
+    def coordinates(self) -> np.ndarray:
+        """(n, 3) bool: coordinates that exist, in the axes of the file."""
+        return np.asarray((self.network.points.absent @ np.abs(self.network.axes)) == 0.0)
 
     @cached_property
     def u_parameters(self) -> np.ndarray:
@@ -383,16 +387,17 @@ def findings(
 
 
 def _relative(solution: NetworkSolution, pair: tuple[str, str], factor: float) -> Relative:
-    """The vector between two points; unknown where there is no answer."""
+    """The vector between two points, in the coordinates that both have; unknown where there is no answer."""
     strange = [name for name in pair if name not in solution.index]
     if strange:
         raise EstimationError(f"point {strange[0]!r} is not in the network (expected one of its names)")
-    axes, rows = solution.network.axes, [solution.index[name] for name in pair]
-    vector = (solution.x[rows[1]] - solution.x[rows[0]]) @ axes
-    covariance = np.full((3, 3), np.nan)
-    if np.isfinite(solution.covariance).all():
-        covariance = axes.T @ relative_covariance(solution.block(pair)) @ axes * factor
-    distance = float(np.linalg.norm(vector))
-    unit = vector / distance if distance > 0.0 else np.full(3, np.nan)
-    u = float(np.sqrt(np.maximum(unit @ covariance @ unit, 0.0)))
+    rows = [solution.index[name] for name in pair]
+    vector, covariance = solution.x[rows[1]] - solution.x[rows[0]], np.full((3, 3), np.nan)
+    if solution.answered:
+        covariance = relative_covariance(solution.block(pair)) * factor
+    (vector,), (covariance,) = in_file_axes(solution.network, vector[None], covariance[None])
+    there = np.flatnonzero(np.isfinite(vector))
+    distance = float(np.linalg.norm(vector[there]))
+    unit = vector[there] / distance if distance > 0.0 else np.full(len(there), np.nan)
+    u = float(np.sqrt(np.maximum(unit @ covariance[np.ix_(there, there)] @ unit, 0.0))) if len(there) else np.nan
     return Relative(*pair, distance, u, covariance, ellipsoid(covariance))

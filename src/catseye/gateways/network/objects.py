@@ -98,6 +98,7 @@ def _head(findings: Findings, treated: "AdjustedNetwork | None") -> dict[str, An
             "description": findings.network.description,
             "status": solution.status,
             "datum": solution.datum,
+            "notes": [*findings.network.notes, *findings.network.doubts],
             "axes": list(findings.network.axis_names),
             "iterations": solution.iterations,
             "approximate": list(solution.approximate),
@@ -180,9 +181,8 @@ def _points(findings: Findings, low: int) -> Iterator[tuple[str, dict[str, Any]]
     """Name and object of the points from row `low` on, a piece of them."""
     part = slice(low, low + PIECE)
     axes, names = np.abs(findings.network.axes), np.array(findings.network.axis_names)
-    fixed, datum = (
-        (flags[part] @ axes) > 0.0 for flags in (findings.network.points.fixed, findings.network.points.datum)
-    )
+    points = findings.network.points
+    fixed, datum, absent = ((flags[part] @ axes) > 0.0 for flags in (points.fixed, points.datum, points.absent))
     columns = (
         findings.names[part],
         _numbers(findings.x[part]),
@@ -192,9 +192,12 @@ def _points(findings: Findings, low: int) -> Iterator[tuple[str, dict[str, Any]]
         _numbers(np.swapaxes(findings.ellipsoid.directions[part], 1, 2)),
         fixed,
         datum,
+        absent,
         findings.seen[part].tolist(),
     )
-    for name, (x, y, z), u, covariance, semi_axes, directions, held, chosen, observations in zip(*columns, strict=True):
+    for name, (x, y, z), u, covariance, semi_axes, directions, held, chosen, gone, observations in zip(
+        *columns, strict=True
+    ):
         yield (
             name,
             {
@@ -206,6 +209,7 @@ def _points(findings: Findings, low: int) -> Iterator[tuple[str, dict[str, Any]]
                 "ellipsoid": {"semi_axes": semi_axes, "directions": directions},
                 "fixed": names[held].tolist(),
                 "datum": names[chosen].tolist(),
+                "absent": names[gone].tolist(),
                 "observations": observations,
             },
         )

@@ -18,7 +18,7 @@ from catseye.gateways.network.objects import network_object
 from catseye.gateways.network.summary import direction_words, quantity
 from catseye.gateways.network.tables import coordinates_csv
 from catseye.gateways.writers.objects import json_page, plain
-from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.page import card, page, paragraph, section, table
 from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.verdict import Verdict, verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
@@ -123,12 +123,13 @@ def _candidate(c: Candidate, *, scheduled: bool) -> dict[str, Any]:
 def _scatter(scatter: MonteCarloScatter | None) -> dict[str, Any] | None:
     if scatter is None:
         return None
+    free = scatter.predicted > 0.0  # neither held nor absent
     return {
         "runs": scatter.runs,
         "asked": scatter.asked,
         "ratio": scatter.ratio,
-        "rms": float(np.sqrt(np.mean(scatter.rms**2))),
-        "predicted": float(np.sqrt(np.mean(scatter.predicted**2))),
+        "rms": float(np.sqrt(np.mean(scatter.rms[free] ** 2))),
+        "predicted": float(np.sqrt(np.mean(scatter.predicted[free] ** 2))),
         "blunders_found": scatter.found,
         "good_lost": scatter.false,
     }
@@ -230,7 +231,7 @@ def _cell(text: str) -> str:
 def plan_report(plan_findings: PlanFindings, when: datetime, inputs: Mapping[str, str]) -> str:
     """The whole page of a plan, HTML."""
     from catseye.gateways.network.figures import network_figures
-    from catseye.gateways.network.report import provenance_section
+    from catseye.gateways.network.report import provenance_section, view_pictures
 
     findings, plan = plan_findings.findings, plan_findings.plan
     drawn = network_figures(findings)
@@ -263,9 +264,7 @@ def plan_report(plan_findings: PlanFindings, when: datetime, inputs: Mapping[str
             f'<div class="cards">{"".join(_cards(plan_findings))}</div>',
             f"<dl>{words}</dl>",
         ),
-        section(
-            "network", CONTENTS["network"], *(picture(drawn[k].svg, drawn[k].caption) for k in ("plan", "elevation"))
-        ),
+        section("network", CONTENTS["network"], *view_pictures(drawn)),
         section("weakest", CONTENTS["weakest"], _weakest(plan_findings)),
         section(
             "next",

@@ -10,7 +10,7 @@ import numpy as np
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.gateways.network.figures import CaptionedFigure, network_figures
 from catseye.gateways.network.findings import Findings
-from catseye.gateways.network.summary import passages, quantity, treatment_passages, verdict
+from catseye.gateways.network.summary import factor_words, passages, quantity, treatment_passages, verdict
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
 from catseye.gateways.writers.verdict import verdict_line
@@ -108,7 +108,7 @@ def network_cards(findings: Findings) -> list[str]:
     return [
         card(
             "Variance factor",
-            f"{whole.factor:.3f}" if np.isfinite(whole.p) else "unknown",
+            factor_words(whole.factor) if np.isfinite(whole.p) else "unknown",
             f"{interval}, {degrees:.0f} degrees of freedom" if np.isfinite(degrees) else interval,
         ),
         card("Suspect observations", suspects, f"of {int(active.sum())}, level {findings.level:g} for all"),
@@ -121,9 +121,19 @@ def network_cards(findings: Findings) -> list[str]:
 
 
 def _network(drawn: dict[str, CaptionedFigure]) -> str:
-    return section(
-        "network", CONTENTS["network"], *(picture(drawn[k].svg, drawn[k].caption) for k in ("plan", "elevation"))
-    )
+    return section("network", CONTENTS["network"], *view_pictures(drawn))
+
+
+def view_pictures(drawn: dict[str, CaptionedFigure]) -> list[str]:
+    """Plan and elevation as pictures; a sentence for one that has nothing to show.
+
+    drawn   figures by name, see `network_figures`
+    """
+    missing = {"plan": "No plan: no point has x and y.", "elevation": "No elevation: no point has x, y and z."}
+    return [
+        picture(drawn[k].svg, drawn[k].caption) if k in drawn else paragraph(text, "faint")
+        for k, text in missing.items()
+    ]
 
 
 def _observations(findings: Findings, drawn: dict[str, CaptionedFigure], file: str) -> str:
@@ -203,7 +213,7 @@ def _points(findings: Findings, file: str) -> str:
     names = findings.network.axis_names
     points = findings.network.points
     roles = np.where(points.datum.any(axis=1), "datum", "")
-    roles = np.where(points.fixed.any(axis=1), np.where(points.fixed.all(axis=1), "held", "partly held"), roles)
+    roles = np.where(points.fixed.any(axis=1), np.where(points.free.any(axis=1), "partly held", "held"), roles)
     u, axis = findings.u / MILLIMETRE, findings.ellipsoid.semi_axes / MILLIMETRE
     lines = [
         (

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import ndtri, stdtrit
 
 from catseye.constants import MILLIMETRE, TWO_PI
-from catseye.estimation.network.diagnosis import unconnected
+from catseye.estimation.network.diagnosis import pieces_of
 from catseye.gateways.network.findings import Findings
 from catseye.version import __version__
 
@@ -58,7 +58,7 @@ DIFFERENCES = """written by catseye, not by gama-local; it differs in this:
   approximate coordinates are the file's, or where it has none the adjusted ones;
   angles are left-handed (clockwise) whatever the input's sense; an orientation runs from the x axis towards y;
   covariances belong to the coordinates as they are written, also where axes and angles are inconsistent;
-  a coordinate held alone (x without y) is adjusted with variance 0; one that the input never had is fixed at 0;
+  a coordinate held alone (x without y) is adjusted with variance 0; x without y, where there is no y, is missing;
   observations left out of the adjustment, and kinds that gama-local does not have, are missing:"""
 
 
@@ -104,14 +104,19 @@ class _Unknowns:
         flags = [(f @ np.abs(self.turn)) > 0.0 for f in (network.points.fixed, network.points.datum)]
         self.fixed, self.datum = (np.stack([f[:, :2].all(axis=1), f[:, 2]], axis=1) for f in flags)
         self.datum &= ~self.fixed
-        self.x, self.given = findings.solution.x @ self.turn, network.points.xyz @ self.turn
+        gone = (network.points.absent @ np.abs(self.turn)) > 0.0
+        self.there = np.stack([~gone[:, :2].any(axis=1), ~gone[:, 2]], axis=1)
+        self.x, self.given = (
+            np.where(gone, np.nan, np.where(network.points.absent, 0.0, xyz) @ self.turn)
+            for xyz in (findings.solution.x, network.points.xyz)
+        )
         columns: dict[int, int] = {}
         for group in network.groups:
             column = getattr(group, "orientation", None)
             if column is not None:
                 columns |= {int(c): int(o) // 3 for c, o in zip(column, group.origin, strict=True) if c >= 0}  # type: ignore[attr-defined]
         self.orientations = dict(sorted(columns.items()))
-        free = np.repeat(~self.fixed, (2, 1), axis=1)
+        free = np.repeat(~self.fixed & self.there, (2, 1), axis=1)
         self.coordinates = np.flatnonzero(free.ravel())  # in the file's axes
         self.clockwise = -np.sign(np.linalg.det(self.turn[:2, :2]))  # from x to y
         self.zero = np.arctan2(self.turn[0, 0], self.turn[1, 0])  # azimuth of the x axis
@@ -122,7 +127,8 @@ class _Unknowns:
         turns = np.array(list(self.orientations), dtype=int)
         angular = np.full(len(turns), self.clockwise / CC)
         if size > FULL:
-            own = np.einsum("ki,nkl,li->ni", self.turn, findings.solution.covariance, self.turn).ravel()
+            blocks = np.nan_to_num(findings.solution.covariance)  # absent coordinates are not among these
+            own = np.einsum("ki,nkl,li->ni", self.turn, blocks, self.turn).ravel()
             return np.concatenate(
                 [own[self.coordinates] / MILLIMETRE**2, findings.solution.q.diagonal()[turns] / CC**2]
             ), 0
@@ -168,11 +174,12 @@ def _summary(findings: Findings, unknowns: _Unknowns) -> str:
         kinds[TAGS.get(kind, "")] += count
     priors = sum(0.0 < p.sigma < np.inf for p in network.parameters)
     equations = int(table.active.sum()) + priors
-    free = int(np.sum(~network.points.fixed)) + sum(p.sigma > 0.0 for p in network.parameters)
+    free = int(np.sum(network.points.free)) + sum(p.sigma > 0.0 for p in network.parameters)
     degrees = round(findings.solution.degrees_of_freedom)
     tested = np.isfinite(whole.p)
     ratio, lower, upper = (np.sqrt(v) if tested else 0.0 for v in (whole.factor, whole.lower, whole.upper))
-    states = (("adjusted", ~unknowns.fixed), ("constrained", unknowns.datum), ("fixed", unknowns.fixed))
+    adjusted = ~unknowns.fixed & unknowns.there
+    states = (("adjusted", adjusted), ("constrained", unknowns.datum), ("fixed", unknowns.fixed))
     return "".join(
         [
             "<network-processing-summary>\n<coordinates-summary>\n",
@@ -186,7 +193,7 @@ def _summary(findings: Findings, unknowns: _Unknowns) -> str:
             f"</observations-summary>\n<project-equations><equations>{equations}</equations><unknowns>{free}</unknowns>"
             f"<degrees-of-freedom>{degrees}</degrees-of-freedom><defect>{degrees - equations + free}</defect>"
             f"<sum-of-squares>{ratio**2 * degrees:.7e}</sum-of-squares>",
-            "<connected-network/>" if unconnected(network) is None else "<disconnected-network/>",
+            "<connected-network/>" if not pieces_of(network).any() else "<disconnected-network/>",
             f"</project-equations>\n<standard-deviation><apriori>1</apriori><aposteriori>{ratio:.7e}</aposteriori>"
             f"<used>{'aposteriori' if findings.scaled else 'apriori'}</used><probability>{1.0 - findings.level:.3f}"
             f"</probability><ratio>{ratio:.6f}</ratio><lower>{lower:.6f}</lower><upper>{upper:.6f}</upper>",
@@ -207,8 +214,8 @@ def _coordinates(findings: Findings, unknowns: _Unknowns) -> Iterator[str]:
     yield "<coordinates>\n"
     for tag, xyz, shown in (
         ("fixed", unknowns.x, unknowns.fixed),
-        ("approximate", given, ~unknowns.fixed),
-        ("adjusted", unknowns.x, ~unknowns.fixed),
+        ("approximate", given, ~unknowns.fixed & unknowns.there),
+        ("adjusted", unknowns.x, ~unknowns.fixed & unknowns.there),
     ):
         yield f"<{tag}>\n"
         capital = unknowns.datum if tag != "fixed" else np.zeros_like(unknowns.datum)
@@ -299,7 +306,7 @@ def _adjusted_share(findings: Findings) -> np.ndarray:
     """(m,) variance of each adjusted observation over that of the observed one, variance factor 1."""
     solution, table = findings.solution, findings.table
     share = 1.0 - table.redundancy
-    x = np.concatenate([solution.x.ravel(), solution.parameters])
+    x = solution.state
     for g, group in enumerate(findings.network.groups):
         if group.covariance.ndim > 1:  # redundancy numbers of correlated observations are no such share
             _, jacobian = group.predict(x)

@@ -63,7 +63,7 @@ class Approximation(NamedTuple):
 def approximate(network: ObservationNetwork) -> Approximation:
     """Start values of all points and of the orientations, level heights and poses among the parameters.
 
-    network   points may have nan coordinates; every other point counts as known
+    network   points may have nan coordinates; every other point counts as known; absent ones stay nan
 
     Directions, angles, azimuths, zenith angles, inclinations, ranges, horizontal distances, height differences, level
     planes, vectors, observed coordinates and rigid bodies serve; other kinds hold too little by themselves. Parameters
@@ -79,11 +79,14 @@ def approximate(network: ObservationNetwork) -> Approximation:
     >>> approximate(ObservationNetwork(points, (), (leg,))).xyz[1]
     array([11.,  2.,  4.])
     """
-    points = network.points
+    points, given = network.points, network.points
     n = len(points.names)
+    if points.absent.any():  # any value serves where no observation depends on it
+        points = replace(points, xyz=np.where(points.absent, 0.0, points.xyz), absent=np.zeros_like(points.absent))
+        network = replace(network, points=points)
     values = np.array([p.start for p in network.parameters], dtype=float)
     unknown = ~np.isfinite(points.xyz).all(axis=1)
-    movable = np.array(~points.fixed.any(axis=1))
+    movable = np.array(given.free.all(axis=1))
     search = _search(network if unknown.any() else _lengths_and_directions_of(network), values)
     replaced = np.zeros(n, dtype=bool)
     if disagreeing(search.rows, search.xyz, movable).any():
@@ -101,7 +104,8 @@ def approximate(network: ObservationNetwork) -> Approximation:
     found, assumed = unknown & placed, np.zeros(n, dtype=bool)
     assumed[list(search.sides | search.conventional)] = True
     named = [tuple(points.names[p] for p in np.flatnonzero(k)) for k in (found, assumed & found, replaced)]
-    return Approximation(search.xyz, values, named[0], missing, named[1], named[2])
+    xyz = np.where(given.absent, np.nan, search.xyz)
+    return Approximation(xyz, values, named[0], missing, named[1], named[2])
 
 
 def _search(network: ObservationNetwork, values: np.ndarray) -> PlacingSearch:
