@@ -331,7 +331,7 @@ def air_effects(s: Night) -> Iterator[Effect]:
         "cold layer, 10 m",
         "1 °C at the ground",
         fixed(c * s.mean(layer - line)),
-        "considered, 0.5 °C",
+        "no, the bend has 0.03 °C: a shape exp(-z/10 m), 0.5 °C",
     )
 
     yield Effect(
@@ -390,7 +390,7 @@ def air_effects(s: Night) -> Iterator[Effect]:
     square = np.sum(s.nodes[0][..., :2] ** 2, axis=2) / 100.0**2
     where = np.sum(s.network.field.places**2, axis=1) / 100.0**2
     bowl = s.mean(square) - where.mean()
-    yield Effect("air warmer all around", "0.1 °C at 100 m", fixed(0.1 * c * bowl), "considered")
+    yield Effect("air warmer all around", "0.1 °C at 100 m", fixed(0.1 * c * bowl), "thermometers' offsets")
     plate = np.isin(s.body, ["dish"]) * 5.0 / s.distance * (1.0 - np.exp(-s.distance / 5.0))
     yield Effect("air cold on the dish", "0.3 °C, within 5 m", fixed(-0.3 * c * plate), "no")
     within = (s.own_body == "arm") & np.isin(s.body, ["dish", "arm"])
@@ -398,12 +398,8 @@ def air_effects(s: Night) -> Iterator[Effect]:
         "air within the dish another", "0.05 °C", fixed(0.05 * c * within), "no: a level of the air within the dish"
     )
     yield Effect("eddies that last", "0.03 ppm for 60 s", lambda n: _lasting(n, s), "independent at each shot")
-    yield Effect(
-        "lines that are neighbours", "5 m", lambda n: _neighbours(n, s), "considered, six shapes a ranger"
-    )
-    yield Effect(
-        "strength of the lines' fluctuation", "20 %", lambda n: _lines(n, s, 0.2), "u itself: 5 % larger"
-    )
+    yield Effect("lines that are neighbours", "5 m", lambda n: _neighbours(n, s), "considered, six shapes a ranger")
+    yield Effect("strength of the lines' fluctuation", "20 %", lambda n: _lines(n, s, 0.2), "u itself: 5 % larger")
     bent = excess_bound(index_gradient(0.1), s.distance)
     yield Effect("bending of the ray", "0.1 °C/m", fixed(-bent), "nothing")
     curved = np.sum(s.nodes[0][..., :2] ** 2, axis=2) / (2.0 * 6.371e6)
@@ -552,7 +548,7 @@ def signal_effects(s: Night) -> Iterator[Effect]:
         "amplitude to phase, no sheet",
         "0.1 mrad a factor e",
         in_groups(1e-4 * s.per_radian * strong, s.ranger),
-        "considered, or a parameter where u_amplitude_to_phase_rad is given",
+        "a parameter where u_amplitude_to_phase_rad is given; else none",
     )
     yield Effect(
         "cyclic, no sheet",
@@ -563,7 +559,7 @@ def signal_effects(s: Night) -> Iterator[Effect]:
     slopes = _axes(s)
     for size, name, done in (
         (1e-6 * UNIFORM, "axes that do not meet, as rounded", "nothing"),
-        (10e-6, "axes that do not meet, no sheet", "considered, or a parameter where u_axis_mm is given"),
+        (10e-6, "axes that do not meet, no sheet", "a parameter where u_axis_mm is given; else they meet"),
     ):
         yield Effect(
             name,
@@ -577,9 +573,7 @@ def signal_effects(s: Night) -> Iterator[Effect]:
         lambda n: _modes(n, s),
         "u itself: 1 % larger",
     )
-    yield Effect(
-        "strength of the electronics' walk", "20 %", lambda n: _walk(n, s, 0.2), "u itself: 4 % larger"
-    )
+    yield Effect("strength of the electronics' walk", "20 %", lambda n: _walk(n, s, 0.2), "u itself: 4 % larger")
     yield Effect("warm-up between references", "20 mrad, 300 s, 1 in 3", fixed(_warming(s)), "nothing")
     yield Effect(
         "each shot weighed by its own scatter",
@@ -730,7 +724,10 @@ def target_effects(s: Night) -> Iterator[Effect]:
     yield Effect("normals higher, in common", "0.1°", fixed(up), "each its own")
     yield Effect("tilts to second order", "0.1°", fixed(bend), "nothing")
     yield Effect(
-        "heights of glass, 100 prisms in common", "2 µm", in_groups(*_batches(s, ratio)), "considered, 100 by serial order"
+        "heights of glass, 100 prisms in common",
+        "2 µm",
+        in_groups(*_batches(s, ratio)),
+        "considered, 100 by serial order",
     )
     each = np.unique(s.target, return_inverse=True)[1]
     yield Effect(
@@ -802,13 +799,26 @@ def survey_effects(s: Night) -> Iterator[Effect]:
     cold = s.weather[0].mean() - 20.0
     arm = on(offsets[2::3], 0.25 * STEEL_PER_K * cold)
     yield Effect(
-        "mirror offsets colder than measured", _signed(cold, "K", 0), fixed(arm), "considered, where site.toml says sheets_at_c; else u_offset covers it"
+        "mirror offsets colder than measured",
+        _signed(cold, "K", 0),
+        fixed(arm),
+        "considered, where site.toml says sheets_at_c; else u_offset covers it",
     )
     yield Effect("certificates as rounded", "1 µm", at_random(on(marks, micron)), "benchmarks' u")
     lengths = np.array([g.observed[0] for g in s.groups if g.name == "benchmarks"])
-    yield Effect("certificates, in common", "10⁻⁷", fixed(on(marks, 1e-7 * lengths)), "considered")
+    yield Effect(
+        "certificates, in common",
+        "10⁻⁷",
+        fixed(on(marks, 1e-7 * lengths)),
+        "considered, where site.toml says certificate_scale_ppm",
+    )
     lengths = on(survey, 0.5e-6 * np.concatenate([g.observed for g in s.groups if g.name == "monuments"]))
-    yield Effect("survey's scale", "0.5 ppm", fixed(lengths), "considered, where site.toml says survey_scale_ppm; else each errs by itself")
+    yield Effect(
+        "survey's scale",
+        "0.5 ppm",
+        fixed(lengths),
+        "considered, where site.toml says survey_scale_ppm; else each errs by itself",
+    )
     units = [s.network.places[t.left_prism.target] for t in s.campaign.triplets.values()]
     along = on(s.rows("triplet balls"), 2e-5 * np.concatenate([p.normal for p in units]))
     yield Effect("triplets' heights, in common", "20 µm", fixed(along), "considered")

@@ -1,10 +1,10 @@
 """Errors that many shots have in common and no parameter of the adjustment stands for: considered in its covariance.
 
-Sheets of one bench, certificates of one laboratory, one batch of glass, a layer of cold air on the ground: beside 700
-shots they are nothing, beside 20 000 they are all that is left. No range tells them apart, so the answer keeps to the
-records, and its covariance takes them in: an error d of the rows moves all parameters by Q A'P d. What records state
-with a u is taken at that u, in common; what a record may say of its own kind is `[in_common]` of site.toml.
-`docs/studies/neglected.md` has the size of each beside a whole dish.
+Sheets of one bench, one batch of glass, air that lines share with their neighbours: beside 700 shots they are nothing,
+beside 20 000 they are all that is left. No range tells them apart, so the answer keeps to the records, and its
+covariance takes them in: an error d of the rows moves all parameters by Q A'P d. What records state with a u is taken
+at that u, in common; what records of one kind share beyond that is said in `[in_common]` of site.toml, and what axes
+and amplitudes of a head do on its mirror's sheet. `docs/studies/neglected.md` has the size of each for a whole dish.
 
 Source: consider parameters, [SCHMIDT66].
 """
@@ -17,22 +17,27 @@ from scipy.sparse import csr_array
 
 from catseye.atmosphere.path.mean import LAPSE_HPA_PER_M, nodes_along
 from catseye.atmosphere.weather.humidity import relative_humidity_percent, vapour_pressure_hpa
-from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
+from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
 from catseye.estimation.least_squares.covariance import Widened
-from catseye.estimation.least_squares.rows import ActiveRows
-from catseye.geometry.mirror.mirror_path import direction_angles, path_change
+from catseye.estimation.least_squares.rows import ActiveRows, variances
 from catseye.optics.glass import glass_named, temperature_slopes
 from catseye.reduction.epoch.shots import ShotGroup, ShotParts
-from catseye.reduction.epoch.unknowns import BENCHMARKS, MONUMENTS, OFFSETS, TRIPLET_BALLS, CampaignNetwork, path_ppm
-from catseye.reduction.site.stations import station_in
+from catseye.reduction.epoch.unknowns import (
+    BENCHMARKS,
+    GLASS,
+    MONUMENTS,
+    OFFSETS,
+    TRIPLET_BALLS,
+    ZEROS,
+    CampaignNetwork,
+    path_ppm,
+)
 
 STEEL_PER_K = 12e-6
-U_WAVELENGTH_UM = 2.5e-3  # laser diodes of one type, each its own
-U_AMPLITUDE = 1e-4  # rad a factor e, where the sheet says nothing
+U_WAVELENGTH_UM = 1e-3  # of each head: site.toml gives one for all, 0.780, to its last digit
+OF_BENCH = np.sqrt(0.5)  # of the u of a D0: half of its variance is the bench's, which calibrated them all
 BATCH = 100  # prisms of one melt and one polishing, by serial order
-LAYER_M, LAYER_C = 10.0, 0.5  # cold air on the ground of a clear night, beyond the line through the stations
-BOWL_M, BOWL_C = 100.0, 0.1  # air that is warmer all around than in the middle
 ALIKE_M = 5.0  # lines of one ranger share their air where their ends are so near: the outer scale close to a dish
 NODES = 12  # of a path
 
@@ -131,8 +136,9 @@ class _Sight:
 def _of_heads(network: CampaignNetwork, parts: list[ShotParts], sights: list[_Sight]) -> Iterator[CommonError]:
     campaign = network.campaign
     mirrors = {p.name: campaign.mirror_of(p.name) for p in parts}
-    bench = float(np.sqrt(np.mean([(m.u_d0_mm * MILLIMETRE) ** 2 for m in mirrors.values()])))
-    yield CommonError("D0 of one bench", {s.name: bench * s.index for s in sights})
+    zeros = [prior for prior in network.priors if prior.name == ZEROS]
+    bench = [np.full(len(z.observed), OF_BENCH * np.sqrt(np.mean(variances(z)))) for z in zeros]
+    yield CommonError("D0 of one bench", {}, {ZEROS: bench})
     if campaign.site.in_common.sheets_at_c is not None:
         warm = {s.name: STEEL_PER_K * (s.temperature - campaign.site.in_common.sheets_at_c) for s in sights}
         mean = float(np.mean(np.concatenate(list(warm.values()))))
@@ -142,34 +148,6 @@ def _of_heads(network: CampaignNetwork, parts: list[ShotParts], sights: list[_Si
             {s.name: s.index * mirrors[s.name].d0_mm * MILLIMETRE * warm[s.name] for s in sights},
             {OFFSETS: offsets} if offsets else {},
         )
-    half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz
-    for part, sight in zip(parts, sights, strict=True):
-        name, mirror = part.name, mirrors[part.name]
-        if mirror.u_axis_mm is None:  # axes and beam then miss each other as the mirror's place is known: alike aligned
-            for i, slope in enumerate(_axes(network, sight).T):
-                size = mirror.u_offset_mm * MILLIMETRE * sight.index
-                yield CommonError(f"axes of {name} {i + 1}", {name: size * slope})
-        if mirror.u_amplitude_to_phase_rad is None:
-            lit = network.phases.phasor[part.electronics.shots]
-            strong = np.log(np.abs(lit) / np.abs(part.electronics.reference))
-            yield CommonError(f"amplitude of {name}", {name: U_AMPLITUDE * half / TWO_PI * strong})
-
-
-def _axes(network: CampaignNetwork, sight: _Sight) -> np.ndarray:
-    """(m, 4): derivatives of one ranger's ranges by its mirror's four offsets.
-
-    Where no record says how the mount stands, the azimuth axis is taken as level, across the mean sight.
-    """
-    station, ways = station_in(network.campaign, sight.name), sight.b - sight.a
-    if station is not None:
-        turn = station.mirror_from_ground
-    else:
-        mean, up = ways.mean(axis=0), np.array([0.0, 0.0, 1.0])
-        z = np.cross(mean, up) if np.hypot(*mean[:2]) > 0.0 else np.array([1.0, 0.0, 0.0])
-        z /= np.linalg.norm(z)
-        turn = np.stack([np.cross(up, z), up, z])
-    theta, phi = direction_angles(ways @ turn.T)
-    return path_change(theta, phi, np.linalg.norm(ways, axis=1), np.zeros(4))[1]
 
 
 def _of_glass(network: CampaignNetwork, parts: list[ShotParts], sights: list[_Sight]) -> Iterator[CommonError]:
@@ -189,17 +167,15 @@ def _of_glass(network: CampaignNetwork, parts: list[ShotParts], sights: list[_Si
             "temperature of the glass",
             {s.name: per_k * glass[s.name] * (s.temperature - common.sheets_at_c) for s in sights},
         )
-    prisms = sorted({t for p in parts for t in p.target if places[t].kind == "prism" and places[t].u_constant > 0.0})
+    (prior,) = [prior for prior in network.priors if prior.name == GLASS] or (None,)
+    if prior is None:
+        return
+    owners = [network.layout.parameters[c].of for c in np.ravel(prior.columns).tolist()]
+    prisms = [name for name in owners if places[name].kind == "prism"]
     for first in range(0, len(prisms), BATCH):
-        batch = set(prisms[first : first + BATCH])
-        own = [p for p in parts if not batch.isdisjoint(p.target)]
-        yield CommonError(
-            f"glass of batch {first // BATCH + 1}",
-            {
-                p.name: (1.0 + p.refractivity) * [places[t].u_constant if t in batch else 0.0 for t in p.target]
-                for p in own
-            },
-        )
+        batch = np.isin(owners, prisms[first : first + BATCH])
+        error = np.where(batch, np.sqrt(variances(prior)), 0.0)
+        yield CommonError(f"glass of batch {first // BATCH + 1}", {}, {GLASS: [error]})
 
 
 def _of_surveys(network: CampaignNetwork) -> Iterator[CommonError]:
@@ -223,30 +199,17 @@ def _of_surveys(network: CampaignNetwork) -> Iterator[CommonError]:
 
 def _of_air(network: CampaignNetwork, parts: list[ShotParts], sights: list[_Sight]) -> Iterator[CommonError]:
     air = network.field
-    layer, bowl, wet = {}, {}, {}
-    heights, middle = air.heights, air.heights.mean()
-    line = np.linalg.pinv(np.stack([np.ones(len(heights)), heights - middle], axis=1))
-    low = heights.min()
-    where = np.mean(np.sum(air.places**2, axis=1)) / BOWL_M**2
-
-    def cold(z: np.ndarray) -> np.ndarray:
-        return -LAYER_C * np.exp(-np.maximum(z - low, 0.0) / LAYER_M)
-
+    wet = {}
+    middle = air.heights.mean()
     for part, s in zip(parts, sights, strict=True):
-        (east, weight), (north, _), (z, _) = (nodes_along(s.a[:, i], s.b[:, i], NODES) for i in range(3))
+        z, weight = nodes_along(s.a[:, 2], s.b[:, 2], NODES)
         above = z - middle
-        per_c, per_percent = _slopes(network, s, 0.5 * (s.a[:, 2] + s.b[:, 2]))
-        stations = cold(heights) @ line.T
-        level, slope = stations if air.profile != "gradient" else (stations[0], 0.0)
-        layer[s.name] = part.distance * per_c * ((cold(z) - level - slope * above) @ weight)
-        bowl[s.name] = part.distance * per_c * BOWL_C * (((east**2 + north**2) / BOWL_M**2) @ weight - where)
+        per_percent = _per_percent(network, s, 0.5 * (s.a[:, 2] + s.b[:, 2]))
         temperature = s.temperature[:, None] + s.gradient[:, None] * above
         pressure = s.pressure[:, None] - LAPSE_HPA_PER_M * above
         vapour = vapour_pressure_hpa(s.temperature, s.pressure, s.humidity)
         even = relative_humidity_percent(np.broadcast_to(vapour[:, None], z.shape), temperature, pressure)
         wet[s.name] = part.distance * per_percent * ((even - s.humidity[:, None]) @ weight)
-    yield CommonError("cold air on the ground", layer)
-    yield CommonError("air warmer all around", bowl)
     yield CommonError("vapour even with height, not relative humidity", wet)
     for part, s in zip(parts, sights, strict=True):
         now, redder = (
@@ -263,16 +226,12 @@ def _of_air(network: CampaignNetwork, parts: list[ShotParts], sights: list[_Sigh
                 )
 
 
-def _slopes(network: CampaignNetwork, s: _Sight, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(m,) of the refractivity at heights z by °C and by % of humidity."""
+def _per_percent(network: CampaignNetwork, s: _Sight, z: np.ndarray) -> np.ndarray:
+    """(m,) of the refractivity at heights z by % of humidity, downwards: fog is no wetter."""
     air = network.field
     above = z - air.heights.mean()
-    state = (s.temperature + s.gradient * above, s.pressure - LAPSE_HPA_PER_M * above, s.humidity)
-    here, colder, drier = (
-        air.refractivity_of(*(v - (i == j) for j, v in enumerate(state)))  # downwards: fog is no wetter
-        for i in (None, 0, 2)
-    )
-    return here - colder, here - drier
+    dry = (s.temperature + s.gradient * above, s.pressure - LAPSE_HPA_PER_M * above)
+    return air.refractivity_of(*dry, s.humidity) - air.refractivity_of(*dry, s.humidity - 1.0)
 
 
 def _smooth(ends: np.ndarray) -> np.ndarray:
@@ -281,6 +240,8 @@ def _smooth(ends: np.ndarray) -> np.ndarray:
     What falls off as exp(-r / L) has, over a surface much larger than L^2, in each smooth shape of mean square 1 the
     variance 2 pi L^2 / area of a line's; all six of second order, or as many as the ends tell apart.
     """
+    if len(ends) < 3:
+        return np.zeros((len(ends), 0))
     away = ends - ends.mean(axis=0)
     spread, axes = np.linalg.svd(away, full_matrices=False)[1:]
     u, v = (away @ axes[:2].T / max(float(spread[0]) / np.sqrt(len(ends)), 1e-9)).T

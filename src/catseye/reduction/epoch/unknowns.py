@@ -33,7 +33,7 @@ THERMOMETERS = "thermometers"
 SOUND = "path temperatures"
 ZEROS = "ranger zeros"
 BENCHMARKS, MONUMENTS, OFFSETS = "benchmarks", "monuments", "mirror offsets"
-TRIPLET_BALLS = "triplet balls"
+TRIPLET_BALLS, GLASS = "triplet balls", "glass constants"
 LIMITS = "instruments' limits"
 FAMILIES_PRIOR = "unexplained averages"
 UNJUDGED = (APPROXIMATE, LIMITS)  # priors that say little on purpose and count in no variance factor
@@ -543,7 +543,7 @@ def _glass(seen: dict[str, RangedPoint], layout: UnknownsLayout) -> list[Observa
     if not names:
         return []
     columns = [layout.at[Parameter(ParameterKind.GLASS, name)] for name in names]
-    return [_independent("glass constants", columns, np.zeros(len(names)), [seen[n].u_constant for n in names])]
+    return [_independent(GLASS, columns, np.zeros(len(names)), [seen[n].u_constant for n in names])]
 
 
 def _positive(u: float, where: str) -> float:
