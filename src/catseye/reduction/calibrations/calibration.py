@@ -1,8 +1,12 @@
 """What a calibration gives, whatever was calibrated: quantities with covariance, residuals, decisions, provenance."""
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from catseye.reduction.calibrations.fit import CalibrationFit
 
 STATE = "state"  # last column of a table of readings: used, suspect, rejected, or left out with a reason
 Cell = str | int | float  # of a table of readings
@@ -38,6 +42,8 @@ class CheckOutcome:
     limit      what it was compared with
     passed     the outcome; None where the data do not allow the test
     text       what it means, one sentence
+    least      the limit is the least that passes, not the most
+    grave      a failure rejects the answer; otherwise it casts doubt on it
     """
 
     name: str
@@ -45,6 +51,19 @@ class CheckOutcome:
     limit: float
     passed: bool | None
     text: str
+    least: bool = False
+    grave: bool = True
+
+    @property
+    def comparison(self) -> str:
+        """The numbers with the side on which the limit stands; "" where nothing was compared.
+
+        >>> CheckOutcome("arc, rad", 3.0, 1.57, True, "wide enough", least=True).comparison
+        '3, at least 1.57'
+        """
+        if self.limit != self.limit:
+            return ""
+        return f"{self.statistic:.4g}, at {'least' if self.least else 'most'} {self.limit:.4g}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +86,9 @@ class Calibration:
     method       how the readings became the quantities, in a few sentences for the certificate
     record       what can be copied into the record that the quantities belong to, by its keys: numbers or lists
     equal_axes   the figure is a plane: both axes to one scale
+    fit          the adjustment behind it, if there was one
+    explained    share of the readings' variance that the model explains, where no fit tells
+    plausible    its numbers against what the kind's instruments can give, by `plausibility.judged`
     """
 
     kind: str
@@ -85,6 +107,9 @@ class Calibration:
     method: str = ""
     record: dict[str, RecordValue] = field(default_factory=dict)
     equal_axes: bool = False
+    fit: "CalibrationFit | None" = None
+    explained: float = float("nan")
+    plausible: tuple[CheckOutcome, ...] = ()
 
     @property
     def states(self) -> tuple[str, ...]:
