@@ -31,7 +31,7 @@ def calibration_verdict(calibration: Calibration) -> Verdict:
         names = "; ".join(decision.name for decision in failed)
         return Verdict("failed", f"{len(failed)} of its own test{plural} failed: {names}")
     if off or failed:
-        return Verdict("doubtful", (*off, *failed)[0].text)
+        return Verdict("doubtful", "; ".join(outcome.text for outcome in (*failed, *off)))
     if calibration.degrees_of_freedom < 1 and not any(d.passed for d in calibration.decisions):
         return Verdict("doubtful", "nothing was measured twice and no test could be made")
     suspects = [number for number, state in enumerate(calibration.states, start=1) if state == "suspect"]

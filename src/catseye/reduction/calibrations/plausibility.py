@@ -42,9 +42,12 @@ def judged(kind: CalibrationKind, readings: SheetReadings, calibration: Calibrat
     states for a reading, and one for all quantities.
     """
     outcomes = _outcomes(kind.plausible, readings, calibration)
-    first = next((k for k, outcome in enumerate(outcomes) if outcome.passed is False), None)
-    if first is None:
+    failed = [k for k, outcome in enumerate(outcomes) if outcome.passed is False]
+    grave = [k for k in failed if outcomes[k].grave]
+    suspect = calibration.fit is not None and bool(calibration.fit.suspects.any())
+    if not failed or (suspect and not grave):  # a single reading that stands out is looked at first
         return replace(calibration, plausible=tuple(outcomes))
+    first = (grave or failed)[0]
     advice = _advice(kind, readings)
     if advice:
         outcomes[first] = replace(outcomes[first], text=f"{outcomes[first].text}; {advice}")
@@ -185,7 +188,7 @@ def _advice(kind: CalibrationKind, readings: SheetReadings) -> str:
         return ""
     cures = list(islice((how for how, copy in copies if _holds(kind, copy)), NAMED + 1))
     if not cures or len(cures) > NAMED:
-        return "no single column, changed, makes them agree" if not cures else ""
+        return ""
     return f"they agree with {', or '.join(cures)}: check {'that column' if len(cures) == 1 else 'these columns'}"
 
 

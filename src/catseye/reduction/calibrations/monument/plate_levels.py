@@ -225,6 +225,6 @@ RECIPE = CalibrationKind(
             5.0, "arcsec", ARCSECOND, "a precision level has 2 to 4 arcsec a division [PARKER04] 2.2.1"
         ),
         sizes={"alpha?_rad": Span(-0.02, 0.02, "a mount within a degree of level", u=10.0 * ARCSECOND)},
-        varying={"orientation_deg": 180.0, "plate_deg": 360.0},
+        varying={"orientation_deg": 180.0},
     ),
 )
