@@ -12,7 +12,8 @@ from catseye.gateways.writers.drawing import svg
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import folded, page, paragraph, picture, section, table
 from catseye.gateways.writers.verdict import verdict_line
-from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome, Quantity
+from catseye.reduction.calibrations.calibration import Calibration, Quantity
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 
 TITLE = "Certificate of calibration"
 MARK = f"<title>{TITLE}"  # by which a page is known as ours

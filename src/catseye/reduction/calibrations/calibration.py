@@ -1,12 +1,11 @@
 """What a calibration gives, whatever was calibrated: quantities with covariance, residuals, decisions, provenance."""
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from catseye.reduction.calibrations.fit import CalibrationFit
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
+from catseye.reduction.calibrations.fit import CalibrationFit
 
 STATE = "state"  # last column of a table of readings: used, suspect, rejected, or left out with a reason
 Cell = str | int | float  # of a table of readings
@@ -31,39 +30,6 @@ class Quantity:
     unit: str
     meaning: str
     coverage: float = 2.0
-
-
-@dataclass(frozen=True)
-class CheckOutcome:
-    """A statistical test or a comparison with a limit, with its outcome.
-
-    name       "outliers: largest |w|"
-    statistic  what was computed
-    limit      what it was compared with
-    passed     the outcome; None where the data do not allow the test
-    text       what it means, one sentence
-    least      the limit is the least that passes, not the most
-    grave      a failure rejects the answer; otherwise it casts doubt on it
-    """
-
-    name: str
-    statistic: float
-    limit: float
-    passed: bool | None
-    text: str
-    least: bool = False
-    grave: bool = True
-
-    @property
-    def comparison(self) -> str:
-        """The numbers with the side on which the limit stands; "" where nothing was compared.
-
-        >>> CheckOutcome("arc, rad", 3.0, 1.57, True, "wide enough", least=True).comparison
-        '3, at least 1.57'
-        """
-        if self.limit != self.limit:
-            return ""
-        return f"{self.statistic:.4g}, at {'least' if self.least else 'most'} {self.limit:.4g}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +73,7 @@ class Calibration:
     method: str = ""
     record: dict[str, RecordValue] = field(default_factory=dict)
     equal_axes: bool = False
-    fit: "CalibrationFit | None" = None
+    fit: CalibrationFit | None = None
     explained: float = float("nan")
     plausible: tuple[CheckOutcome, ...] = ()
 

@@ -14,7 +14,7 @@ from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import LeastSquaresSolution, adjust
 from catseye.estimation.observations.kinds import Linear
 from catseye.estimation.quality.reliability import checked, global_test, single_level, tau_critical, w_critical
-from catseye.reduction.calibrations.calibration import CheckOutcome
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.scatter import effective_degrees, restricted_likelihood
 
 TESTS = 3  # that share the level evenly: scatter, single readings, what the kind tests beside them

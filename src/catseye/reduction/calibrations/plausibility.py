@@ -14,7 +14,8 @@ import numpy as np
 
 from catseye.errors import CatseyeError
 from catseye.records.files.readings import TIME, SheetReadings
-from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome
+from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.kind import CalibrationKind, Plausibility
 
 GRAVE = 10.0  # times a limit: beyond it the answer is rejected, up to it doubted

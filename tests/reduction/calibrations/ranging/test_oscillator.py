@@ -66,11 +66,13 @@ def test_u_of_the_noise_of_a_range_and_the_table_and_line_of_averages_by_hand():
     assert first["range_um"] == pytest.approx(first["allan_deviation_rad"] * 99.93e3 / (2 * np.pi), rel=1e-9)
     time, height = found.curve["fit"]
     assert height[0] == pytest.approx(-2.0, abs=0.01)  # 10 mrad
-    # [RILEY08] table 3 with the walk in steps: white^2/m + walk^2 (2 m^2 + 1)/(6 m); no flicker was found
+    # [RILEY08] table 3 with the walk in steps: white^2/m + walk^2 (2 m^2 + 1)/(6 m)
     m = 10**time / 0.001
-    assert found.value("flicker_mrad2") == 0.0
+    flicker = found.value("flicker_mrad2")  # 2 h at one reading, 2 ln 2 h of many [RILEY08], within 2 % between
     by_hand = 1e-6 * (found.value("white_mrad2") / m + found.value("walk_mrad2") * (2 * m**2 + 1) / (6 * m))
-    assert height == pytest.approx(0.5 * np.log10(by_hand), rel=1e-9)
+    by_hand[0] += 2e-6 * flicker
+    by_hand[1:] += 2e-6 * np.log(2) * flicker
+    assert height == pytest.approx(0.5 * np.log10(by_hand), abs=1e-3)  # flicker is 1 % of the last: 2 % of that
 
 
 def test_the_line_of_averages_holds_the_walk_that_the_readings_show():

@@ -14,7 +14,8 @@ from catseye.constants import PPM
 from catseye.geometry.catenary import expanded
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings, Words
 from catseye.records.files.record import Record, Uncertainty, Within, broken_rule
-from catseye.reduction.calibrations.calibration import Calibration, Cell, CheckOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Cell
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.fit import (
     CalibrationFit,
     Effect,

@@ -13,7 +13,8 @@ from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.errors import EstimationError
 from catseye.estimation.quality.reliability import single_level
 from catseye.records.files.readings import SheetReadings
-from catseye.reduction.calibrations.calibration import Calibration, Cell, CheckOutcome, Quantity, RecordValue
+from catseye.reduction.calibrations.calibration import Calibration, Cell, Quantity, RecordValue
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.fit import TESTS, CalibrationFit, Effect, FitOptions, fit_readings
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,

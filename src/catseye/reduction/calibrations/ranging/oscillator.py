@@ -10,7 +10,8 @@ import numpy as np
 from catseye.constants import TWO_PI
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
-from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome, Quantity
+from catseye.reduction.calibrations.calibration import Calibration, Quantity
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,

@@ -9,7 +9,8 @@ from catseye.estimation.quality.repeatability import Repeatability
 from catseye.estimation.quality.repeatability import repeatability as analysed
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
-from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome
+from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
