@@ -157,7 +157,7 @@ def _tests(calibration: Calibration) -> str:
 
 
 def _limit(decision: CheckOutcome) -> str:
-    """A limit with its side."""
+    """A limit of a test with the side on which it stands: ≤ or ≥."""
     shown = _number(decision.limit, ".4g")
     return shown if decision.limit != decision.limit else f"{'≥' if decision.least else '≤'} {shown}"
 

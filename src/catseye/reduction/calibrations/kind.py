@@ -14,7 +14,7 @@ PROVENANCE = ("instrument", "serial", "measured_on", "valid_until", "by", "repor
 
 
 @dataclass(frozen=True)
-class Span:
+class PlausibleSpan:
     """The values that a number can have.
 
     low, high   bounds, in the number's own unit
@@ -33,7 +33,7 @@ class Span:
 
         Source: [JCGM100] 4.3.7 (a quantity known to lie between two bounds and nothing else).
 
-        >>> round(Span(-3.0, 3.0, "").most_u, 3)
+        >>> round(PlausibleSpan(-3.0, 3.0, "").most_u, 3)
         1.732
         """
         return (self.high - self.low) / np.sqrt(12.0) if self.u is None else self.u
@@ -66,9 +66,9 @@ class Plausibility:
     """
 
     scatter: ReadingScatter | None = None
-    sizes: Mapping[str, Span] = field(default_factory=dict)
+    sizes: Mapping[str, PlausibleSpan] = field(default_factory=dict)
     explained: float = 0.0
-    columns: Mapping[str, Span] = field(default_factory=dict)
+    columns: Mapping[str, PlausibleSpan] = field(default_factory=dict)
     varying: Mapping[str, float] = field(default_factory=dict)
 
 

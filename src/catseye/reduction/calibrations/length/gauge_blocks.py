@@ -26,8 +26,8 @@ from catseye.reduction.calibrations.fit import (
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
+    PlausibleSpan,
     ReadingScatter,
-    Span,
     provenance,
     quantities,
     residuals_by_number,
@@ -272,10 +272,12 @@ BLOCKS_RECIPE = CalibrationKind(
             10.0, "µm", 1e-3, "a height gauge or comparator is read to 1 µm [PARKER04] section 2.2.2"
         ),
         sizes={
-            "zero_mm": Span(-1.0, 1.0, "an instrument is set to zero before it is calibrated"),
-            "scale_ppm": Span(-1e3, 1e3, "a steel scale off by 85 °C reads 1000 ppm wrong"),
+            "zero_mm": PlausibleSpan(-1.0, 1.0, "an instrument is set to zero before it is calibrated"),
+            "scale_ppm": PlausibleSpan(-1e3, 1e3, "a steel scale off by 85 °C reads 1000 ppm wrong"),
         },
-        columns={"temperature_c": Span(10.0, 30.0, "blocks are true at 20 °C [ISO98], in a room where people work")},
+        columns={
+            "temperature_c": PlausibleSpan(10.0, 30.0, "blocks are true at 20 °C [ISO98], in a room where people work")
+        },
     ),
 )
 SPACERS_RECIPE = CalibrationKind(
@@ -286,7 +288,9 @@ SPACERS_RECIPE = CalibrationKind(
         scatter=ReadingScatter(
             10.0, "µm", 1e-3, "a height gauge or comparator is read to 1 µm [PARKER04] section 2.2.2"
         ),
-        sizes={"*_mm": Span(0.0, 2000.0, "a length, as long as a gauge reaches")},
-        columns={"temperature_c": Span(10.0, 30.0, "lengths hold at 20 °C [ISO22], in a room where people work")},
+        sizes={"*_mm": PlausibleSpan(0.0, 2000.0, "a length, as long as a gauge reaches")},
+        columns={
+            "temperature_c": PlausibleSpan(10.0, 30.0, "lengths hold at 20 °C [ISO22], in a room where people work")
+        },
     ),
 )

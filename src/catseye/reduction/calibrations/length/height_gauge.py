@@ -29,8 +29,8 @@ from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
+    PlausibleSpan,
     ReadingScatter,
-    Span,
     provenance,
     residuals_by_number,
     scatter_notes,
@@ -287,8 +287,8 @@ RECIPE = CalibrationKind(
             20.0, "µm", 1e-3, "a height gauge on a surface plate repeats to some µm [PARKER04] 2.2.2"
         ),
         sizes={
-            "d[xz]_mm": Span(-100.0, 100.0, "what the sheet allows of an offset known beforehand", u=0.5),
-            "dy_mm": Span(50.0, 1000.0, "what the sheet allows of an offset known beforehand", u=0.5),
+            "d[xz]_mm": PlausibleSpan(-100.0, 100.0, "what the sheet allows of an offset known beforehand", u=0.5),
+            "dy_mm": PlausibleSpan(50.0, 1000.0, "what the sheet allows of an offset known beforehand", u=0.5),
         },
     ),
 )

@@ -24,8 +24,8 @@ from catseye.reduction.calibrations.fit import (
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
+    PlausibleSpan,
     ReadingScatter,
-    Span,
     provenance,
     quantities,
     residuals_by_number,
@@ -236,6 +236,6 @@ RECIPE = CalibrationKind(
     measure_with_wire,
     plausible=Plausibility(
         scatter=ReadingScatter(100.0, "µm", 1e-3, "end scales of half millimetres are read to a fifth of one"),
-        columns={"temperature_c": Span(-30.0, 45.0, "air in which people stretch a wire")},
+        columns={"temperature_c": PlausibleSpan(-30.0, 45.0, "air in which people stretch a wire")},
     ),
 )

@@ -33,8 +33,8 @@ from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
+    PlausibleSpan,
     ReadingScatter,
-    Span,
     provenance,
     scatter_notes,
 )
@@ -262,8 +262,8 @@ RECIPE = CalibrationKind(
     plausible=Plausibility(
         scatter=ReadingScatter(0.1, "mm", 1.0, "the middle of a spot of some mm is read by eye to a tenth of one"),
         sizes={
-            "beam_[xy]_mm": Span(-10.0, 10.0, "a beam further off leaves the mirror", u=1.0),
-            "beam_tilt_[xy]_rad": Span(-0.05, 0.05, "a beam 3 degrees askew misses its mount"),
+            "beam_[xy]_mm": PlausibleSpan(-10.0, 10.0, "a beam further off leaves the mirror", u=1.0),
+            "beam_tilt_[xy]_rad": PlausibleSpan(-0.05, 0.05, "a beam 3 degrees askew misses its mount"),
         },
     ),
 )

@@ -30,8 +30,8 @@ from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
+    PlausibleSpan,
     ReadingScatter,
-    Span,
     provenance,
     scatter_notes,
 )
@@ -308,8 +308,8 @@ RECIPE = CalibrationKind(
             5.0, "arcsec", ARCSECOND, "an autocollimator is read to a second or better [PARKER04] 2.4"
         ),
         sizes={
-            "beta?_rad": Span(-0.02, 0.02, "a mirror's axes within a degree of its mount's"),
-            "face_tilt_rad": Span(-0.01, 0.01, "a face half a degree off its shaft is mounted wrongly"),
+            "beta?_rad": PlausibleSpan(-0.02, 0.02, "a mirror's axes within a degree of its mount's"),
+            "face_tilt_rad": PlausibleSpan(-0.01, 0.01, "a face half a degree off its shaft is mounted wrongly"),
         },
     ),
 )

@@ -25,8 +25,8 @@ from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
+    PlausibleSpan,
     ReadingScatter,
-    Span,
     provenance,
     residuals_by_number,
     scatter_notes,
@@ -214,6 +214,6 @@ RECIPE = CalibrationKind(
         scatter=ReadingScatter(
             100.0, "µm", 1e-6, "a ranger repeats to a tenth of a millimetre or better, 0.4° of phase"
         ),
-        sizes={"*_offset_mm": Span(-10.0, 10.0, "what a mirror's record may hold of an offset", u=1.0)},
+        sizes={"*_offset_mm": PlausibleSpan(-10.0, 10.0, "what a mirror's record may hold of an offset", u=1.0)},
     ),
 )

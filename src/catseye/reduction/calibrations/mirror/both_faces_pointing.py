@@ -30,8 +30,8 @@ from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
+    PlausibleSpan,
     ReadingScatter,
-    Span,
     provenance,
     residuals_by_number,
     scatter_notes,
@@ -275,7 +275,7 @@ RECIPE = CalibrationKind(
         scatter=ReadingScatter(
             5.0, "counts", 1.0, "a search finds a target to some counts of 13 arcsec [PARKER04] 2.4"
         ),
-        sizes={"*_tilt*_rad": Span(-0.05, 0.05, "a beam or face 3 degrees askew misses its mount")},
+        sizes={"*_tilt*_rad": PlausibleSpan(-0.05, 0.05, "a beam or face 3 degrees askew misses its mount")},
         explained=0.99,
     ),
 )

@@ -28,8 +28,8 @@ from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
+    PlausibleSpan,
     ReadingScatter,
-    Span,
     provenance,
     quantities,
     scatter_notes,
@@ -278,7 +278,7 @@ RECIPE = CalibrationKind(
         scatter=ReadingScatter(
             5.0, "%", 0.01, "an amplitude of many cycles repeats to a per cent [PARKER04] chapter 6"
         ),
-        sizes={"depth_mm": Span(0.0, 100.0, "of a focus within the reach of the stage")},
+        sizes={"depth_mm": PlausibleSpan(0.0, 100.0, "of a focus within the reach of the stage")},
         explained=0.9,
         varying={"position_mm": 0.0},
     ),

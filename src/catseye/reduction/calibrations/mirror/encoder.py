@@ -27,8 +27,8 @@ from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
+    PlausibleSpan,
     ReadingScatter,
-    Span,
     provenance,
     scatter_notes,
 )
@@ -247,7 +247,7 @@ RECIPE = CalibrationKind(
     calibrate_encoder,
     plausible=Plausibility(
         scatter=ReadingScatter(1.0, "counts", 1.0, "a servo settles within a count [PARKER04] section 2.4"),
-        sizes={"*_counts": Span(-200.0, 200.0, "0.7 degrees: no disc is so far off its centre", u=20.0)},
+        sizes={"*_counts": PlausibleSpan(-200.0, 200.0, "0.7 degrees: no disc is so far off its centre", u=20.0)},
         varying={"angle_deg": 360.0},
     ),
 )

@@ -397,9 +397,10 @@ def _dms(angle: float) -> str:
     return f"{degrees}° {minutes:02d}' {seconds / 10:04.1f}\""
 
 
-RECIPE = CalibrationKind("azimuth of a Kelvin mount from directions to known points, stars and references", LAYOUT,
-              calibrate_azimuth,
-    plausible=Plausibility(
-        scatter=ReadingScatter(10.0, "arcsec", ARCSECOND, "a theodolite reads to 2 arcsec, a star is timed to 1 s"),
-    ),
-)  # fmt: skip
+CIRCLE = ReadingScatter(10.0, "arcsec", ARCSECOND, "a theodolite reads to 2 arcsec, a star is timed to 1 s")
+RECIPE = CalibrationKind(
+    "azimuth of a Kelvin mount from directions to known points, stars and references",
+    LAYOUT,
+    calibrate_azimuth,
+    Plausibility(scatter=CIRCLE),
+)

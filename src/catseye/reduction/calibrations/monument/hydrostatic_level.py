@@ -33,8 +33,8 @@ from catseye.reduction.calibrations.fit import (
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
+    PlausibleSpan,
     ReadingScatter,
-    Span,
     provenance,
     quantities,
     scatter_notes,
@@ -344,8 +344,8 @@ RECIPE = CalibrationKind(
             50.0, "µm", 1e-3 * MILLIMETRE, "micrometers touch water to some µm; 0.1 mm is 1 Pa of air"
         ),
         sizes={
-            "height_*_mm": Span(-1e6, 1e6, "a height above any datum, by water that tells 0.05 mm", u=0.5),
-            "constant_mm": Span(-100.0, 100.0, "two vessels of one make"),
+            "height_*_mm": PlausibleSpan(-1e6, 1e6, "a height above any datum, by water that tells 0.05 mm", u=0.5),
+            "constant_mm": PlausibleSpan(-100.0, 100.0, "two vessels of one make"),
         },
     ),
 )

@@ -35,8 +35,8 @@ from catseye.reduction.calibrations.fit import (
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
+    PlausibleSpan,
     ReadingScatter,
-    Span,
     provenance,
     quantities,
     scatter_notes,
@@ -402,16 +402,17 @@ def _notes(axes: _AxisReadings) -> tuple[str, ...]:
     )
 
 
-RECIPE = CalibrationKind("scales, zeros and axes of a dual-axis inclinometer on a tilt table or a pier", LAYOUT,
-              calibrate_inclinometer,
+RECIPE = CalibrationKind(
+    "scales, zeros and axes of a dual-axis inclinometer on a tilt table or a pier",
+    LAYOUT,
+    calibrate_inclinometer,
     plausible=Plausibility(
         scatter=ReadingScatter(5.0, "mV", 1e-3, "three seconds of arc at 400 V/rad [PARKER04] chapter 7"),
         sizes={
-            "scale_?_volt_per_rad": Span(0.0, 1e5, "above zero where the axis' + end up reads more"),
-            "misalignment_?_arcsec": Span(-36e3, 36e3, "an axis within 10 degrees of the case's mark"),
-            "table_tilt_?_arcsec": Span(-36e3, 36e3, "a table within 10 degrees of level"),
+            "scale_?_volt_per_rad": PlausibleSpan(0.0, 1e5, "above zero where the axis' + end up reads more"),
+            "misalignment_?_arcsec": PlausibleSpan(-36e3, 36e3, "an axis within 10 degrees of the case's mark"),
+            "table_tilt_?_arcsec": PlausibleSpan(-36e3, 36e3, "a table within 10 degrees of level"),
         },
-        explained=0.9,
-        columns={"temperature_c": Span(-30.0, 45.0, "air in which people read an inclinometer")},
+        columns={"temperature_c": PlausibleSpan(-30.0, 45.0, "air in which people read an inclinometer")},
     ),
-)  # fmt: skip
+)

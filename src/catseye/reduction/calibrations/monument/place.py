@@ -19,12 +19,7 @@ from catseye.records.files.record import Elevation, Within
 from catseye.records.files.refusal import refusal, shown
 from catseye.reduction.calibrations.calibration import Calibration, RecordValue
 from catseye.reduction.calibrations.check_outcome import CheckOutcome
-from catseye.reduction.calibrations.kind import (
-    CalibrationKind,
-    Plausibility,
-    provenance,
-    quantities,
-)
+from catseye.reduction.calibrations.kind import CalibrationKind, Plausibility, provenance, quantities
 from catseye.reduction.calibrations.monument.frame_sheet import FrameSheet, frame_of
 
 KIND = "monument-place"

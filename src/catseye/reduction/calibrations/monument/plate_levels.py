@@ -31,8 +31,8 @@ from catseye.reduction.calibrations.fit import (
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
+    PlausibleSpan,
     ReadingScatter,
-    Span,
     provenance,
     quantities,
     scatter_notes,
@@ -224,7 +224,7 @@ RECIPE = CalibrationKind(
         scatter=ReadingScatter(
             5.0, "arcsec", ARCSECOND, "a precision level has 2 to 4 arcsec a division [PARKER04] 2.2.1"
         ),
-        sizes={"alpha?_rad": Span(-0.02, 0.02, "a mount within a degree of level", u=10.0 * ARCSECOND)},
+        sizes={"alpha?_rad": PlausibleSpan(-0.02, 0.02, "a mount within a degree of level", u=10.0 * ARCSECOND)},
         varying={"orientation_deg": 180.0},
     ),
 )

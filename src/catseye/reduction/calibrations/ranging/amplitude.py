@@ -17,8 +17,8 @@ from catseye.reduction.calibrations.fit import CalibrationFit, FitOptions, Obser
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
+    PlausibleSpan,
     ReadingScatter,
-    Span,
     provenance,
     quantities,
     scatter_notes,
@@ -209,7 +209,7 @@ RECIPE = CalibrationKind(
         scatter=ReadingScatter(
             0.2, "mrad", MILLIRADIAN, "1 mV of noise in a phasor of 5 V, the converter's full range"
         ),
-        sizes={"amplitude_to_phase*_rad": Span(-0.1, 0.1, "what a mirror's record may hold of it")},
+        sizes={"amplitude_to_phase*_rad": PlausibleSpan(-0.1, 0.1, "what a mirror's record may hold of it")},
         varying={"amplitude_target_volt": 0.0},
     ),
 )

@@ -17,8 +17,8 @@ from catseye.reduction.calibrations.fit import SCATTER_LIMIT, CalibrationFit, Fi
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
+    PlausibleSpan,
     ReadingScatter,
-    Span,
     provenance,
     scatter_notes,
 )
@@ -214,6 +214,6 @@ RECIPE = CalibrationKind(
     calibrate_leakage,
     plausible=Plausibility(
         scatter=ReadingScatter(5.0, "mV", MILLIVOLT, "a thousandth of a full return of 5 V"),
-        sizes={"leakage_amplitude_volt": Span(0.0, 0.5, "a tenth of a full return of 5 V", u=0.05)},
+        sizes={"leakage_amplitude_volt": PlausibleSpan(0.0, 0.5, "a tenth of a full return of 5 V", u=0.05)},
     ),
 )

@@ -20,8 +20,8 @@ from catseye.reduction.calibrations.fit import SCATTER_LIMIT, CalibrationFit, Fi
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
+    PlausibleSpan,
     ReadingScatter,
-    Span,
     provenance,
     scatter_notes,
 )
@@ -267,7 +267,7 @@ RECIPE = CalibrationKind(
     calibrate_lit_leakage,
     plausible=Plausibility(
         scatter=ReadingScatter(5.0, "mV", MILLIVOLT, "a thousandth of a full return of 5 V"),
-        sizes={"leakage_amplitude_volt": Span(0.0, 0.5, "a tenth of a full return of 5 V", u=0.05)},
+        sizes={"leakage_amplitude_volt": PlausibleSpan(0.0, 0.5, "a tenth of a full return of 5 V", u=0.05)},
         explained=0.99,
         varying={"distance_m": 0.0},
     ),

@@ -19,8 +19,8 @@ from catseye.reduction.calibrations.fit import TESTS, CalibrationFit, Effect, Fi
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
+    PlausibleSpan,
     ReadingScatter,
-    Span,
     provenance,
     quantities,
     scatter_notes,
@@ -333,9 +333,9 @@ RECIPE = CalibrationKind(
     plausible=Plausibility(
         scatter=ReadingScatter(50.0, "µm", 1e-3 * MILLIMETRE, "3 mrad of phase, half a wavelength of 0.1 m"),
         sizes={
-            "zero_mm": Span(-20.0, 20.0, "a reference distance that was taken from the drawing"),
-            "scale_ppm": Span(-1e3, 1e3, "air left out makes 300 ppm, an oscillator of its own 100"),
-            "cyclic_*_mm": Span(-5.0, 5.0, "a leakage of a third of the return", u=0.5),
+            "zero_mm": PlausibleSpan(-20.0, 20.0, "a reference distance that was taken from the drawing"),
+            "scale_ppm": PlausibleSpan(-1e3, 1e3, "air left out makes 300 ppm, an oscillator of its own 100"),
+            "cyclic_*_mm": PlausibleSpan(-5.0, 5.0, "a leakage of a third of the return", u=0.5),
         },
     ),
 )

@@ -12,12 +12,7 @@ from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.reduction.calibrations.calibration import Calibration, Quantity
 from catseye.reduction.calibrations.check_outcome import CheckOutcome
-from catseye.reduction.calibrations.kind import (
-    CalibrationKind,
-    Plausibility,
-    Span,
-    provenance,
-)
+from catseye.reduction.calibrations.kind import CalibrationKind, Plausibility, PlausibleSpan, provenance
 from catseye.signal.drift.allan import allan_deviation, expected_variance
 from catseye.signal.drift.noise import FEWEST, NoiseSpectrum, noise_spectrum
 
@@ -143,6 +138,6 @@ RECIPE = CalibrationKind(
     LAYOUT,
     measure_oscillator,
     plausible=Plausibility(
-        sizes={"white_mrad2": Span(0.0, 1e5, "a third of a radian in a cycle: its phase would be lost")},
+        sizes={"white_mrad2": PlausibleSpan(0.0, 1e5, "a third of a radian in a cycle: its phase would be lost")},
     ),
 )

@@ -25,8 +25,8 @@ from catseye.reduction.calibrations.fit import (
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
+    PlausibleSpan,
     ReadingScatter,
-    Span,
     provenance,
     quantities,
     scatter_notes,
@@ -253,8 +253,8 @@ RECIPE = CalibrationKind(
     plausible=Plausibility(
         scatter=ReadingScatter(50.0, "µm", 1e-3 * MILLIMETRE, "3 mrad of phase, half a wavelength of 0.1 m"),
         sizes={
-            "d0_mm": Span(50.0, 1000.0, "what the sheet allows of the drawing's value", u=1.0),
-            "scale_ppm": Span(-1e3, 1e3, "air left out makes 300 ppm, an oscillator of its own 100"),
+            "d0_mm": PlausibleSpan(50.0, 1000.0, "what the sheet allows of the drawing's value", u=1.0),
+            "scale_ppm": PlausibleSpan(-1e3, 1e3, "air left out makes 300 ppm, an oscillator of its own 100"),
         },
     ),
 )

@@ -11,13 +11,7 @@ from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadin
 from catseye.records.files.record import Within
 from catseye.reduction.calibrations.calibration import Calibration
 from catseye.reduction.calibrations.check_outcome import CheckOutcome
-from catseye.reduction.calibrations.kind import (
-    CalibrationKind,
-    Plausibility,
-    Span,
-    provenance,
-    quantities,
-)
+from catseye.reduction.calibrations.kind import CalibrationKind, Plausibility, PlausibleSpan, provenance, quantities
 
 KIND = "repeatability"
 MICROMETRE = 1e-3 * MILLIMETRE
@@ -127,6 +121,10 @@ RECIPE = CalibrationKind(
     LAYOUT,
     measure_repeatability,
     plausible=Plausibility(
-        sizes={"*_um": Span(0.0, 1e3, "60 mrad of phase, half a wavelength of 0.1 m: twenty times a ranger's noise")},
+        sizes={
+            "*_um": PlausibleSpan(
+                0.0, 1e3, "60 mrad of phase, half a wavelength of 0.1 m: twenty times a ranger's noise"
+            )
+        },
     ),
 )

@@ -19,8 +19,8 @@ from catseye.reduction.calibrations.fit import CalibrationFit, FitOptions, Obser
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
+    PlausibleSpan,
     ReadingScatter,
-    Span,
     provenance,
     quantities,
     scatter_notes,
@@ -243,6 +243,8 @@ RECIPE = CalibrationKind(
     calibrate_retroreflector,
     plausible=Plausibility(
         scatter=ReadingScatter(50.0, "µm", 1e-3 * MILLIMETRE, "3 mrad of phase, half a wavelength of 0.1 m"),
-        sizes={"pc_*mm": Span(-2000.0, 0.0, "glass makes a range longer: below zero [GOLDMAN00] eq. 3.10", u=1.0)},
+        sizes={
+            "pc_*mm": PlausibleSpan(-2000.0, 0.0, "glass makes a range longer: below zero [GOLDMAN00] eq. 3.10", u=1.0)
+        },
     ),
 )
