@@ -15,13 +15,7 @@ from catseye.records.files.readings import SheetReadings
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, Cell
 from catseye.reduction.calibrations.check_outcome import CheckOutcome
-from catseye.reduction.calibrations.fit import (
-    CalibrationFit,
-    Effect,
-    FitOptions,
-    ObservedScatter,
-    fit_readings,
-)
+from catseye.reduction.calibrations.fit import CalibrationFit, Effect, FitOptions, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,

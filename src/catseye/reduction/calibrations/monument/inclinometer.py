@@ -25,13 +25,7 @@ from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, Cell
 from catseye.reduction.calibrations.check_outcome import CheckOutcome
-from catseye.reduction.calibrations.fit import (
-    CalibrationFit,
-    Effect,
-    FitOptions,
-    ObservedScatter,
-    fit_readings,
-)
+from catseye.reduction.calibrations.fit import CalibrationFit, Effect, FitOptions, ObservedScatter, fit_readings
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
     Plausibility,
