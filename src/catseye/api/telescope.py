@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
-    from catseye.gateways.pose.objects import PoseFindings
     from catseye.gateways.surface.objects import SurfaceFindings
     from catseye.gateways.writers.passage import Passage
     from catseye.records.network.solved_points import SolvedPoints
     from catseye.records.site.folder import SiteFolder
+    from catseye.reduction.pose.verdicts import PoseFindings
     from catseye.reduction.surface.shape import Prisms
 
 Optics = Literal["prime", "gregorian"]
@@ -157,9 +157,9 @@ def pose(
 
     Raises InputError where points, postures or files are missing and EstimationError where nothing can be fitted.
     """
-    from catseye.gateways.pose.objects import pose_status, pose_verdict
     from catseye.records.site.folder import SiteFolder, read_site
     from catseye.reduction.pose.pose import at_posture
+    from catseye.reduction.pose.verdicts import pose_status, pose_verdict
 
     records = site if isinstance(site, SiteFolder) else read_site(place_of(site))
     later, before = _solved(epoch, posture_deg), None if earlier is None else _solved(earlier, earlier_posture_deg)
@@ -206,10 +206,10 @@ def _posed(
     tilt_arcsec: Sequence[float] | None,
 ) -> "PoseFindings":
     """The pose, with an inclinometer joined or the beam derived where asked for."""
-    from catseye.gateways.pose.objects import PoseFindings
     from catseye.reduction.pose.pointing_offsets import cross_covariance, pointing_offset
     from catseye.reduction.pose.pose import pose_of_group
     from catseye.reduction.pose.track_profile import pose_with_tilt
+    from catseye.reduction.pose.verdicts import PoseFindings
 
     group_pose = pose_of_group(later, before, site, **chosen)
     if tilt_arcsec is not None:
@@ -231,7 +231,7 @@ def _solved(
     from catseye.reduction.pose.dish_ways import solved_points
 
     if isinstance(epoch, NightResult):
-        solved = solved_points(epoch.reduction)
+        solved = replace(solved_points(epoch.reduction), verdict=epoch.verdict)
     else:
         solved = epoch if isinstance(epoch, SolvedPoints) else read_solved_points(place_of(epoch, output=True))
     if posture_deg is None:
