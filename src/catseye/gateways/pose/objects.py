@@ -6,12 +6,12 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import InputError
-from catseye.estimation.shapes.pose import COMPONENTS
+from catseye.estimation.shapes.pose import COMPONENTS, RIGID
 from catseye.records.files.reading import Folder
 from catseye.records.files.verdicts import stored_verdict
 from catseye.reduction.pose.pointing_offsets import COMPONENTS as BEAM
 from catseye.reduction.pose.pointing_offsets import PointingOffset
-from catseye.reduction.pose.verdicts import WEAK_LEVEL, PoseFindings, pose_status, pose_verdict
+from catseye.reduction.pose.verdicts import PoseFindings, pose_status, pose_verdict
 from catseye.verdict import Verdict
 
 FORMAT = "catseye-pose-1"
@@ -101,7 +101,7 @@ def pose_words(result: PoseFindings) -> list[tuple[str, str]]:
         ("Frame", f"{pose.frame}, turned about the pivot ({pivot}) m"),
     ]
     if pose.motion.degrees_of_freedom:
-        fits = "moves as one" if pose.p >= WEAK_LEVEL else "does not move as one: look at the residuals"
+        fits = "moves as one" if pose.p >= RIGID else "does not move as one: look at the residuals"
         passages.append(
             (
                 "Rigid",

@@ -12,8 +12,8 @@ from catseye.errors import EstimationError, InputError
 from catseye.records.network.solved_points import SolvedPoints
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.pose.pose import pose_of_group
-from catseye.reduction.pose.posture import axis_lean
 from catseye.reduction.site.places import nominal_frame
+from catseye.reduction.site.posture import axis_lean
 from catseye.reduction.surface.shape import LitAperture, Prisms, ShapeSettings, shape_of
 
 

@@ -24,9 +24,9 @@ from catseye.geometry.frames.frame import Transform
 from catseye.records.network.solved_points import SolvedPoints
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.epoch.settings import ReductionSettings
-from catseye.reduction.pose.posture import PostureOffset, offset_of
 from catseye.reduction.site.bodies import bodies_of
 from catseye.reduction.site.places import RangedPoint, nominal_frame, places_of
+from catseye.reduction.site.posture import PostureOffset, offset_of
 
 GROUPS = ("dish", "feed-arm", "alidade", "subreflector")
 FRAMES = ("ground", "alidade", "reflector")

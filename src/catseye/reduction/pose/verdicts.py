@@ -5,13 +5,13 @@ from typing import NamedTuple
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, SPEED_OF_LIGHT
+from catseye.estimation.shapes.pose import RIGID
 from catseye.reduction.pose.pointing_fit import PointingFit
 from catseye.reduction.pose.pointing_offsets import PointingOffset
 from catseye.reduction.pose.pose import GroupPose
 from catseye.reduction.pose.star_readings import better_readings
 from catseye.verdict import Verdict
 
-WEAK_LEVEL = 0.01  # chance below which a group is said not to move as one
 UNLIKELY = 1e-4  # chance, on either side, below which a stated uncertainty does not fit the scatter
 LOWEST_FREQUENCY = 1.15e9  # Hz, of the Gregorian receivers: its beam is the widest that a fit has to find
 APERTURE = 100.0  # m across: [GBTPM01]'s telescope
@@ -32,7 +32,7 @@ def pose_status(result: PoseFindings) -> str:
     pose = result.pose.pose
     if pose.motion.status != "converged":
         return pose.motion.status
-    if pose.motion.degrees_of_freedom and pose.p < WEAK_LEVEL:
+    if pose.motion.degrees_of_freedom and pose.p < RIGID:
         what = "the pose, and the beam that follows from it," if result.beam is not None else "the pose"
         return f"the group does not move as one (p {pose.p:.2g}): {what} is a mean of what its points do; see residuals"
     return "converged"

@@ -38,7 +38,7 @@ class PostureOffset:
         told = "the told posture and the design" if self.postures == 1 else "the told postures of the two epochs"
         return (
             f"{told} disagree with the {self.what} by {self.offset[worst] / DEGREE:+.3f} degrees {along} (u "
-            f"{self.u[worst] / DEGREE:.4f}, expected up to {limit / DEGREE:.3f}): which of them is wrong nothing here says"
+            f"{self.u[worst] / DEGREE:.4f}, expected up to {limit / DEGREE:.3f}); nothing here says which is wrong"
         )
 
 
