@@ -170,13 +170,13 @@ def _fitted(
     if against is None:
         return pointing_fit, observed, None
     if against == "published" or against.endswith(".toml"):
-        other, hashes = read_series(against)
+        other, hashes, judged = read_series(against)
     else:
         second = read_observed([Path(against)])
         other_fit = fitted(second)
-        other, hashes = other_fit.series, second.hashes
-        pointing_fit = replace(pointing_fit, sources={**pointing_fit.sources, against: fit_verdict(other_fit)})
+        other, hashes, judged = other_fit.series, second.hashes, fit_verdict(other_fit)
     observed.hashes.update(hashes)
+    pointing_fit = replace(pointing_fit, sources={**pointing_fit.sources, against: judged})
     return pointing_fit, observed, compare_series(other, pointing_fit.series)
 
 
@@ -210,8 +210,10 @@ def predict(
 
     from catseye.gateways.pose.pointing_series_objects import read_series
     from catseye.gateways.writers.objects import json_line
+    from catseye.verdict import Verdict
 
-    series, _ = read_series(model)
+    series, _, judged = read_series(model)
+    verdict = Verdict("good", "the series of the model").resting_on({model: judged})
     a, e = azimuth_deg * DEGREE, elevation_deg * DEGREE
     correction, spread = series.correction(a, e), series.covariance_of_correction(a, e)
     encoder = series.encoders(a, e)
@@ -219,6 +221,7 @@ def predict(
     u = np.sqrt(np.diag(spread))
     if json:
         answer = {
+            "verdict": verdict.to_object(),
             "model": model,
             "order": ["azimuth times cos E", "elevation"],
             "correction": correction,
@@ -227,6 +230,8 @@ def predict(
         }
         say(json_line(answer))
         return
+    if verdict.word != "good":
+        say(wrapped("Verdict", verdict.text))
     for name, value, w in zip(("azimuth times cos E", "elevation"), correction, u, strict=True):
         u_text = f"   u {w / ARCSECOND:.3f}" if known else "   u unknown"
         say(f"{name:<22}{value / ARCSECOND:+12.3f} arcsec{u_text}")

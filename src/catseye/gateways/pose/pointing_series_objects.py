@@ -99,14 +99,14 @@ def _pose(folder: Folder, path: Path) -> tuple[tuple[float, float], np.ndarray, 
     return angles, value, spread, stored_verdict(str(path), stored)
 
 
-def read_series(text: str) -> tuple[PointingSeries, dict[str, str]]:
-    """A series by name ("published") or from its TOML file, and the SHA-256 of what was read."""
+def read_series(text: str) -> tuple[PointingSeries, dict[str, str], Verdict | None]:
+    """A series by name ("published") or from its TOML file, the SHA-256 of what was read, the file's verdict."""
     if text == PUBLISHED:
-        return published(), {}
+        return published(), {}, None
     path = Path(text)
     folder = Folder(path.parent)
     record = folder.record(path.name, PointingModel) if path.suffix == ".toml" else read_record(path, PointingModel)
-    return record.series, dict(folder.hashes)
+    return record.series, dict(folder.hashes), record.judged
 
 
 def series_object(series: PointingSeries) -> dict[str, Any]:
@@ -199,7 +199,7 @@ def fit_rows(fit: PointingFit, compared: SeriesComparison | None) -> list[tuple[
 
 def model_record(fit: PointingFit, name: str) -> PointingModel:
     """The fit as a record, rounded to a micro arc second."""
-    q = fit.series.covariance / ARCSECOND**2
+    q, judged = fit.series.covariance / ARCSECOND**2, fit_verdict(fit)
     return PointingModel(
         format="catseye-pointing-series-1",
         name=name[:200] or "pointing",
@@ -207,6 +207,8 @@ def model_record(fit: PointingFit, name: str) -> PointingModel:
         values_arcsec=tuple(round(float(v), 6) for v in fit.series.values / ARCSECOND),
         covariance_arcsec2=tuple(tuple(float(f"{v:.12g}") for v in row) for row in 0.5 * (q + q.T)),
         sky_rms_arcsec=round(fit.sky_rms / ARCSECOND, 6),
+        verdict=None if judged.word == "good" else judged.word,
+        why="" if judged.word == "good" else judged.why,
     )
 
 

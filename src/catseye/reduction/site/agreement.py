@@ -107,9 +107,8 @@ def distance_disagreement(
     if not abs(difference) > SURE * u:
         return None
     reason = _factor(typed / length if length > 0.0 else np.inf)
-    where = f"{names[0]} and {names[1]}"
     scaled = difference / MILLIMETRE, u / MILLIMETRE, "mm"
-    return Disagreement("typed distance and coordinates", *names, *scaled, "", f"{reason} (between {where})")
+    return Disagreement("typed distance and coordinates", *names, *scaled, "", reason)
 
 
 def _factor(ratio: float) -> str:
