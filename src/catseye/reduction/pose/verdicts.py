@@ -92,11 +92,11 @@ def _fit_verdict(fit: PointingFit) -> Verdict:
             f"{rms:.2f} arc seconds rms on the sky, beyond {limit:.0f}, a tenth of the beam at the telescope's lowest "
             "frequency: check columns and units",
         )
+    if not fit.scaled and (doubt := _contradicted(fit)):
+        return Verdict("doubtful", doubt)
     lost = [w for w in fit.weak if w.u_on_the_sky > fit.sky_rms]
     if lost:
         return Verdict("doubtful", f"the observations do not tell {', '.join(lost[0].parts)} apart")
-    if not fit.scaled and (doubt := _contradicted(fit)):
-        return Verdict("doubtful", doubt)
     return Verdict("good", f"{int(fit.used.sum())} observations hold the terms, {rms:.2f} arc seconds rms on the sky")
 
 
