@@ -107,8 +107,15 @@ def distance_disagreement(
     if not abs(difference) > SURE * u:
         return None
     reason = _factor(typed / length if length > 0.0 else np.inf)
-    scaled = difference / MILLIMETRE, u / MILLIMETRE, "mm"
-    return Disagreement("typed distance and coordinates", *names, *scaled, "", reason)
+    return Disagreement(
+        "typed distance and coordinates",
+        *names,
+        difference / MILLIMETRE,
+        u / MILLIMETRE,
+        "mm",
+        accused="",
+        reason=reason,
+    )
 
 
 def _factor(ratio: float) -> str:

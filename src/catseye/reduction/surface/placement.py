@@ -25,7 +25,7 @@ ROUNDING = 1e-6  # of the radius: of coordinates as tables print them
 
 
 @dataclass(frozen=True, eq=False)
-class Placement:
+class DishPlacement:
     """Where k prisms stand on the site's dish.
 
     inside     prisms within the circle of the aperture
@@ -60,7 +60,7 @@ class Placement:
         return f"the points do not fit the site's dish: {'; '.join(found)}{cure}"
 
 
-def placement_of(prisms: Prisms, aperture: LitAperture, design: Mapping[str, np.ndarray]) -> Placement:
+def placement_of(prisms: Prisms, aperture: LitAperture, design: Mapping[str, np.ndarray]) -> DishPlacement:
     """Where prisms stand on the site's dish, and which change of their axes would put them there.
 
     prisms     as measured
@@ -97,11 +97,11 @@ def _changes(local: np.ndarray) -> list[tuple[str, np.ndarray]]:
 
 def _placed(
     names: tuple[str, ...], local: np.ndarray, aperture: LitAperture, design: Mapping[str, np.ndarray]
-) -> Placement:
+) -> DishPlacement:
     size = np.linalg.norm(aperture.unit(local), axis=1)
     beyond = np.maximum(size - 1.0 - RIM, 0.0) * aperture.radius
     inside = int((size <= 1.0 + ROUNDING).sum())
-    return Placement(inside, beyond, _largest_deviation(local, aperture), _elsewhere(names, local, design), ())
+    return DishPlacement(inside, beyond, _largest_deviation(local, aperture), _elsewhere(names, local, design), ())
 
 
 def _largest_deviation(local: np.ndarray, aperture: LitAperture) -> float:

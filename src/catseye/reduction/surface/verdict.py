@@ -9,7 +9,7 @@ from catseye.reduction.site.posture import SURE, largest_correction
 from catseye.reduction.surface.actuators import Actuators
 from catseye.reduction.surface.change import Change
 from catseye.reduction.surface.lookup import Lookup
-from catseye.reduction.surface.placement import TRAVEL, Placement
+from catseye.reduction.surface.placement import TRAVEL, DishPlacement
 from catseye.reduction.surface.shape import MeanSquare, SurfaceShape
 from catseye.verdict import Verdict
 
@@ -28,7 +28,7 @@ class SurfaceFindings:
     change: Change | None = None
     lookup: Lookup | None = None
     actuators: Actuators | None = None
-    placements: tuple[Placement, ...] = ()
+    placements: tuple[DishPlacement, ...] = ()
 
 
 def surface_verdict(result: SurfaceFindings) -> Verdict:
@@ -40,8 +40,7 @@ def surface_verdict(result: SurfaceFindings) -> Verdict:
 def _own_verdict(result: SurfaceFindings) -> Verdict:
     for shape, placement in zip(result.shapes, result.placements, strict=False):
         if placement.doubt:
-            word = "failed" if placement.cures else "doubtful"
-            return Verdict(word, f"{shape.prisms.source}: {placement.doubt}")
+            return Verdict("failed" if placement.cures else "doubtful", f"{shape.prisms.source}: {placement.doubt}")
     for shape in result.shapes:
         if doubt := _implausible(shape):
             return Verdict("doubtful", f"{shape.prisms.source}: {doubt}")
