@@ -517,6 +517,11 @@ SOURCES: dict[str, Source] = {
         locator="doi:10.6028/jres.080A.007",
         used="enhancement of saturation over ice, -100 to 0 °C",
     ),
+    "WMOARC25": Source(
+        title="WMO, World weather and climate extremes archive: highest and lowest sea level air pressure",
+        locator="wmo.asu.edu, pressure",
+        used="870 hPa (typhoon Tip, 1979) and 1084.8 hPa (Tosontsengel, 2001)",
+    ),
     "WMO18": Source(
         title="WMO, Guide to instruments and methods of observation, WMO-No. 8, 2018",
         locator="WMO-No. 8, volume I, annex 4.B",

@@ -27,7 +27,11 @@ MEANING = {
 
 
 def verdict(reduction: Reduction) -> Verdict:
-    """Whether the night may be relied on: its scatter bears out what is claimed, and few shots were lost."""
+    """Scatter against what is claimed, shots lost, and the verdict of an exported campaign."""
+    return _own_verdict(reduction).resting_on({"the exported campaign": reduction.campaign.verdict})
+
+
+def _own_verdict(reduction: Reduction) -> Verdict:
     coordinates = reduction.coordinates
     factor, degrees = coordinates.variance_factor, coordinates.degrees_of_freedom
     if coordinates.status != CONVERGED:

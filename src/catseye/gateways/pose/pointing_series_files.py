@@ -15,7 +15,6 @@ from catseye.gateways.pose.pointing_series_objects import (
     Observed,
     fit_object,
     fit_rows,
-    fit_verdict,
     fit_words,
     model_record,
     track_object,
@@ -31,6 +30,7 @@ from catseye.records.files.toml_text import record_toml
 from catseye.records.site.pointing_model import FORMAT as MODEL
 from catseye.reduction.pose.pointing_fit import PointingFit, SeriesComparison
 from catseye.reduction.pose.track_profile import TrackProfile
+from catseye.reduction.pose.verdicts import fit_verdict
 
 OBSERVATIONS = (
     "place", "azimuth_deg", "elevation_deg", "correction_azimuth_cos_e_arcsec", "correction_elevation_arcsec",

@@ -10,8 +10,8 @@ alone cannot tell it from the part (c_1, s_1) that does the same. Ranges can, co
 shape. Both go into one least squares. The mean is the azimuth axis's lean: AN and AW of the pointing series.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from catseye.geometry.antenna.pointing_series import axis_terms
 from catseye.geometry.frames.rotation import from_vector, rz
 from catseye.records.laboratory.tilts import TiltReadings
 from catseye.reduction.pose.pose import GroupPose
+from catseye.verdict import Verdict
 
 MOST_HARMONICS = 36
 
@@ -64,6 +65,7 @@ class TrackProfile:
     w            (n, 2) standardised residuals; nan where nothing checks one
     poses        how many of the n are poses
     pvv, degrees_of_freedom, p   of the fit
+    sources      verdicts of the poses, by their files
     """
 
     series: TiltSeries
@@ -75,6 +77,7 @@ class TrackProfile:
     pvv: float
     degrees_of_freedom: int
     p: float
+    sources: Mapping[str, Verdict | None] = field(default_factory=dict)
 
 
 def _rows(azimuth: np.ndarray, harmonics: int) -> np.ndarray:
