@@ -44,7 +44,7 @@ def json_object(text: str) -> dict[str, object]:
     """The JSON object of a cell. Raises ValueError: it holds something else."""
     found = json.loads(text)
     if not isinstance(found, dict):
-        raise ValueError("no JSON object")  # noqa: TRY004 - of the file's content, not of an argument
+        raise ValueError("no JSON object")
     return found
 
 
