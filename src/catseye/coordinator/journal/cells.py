@@ -3,13 +3,12 @@
 import json
 from collections.abc import Sequence
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import Any
+
+import sqlalchemy
 
 from catseye.coordinator.journal.tables import JournalTable
 from catseye.errors import InputError
-
-if TYPE_CHECKING:
-    from catseye.coordinator.journal.rows import StoredRow
 
 WORDS = {str: "text", bytes: "bytes", int: "a whole number", float: "a number", bool: "yes or no"}
 REMEDY = "the journal is damaged; restore it from a copy"
@@ -26,7 +25,7 @@ def _kinds(table: JournalTable) -> tuple[tuple[type, ...], ...]:
     return tuple(kinds)
 
 
-def check_cells(table: JournalTable, row: "StoredRow", place: str) -> None:
+def check_cells(table: JournalTable, row: "sqlalchemy.Row[tuple[object, ...]]", place: str) -> None:
     """Raise InputError naming the first cell of a whole row that its column cannot hold.
 
     place   for the refusal: journal, run and event
@@ -40,7 +39,7 @@ def check_cells(table: JournalTable, row: "StoredRow", place: str) -> None:
     raise damaged(f"{place}: column {column.name!r} of {table.name!r}", f"{_shown(row[at])} (expected {expected})")
 
 
-def json_object(text: str) -> dict[str, object]:
+def json_object(text: str) -> dict[str, Any]:
     """The JSON object of a cell. Raises ValueError: it holds something else."""
     found = json.loads(text)
     if not isinstance(found, dict):
