@@ -308,3 +308,13 @@ def test_one_number_is_one_and_a_row_is_a_row():
     assert plain(np.array([1.0, 2.0]), In("GHz", many=True), "x") == (1.0, 2.0)
     with pytest.raises(InputError, match="expected a whole number"):
         plain(2.5, In("", whole=True), "x")
+
+
+@pytest.mark.parametrize("function", [catseye.air, catseye.sound])
+def test_a_humidity_that_is_likely_a_fraction_is_doubtful_with_both_readings(function):
+    verdict = function(20.0, 933.0, [0.5, 0.7]).verdict
+    assert verdict.word == "doubtful"
+    assert "0.5 %" in verdict.why
+    assert "as a fraction it would be 50 %" in verdict.why
+    for humidity in (0.0, 1.5, 50.0, [0.5, 40.0], 0.5 * u.one):
+        assert function(20.0, 933.0, humidity).verdict.word == "good"

@@ -220,12 +220,17 @@ def sound(
     343.577
     """
     from catseye.atmosphere.sound.speed import sound as state_of
+    from catseye.atmosphere.weather.humidity import fraction_words, likely_fraction
     from catseye.gateways.air.sound_objects import sound_verdict
+    from catseye.gateways.writers.verdict import Verdict
 
     state = state_of(temperature_c, pressure_hpa, humidity_percent, model=model, co2_ppm=co2_ppm)
     u = state.combined_uncertainty(u_temperature_c, u_pressure_hpa, u_humidity_percent, u_co2_ppm)
+    judged = sound_verdict(state, u)
+    if likely_fraction(humidity_percent):
+        judged = Verdict("doubtful", fraction_words(humidity_percent))
     return SoundResult(
-        sound_verdict(state, u),
+        judged,
         temperature_c,
         pressure_hpa,
         humidity_percent,
