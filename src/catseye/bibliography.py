@@ -58,7 +58,7 @@ SOURCES: dict[str, Source] = {
             "4.3 prints gamma_w = 1.004 for water vapour, about 1.33 is right: humid air 0.5 m/s faster at 20 °C, 50 %",
             "5.1.3 says the detected signal is mixed with 1500.000 MHz; 5.1.1, + IF, is right",
             "5.2: clipping on top shifts a single edge, not the average of both edges that the Clark-Hess meter takes",
-            "5.8 takes noise in quadrature for the extreme: arcsin(r), not arctan(r); 7.9 um more at 10:1, 8 pm at 1000:1",
+            "5.8 takes quadrature for the extreme: arcsin(r), not arctan(r); 7.9 um more at 10:1, 8 pm at 1000:1",
             "5.9 prints -2pi/lambda/2; -2pi/(lambda/2) is meant",
             "5.14 and 5.17 print -2pi(n_i - n_0); 5.12 and 5.15 require +2pi(n_i - n_0)",
         ),
