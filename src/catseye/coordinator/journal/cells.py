@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from functools import cache
+
 import sqlalchemy
 
 from catseye.coordinator.journal.tables import JournalTable
@@ -37,7 +38,7 @@ def check_cells(table: JournalTable, row: "sqlalchemy.Row[tuple[object, ...]]", 
     raise damaged(f"{place}: column {column.name!r} of {table.name!r}", f"{_shown(row[at])} (expected {expected})")
 
 
-def json_object(text: str):  # type: ignore[no-untyped-def] # what a key holds is the caller's to know
+def json_object(text: str):  # what a key holds is the caller's to know
     """The JSON object of a cell. Raises ValueError: it holds something else."""
     found = json.loads(text)
     if not isinstance(found, dict):
