@@ -5,12 +5,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from catseye.api.reading import place_of
 from catseye.api.result import Progress, Result, quantities
+from catseye.api.units import In, with_units
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError, InputError
 
@@ -138,6 +139,7 @@ class AdjustmentResult(Result):
         return () if self.path is None else (self.path,)
 
 
+@with_units
 def adjust(
     network: "str | os.PathLike[str] | ObservationNetwork",
     *,
@@ -146,10 +148,10 @@ def adjust(
     robust: str | None = None,
     components: str | None = None,
     scale_by_variance_factor: bool = False,
-    level: float = 0.05,
+    level: Annotated[Any, In("", one=True)] = 0.05,
     relative: Sequence[tuple[str, str]] = (),
-    sigma_mm: float | None = None,
-    sigma_ppm: float | None = None,
+    sigma_mm: Annotated[Any, In("mm", one=True)] = None,
+    sigma_ppm: Annotated[Any, In("ppm", one=True)] = None,
     progress: Progress | None = None,
 ) -> AdjustmentResult:
     """A network by least squares, every observation used as claimed unless asked otherwise.
@@ -272,12 +274,13 @@ class ComparisonResult(Result):
         return (*self.first.sources(), *self.second.sources())
 
 
+@with_units
 def compare(
     first: "str | os.PathLike[str] | ObservationNetwork | AdjustmentResult",
     second: "str | os.PathLike[str] | ObservationNetwork | AdjustmentResult",
     *,
     points: Sequence[str] | None = None,
-    level: float = 0.05,
+    level: Annotated[Any, In("", one=True)] = 0.05,
     progress: Progress | None = None,
 ) -> ComparisonResult:
     """What moved between two epochs of a network.
@@ -385,22 +388,23 @@ class PlanResult(Result):
         return () if self.path is None else (self.path,)
 
 
+@with_units
 def plan(
     network: "str | os.PathLike[str] | ObservationNetwork",
     *,
     datum: str | None = None,
     interest: Sequence[str] | None = None,
-    budget_s: float | None = None,
-    shot_s: float = 5.0,
-    most: int = 20,
-    runs: int = 0,
-    seed: int = 1,
-    air_ppm: float = 0.0,
-    station_ppm: float = 0.0,
-    refraction: float = 0.0,
-    blunders_percent: float = 0.0,
-    sigma_mm: float | None = None,
-    sigma_ppm: float | None = None,
+    budget_s: Annotated[Any, In("s", one=True)] = None,
+    shot_s: Annotated[Any, In("s", one=True)] = 5.0,
+    most: Annotated[Any, In("", whole=True)] = 20,
+    runs: Annotated[Any, In("", whole=True)] = 0,
+    seed: Annotated[Any, In("", whole=True)] = 1,
+    air_ppm: Annotated[Any, In("ppm", one=True)] = 0.0,
+    station_ppm: Annotated[Any, In("ppm", one=True)] = 0.0,
+    refraction: Annotated[Any, In("", one=True)] = 0.0,
+    blunders_percent: Annotated[Any, In("percent", one=True)] = 0.0,
+    sigma_mm: Annotated[Any, In("mm", one=True)] = None,
+    sigma_ppm: Annotated[Any, In("ppm", one=True)] = None,
     progress: Progress | None = None,
 ) -> PlanResult:
     """A network before it is measured: what it will be worth, where it is weak, what to measure next.
@@ -500,12 +504,13 @@ class PositionsResult(Result):
         return {"positions": quantities(columns)}
 
 
+@with_units
 def locate(
-    stations: np.ndarray,
-    ranges: np.ndarray,
-    sigma: "np.ndarray | float",
+    stations: Annotated[Any, In("m")],
+    ranges: Annotated[Any, In("m")],
+    sigma: Annotated[Any, In("m")],
     *,
-    near: np.ndarray | None = None,
+    near: Annotated[Any, In("m")] = None,
 ) -> PositionsResult:
     """Positions of many targets, each by least squares from its ranges to known stations.
 

@@ -4,13 +4,14 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
 from catseye.api.night import NightResult
 from catseye.api.reading import place_of
 from catseye.api.result import Progress, Result, quantities
+from catseye.api.units import In, with_units
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import EstimationError, InputError
 
@@ -126,6 +127,7 @@ class PoseResult(Result):
         return self.read
 
 
+@with_units
 def pose(
     epoch: "str | os.PathLike[str] | SolvedPoints | NightResult",
     earlier: "str | os.PathLike[str] | SolvedPoints | NightResult | None" = None,
@@ -134,12 +136,12 @@ def pose(
     group: str | None = None,
     points: Sequence[str] | None = None,
     frame: str | None = None,
-    pivot: Sequence[float] | np.ndarray | None = None,
+    pivot: Annotated[Any, In("m", many=True)] = None,
     robust: str | None = None,
     pointing: Optics | None = None,
-    tilt_arcsec: Sequence[float] | None = None,
-    posture_deg: Sequence[float] | None = None,
-    earlier_posture_deg: Sequence[float] | None = None,
+    tilt_arcsec: Annotated[Any, In("arcsec", many=True)] = None,
+    posture_deg: Annotated[Any, In("deg", many=True)] = None,
+    earlier_posture_deg: Annotated[Any, In("deg", many=True)] = None,
 ) -> PoseResult:
     """Six degrees of freedom of a part of the antenna between two epochs or against design; beam and focus too.
 
@@ -350,18 +352,19 @@ class SurfaceResult(Result):
         return self.read
 
 
+@with_units
 def surface(
     *epochs: "str | os.PathLike[str] | NightResult",
     site: "str | os.PathLike[str] | SiteFolder" = "gbt",
     free: Sequence[str] = ("vertex", "axis", "focal-length"),
-    taper_db: float = 0.0,
-    frequency_ghz: Sequence[float] = (),
-    zernike: int = 15,
+    taper_db: Annotated[Any, In("dB", one=True)] = 0.0,
+    frequency_ghz: Annotated[Any, In("GHz", many=True)] = (),
+    zernike: Annotated[Any, In("", whole=True)] = 15,
     order: Literal["noll", "ansi"] = "noll",
     frame: Literal["reflector", "ground"] = "reflector",
-    azimuth_deg: float | None = None,
-    elevation_deg: Sequence[float] = (),
-    temperature_c: Sequence[float] = (),
+    azimuth_deg: Annotated[Any, In("deg", one=True)] = None,
+    elevation_deg: Annotated[Any, In("deg", many=True)] = (),
+    temperature_c: Annotated[Any, In("deg_C", many=True)] = (),
     actuators: bool = False,
     positions: "str | os.PathLike[str] | None" = None,
     travel: Literal["normal", "axis"] = "normal",

@@ -4,12 +4,13 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from catseye.api.reading import place_of
 from catseye.api.result import Progress, Result, quantities
+from catseye.api.units import In, with_units
 from catseye.atmosphere.index.model import IndexSensitivity
 
 if TYPE_CHECKING:
@@ -83,18 +84,19 @@ class AirResult(Result):
         return {"air": quantities(rows, model=self.model)}
 
 
+@with_units
 def air(
-    temperature_c: Any,
-    pressure_hpa: Any,
-    humidity_percent: Any,
+    temperature_c: Annotated[Any, In("deg_C")],
+    pressure_hpa: Annotated[Any, In("hPa")],
+    humidity_percent: Annotated[Any, In("percent")],
     *,
-    wavelength_um: Any = 0.780,
+    wavelength_um: Annotated[Any, In("um")] = 0.780,
     model: str = "ciddor_hill1999",
-    co2_ppm: Any = 450.0,
-    u_temperature_c: Any = 0.0,
-    u_pressure_hpa: Any = 0.0,
-    u_humidity_percent: Any = 0.0,
-    u_co2_ppm: Any = 0.0,
+    co2_ppm: Annotated[Any, In("ppm")] = 450.0,
+    u_temperature_c: Annotated[Any, In("deg_C", difference=True)] = 0.0,
+    u_pressure_hpa: Annotated[Any, In("hPa")] = 0.0,
+    u_humidity_percent: Annotated[Any, In("percent")] = 0.0,
+    u_co2_ppm: Annotated[Any, In("ppm")] = 0.0,
 ) -> AirResult:
     """Index of air, with sensitivities and uncertainty.
 
@@ -192,17 +194,18 @@ class SoundResult(Result):
         return {"sound": quantities(rows, model=self.model)}
 
 
+@with_units
 def sound(
-    temperature_c: Any,
-    pressure_hpa: Any,
-    humidity_percent: Any,
+    temperature_c: Annotated[Any, In("deg_C")],
+    pressure_hpa: Annotated[Any, In("hPa")],
+    humidity_percent: Annotated[Any, In("percent")],
     *,
     model: str = "parker2004",
-    co2_ppm: Any = 450.0,
-    u_temperature_c: Any = 0.0,
-    u_pressure_hpa: Any = 0.0,
-    u_humidity_percent: Any = 0.0,
-    u_co2_ppm: Any = 0.0,
+    co2_ppm: Annotated[Any, In("ppm")] = 450.0,
+    u_temperature_c: Annotated[Any, In("deg_C", difference=True)] = 0.0,
+    u_pressure_hpa: Annotated[Any, In("hPa")] = 0.0,
+    u_humidity_percent: Annotated[Any, In("percent")] = 0.0,
+    u_co2_ppm: Annotated[Any, In("ppm")] = 0.0,
 ) -> SoundResult:
     """Speed of sound in air, with sensitivities and uncertainty.
 
@@ -217,12 +220,17 @@ def sound(
     343.577
     """
     from catseye.atmosphere.sound.speed import sound as state_of
+    from catseye.atmosphere.weather.humidity import fraction_words, likely_fraction
     from catseye.gateways.air.sound_objects import sound_verdict
+    from catseye.gateways.writers.verdict import Verdict
 
     state = state_of(temperature_c, pressure_hpa, humidity_percent, model=model, co2_ppm=co2_ppm)
     u = state.combined_uncertainty(u_temperature_c, u_pressure_hpa, u_humidity_percent, u_co2_ppm)
+    judged = sound_verdict(state, u)
+    if likely_fraction(humidity_percent):
+        judged = Verdict("doubtful", fraction_words(humidity_percent))
     return SoundResult(
-        sound_verdict(state, u),
+        judged,
         temperature_c,
         pressure_hpa,
         humidity_percent,
@@ -301,8 +309,11 @@ class RefractometerResult(Result):
         return (self.path,)
 
 
+@with_units
 def refractometer(
-    readings: "str | os.PathLike[str]", sheet: "str | os.PathLike[str] | None" = None, **known: Any
+    readings: "str | os.PathLike[str]",
+    sheet: "str | os.PathLike[str] | None" = None,
+    **known: Annotated[Any, In("name")],
 ) -> RefractometerResult:
     """The group index along a fixed path: calibrated by a night of phases and weather, then from each phase.
 

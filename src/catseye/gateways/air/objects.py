@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from catseye.atmosphere.weather.humidity import fraction_words, likely_fraction
 from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.verdict import Verdict
 
@@ -18,6 +19,8 @@ def air_verdict(air: "AirState", u: Any) -> Verdict:
 
     u   standard uncertainty of the group index, as told
     """
+    if likely_fraction(air.humidity_percent):
+        return Verdict("doubtful", fraction_words(air.humidity_percent))
     alone = bool(np.all(np.asarray(u) <= np.asarray(air.standard_uncertainty) * (1.0 + 1e-12)))
     what = FORMULA_ALONE if alone else "u has the formula's part and the sensors'"
     return Verdict("good", f"within the limits of {air.model}; {what}")
