@@ -211,6 +211,6 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCo
         unresolved=resolved.rejected,
         sound=sound,
         strength=network.strength,
-        doubts=doubts_of(network, solution),
+        doubts=doubts_of(network, solution, air),
         refuted=tuple(refuted_priors(settled)),
     )
