@@ -36,6 +36,7 @@ class AirResult(Result):
     standard_uncertainty         of the group index: the formula's, and the instruments' as far as they were given
     formula_uncertainty          the formula's own part
     model                        name of the formula
+    uncertainty_of               inputs whose uncertainty the standard uncertainty has
     """
 
     temperature_c: Any
@@ -52,6 +53,7 @@ class AirResult(Result):
     formula_uncertainty: Any
     model: str
     state: "AirState"
+    uncertainty_of: tuple[str, ...]
 
     def passages(self) -> "Sequence[Passage]":
         """The index, its uncertainty and its slopes."""
@@ -63,7 +65,9 @@ class AirResult(Result):
         """As `catseye air --json`."""
         from catseye.gateways.air.objects import air_object
 
-        return air_object(self.state, self.wavelength_um, self.standard_uncertainty, verdict=self.verdict)
+        return air_object(
+            self.state, self.wavelength_um, self.standard_uncertainty, verdict=self.verdict, stated=self.uncertainty_of
+        )
 
     def tables(self) -> "dict[str, QTable]":
         """One table, a row for each state."""
@@ -113,14 +117,17 @@ def air(
     1.000253319
     """
     from catseye.atmosphere.index.air import air as state_of
-    from catseye.gateways.air.objects import air_verdict
+    from catseye.gateways.air.objects import air_verdict, stated_inputs
 
     state = state_of(
         temperature_c, pressure_hpa, humidity_percent, wavelength_um=wavelength_um, model=model, co2_ppm=co2_ppm
     )
     u = state.combined_uncertainty(u_temperature_c, u_pressure_hpa, u_humidity_percent, u_co2_ppm=u_co2_ppm)
+    stated = stated_inputs(
+        temperature=u_temperature_c, pressure=u_pressure_hpa, humidity=u_humidity_percent, carbon_dioxide=u_co2_ppm
+    )
     return AirResult(
-        air_verdict(state, u),
+        air_verdict(state, u, stated),
         state.temperature_c,
         state.pressure_hpa,
         state.humidity_percent,
@@ -135,6 +142,7 @@ def air(
         state.standard_uncertainty,
         model,
         state,
+        stated,
     )
 
 
@@ -149,6 +157,7 @@ class SoundResult(Result):
     standard_uncertainty   of the speed, m/s: the formula's, and the instruments' as far as they were given
     formula_uncertainty    the formula's own part
     model                  name of the formula
+    uncertainty_of         inputs whose uncertainty the standard uncertainty has
     """
 
     temperature_c: Any
@@ -163,6 +172,7 @@ class SoundResult(Result):
     model: str
     state: "Sound"
     co2_ppm: Any
+    uncertainty_of: tuple[str, ...]
 
     def passages(self) -> "Sequence[Passage]":
         """The speed, its slopes and what other formulas say; of an array, how far it goes."""
@@ -175,7 +185,7 @@ class SoundResult(Result):
         from catseye.gateways.air.sound_objects import sound_object
 
         weather = (self.temperature_c, self.pressure_hpa, self.humidity_percent)
-        return sound_object(self.state, weather, self.co2_ppm, u=self.standard_uncertainty)
+        return sound_object(self.state, weather, self.co2_ppm, u=self.standard_uncertainty, stated=self.uncertainty_of)
 
     def tables(self) -> "dict[str, QTable]":
         """One table, a row for each state."""
@@ -217,12 +227,16 @@ def sound(
     343.577
     """
     from catseye.atmosphere.sound.speed import sound as state_of
+    from catseye.gateways.air.objects import stated_inputs
     from catseye.gateways.air.sound_objects import sound_verdict
 
     state = state_of(temperature_c, pressure_hpa, humidity_percent, model=model, co2_ppm=co2_ppm)
     u = state.combined_uncertainty(u_temperature_c, u_pressure_hpa, u_humidity_percent, u_co2_ppm)
+    stated = stated_inputs(
+        temperature=u_temperature_c, pressure=u_pressure_hpa, humidity=u_humidity_percent, carbon_dioxide=u_co2_ppm
+    )
     return SoundResult(
-        sound_verdict(state, u),
+        sound_verdict(state, u, stated),
         temperature_c,
         pressure_hpa,
         humidity_percent,
@@ -235,6 +249,7 @@ def sound(
         model,
         state,
         co2_ppm,
+        stated,
     )
 
 
