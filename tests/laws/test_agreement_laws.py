@@ -4,9 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from catseye.atmosphere.index import air as index
+from catseye.atmosphere.sound import speed as sounds
 from catseye.gateways.optics.glass_objects import glass_object
 from catseye.optics.glass import GLASSES, absolute_index, phase_index, reference_air, temperature_slopes
 from catseye.optics.retroreflector.warm_prism import warm_prism, warm_prism_slopes
@@ -105,3 +107,66 @@ def test_a_beam_of_the_limit_of_exposure_is_a_hazard_nowhere(um, duration, ulps)
             inside = max(beam_of(power * (1.0 + 1e-3), um).power_within(m.aperture, z) / m.power for m in limits)
             assert inside == pytest.approx(1.0, rel=1e-9)
     assert not exceeds(power, power)
+
+
+STANDARD = {"index": "ciddor_hill1999", "sound": "real_gas"}
+weathers = st.tuples(st.floats(-40.0, 50.0), st.floats(500.0, 1100.0), st.floats(0.0, 100.0))
+
+
+@given(weathers, st.floats(0.36, 1.69), st.floats(0.0, 2000.0), st.sampled_from(sorted(index.MODELS)))
+def test_an_index_is_off_by_no_more_than_its_uncertainty_claims(weather, um, co2_ppm, model):
+    """Over all that a model accepts: 1.2 times both models' u, the vapour's formulas apart by a tenth."""
+    light = {"wavelength_um": um, "co2_ppm": co2_ppm}
+    found = index.air(*weather, model=model, **light)
+    standard = index.air(*weather, model=STANDARD["index"], **light)
+    u = math.hypot(found.standard_uncertainty, standard.standard_uncertainty)
+    assert abs(found.group_refractivity - standard.group_refractivity) < 1.2 * u
+    assert found.standard_uncertainty < 3e-6  # and is no excuse: 1.8e-6 at the worst
+
+
+@given(weathers, st.sampled_from(sorted(index.MODELS)))
+def test_an_index_changes_by_the_integral_of_its_sensitivities(weather, model):
+    t, p, h = weather
+    start = (20.0, 900.0, 50.0)
+
+    def state(share):
+        return index.air(*(a + share * (b - a) for a, b in zip(start, (t, p, h), strict=True)), model=model)
+
+    def slope(share):
+        along = state(share).sensitivity
+        steps = (t - start[0], p - start[1], h - start[2])
+        return sum(float(s) * d for s, d in zip(along[:3], steps, strict=True))
+
+    moved = float(state(1.0).group_refractivity - state(0.0).group_refractivity)
+    assert moved == pytest.approx(integral(slope, 0.0, 1.0), abs=1e-12)  # 1e-6 ppm
+
+
+@given(weathers, st.floats(0.0, 2000.0), st.sampled_from(sorted(sounds.MODELS)))
+def test_a_speed_of_sound_is_off_by_no_more_than_its_uncertainty_claims(weather, co2_ppm, model):
+    t, p, h = weather
+    if model == "cramer1993":
+        t, p = 0.0 + (t + 40.0) / 3.0, 750.0 + (p - 500.0) * 0.45
+    e = float(sounds.humidity.vapour_pressure_hpa(t, p, h, "buck"))
+    assume(e < 0.05 * p if model == "cramer1993" else e < 0.19 * p)
+    found, standard = (sounds.sound(t, p, h, model=m, co2_ppm=co2_ppm) for m in (model, STANDARD["sound"]))
+    u = math.hypot(found.standard_uncertainty, standard.standard_uncertainty)
+    assert abs(found.speed - standard.speed) < 1.2 * u
+    assert found.standard_uncertainty < 10.0
+
+
+@pytest.mark.parametrize(("model", "um", "off"), [("iag1999_closed", 0.633, 0.426), ("barrell_sears1963", 0.5, 0.623)])
+def test_the_closed_formulas_claim_what_they_are_off_at_50_degrees_and_500_hpa(model, um, off):
+    """ppm, by a table of differences; was 0.1 everywhere."""
+    state = index.air(50.0, 500.0, 100.0, model=model, wavelength_um=um)
+    assert float(state.standard_uncertainty) * 1e6 == pytest.approx(math.hypot(off, 0.05), abs=2e-3)
+    assert float(index.air(20.0, 933.0, 50.0, model=model).standard_uncertainty) == 1e-7
+
+
+def test_the_notes_speed_of_sound_claims_what_it_is_off_where_hot_moist_and_high():
+    """By the notes' own erratum: gamma of water is 1.33, not 1.004; x = 0.198 of vapour cost 0.5 (0.326/1.402) x."""
+    state = sounds.sound(50.0, 500.0, 80.0)
+    x = float(state.vapour_pressure_hpa) / 500.0
+    by_hand = 0.5 * float(state.speed) * (1.330 - 1.004) / 1.402 * x
+    assert float(state.standard_uncertainty) == pytest.approx(by_hand, rel=0.1)
+    assert by_hand == pytest.approx(8.3, abs=0.2)
+    assert float(sounds.sound(20.0, 933.0, 50.0).standard_uncertainty) == 1.0

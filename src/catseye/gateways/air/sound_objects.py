@@ -90,7 +90,7 @@ def sound_passages(answer: dict[str, Any]) -> list[Passage]:
         else "the formula's air has its own carbon dioxide"
     )
     others = "; ".join(
-        f"{name} {spread(item['speed'], '.3f')} ± {item['standard_uncertainty']:.2g} m/s"
+        f"{name} {spread(item['speed'], '.3f')} ± {spread(item['standard_uncertainty'], '.2g')} m/s"
         if item["speed"] is not None
         else f"{name}: {item['reason']}"
         for name, item in answer["models"].items()
