@@ -220,14 +220,17 @@ def model_record(fit: PointingFit, name: str) -> PointingModel:
 
 
 def track_verdict(profile: TrackProfile) -> Verdict:
-    """Whether poses and readings scatter about the profile as they claim."""
+    """Good where poses and readings scatter about the profile as they claim; what they do not determine is named."""
     degrees = profile.degrees_of_freedom
     if degrees < 1:
         return Verdict("doubtful", "as many readings as coefficients: nothing checks the profile")
-    factor = profile.pvv / degrees
+    word, factor = "good", profile.pvv / degrees
+    why = f"readings scatter about the profile as claimed (variance factor {factor:.2f})"
     if factor > 1.0 + 3.0 * (2.0 / degrees) ** 0.5:
-        return Verdict("doubtful", f"readings scatter more than claimed (variance factor {factor:.2f})")
-    return Verdict("good", f"readings scatter about the profile as claimed (variance factor {factor:.2f})")
+        word, why = "doubtful", f"readings scatter more than claimed (variance factor {factor:.2f})"
+    if profile.series.undetermined:
+        why += "; without the wave of one turn, which an inclinometer alone cannot tell from its zero"
+    return Verdict(word, why)
 
 
 def track_object(profile: TrackProfile) -> dict[str, Any]:
@@ -241,6 +244,7 @@ def track_object(profile: TrackProfile) -> dict[str, Any]:
         "harmonics": series.harmonics,
         "coefficients": dict(zip(series.names, series.values, strict=True)),
         "u_coefficients": dict(zip(series.names, np.sqrt(np.diag(series.covariance)), strict=True)),
+        "undetermined": list(series.undetermined),
         "covariance": series.covariance,
         "AN": axis[0],
         "AW": axis[1],
