@@ -182,7 +182,7 @@ class IndexModel:
             off = self.refractivity(*weather, **light, co2_ppm=self.co2_ppm)
             off = off - self.standard.refractivity(*weather, **light, co2_ppm=co2_ppm)
             return np.maximum(self.standard_uncertainty, np.hypot(self.standard.standard_uncertainty, off))
-        least = self.standard_uncertainty
+        least: Any = self.standard_uncertainty
         if self.vapour_uncertainty:
             least = np.hypot(least, self.vapour_uncertainty * np.asarray(vapour_pressure_hpa, float))
         if self.co2_slope or not np.any(np.asarray(co2_ppm) != CO2_OF_TODAY_PPM):

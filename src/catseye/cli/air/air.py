@@ -1,7 +1,7 @@
 """The command of the air."""
 
 import math
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -104,7 +104,7 @@ def air(  # noqa: PLR0913 - its options are its command line
         assert mercury_c is not None
         latitude = None if latitude_deg is None else latitude_deg * DEGREE
         read = {"u_reading_mmhg": u_barometer_mmhg, "u_mercury_c": u_mercury_c}
-        place = {"gravity": gravity, "latitude": latitude, "elevation": elevation_m}
+        place: dict[str, Any] = {"gravity": gravity, "latitude": latitude, "elevation": elevation_m}
         found_p, u_p = station_pressure(barometer_mmhg, mercury_c, **place, **read)
         u_of_formula = float(station_pressure(barometer_mmhg, mercury_c, **place)[1])
         pressure_hpa, u_pressure_hpa = float(found_p), math.hypot(u_pressure_hpa, float(u_p))

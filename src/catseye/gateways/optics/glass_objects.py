@@ -106,7 +106,9 @@ def index_keys(index: dict[str, float]) -> dict[str, float]:
 def _prism_object(asked: tuple[float, str, float, float], index: dict[str, float]) -> dict[str, Any]:
     """A prism at its temperature, in the air about it; `asked`: height at 20 °C, glass, vacuum um, °C."""
     height, name, wavelength_um, _ = asked
-    found, per_c = warm_prism(*asked, **index), warm_prism_slopes(*asked, **index)
+    phase, group = index["air_phase"], index["air_group"]
+    found = warm_prism(*asked, air_phase=phase, air_group=group)
+    per_c = warm_prism_slopes(*asked, air_phase=phase, air_group=group)
     notes = float(group_index(wavelength_um, name)) / index["air_group"]
     return {
         "height": height,

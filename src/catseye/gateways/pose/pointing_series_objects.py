@@ -224,13 +224,12 @@ def track_verdict(profile: TrackProfile) -> Verdict:
     degrees = profile.degrees_of_freedom
     if degrees < 1:
         return Verdict("doubtful", "as many readings as coefficients: nothing checks the profile")
-    word, factor = "good", profile.pvv / degrees
-    why = f"readings scatter about the profile as claimed (variance factor {factor:.2f})"
-    if factor > 1.0 + 3.0 * (2.0 / degrees) ** 0.5:
-        word, why = "doubtful", f"readings scatter more than claimed (variance factor {factor:.2f})"
+    factor, without = profile.pvv / degrees, ""
     if profile.series.undetermined:
-        why += "; without the wave of one turn, which an inclinometer alone cannot tell from its zero"
-    return Verdict(word, why)
+        without = "; without the wave of one turn, which an inclinometer alone cannot tell from its zero"
+    if factor > 1.0 + 3.0 * (2.0 / degrees) ** 0.5:
+        return Verdict("doubtful", f"readings scatter more than claimed (variance factor {factor:.2f}){without}")
+    return Verdict("good", f"readings scatter about the profile as claimed (variance factor {factor:.2f}){without}")
 
 
 def track_object(profile: TrackProfile) -> dict[str, Any]:
