@@ -37,6 +37,7 @@ class AirResult(Result):
     standard_uncertainty         of the group index: the formula's, and the instruments' as far as they were given
     formula_uncertainty          the formula's own part
     model                        name of the formula
+    uncertainty_of               inputs whose uncertainty the standard uncertainty has
     """
 
     temperature_c: Any
@@ -53,6 +54,7 @@ class AirResult(Result):
     formula_uncertainty: Any
     model: str
     state: "AirState"
+    uncertainty_of: tuple[str, ...]
 
     def passages(self) -> "Sequence[Passage]":
         """The index, its uncertainty and its slopes."""
@@ -64,7 +66,9 @@ class AirResult(Result):
         """As `catseye air --json`."""
         from catseye.gateways.air.objects import air_object
 
-        return air_object(self.state, self.wavelength_um, self.standard_uncertainty, verdict=self.verdict)
+        return air_object(
+            self.state, self.wavelength_um, self.standard_uncertainty, verdict=self.verdict, stated=self.uncertainty_of
+        )
 
     def tables(self) -> "dict[str, QTable]":
         """One table, a row for each state."""
@@ -115,14 +119,17 @@ def air(
     1.000253319
     """
     from catseye.atmosphere.index.air import air as state_of
-    from catseye.gateways.air.objects import air_verdict
+    from catseye.gateways.air.objects import air_verdict, stated_inputs
 
     state = state_of(
         temperature_c, pressure_hpa, humidity_percent, wavelength_um=wavelength_um, model=model, co2_ppm=co2_ppm
     )
     u = state.combined_uncertainty(u_temperature_c, u_pressure_hpa, u_humidity_percent, u_co2_ppm=u_co2_ppm)
+    stated = stated_inputs(
+        temperature=u_temperature_c, pressure=u_pressure_hpa, humidity=u_humidity_percent, carbon_dioxide=u_co2_ppm
+    )
     return AirResult(
-        air_verdict(state, u),
+        air_verdict(state, u, stated),
         state.temperature_c,
         state.pressure_hpa,
         state.humidity_percent,
@@ -137,6 +144,7 @@ def air(
         state.standard_uncertainty,
         model,
         state,
+        stated,
     )
 
 
@@ -151,6 +159,7 @@ class SoundResult(Result):
     standard_uncertainty   of the speed, m/s: the formula's, and the instruments' as far as they were given
     formula_uncertainty    the formula's own part
     model                  name of the formula
+    uncertainty_of         inputs whose uncertainty the standard uncertainty has
     """
 
     temperature_c: Any
@@ -165,6 +174,7 @@ class SoundResult(Result):
     model: str
     state: "Sound"
     co2_ppm: Any
+    uncertainty_of: tuple[str, ...]
 
     def passages(self) -> "Sequence[Passage]":
         """The speed, its slopes and what other formulas say; of an array, how far it goes."""
@@ -177,7 +187,7 @@ class SoundResult(Result):
         from catseye.gateways.air.sound_objects import sound_object
 
         weather = (self.temperature_c, self.pressure_hpa, self.humidity_percent)
-        return sound_object(self.state, weather, self.co2_ppm, u=self.standard_uncertainty)
+        return sound_object(self.state, weather, self.co2_ppm, u=self.standard_uncertainty, stated=self.uncertainty_of)
 
     def tables(self) -> "dict[str, QTable]":
         """One table, a row for each state."""
@@ -221,12 +231,16 @@ def sound(
     """
     from catseye.atmosphere.sound.speed import sound as state_of
     from catseye.atmosphere.weather.humidity import fraction_words, likely_fraction
+    from catseye.gateways.air.objects import stated_inputs
     from catseye.gateways.air.sound_objects import sound_verdict
     from catseye.gateways.writers.verdict import Verdict
 
     state = state_of(temperature_c, pressure_hpa, humidity_percent, model=model, co2_ppm=co2_ppm)
     u = state.combined_uncertainty(u_temperature_c, u_pressure_hpa, u_humidity_percent, u_co2_ppm)
-    judged = sound_verdict(state, u)
+    stated = stated_inputs(
+        temperature=u_temperature_c, pressure=u_pressure_hpa, humidity=u_humidity_percent, carbon_dioxide=u_co2_ppm
+    )
+    judged = sound_verdict(state, u, stated)
     if likely_fraction(humidity_percent):
         judged = Verdict("doubtful", fraction_words(humidity_percent))
     return SoundResult(
@@ -243,6 +257,7 @@ def sound(
         model,
         state,
         co2_ppm,
+        stated,
     )
 
 

@@ -179,7 +179,7 @@ def coating(
 def polarization(
     out: Out,
     glass: Annotated[str, typer.Option("--glass", help="Of the solid corner.")] = "BK7-old",
-    wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="µm.")] = 0.780,
+    wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Of air, µm.")] = 0.780,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:

@@ -106,9 +106,32 @@ def test_the_track_under_an_inclinometer_and_poses(catseye, tmp_path):
         off = found["coefficients"][name] / ARCSECOND - wanted
         assert abs(off) < 4 * found["u_coefficients"][name] / ARCSECOND
     assert found["p"] > 1e-3
-    status, _, complained = catseye("pointing", "track", "--tilts", TILTS, "--harmonics", "1")
-    assert status == 1
-    assert "zero x" in complained
+
+
+def test_the_shipped_inclinometer_alone_gives_all_waves_but_the_first(catseye, tmp_path):
+    """Planted: mean 2.96 and 2.18, cos 3A -1.2 east, sin 3A 1.5 north, cos 2A 0.9 north, sin 2A 0.8 east."""
+    told = ("pointing", "track", "--tilts", TILTS, "--harmonics", "3")
+    status, said, complained = catseye(*told, "--json")
+    assert (status, complained) == (0, "")
+    found = json.loads(said)
+    assert found["verdict"]["word"] == "good"
+    assert "an inclinometer alone cannot tell from its zero" in found["verdict"]["why"]
+    lost = [f"{f} 1A {axis}" for f in ("cos", "sin") for axis in ("east", "north")]
+    assert found["undetermined"] == lost
+    assert found["inclinometer_zero"] is None
+    for k, (name, value) in enumerate(found["coefficients"].items()):
+        assert (value is None) == (name in lost)
+        assert (found["covariance"][k][k] is None) == (name in lost)
+    planted = {"mean east": 2.96, "mean north": 2.18, "cos 3A east": -1.2, "sin 3A north": 1.5, "cos 2A north": 0.9,
+               "sin 2A east": 0.8}  # fmt: skip
+    for name in set(found["coefficients"]) - set(lost):
+        off = found["coefficients"][name] / ARCSECOND - planted.get(name, 0.0)
+        assert abs(off) < 4 * found["u_coefficients"][name] / ARCSECOND
+    out = tmp_path / "out"
+    assert catseye(*told, "--out", out)[0] == 0
+    assert (out / "tilt.csv").read_text().startswith("azimuth_deg,tilt_east_without_wave_1_arcsec,")
+    assert ">nan<" not in (out / "report.html").read_text()
+    assert "AN -2.9" in " ".join(catseye(*told)[1].split())
 
 
 @pytest.mark.parametrize(

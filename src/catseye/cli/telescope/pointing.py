@@ -239,7 +239,8 @@ def predict(
 
 
 @pointing.command(
-    epilog="\b\nExample: catseye pointing track pose-000/pose.json pose-090/pose.json --tilts tilts.csv --harmonics 2\n"
+    epilog="\b\nExample: catseye pointing track --tilts examples/pointing/tilts.csv --harmonics 3\n"
+    "Example: catseye pointing track pose-000/pose.json pose-090/pose.json --tilts tilts.csv --harmonics 2\n"
     "POSE.json: catseye pose --group alidade --frame alidade --out; TILTS.csv: docs/formats/star-offsets.md"
 )
 def track(
@@ -261,7 +262,7 @@ def track(
 
     from catseye.gateways.pose.objects import tilt_of_pose
     from catseye.gateways.pose.pointing_series_files import track_rows, track_words, write_track
-    from catseye.gateways.pose.pointing_series_objects import track_object
+    from catseye.gateways.pose.pointing_series_objects import track_object, track_verdict
     from catseye.gateways.writers.output import refuse_output, whole_directory
     from catseye.records.files.reading import Folder
     from catseye.records.laboratory.tilts import read_tilts
@@ -289,6 +290,7 @@ def track(
         tilts=readings,
         harmonics=harmonics,
         names=[str(p) for p in poses or []],
+        partial=True,
     )
     profile = replace(profile, sources={str(p): t.verdict for p, t in zip(poses or [], tilts_of_poses, strict=True)})
     if out is not None:
@@ -301,6 +303,7 @@ def track(
         return
     if quiet:
         return
+    say(wrapped("Verdict", track_verdict(profile).text))
     for title, text in track_words(profile):
         say(wrapped(title, text))
     for name, value, u in track_rows(profile):

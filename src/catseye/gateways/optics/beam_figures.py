@@ -186,8 +186,11 @@ def beam_object(beam_path: BeamPath) -> dict[str, Any]:
     """
     keys = ("leg", "name", "way", "radius", "curvature", "aperture", "clipped", "power")
     rows = ("distance", "radius", "hit", "collected", "power", "status")
-    good = beam_path.status == "ok"
+    lost = [row for row in beam_path.returned if row.status != "ok"]
+    good = beam_path.status == "ok" and not lost
     why = "every element passes the beam" if good else beam_path.status
+    if lost and beam_path.status == "ok":
+        why = f"no power from {', '.join(f'{row.distance:g}' for row in lost)} m: {lost[0].status}"
     return {
         "verdict": Verdict("good" if good else "doubtful", why).to_object(),
         "name": beam_path.train.name,

@@ -213,7 +213,7 @@ def model_record(fit: PointingFit, name: str) -> PointingModel:
 
 
 def track_verdict(profile: TrackProfile) -> Verdict:
-    """Scatter of poses and readings about the profile against what they claim, and the poses' own verdicts."""
+    """Scatter of poses and readings against what they claim, what they do not determine, and the poses' own verdicts."""
     return _track_verdict(profile).resting_on(profile.sources)
 
 
@@ -221,10 +221,12 @@ def _track_verdict(profile: TrackProfile) -> Verdict:
     degrees = profile.degrees_of_freedom
     if degrees < 1:
         return Verdict("doubtful", "as many readings as coefficients: nothing checks the profile")
-    factor = profile.pvv / degrees
+    factor, without = profile.pvv / degrees, ""
+    if profile.series.undetermined:
+        without = "; without the wave of one turn, which an inclinometer alone cannot tell from its zero"
     if factor > 1.0 + 3.0 * (2.0 / degrees) ** 0.5:
-        return Verdict("doubtful", f"readings scatter more than claimed (variance factor {factor:.2f})")
-    return Verdict("good", f"readings scatter about the profile as claimed (variance factor {factor:.2f})")
+        return Verdict("doubtful", f"readings scatter more than claimed (variance factor {factor:.2f}){without}")
+    return Verdict("good", f"readings scatter about the profile as claimed (variance factor {factor:.2f}){without}")
 
 
 def track_object(profile: TrackProfile) -> dict[str, Any]:
@@ -238,6 +240,7 @@ def track_object(profile: TrackProfile) -> dict[str, Any]:
         "harmonics": series.harmonics,
         "coefficients": dict(zip(series.names, series.values, strict=True)),
         "u_coefficients": dict(zip(series.names, np.sqrt(np.diag(series.covariance)), strict=True)),
+        "undetermined": list(series.undetermined),
         "covariance": series.covariance,
         "AN": axis[0],
         "AW": axis[1],
