@@ -114,7 +114,9 @@ def second_virial(temperature_c, vapour_fraction):
     >>> round(float(second_virial(20.0, 0.0)[0][0]) * 1e6, 2)
     -9.12
     """
-    kelvin, x = np.asarray(temperature_c, float) + ZERO_CELSIUS_K, np.asarray(vapour_fraction, float)
+    kelvin, x = np.broadcast_arrays(
+        np.asarray(temperature_c, float) + ZERO_CELSIUS_K, np.asarray(vapour_fraction, float)
+    )
     aa = _powers(kelvin / B_AIR_KELVIN, B_AIR)
     aw, ww = (_powers(kelvin / HUNDRED_KELVIN, terms) for terms in (B_AIR_WATER, B_WATER))
     y = 1.0 - x

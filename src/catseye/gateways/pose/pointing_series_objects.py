@@ -213,7 +213,7 @@ def model_record(fit: PointingFit, name: str) -> PointingModel:
 
 
 def track_verdict(profile: TrackProfile) -> Verdict:
-    """Scatter of poses and readings against what they claim, what they do not determine, and the poses' own verdicts."""
+    """Scatter of poses and readings against what they claim, what they do not determine, the poses' own verdicts."""
     return _track_verdict(profile).resting_on(profile.sources)
 
 
