@@ -213,7 +213,7 @@ class ComparisonResult(Result):
     covariances     (k, 3, 3) m² of each displacement
     u               (k, 3) m
     p               (k,) chance of a displacement as large if the point stands still
-    words           (k) "moved", "stable", "held" or "not checked"
+    words           (k) "moved", "stable", "held", "undecided" or "not checked"
     compared        everything else
     first, second   the epochs
     """
@@ -281,6 +281,7 @@ def compare(
     *,
     points: Sequence[str] | None = None,
     level: Annotated[Any, In("", one=True)] = 0.05,
+    scale_by_variance_factor: bool = False,
     progress: Progress | None = None,
 ) -> ComparisonResult:
     """What moved between two epochs of a network.
@@ -288,6 +289,10 @@ def compare(
     first, second   networks as for `adjust`, or what it gave
     points          names to compare; all common ones without
     level           of the tests
+    scale_by_variance_factor   multiply covariances by the variance factor of both epochs together; F tests
+
+    Every common point is in the answer, with displacement, covariance and test; one that moved so far that it may be
+    another point under the same name makes the verdict doubtful. A coordinate absent in either epoch is nan.
 
     Raises EstimationError where an epoch has no answer or the two have too little in common.
     """
@@ -302,7 +307,8 @@ def compare(
     for epoch in epochs:
         require_answer(epoch)
     solutions = [epoch.findings.solution for epoch in epochs]
-    moved = moved_between(*solutions, points=points, options=ComparisonOptions(level=level))
+    chosen = ComparisonOptions(level=level, scale_by_variance_factor=scale_by_variance_factor)
+    moved = moved_between(*solutions, points=points, options=chosen)
     compared = ComparedEpochs(epochs[0].findings, epochs[1].findings, moved)
     return ComparisonResult(
         comparison_verdict(compared),

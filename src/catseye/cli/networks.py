@@ -150,7 +150,13 @@ def adjust(  # noqa: PLR0913 - its options are its command line
             if epochs[0].findings.answered:
                 _save(result, out, progress)
         else:
-            result = face.compare(epochs[0], epochs[1], points=_names(points), level=asked.level)
+            result = face.compare(
+                epochs[0],
+                epochs[1],
+                points=_names(points),
+                level=asked.level,
+                scale_by_variance_factor=asked.scale_by_variance_factor,
+            )
             _save(result, out, progress)
     finally:
         progress.clear()

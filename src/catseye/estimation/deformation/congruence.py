@@ -25,6 +25,7 @@ DATUMS: dict[str, tuple[int, ...]] = {
     "rigid": (0, 1, 2, 3, 4, 5),
     "similarity": (0, 1, 2, 3, 4, 5, 6),
 }
+CHANGED = ([0], [1], [2], [1, 2], [0, 2], [0, 1], [0, 1, 2])  # axes along which each of MOTIONS moves points
 HELD = 1e-12  # of the epochs' variances: a difference with less variance is held, not measured
 HELD_APART = 1e-9  # m: held coordinates may differ by rounding, not more
 CURVED = 0.05  # of the smallest sigma: second-order effect of a turn that a linear datum motion may have
@@ -141,11 +142,14 @@ class CongruenceTest:
     p: float
 
 
-def _combination(points: np.ndarray, datum: str, pivot: np.ndarray) -> np.ndarray:
-    """(7, g): motions of the datum, scaled to unit columns over the points, from those of `motion_columns`."""
+def _combination(points: np.ndarray, datum: str, pivot: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """(7, g): motions of the datum, scaled to unit columns over the points, from those of `motion_columns`.
+
+    axes   (3,) bool: compared in any point; a motion that changes no such coordinate is none
+    """
     if datum not in DATUMS:
         raise EstimationError(f"datum {datum!r} is none of {', '.join(DATUMS)}")
-    chosen = np.eye(7)[:, DATUMS[datum]]
+    chosen = np.eye(7)[:, [k for k in DATUMS[datum] if np.any(axes[CHANGED[k]])]]
     length = np.linalg.norm(motion_columns(points, pivot) @ chosen, axis=0)
     return chosen / np.where(length > 0.0, length, 1.0)
 
@@ -181,17 +185,24 @@ class Differences:
     turned: np.ndarray
     shifted: np.ndarray
 
+    @property
+    def _visible(self) -> np.ndarray:
+        """(3n, r): motions that show in the compared coordinates; a turn about a line of points does not."""
+        return self.motions @ seen_motions(self.motions[self.used])[0]
+
+    def holds(self, stable: np.ndarray) -> bool:
+        """True if these points (n,) bool hold every motion of the datum that the compared coordinates show."""
+        motions = self._visible
+        return bool(np.linalg.matrix_rank(motions[np.repeat(stable, 3) & self.used]) == motions.shape[1])
+
     def fit(self, extra: np.ndarray | None = None, called: Sequence[str] = ()) -> LinearEstimate:
         """The differences explained by datum motions, and by extra columns (3n, k), as well as they can be."""
         rows = np.flatnonzero(self.used)
         if not len(rows):
             raise EstimationError("no coordinate is compared: every common one is held or excluded")
-        motions, names = self.motions[rows], self.called
-        if motions.shape[1]:  # what these rows cannot see, such as a turn about the line they stand on, is no matter
-            _, s, vt = np.linalg.svd(motions, full_matrices=False)
-            rank = int(np.sum(s > UNSEEN * s[0]))
-            if rank < motions.shape[1]:
-                motions, names = motions @ vt[:rank].T, tuple(f"datum motion {i + 1}" for i in range(rank))
+        motions, names = self._visible[rows], self.called
+        if motions.shape[1] < len(names):
+            names = tuple(f"datum motion {i + 1}" for i in range(motions.shape[1]))
         return best_linear_estimate(
             motions if extra is None else np.concatenate([motions, extra[rows]], axis=1),
             self.d[rows],
@@ -206,15 +217,35 @@ class Differences:
         Held coordinates come first; what they leave free is held by inner constraints on the stable points, by
         S-transformation. Raises EstimationError if these do not hold it. Source: [BAARDA73].
         """
-        rows = np.repeat(stable, 3) & self.used
-        conditions = np.where(rows[:, None], self.motions, 0.0).T
-        if np.linalg.matrix_rank(conditions) < len(conditions):
+        motions = self._visible
+        conditions = np.where((np.repeat(stable, 3) & self.used)[:, None], motions, 0.0).T
+        if not self.holds(stable):
             raise EstimationError(
                 f"{int(stable.sum())} stable points do not hold a {self.datum} datum; more are needed"
             )
-        moved, t = to_datum(self.d, np.zeros(len(rows)), self.motions, conditions=conditions)
-        s = np.eye(len(rows)) - t @ conditions
+        moved, t = to_datum(self.d, np.zeros(len(self.d)), motions, conditions=conditions)
+        s = np.eye(len(self.d)) - t @ conditions
         return self.d + moved, s @ self.q @ s.T
+
+    def plain(self, stable: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """As `seen_from`; nan where the stable points do not hold the datum, and in what is not compared."""
+        n = len(self.d)
+        d, q = self.seen_from(stable) if self.holds(stable) else (np.full(n, np.nan), np.full((n, n), np.nan))
+        seen = self.used | self.held
+        return np.where(seen, d, np.nan), np.where(seen[:, None] & seen, q, np.nan)
+
+    @staticmethod
+    def blocks(d: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 3) and (n, 3, 3) of each point from those of all, (3n,) and (3n, 3n)."""
+        n = len(d) // 3
+        return d.reshape(n, 3), q.reshape(n, 3, n, 3)[np.arange(n), :, np.arange(n)]
+
+
+def seen_motions(motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Combinations (g, r) of motions (m, g) that show in these rows, and those (g, g - r) that do not."""
+    _, s, vt = np.linalg.svd(np.linalg.qr(motions, mode="r"), full_matrices=True)
+    rank = int(np.sum(s > UNSEEN * s.max(initial=0.0)))
+    return (np.eye(len(vt)), np.zeros((len(vt), 0))) if rank == len(vt) else (vt[:rank].T, vt[rank:].T)
 
 
 def differences(epochs: Epochs, datum: str, stable: np.ndarray) -> Differences:
@@ -236,14 +267,15 @@ def differences(epochs: Epochs, datum: str, stable: np.ndarray) -> Differences:
     _check_held(epochs.names, np.where(held, np.abs((y - x).ravel()), 0.0))
     fully_held = held.reshape(n, 3).all(axis=1)
     pivot = x[fully_held].mean(axis=0) if fully_held.any() else x[stable].mean(axis=0)
-    combination = _combination(x, datum, pivot)
+    axes = compared.reshape(n, 3).any(axis=0)
+    combination = _combination(x, datum, pivot, axes)
     base = motion_columns(x, pivot)
-    called = tuple(MOTIONS[i] for i in DATUMS[datum])
+    called = tuple(MOTIONS[i] for i in DATUMS[datum] if np.any(axes[CHANGED[i]]))
     if held.any() and combination.shape[1]:  # only motions that leave held coordinates where they are
         _, s, vt = np.linalg.svd(base[held] @ combination)
         left = vt[int(np.sum(s > UNSEEN * s.max(initial=0.0))) :].T
         combination, called = combination @ left, tuple(f"datum motion {i + 1}" for i in range(left.shape[1]))
-    partial = not (compared.all() and np.array_equal(held.reshape(n, 3).any(axis=1), fully_held))
+    partial = not _turns_alike(compared.reshape(n, 3), held.reshape(n, 3), combination)
     on = np.repeat(stable, 3) & compared & ~held
     turned = np.eye(3)
     aligned = y
@@ -266,6 +298,12 @@ def differences(epochs: Epochs, datum: str, stable: np.ndarray) -> Differences:
         turned=turned,
         shifted=aligned[0] - turned @ y[0],
     )
+
+
+def _turns_alike(compared: np.ndarray, held: np.ndarray, combination: np.ndarray) -> bool:
+    """True if the datum's turns mix coordinates only of one state: held, compared or neither; (n, 3) bool each."""
+    axes = [0, 1, 2] if np.any(combination[3:5]) else [0, 1] if np.any(combination[5]) else [0]
+    return all(bool(np.all(part[:, axes] == part[:, :1])) for part in (compared, held))
 
 
 def _check_held(names: Sequence[str], apart: np.ndarray) -> None:

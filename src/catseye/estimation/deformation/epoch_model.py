@@ -6,13 +6,13 @@ its coordinates follow the held ones by J = -(A_f' P A_f)^-1 A_f' P A_d, and the
 Q_1 + J Q_dd J' + Q_0 - J Q_d0 - Q_0d J', Q_0 of the first epoch, Q_1 of the second with its datum taken as exact.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.deformation.congruence import DATUMS, HELD_APART, Epochs
+from catseye.estimation.deformation.common_points import listed
+from catseye.estimation.deformation.congruence import DATUMS, HELD_APART, UNSEEN, Epochs
 from catseye.estimation.least_squares.covariance import Covariance
 from catseye.estimation.least_squares.rows import ActiveRows
 from catseye.estimation.network.datum import Floating, floating_motions, to_datum, transformed
@@ -26,6 +26,10 @@ EXCHANGED = "the first epoch holds {names} at the second's result; give the epoc
 FOREIGN = (
     "the {which} epoch holds {names} at coordinates that do not come from the other epoch (up to {apart:.3g} m off); "
     "adjust it free (datum 'free'), or say what the datums may differ by (datum=)"
+)
+STRANGE = (
+    "the {which} epoch holds {names}, which the other epoch does not have; adjust it free (datum 'free'), or say what "
+    "the datums may differ by (datum=)"
 )
 PARTLY = "{names} are held in the second epoch {apart:.3g} m from the first's result, others at it; hold all at it"
 REWEIGHTED = (
@@ -43,20 +47,21 @@ def _rows(solution: NetworkSolution) -> tuple[list[ActiveRows], np.ndarray]:
     if len(known):
         start = np.array([parameters[k].start for k in known])
         rows.append(ActiveRows.of(Linear("priors", start, sigma[known] ** 2, offset + known, np.eye(len(known)))))
-    return rows, np.concatenate([solution.x.ravel(), solution.parameters])
+    return rows, solution.state
 
 
 def _floating(solution: NetworkSolution) -> Floating:
     """What the observations alone leave floating, whatever coordinates are held."""
     rows, x = _rows(solution)
     held = np.array([p.sigma == 0.0 for p in solution.network.parameters], dtype=bool)
-    free = np.concatenate([np.ones(solution.x.size, dtype=bool), ~held])
-    return floating_motions(rows, x, solution.x, free=free)
+    absent = solution.network.points.absent
+    free = np.concatenate([~absent.ravel(), ~held])
+    return floating_motions(rows, x, _coordinates(solution), free=free, absent=absent)
 
 
 @dataclass(frozen=True, eq=False)
 class DatumConnection:
-    """How the two datums hang together.
+    """How the two datums are connected.
 
     datum       what they may differ by
     same        names of points with coordinates held in both epochs, more of them than the datum needs
@@ -83,7 +88,7 @@ class DatumConnection:
         floats = [_floating(s) for s in (first, second)]
         fixed = [s.network.points.fixed for s in (first, second)]
         loose = [_minimal(floating, f) for floating, f in zip(floats, fixed, strict=True)]
-        owns = [{} if free else _coordinates(s) for s, free in zip((first, second), loose, strict=True)]
+        owns = [{} if free else _held(s) for s, free in zip((first, second), loose, strict=True)]
         carried: dict[tuple[str, int], float] = {}
         foreign: list[dict[tuple[str, int], float]] = [{}, {}]
         for own, other, strange, at, of_second in (
@@ -91,9 +96,10 @@ class DatumConnection:
             (owns[1], owns[0], foreign[1], first, True),
         ):
             for (name, axis), value in own.items():
-                if (name, axis) in other:
+                known = name in at.index
+                if (name, axis) in other or (known and at.network.points.absent[at.index[name], axis]):
                     continue
-                there = at.x[at.index[name], axis] if name in at.index else np.inf
+                there = at.x[at.index[name], axis] if known else np.inf
                 by = abs(value - there)
                 (carried if of_second and by <= max(rounding, HELD_APART) else strange)[name, axis] = by
         if datum is None:
@@ -111,7 +117,12 @@ class DatumConnection:
         )
 
 
-def _coordinates(solution: NetworkSolution) -> dict[tuple[str, int], float]:
+def _coordinates(solution: NetworkSolution) -> np.ndarray:
+    """(n, 3) m, finite: 0 where a point has no such coordinate."""
+    return solution.state[: solution.x.size].reshape(-1, 3)
+
+
+def _held(solution: NetworkSolution) -> dict[tuple[str, int], float]:
     points = solution.network.points
     return {(points.names[i], int(a)): float(points.xyz[i, a]) for i, a in np.argwhere(points.fixed)}
 
@@ -131,8 +142,10 @@ def _refuse_foreign(
         if strange:
             known = [by for by in strange.values() if np.isfinite(by)]
             names = listed([name for name, _ in strange])
-            text = PARTLY if which == "second" and carried and known else FOREIGN
-            raise EstimationError(text.format(which=which, names=names, apart=max(known, default=np.nan)))
+            if not known:
+                raise EstimationError(STRANGE.format(which=which, names=names))
+            text = PARTLY if which == "second" and carried else FOREIGN
+            raise EstimationError(text.format(which=which, names=names, apart=max(known)))
 
 
 def _least_datum(kinds: np.ndarray) -> str:
@@ -142,12 +155,6 @@ def _least_datum(kinds: np.ndarray) -> str:
     return next(name for name, motions in DATUMS.items() if needed <= set(motions))
 
 
-def listed(names: Sequence[str], most: int = 6) -> str:
-    """Names, each once, and how many more there are."""
-    names = list(dict.fromkeys(names))
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
-
-
 @dataclass(frozen=True, eq=False)
 class EpochModel:
     """Joint stochastic model of n common points in both epochs; coordinates are numbered 0 to 3n - 1.
@@ -155,6 +162,7 @@ class EpochModel:
     x, y             (n, 3) m, first and second; carried coordinates of the second are the first's
     q                covariances of the epochs, and
     columns          (3n,) where the coordinates stand in them
+    compared         (3n,) bool: in both epochs; elsewhere x or y is 0
     follow           (3n, k) of the second epoch's coordinates by the k carried ones; unit rows for these themselves
     carried          (k,) which coordinates these are
     rounded          (3n, k) follow where it is not a unit row, times the standard uncertainty of rounding
@@ -166,6 +174,7 @@ class EpochModel:
     y: np.ndarray
     q: tuple[Covariance, Covariance]
     columns: tuple[np.ndarray, np.ndarray]
+    compared: np.ndarray
     follow: np.ndarray
     carried: np.ndarray
     rounded: np.ndarray
@@ -179,10 +188,13 @@ class EpochModel:
         columns = [
             (3 * np.array([s.index[name] for name in names])[:, None] + np.arange(3)).ravel() for s in (first, second)
         ]
+        compared = np.logical_and(
+            *(s.network.points.existing.ravel()[at] for s, at in zip((first, second), columns, strict=True))
+        )
         place = {name: i for i, name in enumerate(names)}
         carried = np.array([3 * place[name] + axis for name, axis in held.carried], dtype=int)
         q = [
-            s.q if floating is None else _released(s.q, floating, at)
+            s.q if floating is None else _released(s.q, floating, at[compared])
             for s, floating, at in zip((first, second), held.released, columns, strict=True)
         ]
         follow, of_carried = (np.zeros((3 * len(names), len(carried))) for _ in range(2))
@@ -191,7 +203,7 @@ class EpochModel:
             of_carried = q[0].across(columns[0][carried])[columns[0]]
         rounded = held.u * follow
         follow[carried] = np.eye(len(carried))
-        x, y = (s.x.ravel()[at] for s, at in zip((first, second), columns, strict=True))
+        x, y = (s.state[at] for s, at in zip((first, second), columns, strict=True))
         y = np.where(np.isin(np.arange(len(y)), carried), x, y)
         return cls(
             names=names,
@@ -199,6 +211,7 @@ class EpochModel:
             y=y.reshape(-1, 3),
             q=(q[0], q[1]),
             columns=(columns[0], columns[1]),
+            compared=compared,
             follow=follow,
             carried=carried,
             rounded=rounded,
@@ -221,7 +234,9 @@ class EpochModel:
         """Some of the points, those that carry the datum among them, with all their covariances."""
         at = (3 * points[:, None] + np.arange(3)).ravel()
         q1, q2, cross, _ = self.parts(at, at)
-        return Epochs(tuple(self.names[i] for i in points), self.x[points], self.y[points], q1, q2, cross=cross)
+        names = tuple(self.names[i] for i in points)
+        seen = self.compared.reshape(-1, 3)[points]
+        return Epochs(names, self.x[points], self.y[points], q1, q2, cross=cross, compared=seen)
 
     def of_points(self, points: np.ndarray, turned: np.ndarray) -> np.ndarray:
         """(m, 3, 3) m^2, covariance of each point's difference by itself, the second epoch turned (3, 3)."""
@@ -235,15 +250,18 @@ class EpochModel:
 
 
 def _released(q: Covariance, floating: Floating, columns: np.ndarray) -> Covariance:
-    """A covariance without its held coordinates: in the datum of inner constraints on some columns."""
-    conditions = np.zeros(floating.motions.T.shape)
-    conditions[:, columns] = floating.motions[columns].T
-    if np.linalg.matrix_rank(conditions) < len(conditions):
-        raise EstimationError(
-            f"the points compared do not hold {floating.words()}, which the epoch's held coordinates do; compare more"
-        )
-    zero = np.zeros(len(floating.motions))
-    return transformed(q, to_datum(zero, zero, floating.motions, conditions=conditions)[1], conditions)
+    """A covariance without its held coordinates: in the datum of inner constraints on some columns.
+
+    A motion that does not show in these stays as it was held: it does not change them.
+    """
+    _, s, vt = np.linalg.svd(floating.motions[columns], full_matrices=False)
+    motions = floating.motions @ vt[: int(np.sum(s > UNSEEN * s.max(initial=1e-300)))].T
+    if not motions.shape[1]:
+        return q
+    conditions = np.zeros(motions.T.shape)
+    conditions[:, columns] = motions[columns].T
+    zero = np.zeros(len(motions))
+    return transformed(q, to_datum(zero, zero, motions, conditions=conditions)[1], conditions)
 
 
 def _follow(solution: NetworkSolution, columns: np.ndarray, held: np.ndarray) -> np.ndarray:

@@ -20,6 +20,8 @@ from catseye.gateways.writers.verdict import Verdict
 
 FORMAT = "catseye-comparison-1"
 NAMED = 8  # points told in sentences
+SMALLEST = np.finfo(float).tiny  # a probability below it is zero in double precision
+UNTESTED = "not checked"
 DISPLACEMENTS: Formats = {
     "point": "",
     **dict.fromkeys(("x_m", "y_m", "z_m"), ".10f"),
@@ -85,16 +87,20 @@ class ComparedEpochs:
 
     @cached_property
     def verdicts(self) -> list[str]:
-        """One word or two a point: moved, stable, held, not checked."""
+        """One word or two a point: moved, stable, held, not checked; undecided where the search is.
+
+        Without a conclusion a point that differs from the rest by more than chance explains is not called stable.
+        """
         d = self.deformation
+        open_ = np.full(len(d.names), not d.conclusive) & (d.p_adjusted < d.level)
         return [
-            "held" if held else "moved" if moved else "stable" if np.isfinite(p) else "not checked"
-            for held, moved, p in zip(d.held, d.moved, d.p, strict=True)
+            "held" if held else "moved" if moved else "undecided" if doubt else "stable" if np.isfinite(p) else UNTESTED
+            for held, moved, doubt, p in zip(d.held, d.moved, open_, d.p, strict=True)
         ]
 
 
 def comparison_verdict(compared: ComparedEpochs) -> Verdict:
-    """Whether what is said to have moved rests on two good epochs and on a test.
+    """Verdict of a comparison: no better than its epochs, doubtful where a point is doubted or the search is open.
 
     compared   two epochs
     """
@@ -105,10 +111,14 @@ def comparison_verdict(compared: ComparedEpochs) -> Verdict:
             return Verdict(judged.word, f"the {which} epoch: {judged.why}")
     if not np.isfinite(compared.deformation.p).any():
         return Verdict("doubtful", "nothing can be tested: no displacement has an uncertainty")
-    if not moved:
-        return Verdict("good", "both epochs are good, and no point moved by more than chance explains")
-    named = ", ".join(moved[:NAMED]) + (f" and {len(moved) - NAMED} more" if len(moved) > NAMED else "")
-    return Verdict("good", f"both epochs are good; by more than chance explains moved {named}")
+    text = "no point moved by more than chance explains"
+    if moved:
+        named = ", ".join(moved[:NAMED]) + (f" and {len(moved) - NAMED} more" if len(moved) > NAMED else "")
+        text = f"by more than chance explains moved {named}"
+    doubts = compared.moved.doubts
+    if doubts:
+        return Verdict("doubtful", "; ".join([*doubts, *([text] if compared.deformation.conclusive else [])]))
+    return Verdict("good", f"both epochs are good{';' if moved else ', and'} {text}")
 
 
 def comparison_object(compared: ComparedEpochs) -> dict[str, Any]:
@@ -157,6 +167,7 @@ def comparison_object(compared: ComparedEpochs) -> dict[str, Any]:
             "carried": list(compared.moved.carried),
             "frame": list(compared.moved.frame),
             "apart": compared.moved.apart,
+            "conclusive": d.conclusive,
             "homogeneity": compared.moved.homogeneity,
             "variance_factor": factor.value,
             "variance_factor_degrees_of_freedom": factor.degrees_of_freedom,  # null: taken as known
@@ -196,7 +207,7 @@ def comparison_passages(compared: ComparedEpochs) -> list[Passage]:
     d = compared.deformation
     passages = [Passage("What moved", f"{d.status[0].upper()}{d.status[1:]}.")]
     for i, (name, word) in enumerate(zip(d.names, compared.verdicts, strict=True)):
-        if word == "moved" and len(passages) <= NAMED:
+        if word in ("moved", "undecided") and len(passages) <= NAMED:
             parts = ", ".join(
                 f"d{axis} {value / MILLIMETRE:+.3f} (u {u / MILLIMETRE:.3f})"
                 for axis, value, u in zip(
@@ -204,10 +215,11 @@ def comparison_passages(compared: ComparedEpochs) -> list[Passage]:
                 )
                 if np.isfinite(value)
             )
-            passages.append(Passage(name, f"{parts} mm; by chance p = {d.p[i]:.2g}."))
-    count = compared.verdicts.count("moved")
+            chance = f"p = {d.p[i]:.2g}" if d.p[i] > 0.0 else f"p < {SMALLEST:.0e}"
+            passages.append(Passage(name, f"{parts} mm; by chance {chance}."))
+    count = sum(word in ("moved", "undecided") for word in compared.verdicts)
     if count > NAMED:
-        passages.append(Passage("And more", f"{count - NAMED} more points moved."))
+        passages.append(Passage("And more", f"{count - NAMED} more points moved or are undecided."))
     words = [word for word in compared.moved.words if word != d.status]
     return passages + (
         [Passage("Assumed", " ".join(f"{word[0].upper()}{word[1:]}." for word in words))] if words else []

@@ -10,27 +10,29 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
 from catseye.constants import DEGREE, MILLIMETRE
+from catseye.estimation.deformation.deformation import Deformation
 from catseye.estimation.quality.ellipsoid import PLAN, confidence_scale, elevation_view, ellipse
-from catseye.gateways.network.comparison import ComparedEpochs, comparison_passages, comparison_verdict
+from catseye.gateways.network.comparison import UNTESTED, ComparedEpochs, comparison_passages, comparison_verdict
 from catseye.gateways.network.figures import (
     CaptionedFigure,
     file_ticks,
-    looking,
     point_names,
     scale_bar,
     thousands,
     view_frame,
+    views,
 )
 from catseye.gateways.network.findings import Findings
 from catseye.gateways.network.report import network_cards, provenance_section
 from catseye.gateways.network.summary import quantity, verdict
-from catseye.gateways.writers.drawing import BAD, FAINT, INK, nice, styled
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, nice, styled
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.verdict import verdict_line
 
 CONTENTS = {"summary": "Summary", "displacements": "Displacements", "epochs": "Epochs", "provenance": "Provenance"}
 CONFIDENCE = 0.95
 STILL = "#1f5a99"
+DOUBT = SERIES[4]
 SHARE = 0.12  # of the network's extent that the longest displacement or ellipse is drawn as, about
 
 
@@ -68,10 +70,10 @@ def _summary(compared: ComparedEpochs) -> str:
     if moved:
         far = max(moved, key=lambda i: compared.length[i])
         cards.append(card("Farthest", quantity(float(compared.length[far]), "m"), d.names[far]))
-    cards += [
-        card("All points congruent", f"p = {d.before.p:.2g}", _chance(d.before.p, d.level)),
-        card("Stable points congruent", f"p = {d.after.p:.2g}", _chance(d.after.p, d.level)),
-    ]
+    if np.isfinite(d.before.p):
+        cards.append(card("All points congruent", f"p = {d.before.p:.2g}", _chance(d.before.p, d.level)))
+    if np.isfinite(d.after.p):
+        cards.append(card("Stable points congruent", f"p = {d.after.p:.2g}", _chance(d.after.p, d.level)))
     factor = compared.variance_factor
     known = (
         "taken as known"
@@ -129,7 +131,7 @@ def _displacements(compared: ComparedEpochs) -> str:
     return section(
         "displacements",
         CONTENTS["displacements"],
-        *(picture(drawn[key].svg, drawn[key].caption) for key in ("plan", "elevation")),
+        *(picture(figure.svg, figure.caption) for figure in drawn.values()),
         paragraph(
             "Most significant first. p is the chance of such a displacement or a larger one of a point that did not "
             "move; p of all is corrected for the number of points; the last column is the smallest displacement that "
@@ -158,27 +160,31 @@ def _epochs(compared: ComparedEpochs) -> str:
 
 
 def comparison_figures(compared: ComparedEpochs) -> dict[str, CaptionedFigure]:
-    """Plan and elevation with displacements and their confidence ellipses.
+    """Plan and elevation with displacements and their confidence ellipses, those that show any point.
 
     compared   two epochs
     """
     with styled():
-        drawn = {"plan": _view(compared, None), "elevation": _view(compared, looking(compared.first))}
+        drawn = {name: _view(compared, bearing) for name, bearing in views(compared.first).items()}
         return {name: CaptionedFigure(figure, caption) for name, (figure, caption) in drawn.items()}
 
 
 def _view(compared: ComparedEpochs, bearing: float | None) -> tuple[Figure, str]:
     d, first = compared.deformation, compared.first
     axes = PLAN if bearing is None else elevation_view(bearing)
-    flat = first.solution.x @ axes.T
+    there = first.network.points.existing[:, :2] if bearing is None else first.network.points.existing
+    flat = np.where(there.all(axis=1)[:, None], np.nan_to_num(first.solution.x) @ axes.T, np.nan)
+    shown = compared.rows[np.isfinite(flat[compared.rows]).all(axis=1)]
+    if not len(shown):
+        shown = np.flatnonzero(np.isfinite(flat).all(axis=1))
     if bearing is not None:
-        flat[:, 0] -= flat[compared.rows, 0].min()
-    low, high = flat[compared.rows].min(axis=0), flat[compared.rows].max(axis=0)
+        flat[:, 0] -= flat[shown, 0].min()
+    low, high = flat[shown].min(axis=0), flat[shown].max(axis=0)
     size = max(float(np.max(high - low)), 1e-3)
-    shift, spread = d.displacement @ axes.T, axes @ d.covariance @ axes.T
+    shift, spread = _in_view(d, axes)
     factor = confidence_scale(CONFIDENCE, 2, compared.variance_factor.degrees_of_freedom)
-    shown = ellipse(spread)
-    longest = np.fmax(np.hypot(*shift.T), factor * shown.major)
+    outlines = ellipse(spread)
+    longest = np.fmax(np.hypot(*shift.T), factor * outlines.major)
     longest = longest[np.isfinite(longest) & (longest > 0.0)]
     scale = nice(SHARE * size / float(np.max(longest))) if len(longest) else np.nan
     figure, ax = view_frame(0.5 * (low + high), high - low + (0.16 + 2.0 * SHARE) * size)
@@ -188,7 +194,7 @@ def _view(compared: ComparedEpochs, bearing: float | None) -> tuple[Figure, str]
     if not common.all():
         ax.scatter(*flat[~common].T, s=10, c=FAINT, marker="o", lw=0, zorder=2, label="not compared", alpha=0.6)
     if np.isfinite(scale):
-        _arrows(ax, compared, (flat[compared.rows], scale * shift), (shown, scale * factor))
+        _arrows(ax, compared, (flat[compared.rows], scale * shift), (outlines, scale * factor))
     point_names(ax, first, np.where(common[:, None], flat, np.nan))
     _labels(ax, first, bearing)
     figure.legend(*ax.get_legend_handles_labels(), loc="lower center", ncols=6)
@@ -201,11 +207,19 @@ def _view(compared: ComparedEpochs, bearing: float | None) -> tuple[Figure, str]
     )
 
 
+def _in_view(d: Deformation, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Displacements (n, 2) and covariances (n, 2, 2) in a view; nan where a coordinate that shows there is unknown."""
+    seen = axes.any(axis=0)
+    known = np.isfinite(d.displacement[:, seen]).all(axis=1)
+    shift = np.where(known[:, None], np.nan_to_num(d.displacement) @ axes.T, np.nan)
+    return shift, np.where(known[:, None, None], axes @ np.nan_to_num(d.covariance) @ axes.T, np.nan)
+
+
 def _arrows(ax: Any, compared: ComparedEpochs, drawn: tuple[np.ndarray, np.ndarray], shape: tuple[Any, float]) -> None:
     """Displacements and ellipses by verdict."""
     (base, shift), (shown, scale) = drawn, shape
     verdicts = np.array(compared.verdicts)
-    for word, colour in (("stable", STILL), ("moved", BAD)):
+    for word, colour in (("stable", STILL), ("undecided", DOUBT), ("moved", BAD)):
         here = (verdicts == word) & np.isfinite(shift).all(axis=1)
         if not here.any():
             continue
@@ -221,7 +235,7 @@ def _arrows(ax: Any, compared: ComparedEpochs, drawn: tuple[np.ndarray, np.ndarr
             headwidth=4.0, headlength=5.0, headaxislength=4.5, minlength=0.1, zorder=4,
         )  # fmt: skip
         ax.scatter(*base[here].T, s=5, c=colour, lw=0, zorder=3, label=word)
-    for word, marker in (("held", "s"), ("not checked", "o")):
+    for word, marker in (("held", "s"), (UNTESTED, "o")):
         here = verdicts == word
         if here.any():
             ax.scatter(

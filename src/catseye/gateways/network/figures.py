@@ -44,17 +44,20 @@ def network_figures(findings: Findings) -> dict[str, CaptionedFigure]:
     findings   what is told of a solution
     """
     with styled():
-        drawn = {name: _view(findings, bearing) for name, bearing in _views(findings).items()}
+        drawn = {name: _view(findings, bearing) for name, bearing in views(findings).items()}
         if np.isfinite(findings.table.standardised).any():
             drawn |= {"residuals": _residuals(findings), "redundancy": _redundancy(findings)}
         return {name: CaptionedFigure(figure, caption) for name, (figure, caption) in drawn.items()}
 
 
-def _views(findings: Findings) -> dict[str, float | None]:
-    """Bearing of each view that has a point to show; None from above."""
+def views(findings: Findings) -> dict[str, float | None]:
+    """Bearing of each view that has a point to show; None from above.
+
+    findings   what is told of a solution
+    """
     there = findings.network.points.existing
-    views = {"plan": None} if there[:, :2].all(axis=1).any() else {}
-    return {**views, **({"elevation": looking(findings)} if there.all(axis=1).any() else {})}
+    shown = {"plan": None} if there[:, :2].all(axis=1).any() else {}
+    return {**shown, **({"elevation": looking(findings)} if there.all(axis=1).any() else {})}
 
 
 def looking(findings: Findings) -> float:
