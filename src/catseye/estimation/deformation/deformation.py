@@ -137,7 +137,7 @@ def moved_points(
     n = len(epochs.names)
     options: dict[str, Any] = {"level": level, "rule": rule, "far": far}
     found = find_moved(epochs, datum, variance_factor, **options)
-    if far and (found.out or found.stopped):
+    if far and (found.stopped or (found.out and found.out != sorted(far))):
         found = min(found, find_moved(epochs, datum, variance_factor, **options, without=True), key=lambda f: f.rank)
     search, out = found.search, found.out
     before = global_test(search.pvv, search.degrees, variance_factor)
@@ -186,9 +186,7 @@ def _outcome(
     return {"conclusive": stopped is None and text != MAJORITY, "status": stopped or words}
 
 
-def _point_arrays(
-    epochs: Epochs, search: DeletionSearch, state: DeletionState, stable: np.ndarray
-) -> dict[str, np.ndarray]:
+def _point_arrays(epochs: Epochs, search: DeletionSearch, state: DeletionState, stable: np.ndarray) -> dict[str, Any]:
     """Tests of the points spread over arrays: 0 where held, nan where not compared."""
     n = len(epochs.names)
     compared = np.ones((n, 3), dtype=bool) if epochs.compared is None else np.asarray(epochs.compared, dtype=bool)

@@ -6,6 +6,7 @@ its coordinates follow the held ones by J = -(A_f' P A_f)^-1 A_f' P A_d, and the
 Q_1 + J Q_dd J' + Q_0 - J Q_d0 - Q_0d J', Q_0 of the first epoch, Q_1 of the second with its datum taken as exact.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,8 +29,8 @@ FOREIGN = (
     "adjust it free (datum 'free'), or say what the datums may differ by (datum=)"
 )
 STRANGE = (
-    "the {which} epoch holds {names}, which the other epoch does not have; adjust it free (datum 'free'), or say what "
-    "the datums may differ by (datum=)"
+    "the {which} epoch holds {names}, which the other epoch does not have{alike}; adjust it free (datum 'free'), or "
+    "say what the datums may differ by (datum=)"
 )
 PARTLY = "{names} are held in the second epoch {apart:.3g} m from the first's result, others at it; hold all at it"
 REWEIGHTED = (
@@ -103,7 +104,8 @@ class DatumConnection:
                 by = abs(value - there)
                 (carried if of_second and by <= max(rounding, HELD_APART) else strange)[name, axis] = by
         if datum is None:
-            _refuse_foreign(foreign, carried, max(rounding, HELD_APART))
+            names = [s.network.points.names for s in (first, second)]
+            _refuse_foreign(foreign, carried, max(rounding, HELD_APART), names=names)
             datum = _least_datum(np.concatenate([f.kinds for f in floats], axis=1))
         departure = max(carried.values(), default=0.0)
         same = dict.fromkeys(name for name, axis in owns[1] if (name, axis) in owns[0])
@@ -134,18 +136,27 @@ def _minimal(floating: Floating, fixed: np.ndarray) -> bool:
 
 
 def _refuse_foreign(
-    foreign: list[dict[tuple[str, int], float]], carried: dict[tuple[str, int], float], tolerance: float
+    foreign: list[dict[tuple[str, int], float]],
+    carried: dict[tuple[str, int], float],
+    tolerance: float,
+    *,
+    names: Sequence[Sequence[str]],
 ) -> None:
+    """Refuse coordinates held in one epoch alone; names are those of both epochs' points."""
     if foreign[0] and max(foreign[0].values()) <= tolerance:
         raise EstimationError(EXCHANGED.format(names=listed([name for name, _ in foreign[0]])))
     for which, strange in zip(("first", "second"), foreign, strict=True):
         if strange:
             known = [by for by in strange.values() if np.isfinite(by)]
-            names = listed([name for name, _ in strange])
+            held = listed([name for name, _ in strange])
             if not known:
-                raise EstimationError(STRANGE.format(which=which, names=names))
+                folded = {name.casefold(): name for name in names[which == "first"]}
+                pairs = {name: folded[name.casefold()] for name, _ in strange if name.casefold() in folded}
+                said = listed([f"{name} and {other}" for name, other in pairs.items()])
+                alike = f" (by another case: {said})" if pairs else ""
+                raise EstimationError(STRANGE.format(which=which, names=held, alike=alike))
             text = PARTLY if which == "second" and carried else FOREIGN
-            raise EstimationError(text.format(which=which, names=names, apart=max(known)))
+            raise EstimationError(text.format(which=which, names=held, apart=max(known)))
 
 
 def _least_datum(kinds: np.ndarray) -> str:

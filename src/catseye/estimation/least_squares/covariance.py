@@ -10,6 +10,7 @@ from scipy.sparse import csr_array, sparray
 from catseye.errors import EstimationError
 
 LARGEST_MATRIX = 12_000  # parameters: a full matrix of more takes over a gigabyte
+SOLVED = 100  # points whose block is solved for at once, where the factor's pattern does not hold it
 
 
 class Covariance(Protocol):
@@ -155,7 +156,13 @@ class Sparse:
     def blocks(self, first: np.ndarray) -> np.ndarray:
         at = first[:, None] + np.arange(3)
         units = [np.tile(row, (len(at), 1)) for row in np.eye(3)]
-        return np.stack([self.products(at, unit) for unit in units], axis=2)
+        result = np.stack([self.products(at, unit) for unit in units], axis=2)
+        loose = np.flatnonzero(np.isnan(result).any(axis=(1, 2)))  # axes of a point that no observation joins
+        for part in np.split(loose, np.arange(SOLVED, len(loose), SOLVED)):
+            if len(part):
+                own = self.within(at[part].ravel()).reshape(len(part), 3, len(part), 3)
+                result[part] = own[np.arange(len(part)), :, np.arange(len(part))]
+        return result
 
     def diagonal(self) -> np.ndarray:
         result = np.zeros(self.size)
