@@ -344,7 +344,7 @@ def air_effects(s: Night) -> Iterator[Effect]:
         "humidity even in % upwards",
         "even in hPa",
         fixed(percent * s.mean(wet - humidity)),
-        "no: even in vapour pressure",
+        "considered",
     )
 
     yield Effect("hygrometers, in common", "2 %", fixed(2.0 * percent), "thermometers' offsets")
@@ -362,7 +362,7 @@ def air_effects(s: Night) -> Iterator[Effect]:
         "wavelength, each head its own",
         f"2.5 nm, {_ppm(warmer)}",
         in_groups(s.distance * warmer, s.ranger),
-        "no: a scale of each head",
+        "considered",
     )
     middle = s.state(0.5 * (s.a[:, 2] + s.b[:, 2]))
     more, less = (s.refractivity(*middle, model="ciddor_hill1999", co2_ppm=v) for v in (500.0, 450.0))
@@ -390,7 +390,7 @@ def air_effects(s: Night) -> Iterator[Effect]:
     square = np.sum(s.nodes[0][..., :2] ** 2, axis=2) / 100.0**2
     where = np.sum(s.network.field.places**2, axis=1) / 100.0**2
     bowl = s.mean(square) - where.mean()
-    yield Effect("air warmer all around", "0.1 °C at 100 m", fixed(0.1 * c * bowl), "no: x² + y² beside east and north")
+    yield Effect("air warmer all around", "0.1 °C at 100 m", fixed(0.1 * c * bowl), "thermometers' offsets")
     plate = np.isin(s.body, ["dish"]) * 5.0 / s.distance * (1.0 - np.exp(-s.distance / 5.0))
     yield Effect("air cold on the dish", "0.3 °C, within 5 m", fixed(-0.3 * c * plate), "no")
     within = (s.own_body == "arm") & np.isin(s.body, ["dish", "arm"])
@@ -398,12 +398,8 @@ def air_effects(s: Night) -> Iterator[Effect]:
         "air within the dish another", "0.05 °C", fixed(0.05 * c * within), "no: a level of the air within the dish"
     )
     yield Effect("eddies that last", "0.03 ppm for 60 s", lambda n: _lasting(n, s), "independent at each shot")
-    yield Effect(
-        "lines that are neighbours", "5 m", lambda n: _neighbours(n, s), "no: a field over the dish for each ranger"
-    )
-    yield Effect(
-        "strength of the lines' fluctuation", "20 %", lambda n: _lines(n, s, 0.2), "no: a strength that the ranges tell"
-    )
+    yield Effect("lines that are neighbours", "5 m", lambda n: _neighbours(n, s), "considered, six shapes a ranger")
+    yield Effect("strength of the lines' fluctuation", "20 %", lambda n: _lines(n, s, 0.2), "u itself: 5 % larger")
     bent = excess_bound(index_gradient(0.1), s.distance)
     yield Effect("bending of the ray", "0.1 °C/m", fixed(-bent), "nothing")
     curved = np.sum(s.nodes[0][..., :2] ** 2, axis=2) / (2.0 * 6.371e6)
@@ -495,7 +491,7 @@ def telescope_effects(s: Night) -> Iterator[Effect]:
         "arm expands 10 % more",
         "1 °C/h",
         fixed(s.by_body(lambda p, b: 0.1 * steel * p * (b == "arm")[:, None])),
-        "no: a scale of the arm, as the dish has one",
+        "arm scale, a part of the telescope's motion",
     )
     turn = 0.05 * ARCSECOND * s.hours[:, None]
     on = ("dish", "arm", "alidade")
@@ -504,7 +500,7 @@ def telescope_effects(s: Night) -> Iterator[Effect]:
         "telescope turns",
         "0.05″/h",
         fixed(s.by_body(lambda p, b: turn * np.cross(about, p) * np.isin(b, on)[:, None])),
-        "no: turns as parts of the telescope's motion",
+        "turn and tilts, parts of the telescope's motion",
     )
     azimuth = s.campaign.site.campaign.azimuth_deg * DEGREE
     axis, height = np.array([np.cos(azimuth), -np.sin(azimuth), 0.0]), np.array([0.0, 0.0, 48.26])
@@ -512,7 +508,7 @@ def telescope_effects(s: Night) -> Iterator[Effect]:
         "telescope sinks in elevation",
         "0.05″/h",
         fixed(s.by_body(lambda p, b: turn * np.cross(axis, p - height) * np.isin(b, on[:2])[:, None])),
-        "no: turns as parts of the telescope's motion",
+        "turn and tilts, parts of the telescope's motion",
     )
     dish = s.b[s.body == "dish"]
     axes = np.linalg.svd(dish - dish.mean(axis=0), full_matrices=False)[2]
@@ -521,7 +517,7 @@ def telescope_effects(s: Night) -> Iterator[Effect]:
         u, v = ((p - dish.mean(axis=0)) @ axes[:2].T / 50.0).T
         return (20e-6 * s.hours * (u**2 - v**2) * (b == "dish"))[:, None] * axes[2]
 
-    yield Effect("dish bends", "20 µm/h at the rim", fixed(s.by_body(bends)), "no: parts of the telescope's motion")
+    yield Effect("dish bends", "20 µm/h at the rim", fixed(s.by_body(bends)), "bends, parts of the telescope's motion")
     knots = s.network.processes.telescope
     if knots is not None:
         at = np.sort(np.append(knots.knots, 0.0)) + s.network.field.seconds(np.array([s.network.middle_mjd]))
@@ -552,7 +548,7 @@ def signal_effects(s: Night) -> Iterator[Effect]:
         "amplitude to phase, no sheet",
         "0.1 mrad a factor e",
         in_groups(1e-4 * s.per_radian * strong, s.ranger),
-        "no, unless u_amplitude_to_phase_rad is given",
+        "a parameter where u_amplitude_to_phase_rad is given; else none",
     )
     yield Effect(
         "cyclic, no sheet",
@@ -563,7 +559,7 @@ def signal_effects(s: Night) -> Iterator[Effect]:
     slopes = _axes(s)
     for size, name, done in (
         (1e-6 * UNIFORM, "axes that do not meet, as rounded", "nothing"),
-        (10e-6, "axes that do not meet, no sheet", "no, unless u_axis_mm is given: 10 µm by itself"),
+        (10e-6, "axes that do not meet, no sheet", "a parameter where u_axis_mm is given; else they meet"),
     ):
         yield Effect(
             name,
@@ -575,17 +571,15 @@ def signal_effects(s: Night) -> Iterator[Effect]:
         "electronics' weak modes",
         f"{_weakest(s):.2f} of the noise",
         lambda n: _modes(n, s),
-        "no, their variance alone: more states",
+        "u itself: 1 % larger",
     )
-    yield Effect(
-        "strength of the electronics' walk", "20 %", lambda n: _walk(n, s, 0.2), "no, walk_test only tells: a strength"
-    )
+    yield Effect("strength of the electronics' walk", "20 %", lambda n: _walk(n, s, 0.2), "u itself: 4 % larger")
     yield Effect("warm-up between references", "20 mrad, 300 s, 1 in 3", fixed(_warming(s)), "nothing")
     yield Effect(
         "each shot weighed by its own scatter",
         "127 degrees",
         lambda n: _weights(n, s),
-        "no: one noise of a ranger, from all its shots",
+        "u itself: 1 % larger",
     )
     bow = 2.0 * 2.0 ** -(s.campaign.site.adc.bits - 1) * 0.002 * np.abs(s.phasor) / s.campaign.site.adc.full_scale_volt
     step = s.campaign.site.adc.full_scale_volt / 2.0 ** (s.campaign.site.adc.bits - 1)
@@ -691,7 +685,7 @@ def target_effects(s: Night) -> Iterator[Effect]:
         "glass colder than its sheet's",
         _signed(np.mean(warm), "K", 0),
         fixed(per_k * warm),
-        "no: corrected, `optics.glass` knows how",
+        "considered, where site.toml says sheets_at_c; else u of the constants covers it",
     )
     standard = s.refractivity(np.array(20.0), np.array(933.0), np.array(50.0))
     thin = s.index - 1.0 - standard
@@ -700,7 +694,7 @@ def target_effects(s: Night) -> Iterator[Effect]:
         "index ratio of the memo",
         "4.3·10⁻⁴ too low",
         fixed(4.3e-4 * s.glass),
-        "no, it is site.toml's: one index of all glass, with its u",
+        "considered, where site.toml says glass_index_ratio",
     )
     at = [s.refractivity(*s.state(p[:, 2])) for p in (s.a, s.b)]
     path = s.mean(s.refractivity(*s.state(s.nodes[0][..., 2])))
@@ -730,7 +724,10 @@ def target_effects(s: Night) -> Iterator[Effect]:
     yield Effect("normals higher, in common", "0.1°", fixed(up), "each its own")
     yield Effect("tilts to second order", "0.1°", fixed(bend), "nothing")
     yield Effect(
-        "heights of glass, 100 prisms in common", "2 µm", in_groups(*_batches(s, ratio)), "no: an error of each batch"
+        "heights of glass, 100 prisms in common",
+        "2 µm",
+        in_groups(*_batches(s, ratio)),
+        "considered, 100 by serial order",
     )
     each = np.unique(s.target, return_inverse=True)[1]
     yield Effect(
@@ -739,19 +736,19 @@ def target_effects(s: Night) -> Iterator[Effect]:
     radius = s.index * 3e-6 * np.hypot(ratio - 1.0, ratio) * (~s.prism & (s.glass > 0.0))
     yield Effect("radii of balls, in common", "3 µm", fixed(radius), "no: each its own")
     yield Effect("heights of all glass, in common", "2 µm", fixed(s.index * ratio * 2e-6 * s.prism), "no: each its own")
-    yield Effect("D0 of one bench, in common", "10 µm", fixed(s.index * 1e-5), "no: one zero of all")
+    yield Effect("D0 of one bench, in common", "10 µm", fixed(s.index * 1e-5), "considered")
     yield Effect(
         "D0 colder than calibrated",
         _signed(np.mean(warm), "K", 0),
         fixed(s.index * d0 * STEEL_PER_K * warm),
-        "no: one expansion of all D0, its temperature on the sheet",
+        "considered, where site.toml says sheets_at_c; else u_d0 covers it",
     )
     yield Effect("D0 as rounded", "1 µm", in_groups(s.index * 1e-6 * UNIFORM, s.ranger), "zeros")
     yield Effect(
         "D0 expands with its head",
         "1 °C/h",
         fixed(s.index * d0 * STEEL_PER_K * s.hours),
-        "no: one expansion of all D0, times the temperature",
+        "considered, where site.toml says sheets_at_c; else u_d0 covers it",
     )
 
 
@@ -802,16 +799,29 @@ def survey_effects(s: Night) -> Iterator[Effect]:
     cold = s.weather[0].mean() - 20.0
     arm = on(offsets[2::3], 0.25 * STEEL_PER_K * cold)
     yield Effect(
-        "mirror offsets colder than measured", _signed(cold, "K", 0), fixed(arm), "no: corrected, with one u of all"
+        "mirror offsets colder than measured",
+        _signed(cold, "K", 0),
+        fixed(arm),
+        "considered, where site.toml says sheets_at_c; else u_offset covers it",
     )
     yield Effect("certificates as rounded", "1 µm", at_random(on(marks, micron)), "benchmarks' u")
     lengths = np.array([g.observed[0] for g in s.groups if g.name == "benchmarks"])
-    yield Effect("certificates, in common", "10⁻⁷", fixed(on(marks, 1e-7 * lengths)), "no: a scale of the benchmarks")
+    yield Effect(
+        "certificates, in common",
+        "10⁻⁷",
+        fixed(on(marks, 1e-7 * lengths)),
+        "considered, where site.toml says certificate_scale_ppm",
+    )
     lengths = on(survey, 0.5e-6 * np.concatenate([g.observed for g in s.groups if g.name == "monuments"]))
-    yield Effect("survey's scale", "0.5 ppm", fixed(lengths), "no: a scale of the monuments")
+    yield Effect(
+        "survey's scale",
+        "0.5 ppm",
+        fixed(lengths),
+        "considered, where site.toml says survey_scale_ppm; else each errs by itself",
+    )
     units = [s.network.places[t.left_prism.target] for t in s.campaign.triplets.values()]
     along = on(s.rows("triplet balls"), 2e-5 * np.concatenate([p.normal for p in units]))
-    yield Effect("triplets' heights, in common", "20 µm", fixed(along), "no: one error of all")
+    yield Effect("triplets' heights, in common", "20 µm", fixed(along), "considered")
     typed = s.rows("approximate positions")
     yield Effect("positions as typed", "0.1 mm", at_random(on(typed, 1e-4 * UNIFORM)), "positions' u")
 

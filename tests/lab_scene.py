@@ -1,7 +1,7 @@
 """The calibration lab on paper: a rigid mirror, rays, plates and screens, by scipy's rotations and not by catseye.
 
 Each function makes a table of readings as (numbers, words) from a truth; noise comes from a generator that is passed
-in, none where it is None. `python tests/lab_scene.py` writes the examples of these kinds.
+in, none where it is None. `python tests/lab_scene.py` writes the examples of these kinds, good and planted.
 """
 
 from datetime import date
@@ -399,10 +399,11 @@ def check_scatter(values, covariances, truth, chance=1e-5):
 # ----------------------------------------------------------------------------------------------- the examples
 
 EXAMPLES = {
-    # kind: truth for the comment, sheet, numbers and words, the wrong reading and by how much
+    # kind: truth and planted fault for the comment, sheet, numbers and words, the wrong reading and by how much
     "autocollimation": (
         "Truth: beta1 -150 arcsec, beta2 +25 arcsec, N_a0 -4195.3, N_e0 -4935.4, face tilt 20 arcsec; the\n"
-        "autocollimator looks 0.6 arcsec off z. Reading 12 (line 13) is wrong by 30 arcsec in y.",
+        "autocollimator looks 0.6 arcsec off z.",
+        "Reading 12 (line 13) is wrong by 30 arcsec in y.",
         {"displays": "beam", "na0_nominal": -4190.0, "ne0_nominal": -4930.0, "u_lean_x_arcsec": 1.0,
          "u_lean_y_arcsec": 1.0, "u_roll_arcsec": 120.0, "u_flat_arcsec": 1.0, "u_axis_tilt_arcsec": 2.0,
          "u_reading_arcsec": 0.3, "u_count": 0.05},
@@ -412,7 +413,7 @@ EXAMPLES = {
         ("y_arcsec", 11, 30.0),
     ),
     "height-gauge": (
-        "Truth: dx -0.075, dy 247.459, dz -0.762 mm; the v-blocks lean 4 arcsec, 1 um of reading.\n"
+        "Truth: dx -0.075, dy 247.459, dz -0.762 mm; the v-blocks lean 4 arcsec, 1 um of reading.",
         "Reading 20 (line 21) is wrong by 0.05 mm.",
         {"ball_diameter_mm": BALL, "u_ball_diameter_mm": 0.0005, "mirror_diameter_mm": PLUG,
          "u_mirror_diameter_mm": 0.0005, "u_lean_arcsec": 6.0, "u_seating_arcsec": 0.5, "u_scale_ppm": 3.0,
@@ -423,7 +424,7 @@ EXAMPLES = {
         ("height_mm", 19, 0.05),
     ),
     "both-faces": (
-        "Truth: axis offset +0.40 mm, mirror offset -0.30 mm, 20 um of reading.\n"
+        "Truth: axis offset +0.40 mm, mirror offset -0.30 mm, 20 um of reading.",
         "Reading 9 (line 10) is wrong by 0.3 mm.",
         {"u_distance_mm": 0.02, "u_known_distance_mm": 0.03, "u_zero_mm": 0.2},
         lambda rng: faces({"offsets": (0.4e-3, -0.3e-3, 0.0, 0.0), "back": 12e-3, "zero": 0.1e-3,
@@ -431,7 +432,7 @@ EXAMPLES = {
         ("distance_m", 8, 3e-4),
     ),
     "both-faces-pointing": (
-        "Truth: face tilt 0.2 mrad, beam tilt 0.1 and -0.3 mrad, N_a0 2691.4, N_e0 1434.7.\n"
+        "Truth: face tilt 0.2 mrad, beam tilt 0.1 and -0.3 mrad, N_a0 2691.4, N_e0 1434.7.",
         "Reading 5 (line 6) is wrong by 10 counts in azimuth.",
         {"na0_nominal": 2691.0, "ne0_nominal": 1434.0, "axis_offset_mm": 0.4, "u_axis_mm": 0.02,
          "u_direction_arcsec": 2.0, "u_frame_arcsec": 2.0, "u_counts": 0.3},
@@ -440,7 +441,7 @@ EXAMPLES = {
         ("azimuth_counts", 4, 10.0),
     ),
     "encoder": (
-        "Truth: cosine 3.0, -1.0, sine -2.0, 0.5 counts, of once and twice a turn.\n"
+        "Truth: cosine 3.0, -1.0, sine -2.0, 0.5 counts, of once and twice a turn.",
         "Reading 18 (line 19) is wrong by 1.5 counts.",
         {"axis": "azimuth", "zero_counts": 2691.0, "u_face_arcsec": 1.0, "u_counts": 0.04, "u_reading_arcsec": 0.4},
         lambda rng: polygon({"zero": 2691.0, "cosine": (3.0, -1.0), "sine": (-2.0, 0.5)}, rng, size=0.05,
@@ -448,14 +449,15 @@ EXAMPLES = {
         ("counts", 17, 1.5),
     ),
     "limits": (
-        "Truth: stops at -21810 and 76191 counts, touched within 3. Reading 9 (line 10) met a cable at 76100.",
+        "Truth: stops at -21810 and 76191 counts, touched within 3.",
+        "Reading 9 (line 10) met a cable at 76100.",
         {"margin_counts": 480.0, "u_touch_counts": 3.0, "na0": 2691.0},
         lambda rng: ({"azimuth_counts": np.round(np.repeat([-21_810.0, 76_191.0], 5) + noise(rng, 3.0, 10))},
                      {"stop": ["low"] * 5 + ["high"] * 5}),
         ("azimuth_counts", 8, -91.0),
     ),
     "alignment": (
-        "Truth: beam at 0.21, -0.33 mm, tilt 0.3 and 0.1 mrad, 20 um of reading.\n"
+        "Truth: beam at 0.21, -0.33 mm, tilt 0.3 and 0.1 mrad, 20 um of reading.",
         "Reading 11 (line 12) is wrong by 0.3 mm.",
         {"na0": 2691.0, "u_screen_turn_deg": 0.5, "u_path_mm": 2.0, "u_spot_mm": 0.02, "face_tilt_rad": 9.7e-5,
          "u_face_tilt_rad": 1e-6},
@@ -463,14 +465,15 @@ EXAMPLES = {
         ("p_mm", 10, 0.3),
     ),
     "detector-focus": (
-        "Truth: best focus 0.31 mm, depth 1.4 mm, 1 % of reading.\nReading 20 (line 21) is 0.15 V too low.",
+        "Truth: best focus 0.31 mm, depth 1.4 mm, 1 % of reading.",
+        "Reading 20 (line 21) is 0.15 V too low.",
         {"model": "gaussian_beam", "installed_mm": 0.80, "u_installed_mm": 0.05, "u_amplitude_share": 0.01,
          "amplitude_to_phase_rad": -0.0018, "u_amplitude_to_phase_rad": 0.0002},
         lambda rng: (through_focus({"focus": 0.31, "rayleigh": 1.4}, rng), {}),
         ("amplitude_volt", 19, -0.15),
     ),
     "search-results": (
-        "Truth: the records but for N_a0 2692.8, N_e0 1432.9 and alpha1 -1.1972616 (+30 urad).\n"
+        "Truth: the records but for N_a0 2692.8, N_e0 1432.9 and alpha1 -1.1972616 (+30 urad).",
         "Reading 7 (line 8) is another target, 12 counts away.",
         {"u_counts": 0.5, "u_target_mm": 2.0, "monument": MONUMENT, "mirror": MIRROR},
         lambda rng: searches(
@@ -482,11 +485,13 @@ EXAMPLES = {
 PLACES_AFTER_POINT = {"mm": 4, "m": 6, "counts": 2, "arcsec": 2, "deg": 6, "volt": 4}
 
 
-def write_example(kind, folder):
-    """KIND.csv and KIND.toml, as `catseye calibrate KIND` reads them."""
-    truth, sheet, made, (name, row, by) = EXAMPLES[kind]
-    numbers, words = made(np.random.default_rng(sum(map(ord, kind))))
-    numbers[name][row] += by
+def write_example(kind, folder, planted=False, seed=None):
+    """KIND.csv and KIND.toml, as `catseye calibrate KIND` reads them; KIND-planted with a wrong reading."""
+    truth, fault, sheet, made, (name, row, by) = EXAMPLES[kind]
+    numbers, words = made(np.random.default_rng(sum(map(ord, kind)) if seed is None else seed))
+    if planted:
+        numbers[name][row] += by
+        truth = f"{truth}\n{fault}"
     if kind == "both-faces":
         numbers["known_distance_m"] = [round(v, 5) for v in numbers["known_distance_m"]]
     rounded = {n: [round(float(v), PLACES_AFTER_POINT[n.rpartition("_")[2]]) for v in numbers[n]] for n in numbers}
@@ -494,7 +499,8 @@ def write_example(kind, folder):
         rounded = {n: [round(float(v), 2) for v in column] for n, column in numbers.items()}
     cells = {**words, **rounded}
     lines = [",".join(cells), *(",".join(map(str, row)) for row in zip(*cells.values(), strict=True))]
-    (folder / f"{kind}.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    stem = f"{kind}-planted" if planted else kind
+    (folder / f"{stem}.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     head = {"kind": kind, "instrument": "ZP103", "serial": "example-103", "measured_on": date(2026, 9, 1),
             "valid_until": date(2028, 9, 1), "by": "example", "report": "tests/lab_scene.py"}  # fmt: skip
     plain = {key: value for key, value in {**head, **sheet}.items() if not isinstance(value, dict)}
@@ -502,7 +508,7 @@ def write_example(kind, folder):
     for key, value in sheet.items():
         if isinstance(value, dict):
             text += ["", f"[{key}]", *(f"{k} = {said(v)}" for k, v in value.items())]
-    (folder / f"{kind}.toml").write_text("\n".join(text) + "\n", encoding="utf-8")
+    (folder / f"{stem}.toml").write_text("\n".join(text) + "\n", encoding="utf-8")
 
 
 def said(value):
@@ -511,4 +517,5 @@ def said(value):
 
 if __name__ == "__main__":
     for each in EXAMPLES:
-        write_example(each, ROOT / "examples" / "calibrations")
+        for with_fault in (False, True):
+            write_example(each, ROOT / "examples" / "calibrations", with_fault)

@@ -1,9 +1,11 @@
 """The tables of this directory, made from a planted truth with a seed: python examples/calibrations/make_examples.py
 
-Every truth stands in the comment of the sheet beside its table. The simulation writes down phases as the instrument
-would show them; it uses the index of air and nothing else of the calibrations.
+Every truth stands in the comment of the sheet beside its table; KIND-planted is KIND with a planted fault, which the
+comment names. The simulation writes down phases as the instrument would show them; it uses the index of air and nothing
+else of the calibrations.
 """
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +18,7 @@ MJD = 61_280.5  # 2026-09-01, noon UTC
 
 PROVENANCE = """kind = "{kind}"
 instrument = "{instrument}"
-serial = "{serial}"
+serial = "example-103"
 measured_on = 2026-09-01
 valid_until = 2028-09-01
 by = "example"
@@ -45,20 +47,38 @@ def wrapped(phase: np.ndarray) -> np.ndarray:
     return np.mod(phase, 2 * np.pi)
 
 
-def write(
-    kind: str, truth: str, sheet: str, columns: dict[str, np.ndarray | list], *, instrument: str = "ZP103"
-) -> None:
-    """One table and its sheet."""
-    names = list(columns)
-    rows = zip(*columns.values(), strict=True)
-    text = [",".join(names), *(",".join(str(v) for v in row) for row in rows)]
-    (HERE / f"{kind}.csv").write_text("\n".join(text) + "\n", encoding="utf-8")
-    head = "".join(f"# {line}\n" for line in truth.strip().splitlines())
-    provenance = PROVENANCE.format(kind=kind, instrument=instrument, serial="example-103")
-    (HERE / f"{kind}.toml").write_text(head + provenance + sheet, encoding="utf-8")
+@dataclass(frozen=True)
+class Example:
+    """One table and its sheet.
+
+    truth     lines of the sheet's comment
+    sheet     what it says beside the provenance
+    columns   cells of the table, as they are written
+    fault     the planted fault, in words for the comment; "" where there is none
+    """
+
+    kind: str
+    truth: str
+    sheet: str
+    columns: dict[str, list]
+    fault: str = ""
+    instrument: str = "ZP103"
+    provenance: str = PROVENANCE
 
 
-def reference_distance(rng: np.random.Generator) -> None:
+def write(example: Example, folder: Path = HERE) -> None:
+    """KIND.csv and KIND.toml, or KIND-planted where a fault is planted."""
+    name = example.kind + ("-planted" if example.fault else "")
+    rows = zip(*example.columns.values(), strict=True)
+    text = [",".join(example.columns), *(",".join(str(v) for v in row) for row in rows)]
+    (folder / f"{name}.csv").write_text("\n".join(text) + "\n", encoding="utf-8")
+    said = f"{example.truth}\n{example.fault}".strip().splitlines()
+    provenance = example.provenance.format(kind=example.kind, instrument=example.instrument)
+    head = "".join(f"# {line}\n" for line in said) + provenance
+    (folder / f"{name}.toml").write_text(head + example.sheet, encoding="utf-8")
+
+
+def reference_distance(rng: np.random.Generator, planted: bool = False) -> Example:
     d0 = 180.685e-3
     # Ten places spread over half a wavelength at 3 m, ten over 30 m.
     distance = np.concatenate([3.0 + 0.0107 * np.arange(10), np.linspace(4.0, 30.0, 10)])
@@ -67,10 +87,11 @@ def reference_distance(rng: np.random.Generator) -> None:
     reference = electronics
     target = electronics - 2 * np.pi * (true - d0) / half()  # phase falls as distance grows
     noise = 2e-4 * rng.standard_normal((2, 20))
-    target[13] += 0.004  # a person walked through the beam
-    write(
+    if planted:
+        target[13] += 0.004  # a person walked through the beam
+    return Example(
         "reference-distance",
-        "Truth: D0 = 180.685 mm, hollow target. Reading 14 (line 15) is wrong by +4 mrad of phase, -64 um of range.",
+        "Truth: D0 = 180.685 mm, hollow target.",
         AIR
         + """d0_nominal_mm = 181.0       # from the drawing: decides the whole cycles
 u_d0_nominal_mm = 1.0
@@ -88,10 +109,11 @@ u_leakage_volt = 0.0008
             "amplitude_target_volt": [f"{v:.3f}" for v in 4.0 - 0.05 * distance],
             "amplitude_reference_volt": ["5.000"] * 20,
         },
+        fault="Reading 14 (line 15) is wrong by +4 mrad of phase, -64 um of range." if planted else "",
     )
 
 
-def leakage(rng: np.random.Generator) -> None:
+def leakage(rng: np.random.Generator, planted: bool = False) -> Example:
     truth = 0.03104 * np.exp(1j * 4.3574)
     rows = []
     for session in range(6):
@@ -100,11 +122,11 @@ def leakage(rng: np.random.Generator) -> None:
             noise = 2.5e-4 * (rng.standard_normal() + 1j * rng.standard_normal())
             rows.append((f"h{8 + 2 * session:02d}", MJD + session / 12 + buffer / 1440, truth + shift + noise))
     z = np.array([r[2] for r in rows])
-    z[29] += 0.004  # a light was on
-    write(
+    if planted:
+        z[29] += 0.004  # a light was on
+    return Example(
         "leakage",
-        "Truth: 0.03104 V at 4.3574 rad; 0.25 mV of noise in each quadrature of a buffer, 0.40 mV between sessions.\n"
-        "Reading 30 (line 31) holds 4 mV of stray light in its real part.",
+        "Truth: 0.03104 V at 4.3574 rad; 0.25 mV of noise in each quadrature of a buffer, 0.40 mV between sessions.",
         "",
         {
             "session": [r[0] for r in rows],
@@ -112,15 +134,16 @@ def leakage(rng: np.random.Generator) -> None:
             "real_volt": [f"{v:.6f}" for v in z.real],
             "imaginary_volt": [f"{v:.6f}" for v in z.imag],
         },
+        fault="Reading 30 (line 31) holds 4 mV of stray light in its real part." if planted else "",
     )
 
 
-def leakage_lit(rng: np.random.Generator) -> None:
+def leakage_lit(rng: np.random.Generator, planted: bool = False) -> Example:
     truth = 0.03104 * np.exp(1j * 4.3574)
     distance = 5.0 + 0.0061 * np.arange(40)
     light = (2.0 - 0.3 * (distance - 5.0)) * np.exp(1j * (0.7 - 2 * np.pi * distance / half()))
     z = truth + light + 4e-4 * (rng.standard_normal(40) + 1j * rng.standard_normal(40))
-    write(
+    return Example(
         "leakage-lit",
         "Truth: leakage 0.03104 V at 4.3574 rad; the light of 2 V fades by 15 % a metre; 0.4 mV of noise.",
         f"group_index = {index():.8f}\nu_session_volt = 0.0004     # from readings with the beam blocked\n",
@@ -132,7 +155,7 @@ def leakage_lit(rng: np.random.Generator) -> None:
     )
 
 
-def linearity(rng: np.random.Generator) -> None:
+def linearity(rng: np.random.Generator, planted: bool = False) -> Example:
     d0, start = 180.685e-3, 2.4
     length = np.linspace(0.0, 1.5, 121) + 1e-3 * rng.uniform(-1, 1, 121)
     phase_index = 1.0 + float(phase_refractivity(20.4, 931.2, 47.0, wavelength_um=0.63299))
@@ -148,12 +171,12 @@ def linearity(rng: np.random.Generator) -> None:
     minutes = 1.5 * np.arange(121)
     walk = np.cumsum(np.concatenate([[0.0], 1e-6 * np.sqrt(1.5 / 60) * rng.standard_normal(120)]))
     range_ = range_ + walk + 1.5e-6 * rng.standard_normal(121)
-    range_[77] += 25e-6
-    write(
+    if planted:
+        range_[77] += 25e-6
+    return Example(
         "linearity",
         "Truth: zero +35 um, scale +0.4 ppm; cyclic order 1: cosine +6 um, sine -9 um, order 2: cosine -2.5 um, sine\n"
-        "+1.5 um; 1.5 um of noise, a drift that walks by 1 um per square root of an hour.\n"
-        "Reading 78 (line 79) is 25 um too long.",
+        "+1.5 um; 1.5 um of noise, a drift that walks by 1 um per square root of an hour.",
         AIR
         + """d0_mm = 180.685             # what the ranges contain
 pc_mm = 0.0
@@ -171,10 +194,11 @@ random_walk_mm_per_sqrt_hour = 0.001
             "interferometer_vacuum_m": [f"{v:.8f}" for v in vacuum],
             "range_m": [f"{v:.7f}" for v in range_],
         },
+        fault="Reading 78 (line 79) is 25 um too long." if planted else "",
     )
 
 
-def retroreflector(rng: np.random.Generator) -> None:
+def retroreflector(rng: np.random.Generator, planted: bool = False) -> Example:
     rows = []
     for k, name in enumerate(["HOLLOW-1", "ball-7", "prism-12"] * 6):
         seat = 2e-6 * rng.standard_normal()
@@ -183,11 +207,11 @@ def retroreflector(rng: np.random.Generator) -> None:
             excess = {"HOLLOW-1": 0.0, "ball-7": 0.173715, "prism-12": 0.0334937}[name]
             value = 6.2017 + excess + 3e-6 * hours + seat + 3e-6 * rng.standard_normal()
             rows.append((MJD + hours / 24, name, value))
-    rows[41] = (rows[41][0], rows[41][1], rows[41][2] + 60e-6)
-    write(
+    if planted:
+        rows[41] = (rows[41][0], rows[41][1], rows[41][2] + 60e-6)
+    return Example(
         "retroreflector",
-        "Truth: ball-7 -173.715 mm, prism-12 -33.4937 mm; a drift of 3 um/h, 2 um of seating, 3 um of reading.\n"
-        "Reading 42 (line 43) is 60 um too long.",
+        "Truth: ball-7 -173.715 mm, prism-12 -33.4937 mm; a drift of 3 um/h, 2 um of seating, 3 um of reading.",
         """reference = "HOLLOW-1"
 pc_mm = 0.0
 u_pc_mm = 0.002
@@ -199,20 +223,21 @@ u_cyclic_mm = 0.002
             "range_m": [f"{r[2]:.7f}" for r in rows],
         },
         instrument="seat-B",
+        fault="Reading 42 (line 43) is 60 um too long." if planted else "",
     )
 
 
-def amplitude(rng: np.random.Generator) -> None:
+def amplitude(rng: np.random.Generator, planted: bool = False) -> Example:
     level = np.repeat(np.geomspace(0.15, 5.0, 8), 4)
     rng.shuffle(level)
     electronics = 2.0 + np.cumsum(1e-3 * rng.standard_normal(32))
     target = electronics + 0.9 - 1.8e-3 * np.log(level / 5.0) + 3e-4 / level * rng.standard_normal(32)
     reference = electronics + 3e-4 / 5.0 * rng.standard_normal(32)
-    target[9] += 0.05
-    write(
+    if planted:
+        target[9] += 0.05
+    return Example(
         "amplitude-to-phase",
-        "Truth: -1.8 mrad a factor e; 0.3 mV of noise in each quadrature of a phasor. Reading 10 (line 11) is 50 mrad\n"
-        "too high.",
+        "Truth: -1.8 mrad a factor e; 0.3 mV of noise in each quadrature of a phasor.",
         """reference_amplitude_volt = 5.0
 u_phasor_volt = 0.0003
 u_leakage_volt = 0.0002
@@ -223,32 +248,37 @@ u_leakage_volt = 0.0002
             "amplitude_reference_volt": ["5.0000"] * 32,
             "phase_reference_rad": [f"{v:.5f}" for v in wrapped(reference)],
         },
+        fault="Reading 10 (line 11) is 50 mrad too high." if planted else "",
     )
 
 
-def oscillator(rng: np.random.Generator) -> None:
+def oscillator(rng: np.random.Generator, planted: bool = False) -> Example:
     count = 8192
     time = np.arange(count) * 1e-3
     walk = np.cumsum(2e-4 * rng.standard_normal(count))
-    phase = 2.0 + 0.012 * rng.standard_normal(count) + walk + 2.5e-3 * np.sin(2 * np.pi * 57.0 * time + 0.4)
-    write(
+    phase = 2.0 + 0.012 * rng.standard_normal(count) + walk
+    if planted:
+        phase = phase + 2.5e-3 * np.sin(2 * np.pi * 57.0 * time + 0.4)
+    return Example(
         "oscillator",
-        "Truth: 12 mrad of white noise a cycle, a walk by 0.2 mrad a cycle, a line of 2.5 mrad at 57 Hz (a maser's).\n"
+        "Truth: 12 mrad of white noise a cycle, a walk by 0.2 mrad a cycle.\n"
         "Phases of single cycles (SEQ) of the internal cube at an IF of 1 kHz.",
         "interval_s = 0.001\nhalf_wavelength_mm = 99.906\ncycles_per_range = 128\n",
         {"phase_rad": [f"{v:.5f}" for v in wrapped(phase)]},
+        fault="A line of 2.5 mrad at 57 Hz (a maser's)." if planted else "",
     )
 
 
-def repeatability(rng: np.random.Generator) -> None:
+def repeatability(rng: np.random.Generator, planted: bool = False) -> Example:
     names = [f"pointing-{k}" for k in range(1, 9) for _ in range(6)]
-    shift = np.repeat(15e-6 * rng.standard_normal(8), 6)
+    shift = np.repeat((15e-6 if planted else 0.0) * rng.standard_normal(8), 6)
     range_ = 101.2345 + shift + 10e-6 * rng.standard_normal(48)
-    write(
+    return Example(
         "repeatability",
-        "Truth: 10 um within a pointing, 15 um from pointing to pointing.",
+        "Truth: 10 um within a pointing, none from pointing to pointing.",
         "",
         {"set": names, "range_m": [f"{v:.6f}" for v in range_]},
+        fault="15 um from pointing to pointing." if planted else "",
     )
 
 
@@ -266,22 +296,24 @@ u_temperature_c = 0.1
 """
 
 
-def prism(rng: np.random.Generator) -> None:
+def prism(rng: np.random.Generator, planted: bool = False) -> Example:
     height = 38.204 * (1 + 7.1e-6 * 2.5) + 0.0015 * rng.standard_normal(10)
-    height[3] += 0.02
-    write(
+    if planted:
+        height[3] += 0.02
+    return Example(
         "prism-constant",
-        "Truth: height 38.2040 mm at 20 C; 1.5 um of reading. Reading 4 (line 5) is 20 um too long: dust.",
+        "Truth: height 38.2040 mm at 20 C; 1.5 um of reading.",
         GLASS,
         {"height_mm": [f"{v:.4f}" for v in height]},
         instrument="DP-0412",
+        fault="Reading 4 (line 5) is 20 um too long: dust." if planted else "",
     )
 
 
-def ball(rng: np.random.Generator) -> None:
+def ball(rng: np.random.Generator, planted: bool = False) -> Example:
     part = ["r1", "r2"] * 8
     radius = np.array([50.0126, 96.4946] * 8) * (1 + 7.1e-6 * 2.5) + 0.002 * rng.standard_normal(16)
-    write(
+    return Example(
         "ball-constant",
         "Truth: small ball 50.0126 mm, shell 96.4946 mm at 20 C; 2 um of reading.",
         GLASS,
@@ -290,19 +322,19 @@ def ball(rng: np.random.Generator) -> None:
     )
 
 
-def gauge_blocks(rng: np.random.Generator) -> None:
+def gauge_blocks(rng: np.random.Generator, planted: bool = False) -> Example:
     certified = {"100": 100.00021, "50": 49.99990, "25": 25.00004, "10": 10.00001}
     stacks = ["10", "25", "25+10", "50", "50+25", "100", "100+25", "100+50", "100+50+25", "100+50+25+10"] * 2
     temperature = 20.8 + 0.02 * np.arange(20)
     films = np.array([0.00002 * stack.count("+") for stack in stacks])
     length = np.array([sum(certified[name] for name in stack.split("+")) for stack in stacks]) + films
     reads = 0.0042 + length * (1 + 11.5e-6 * (temperature - 20)) * (1 + 18e-6) + 4e-4 * rng.standard_normal(20)
-    reads[12] += 0.006
+    if planted:
+        reads[12] += 0.006
     blocks = "".join(f'\n[[block]]\nname = "{n}"\nlength_mm = {v}\nu_mm = 0.00008\n' for n, v in certified.items())
-    write(
+    return Example(
         "gauge-blocks",
-        "Truth: a height gauge that reads 4.2 um and 18 ppm too much; 0.4 um of reading. Reading 13 (line 14) is 6 um\n"
-        "too long.",
+        "Truth: a height gauge that reads 4.2 um and 18 ppm too much; 0.4 um of reading.",
         STEEL + "film_um = 0.02              # of each film where two blocks are wrung\nu_film_um = 0.01\n" + blocks,
         {
             "blocks": stacks,
@@ -310,15 +342,16 @@ def gauge_blocks(rng: np.random.Generator) -> None:
             "temperature_c": [f"{v:.2f}" for v in temperature],
         },
         instrument="height-gauge-2",
+        fault="Reading 13 (line 14) is 6 um too long." if planted else "",
     )
 
 
-def spacers(rng: np.random.Generator) -> None:
+def spacers(rng: np.random.Generator, planted: bool = False) -> Example:
     true = {"A": 88.9003, "B": 30.0121, "C": 10.0008}
     names = list(true) * 5
     length = np.array([true[name] for name in names]) * (1 + 11.5e-6 * 0.9)
     reads = 0.0042 + length * (1 + 18e-6) + 4e-4 * rng.standard_normal(15)
-    write(
+    return Example(
         "spacers",
         "Truth: spacers A 88.9003, B 30.0121, C 10.0008 mm at 20 C, by the height gauge of gauge-blocks.csv.",
         STEEL + "temperature_c = 20.9\nzero_mm = 0.0042\nu_zero_mm = 0.0003\nscale_ppm = 18.0\nu_scale_ppm = 4.0\n",
@@ -327,7 +360,7 @@ def spacers(rng: np.random.Generator) -> None:
     )
 
 
-def invar_wire(rng: np.random.Generator) -> None:
+def invar_wire(rng: np.random.Generator, planted: bool = False) -> Example:
     tension = np.array([100.0, 100.0, 110.0, 110.0, 120.0, 120.0, 100.0, 110.0, 120.0, 100.0])
     temperature = 17.0 + 0.3 * np.arange(10)
     weight, stiffness, rise, distance = 0.1734, 4.15e5, 0.412, 24.0031
@@ -335,10 +368,11 @@ def invar_wire(rng: np.random.Generator) -> None:
     chord = 24.0 * (1 + (tension - 100.0) / stiffness + 0.6e-6 * (temperature - 20.0))
     sag = 24.0**3 * weight**2 / 24.0 * (1 / 100.0**2 - np.cos(rise / 24.0) ** 2 / tension**2)
     scale = (distance - chord - sag) * 1e3 + 0.02 * rng.standard_normal(10)
-    scale[6] += 0.5
-    write(
+    if planted:
+        scale[6] += 0.5
+    return Example(
         "invar-wire",
-        "Truth: 24.003100 m between the marks; 20 um of reading. Reading 7 (line 8) is a misread half millimetre.",
+        "Truth: 24.003100 m between the marks; 20 um of reading.",
         f"""certified_mm = 24000.0
 u_certified_mm = 0.010
 certified_tension_n = 100.0
@@ -361,24 +395,35 @@ u_scale_sum_mm = 0.005
             "scale_sum_mm": [f"{v:.3f}" for v in scale],
         },
         instrument="wire-24",
+        fault="Reading 7 (line 8) is a misread half millimetre." if planted else "",
     )
+
+
+MAKERS = (
+    reference_distance,
+    leakage,
+    leakage_lit,
+    linearity,
+    retroreflector,
+    amplitude,
+    oscillator,
+    prism,
+    ball,
+    gauge_blocks,
+    spacers,
+    invar_wire,
+    repeatability,
+)  # the place of each is its seed
+
+
+def write_all(makers, seed: int) -> None:
+    """Each example as it is and, where its maker has one, with its fault."""
+    for number, make in enumerate(makers):
+        write(make(np.random.default_rng(seed + number)))
+        faulty = make(np.random.default_rng(seed + number), planted=True)
+        if faulty.fault:
+            write(faulty)
 
 
 if __name__ == "__main__":
-    makers = (
-        reference_distance,
-        leakage,
-        leakage_lit,
-        linearity,
-        retroreflector,
-        amplitude,
-        oscillator,
-        prism,
-        ball,
-        gauge_blocks,
-        spacers,
-        invar_wire,
-        repeatability,
-    )
-    for seed, make in enumerate(makers):
-        make(np.random.default_rng(4200 + seed))
+    write_all(MAKERS, 4200)

@@ -7,7 +7,7 @@ Every truth stands in the comment of the sheet beside its table. Where the plumb
 from itertools import pairwise
 
 import numpy as np
-from make_examples import HERE
+from make_examples import Example, write
 
 from catseye.geometry.frames.local_frame import PINTLE_LATITUDE, PINTLE_LONGITUDE, LocalFrame
 from catseye.geometry.frames.plumb import astronomic, azimuth, plumb_from_ground, zenith_angle
@@ -25,18 +25,17 @@ u_deflection_arcsec = 0.5
 AT = "x_mm = -85312.0\ny_mm = -84107.0\nz_mm = 2431.0\n"
 
 
-def write(kind: str, truth: str, sheet: str, columns: dict[str, list], *, instrument: str = "ZY104") -> None:
-    """One table and its sheet."""
-    rows = zip(*columns.values(), strict=True)
-    text = [",".join(columns), *(",".join(str(v) for v in row) for row in rows)]
-    (HERE / f"{kind}.csv").write_text("\n".join(text) + "\n", encoding="utf-8")
-    head = "".join(f"# {line}\n" for line in truth.strip().splitlines())
-    who = f'kind = "{kind}"\ninstrument = "{instrument}"\nserial = "example"\nmeasured_on = 2026-09-06\n'
-    who += 'valid_until = 2028-09-06\nby = "example"\nreport = "examples/calibrations/make_monument_examples.py"\n'
-    (HERE / f"{kind}.toml").write_text(head + who + sheet, encoding="utf-8")
+WHO = """kind = "{kind}"
+instrument = "{instrument}"
+serial = "example"
+measured_on = 2026-09-06
+valid_until = 2028-09-06
+by = "example"
+report = "examples/calibrations/make_monument_examples.py"
+"""
 
 
-def monument_azimuth(rng: np.random.Generator) -> None:
+def monument_azimuth(rng: np.random.Generator) -> Example:
     true, offset = np.radians(45.4087), np.array([0.012, 0.246, 0.031])
     points = {"ZY106": np.array([-119.4, 12.2, 1.9]), "ZY101": np.array([29.504, 115.942, 0.149])}
     collimation, trunnion, drift, v_block = 12 * ARCSECOND, -8 * ARCSECOND, 1.6 * ARCSECOND, np.pi / 2
@@ -67,7 +66,7 @@ def monument_azimuth(rng: np.random.Generator) -> None:
     for hour in (4.0, 4.05):
         look("M102", "after", hour, -v_block, np.pi / 2)
     names = ("target", "place", "face", "mjd_utc", "direction_deg")
-    write(
+    return Example(
         "monument-azimuth",
         'Truth: z^ at the azimuth 45.4087 degrees, alpha1 = pi - azimuth. 0.7" of noise in a reading, collimation\n'
         '12", trunnion -8", the circle moves against the mount by 1.6" from lab to lab. UT1 - UTC = 0.12 s.',
@@ -113,10 +112,12 @@ u_y_mm = 0.1
 u_z_mm = 0.1
 """,
         {name: [row[k] for row in rows] for k, name in enumerate(names)},
+        instrument="ZY104",
+        provenance=WHO,
     )
 
 
-def plate_levels(rng: np.random.Generator) -> None:
+def plate_levels(rng: np.random.Generator) -> Example:
     alpha2, alpha3, wedge = -14.0 * ARCSECOND, 22.0 * ARCSECOND, (6.0, -9.0)
     mount = gamma(np.pi - np.radians(45.4087), alpha2, alpha3)
     rise = mount @ plumb_from_ground(FRAME, PLACE)[2]
@@ -127,7 +128,7 @@ def plate_levels(rng: np.random.Generator) -> None:
             tilt = (rise[0] * np.cos(o) + rise[2] * np.sin(o)) / ARCSECOND
             reading = 4.0 + tilt + wedge[0] * np.cos(w) + wedge[1] * np.sin(w) + 0.8 * rng.standard_normal()
             rows.append((turned, plate, f"{reading:.1f}"))
-    write(
+    return Example(
         "plate-levels",
         'Truth: alpha2 = -14", alpha3 = +22" against the ground frame; level zero 4", wedge of the plate 6" along and\n'
         '-9" across its mark, 0.8" of noise. The plumb line leans 3.9" outwards here and by the deflection.',
@@ -139,10 +140,12 @@ u_wedge_arcsec = 20.0        # found, as the plate was turned
 u_balls_arcsec = 0.5
 """,
         {name: [row[k] for row in rows] for k, name in enumerate(("orientation_deg", "plate_deg", "reading_arcsec"))},
+        instrument="ZY104",
+        provenance=WHO,
     )
 
 
-def inclinometer(rng: np.random.Generator) -> None:
+def inclinometer(rng: np.random.Generator) -> Example:
     steps = np.array([-600.0, -300.0, 0.0, 300.0, 600.0])
     turned, rows = ARCSECOND * np.array([1400.0, -2300.0]), []
     for case in (0.0, 180.0):
@@ -158,7 +161,7 @@ def inclinometer(rng: np.random.Generator) -> None:
                     volts.append(f"{ideal + 2e-4 * rng.standard_normal():.5f}")
                 rows.append((p, q, case, f"{warm:.1f}", *volts))
     names = ("tilt_x_arcsec", "tilt_y_arcsec", "azimuth_deg", "temperature_c", "x_volt", "y_volt")
-    write(
+    return Example(
         "inclinometer",
         'Truth: zeros 0.013, -0.027 V; scales 412, 405 V/rad; axes turned by 1400", -2300"; bend 300 /rad2 of both;\n'
         'zeros move by 0.2, -0.1 mV/C; the table itself tilts by 35", -20". 0.2 mV of noise, 0.3" in each tilt.',
@@ -171,10 +174,11 @@ u_volt = 0.0002
 """,
         {name: [row[k] for row in rows] for k, name in enumerate(names)},
         instrument="INC-2",
+        provenance=WHO,
     )
 
 
-def hydrostatic_level(rng: np.random.Generator) -> None:
+def hydrostatic_level(rng: np.random.Generator) -> Example:
     heights = {"BM1": 0.0, "ZY103": 8.412, "ZY104": -3.307, "ZY105": 1.951}
     ring, rows = ["BM1", "ZY103", "ZY104", "ZY105", "BM1"], []
     for vessel in (1, 2):
@@ -187,7 +191,7 @@ def hydrostatic_level(rng: np.random.Generator) -> None:
             last = level + swell - heights[b] - zeros[1] + 0.004 * rng.standard_normal()
             rows.append((a, b, vessel, f"{first:.3f}", f"{last:.3f}", f"{cold:.1f}", f"{warm:.1f}"))
     names = ("from", "to", "vessel_from", "reading_from_mm", "reading_to_mm", "temperature_from_c", "temperature_to_c")
-    write(
+    return Example(
         "hydrostatic-level",
         "Truth: ZY103 +8.412 mm, ZY104 -3.307 mm, ZY105 +1.951 mm over BM1; constant 2.2 mm; 4 um of noise in a\n"
         "reading, temperatures of the drops rounded to 0.1 C.",
@@ -200,10 +204,11 @@ u_reading_mm = 0.006
 """,
         {name: [row[k] for row in rows] for k, name in enumerate(names)},
         instrument="H5",
+        provenance=WHO,
     )
 
 
-def monument_place(rng: np.random.Generator) -> None:
+def monument_place(rng: np.random.Generator) -> Example:
     del rng  # an adjustment's answer has no noise of its own to draw
     names = ("ZY103", "ZY104", "ZY105")
     at = np.array([[-12.318, -119.604, 0.0], PLACE, [-117.25, -23.9, 2.9]])
@@ -212,7 +217,7 @@ def monument_place(rng: np.random.Generator) -> None:
     cov = {"xx": 0.0121, "xy": 0.0031, "xz": -0.0012, "yy": 0.0169, "yz": 0.0007, "zz": 0.0064}
     columns |= {f"u_{k}_mm": [f"{np.sqrt(cov[2 * k]):.7f}"] * 3 for k in "xyz"}
     columns |= {f"cov_{k}_mm2": [f"{v:.9e}"] * 3 for k, v in cov.items()}
-    write(
+    return Example(
         "monument-place",
         "Truth: the adjusted place stands in the table, a coordinates.csv of `catseye adjust --out`, made up here.",
         """point = "ZY104"
@@ -222,10 +227,13 @@ geoid_height_m = -31.0       # chosen
 """
         + DEFLECTION,
         columns,
+        instrument="ZY104",
+        provenance=WHO,
     )
 
 
+MAKERS = (monument_azimuth, plate_levels, inclinometer, hydrostatic_level, monument_place)  # each one's place: its seed
+
 if __name__ == "__main__":
-    makers = (monument_azimuth, plate_levels, inclinometer, hydrostatic_level, monument_place)
-    for seed, make in enumerate(makers):
-        make(np.random.default_rng(5200 + seed))
+    for number, make in enumerate(MAKERS):
+        write(make(np.random.default_rng(5200 + number)))

@@ -42,6 +42,8 @@ SOURCES: dict[str, Source] = {
             "1.22 prints 929.37 mb, truncated twice: 929.38",
             "1.31 prints + phi/2pi, 5.18 requires minus; 1.32-1.34 and 1.36-1.38 carry the wrong sign with it",
             "1.34 prints 6283 rad (c taken as 3e8 m/s); 1.32 gives 6287.535 rad",
+            "1.39's example calls 0.5 rad 80 °C; 1.32 and 1.50 give 5.633 mrad a kelvin at 100 m: 88.8 °C, 11 % more",
+            "figure 1.1 (REFRACT.EQ): wave[] divides by 2, half the group wavelength of 1.27: 99.9 for 199.8 mm",
             "2.14 and 5.4 print arctan(b/a): the quadrant matters",
             "2.2.2, step 4: beta1 is minus the y displacement of the autocollimator (its own example 2.36 is right)",
             "2.4, step 6 zeroes y with the autocollimator along z^: that is Theta = beta1, not 0",
@@ -56,6 +58,7 @@ SOURCES: dict[str, Source] = {
             "4.3 prints gamma_w = 1.004 for water vapour, about 1.33 is right: humid air 0.5 m/s faster at 20 °C, 50 %",
             "5.1.3 says the detected signal is mixed with 1500.000 MHz; 5.1.1, + IF, is right",
             "5.2: clipping on top shifts a single edge, not the average of both edges that the Clark-Hess meter takes",
+            "5.8 takes quadrature for the extreme: arcsin(r), not arctan(r); 7.9 um more at 10:1, 8 pm at 1000:1",
             "5.9 prints -2pi/lambda/2; -2pi/(lambda/2) is meant",
             "5.14 and 5.17 print -2pi(n_i - n_0); 5.12 and 5.15 require +2pi(n_i - n_0)",
         ),
@@ -72,6 +75,7 @@ SOURCES: dict[str, Source] = {
         errata=(
             "3.19 prints (delta1 + delta2)/2 inside the root; (delta1 + delta2)/Delta is right",
             "3.11a, 3.15b and the second 3.16 write (1 - sgn)/2, a half at equal phases; 3.13a and 3.16a give none",
+            "3.12 bounds a sum of phases in rad by 1: 1/2pi is missing, the bound is one cycle, 6.28 rad",
             "3.13 and 3.16 slip by a half wavelength where range and D_TOPPL straddle a boundary: round to the nearest",
             "3.23 with D_TOPPL good to 2 mm gives incidences to some mrad, and none where D_0 exceeds D_1",
             "3.4's table: H_rp is 25.146 mm for a 38.4 mm prism, not 25.2; P_c of the ball -173.715 mm, not -173.6",
@@ -516,6 +520,11 @@ SOURCES: dict[str, Source] = {
         title="L. Greenspan, Functional equations for the enhancement factors for CO2-free moist air, 1976",
         locator="doi:10.6028/jres.080A.007",
         used="enhancement of saturation over ice, -100 to 0 °C",
+    ),
+    "WMOARC25": Source(
+        title="WMO, World weather and climate extremes archive: highest and lowest sea level air pressure",
+        locator="wmo.asu.edu, pressure",
+        used="870 hPa (typhoon Tip, 1979) and 1084.8 hPa (Tosontsengel, 2001)",
     ),
     "WMO18": Source(
         title="WMO, Guide to instruments and methods of observation, WMO-No. 8, 2018",

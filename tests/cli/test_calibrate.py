@@ -28,7 +28,7 @@ TRUTH = {
     "retroreflector": {"pc_ball-7_mm": -173.715, "pc_prism-12_mm": -33.4937},
     "amplitude-to-phase": {"amplitude_to_phase_rad": -1.8e-3},
     "oscillator": {"white_mrad2": 144.0, "flicker_mrad2": 0.0, "walk_mrad2": 0.04},
-    "repeatability": {"repeatability_um": 10.0, "between_um": 15.0, "intermediate_um": np.hypot(10.0, 15.0)},
+    "repeatability": {"repeatability_um": 10.0, "between_um": 0.0, "intermediate_um": 10.0},
     "prism-constant": {"height_mm": 38.2040, "hrp_mm": 25.01773, "pc_mm": -33.32272},
     "ball-constant": {"r1_mm": 50.0126, "r2_mm": 96.4946, "pc_b_mm": -173.71556},
     "gauge-blocks": {"zero_mm": 0.0042, "scale_ppm": 18.0},
@@ -79,6 +79,7 @@ TRUTH = {
         "constant_mm": 2.2,
     },
 }
+TRUTH_OF_PLANTED = {"repeatability": {"between_um": 15.0, "intermediate_um": np.hypot(10.0, 15.0)}}
 WRONG = {
     "reference-distance": 13, "leakage": 29, "leakage-lit": None, "linearity": 77, "retroreflector": 41,
     "amplitude-to-phase": 9, "oscillator": None, "repeatability": None, "prism-constant": 3,
@@ -89,16 +90,47 @@ WRONG = {
 }  # fmt: skip
 
 
+PLANTED = [kind for kind, row in WRONG.items() if row is not None]
+
+
 @pytest.mark.parametrize("kind", TRUTH)
-def test_an_example_finds_its_truth_and_its_one_wrong_reading_and_its_record_reads_back(catseye, kind, tmp_path):
-    written = tmp_path / "record.toml"
-    status, out, err = catseye("calibrate", kind, EXAMPLES / f"{kind}.csv", "--reject", "--write", written, "--json")
+def test_an_example_is_good_as_typed(catseye, kind):
+    status, out, err = catseye("calibrate", kind, EXAMPLES / f"{kind}.csv", "--strict", "--json")
+    assert (status, err) == (0, "")
+    found = json.loads(out, parse_constant=pytest.fail)
+    assert found["verdict"]["word"] == "good", found["verdict"]
+    assert all(d["passed"] is not False for d in found["decisions"] + found["plausible"])
+    for key, value in TRUTH[kind].items():
+        each = found["quantities"][key]
+        assert abs(each["value"] - value) < 3.5 * each["u"], key
+
+
+@pytest.mark.parametrize(
+    ("kind", "blamed"),
+    [
+        *((kind, "outliers") for kind in PLANTED),
+        ("oscillator", "spurs: lines in the spectrum"),
+        ("repeatability", "sets agree: F"),
+    ],
+)
+def test_a_planted_fault_is_no_good_calibration(catseye, kind, blamed):
+    status, out, _ = catseye("calibrate", kind, EXAMPLES / f"{kind}-planted.csv", "--strict", "--json")
+    verdict = json.loads(out)["verdict"]
+    assert status == 1
+    assert verdict["word"] == "failed"
+    assert blamed in verdict["why"]
+
+
+@pytest.mark.parametrize("kind", [*PLANTED, "oscillator", "repeatability"])
+def test_a_planted_example_finds_its_truth_and_its_one_wrong_reading_and_its_record_reads_back(catseye, kind, tmp_path):
+    written, table = tmp_path / "record.toml", EXAMPLES / f"{kind}-planted.csv"
+    status, out, err = catseye("calibrate", kind, table, "--reject", "--write", written, "--json")
     assert (status, err) == (0, "")
     record = read_record(written, CalibrationRecord)
     assert {q.key for q in record.quantity} >= set(TRUTH[kind])
     found = json.loads(out, parse_constant=pytest.fail)
     assert found["not_used"] == ([] if WRONG[kind] is None else [WRONG[kind]])
-    for key, value in TRUTH[kind].items():
+    for key, value in {**TRUTH[kind], **TRUTH_OF_PLANTED.get(kind, {})}.items():
         each = found["quantities"][key]
         assert abs(each["value"] - value) < 3.5 * each["u"], key
     if kind == "oscillator":  # its line is no reading that could be left out
@@ -121,7 +153,7 @@ def test_every_kind_has_an_example_its_help_and_its_page_of_columns():
 
 
 def test_without_reject_nothing_is_left_out_and_the_tests_say_so(catseye):
-    status, out, _ = catseye("calibrate", "linearity", EXAMPLES / "linearity.csv", "--json")
+    status, out, _ = catseye("calibrate", "linearity", EXAMPLES / "linearity-planted.csv", "--json")
     found = json.loads(out)
     assert (status, found["not_used"]) == (0, [])
     assert found["readings"][77]["state"] == "suspect"
@@ -175,4 +207,4 @@ def test_an_unknown_kind_is_wrong_usage_and_help_has_an_example(catseye):
     assert "'bogus' is not one of reference-distance, leakage" in " ".join((out + err).split())
     status, out, _ = catseye("calibrate", "--help")
     assert status == 0
-    assert "catseye calibrate linearity examples/calibrations/linearity.csv" in out
+    assert "catseye calibrate linearity examples/calibrations/linearity.csv" in out  # good: the test of every example

@@ -167,7 +167,7 @@ def test_without_uncertainties_u_is_unknown_and_with_them_it_is_given(catseye, t
         (["--to=1,2,3", "--at", "52892.5"], 1, "needs latitude_deg, which the record of ZY3 does not have"),
         (["--to=1,2,3", "--keep-out", "none.toml"], 1, "none.toml: missing"),
         (["--to=1,2,3", "--keep-out", "."], 1, "catseye: .: is not a file (expected one)"),
-        (["--to=1e200,2,3"], 1, "m is too far (expected within 1e+12 m)"),
+        (["--to=1e200,2,3"], 1, "m is too far (expected within 20000 m)"),
         (["--to=1,2,3", "--sun-cone-deg", "7"], 2, "says nothing without --at"),
         (["--to=1,2,3", "--longitude-deg", "7"], 2, "says nothing without --at"),
         (["--to=1,2,3", "--posture", "0,45"], 2, "says nothing without --solids"),
@@ -274,3 +274,13 @@ def test_a_solid_on_the_telescope_needs_a_posture(catseye):
     assert "'alidade tower' stands in the frame alidade" in problem
     for option, value in (("--posture", "10"), ("--facing", "0,0,0"), ("--reflector", "mirror")):
         assert catseye("point", *NIGHT, "--to=0,0,50", option, value)[0] == 2
+
+
+def test_millimetres_typed_as_metres_are_refused_or_doubtful_with_both_readings(catseye):
+    status, _, error = catseye("point", *NOTES, "--to=0,0,50000")
+    assert status == 1
+    assert "50000 m is too far (expected within 20000 m): read as millimetres it is 0, 0, 50 m" in error
+    verdict = answer(catseye, *NOTES, "--to=0,0,5000")[0]["verdict"]
+    assert verdict["word"] == "doubtful"
+    assert "in millimetres it would be 0, 0, 5 m" in verdict["why"]
+    assert answer(catseye, *NOTES, "--to=0,0,50")[0]["verdict"]["word"] == "good"

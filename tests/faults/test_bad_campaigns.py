@@ -245,7 +245,8 @@ DAMAGES: dict[str, tuple[Damage, str]] = {
     "missing key": (drop_key(MIRROR, "d0_mm"), "mirrors/ZP103.toml: d0_mm is missing (expected a value)"),
     "unknown key": (
         swap(MIRROR, "d0_mm", "d0_m"),
-        "mirrors/ZP103.toml: d0_m = 180.534 is not a known key (expected perhaps d0_mm) (and 1 more)",
+        "mirrors/ZP103.toml: d0_m = 180.534 is not a known key (expected perhaps d0_mm); "
+        "invalid or missing, too: d0_mm",
     ),
     "stray key": (swap(MIRROR, "zp =", "qqqq = 1\nzp ="), "qqqq = 1 is not a known key (expected no such key)"),
     "key with a line feed": (

@@ -35,11 +35,14 @@ def solve(network, start=None, iterations=12):
     start   (n, 3) m in the package's axes where the file's coordinates are not to start from
     """
     n = len(network.points.names)
-    x = np.concatenate([network.points.xyz.ravel(), [p.start for p in network.parameters]])
+    there = ~network.points.absent.ravel()  # any value serves in the place of a coordinate that does not exist
+    x = np.concatenate([np.where(there, network.points.xyz.ravel(), 0.0), [p.start for p in network.parameters]])
     if start is not None:
         x[: 3 * n] = start.ravel()
     reference = x.copy()
-    held = np.concatenate([network.points.fixed.ravel(), np.array([p.sigma == 0.0 for p in network.parameters], bool)])
+    held = np.concatenate(
+        [network.points.fixed.ravel() | ~there, np.array([p.sigma == 0.0 for p in network.parameters], bool)]
+    )
     free = np.flatnonzero(~held)
     datum = np.concatenate([network.points.datum.ravel(), np.zeros(len(network.parameters), bool)])[free]
     weights = [np.linalg.inv(covariance_matrix(group)) for group in network.groups]

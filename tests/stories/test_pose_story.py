@@ -158,7 +158,7 @@ def test_the_dish_s_turn_is_known_to_two_tenths_with_the_rim_s_triplets(epoch, n
 
 
 def test_of_the_whole_dish_s_prisms_alone_the_covariance_says_what_holds_them_back(whole, night_01):
-    """2209 prisms: 0.02 arc seconds for their own ranges, 0.28 for where the arm's rangers are, which all share."""
+    """2209 prisms: 0.02 arc seconds for their own ranges, 0.31 for where the arm's rangers are, which all share."""
     frame = nominal_frame(night_01)
     pivot, turn = frame.translation, frame.rotation
     part = whole.of(8)  # 277 of them in full: the pose itself, and Woodbury held against it
@@ -175,7 +175,7 @@ def test_of_the_whole_dish_s_prisms_alone_the_covariance_says_what_holds_them_ba
         return np.sqrt(np.diag(turn.T @ both[3:, 3:] @ turn))[:2] / ARCSECOND
 
     assert np.all(u_of(replace(whole, shared=1e-6 * whole.shared)) < 0.02)
-    assert np.all(u_of(whole) < 0.3)
+    assert np.all(u_of(whole) < 0.33)
     assert np.all(u_of(whole) > 0.9 * u_of(part))  # eight times as many prisms help little: it is not their noise
 
 

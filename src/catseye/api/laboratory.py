@@ -4,12 +4,13 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from catseye.api.reading import place_of
 from catseye.api.result import Progress, Result, digest_of, quantities
+from catseye.api.units import In, with_units
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError
 
@@ -345,12 +346,13 @@ class BaselineResult(Result):
         return self.read
 
 
+@with_units
 def baseline(
     observations: "str | os.PathLike[str]",
     *,
     heights: "str | os.PathLike[str] | None" = None,
     against: "str | os.PathLike[str] | None" = None,
-    settings: "BaselineSettings | None" = None,
+    settings: Annotated["BaselineSettings | None", In("name")] = None,
     progress: Progress | None = None,
 ) -> BaselineResult:
     """Pillars of an EDM baseline, and an instrument's zero, scale and cyclic terms, with ISO 17123-4's tests.

@@ -6,10 +6,11 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from catseye.api.reading import DATABASES, place_of
 from catseye.api.result import Progress, Result, quantities
+from catseye.api.units import In, with_units
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
@@ -67,17 +68,18 @@ class SimulationResult(Result):
         return {"epochs": quantities(columns)}
 
 
+@with_units
 def simulate(
     site: "str | os.PathLike[str] | SiteFolder" = "gbt",
     *,
-    minutes: float = 1.0,
-    seed: int = 1,
+    minutes: Annotated[Any, In("min", one=True)] = 1.0,
+    seed: Annotated[Any, In("", whole=True)] = 1,
     motion: str = "track 145.3 45",
     conditions: str = "night",
     faults: Sequence[str] = (),
-    start_mjd: float = NIGHT,
+    start_mjd: Annotated[Any, In("mjd", one=True)] = NIGHT,
     journal: "str | os.PathLike[str] | None" = None,
-    round_s: float = 10.0,
+    round_s: Annotated[Any, In("s", one=True)] = 10.0,
     drop: Sequence[str] = (),
 ) -> SimulationResult:
     """A whole site in virtual time: twin, rangers, coordinator, its epochs held against the truth.
@@ -181,10 +183,11 @@ class ReplayResult(Result):
         return {"moved": quantities(columns)}
 
 
+@with_units
 def replay(
     journal: "str | os.PathLike[str] | JournalReader",
     *,
-    run: int | str | None = None,
+    run: Annotated[Any, In("", whole=True, text=True)] = None,
     calibrations: "str | os.PathLike[str] | None" = None,
     progress: Progress | None = None,
 ) -> ReplayResult:

@@ -5,12 +5,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from catseye.api.reading import place_of
 from catseye.api.result import Progress, Result, quantities
+from catseye.api.units import In, with_units
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError, InputError
 
@@ -138,6 +139,7 @@ class AdjustmentResult(Result):
         return () if self.path is None else (self.path,)
 
 
+@with_units
 def adjust(
     network: "str | os.PathLike[str] | ObservationNetwork",
     *,
@@ -146,10 +148,10 @@ def adjust(
     robust: str | None = None,
     components: str | None = None,
     scale_by_variance_factor: bool = False,
-    level: float = 0.05,
+    level: Annotated[Any, In("", one=True)] = 0.05,
     relative: Sequence[tuple[str, str]] = (),
-    sigma_mm: float | None = None,
-    sigma_ppm: float | None = None,
+    sigma_mm: Annotated[Any, In("mm", one=True)] = None,
+    sigma_ppm: Annotated[Any, In("ppm", one=True)] = None,
     progress: Progress | None = None,
 ) -> AdjustmentResult:
     """A network by least squares, every observation used as claimed unless asked otherwise.
@@ -272,12 +274,13 @@ class ComparisonResult(Result):
         return (*self.first.sources(), *self.second.sources())
 
 
+@with_units
 def compare(
     first: "str | os.PathLike[str] | ObservationNetwork | AdjustmentResult",
     second: "str | os.PathLike[str] | ObservationNetwork | AdjustmentResult",
     *,
     points: Sequence[str] | None = None,
-    level: float = 0.05,
+    level: Annotated[Any, In("", one=True)] = 0.05,
     scale_by_variance_factor: bool = False,
     progress: Progress | None = None,
 ) -> ComparisonResult:
@@ -391,27 +394,29 @@ class PlanResult(Result):
         return () if self.path is None else (self.path,)
 
 
+@with_units
 def plan(
     network: "str | os.PathLike[str] | ObservationNetwork",
     *,
     datum: str | None = None,
     interest: Sequence[str] | None = None,
-    budget_s: float | None = None,
-    shot_s: float = 5.0,
-    most: int = 20,
-    runs: int = 0,
-    seed: int = 1,
-    air_ppm: float = 0.0,
-    station_ppm: float = 0.0,
-    refraction: float = 0.0,
-    blunders_percent: float = 0.0,
-    sigma_mm: float | None = None,
-    sigma_ppm: float | None = None,
+    budget_s: Annotated[Any, In("s", one=True)] = None,
+    shot_s: Annotated[Any, In("s", one=True)] = 5.0,
+    most: Annotated[Any, In("", whole=True)] = 20,
+    runs: Annotated[Any, In("", whole=True)] = 0,
+    seed: Annotated[Any, In("", whole=True)] = 1,
+    air_ppm: Annotated[Any, In("ppm", one=True)] = 0.0,
+    station_ppm: Annotated[Any, In("ppm", one=True)] = 0.0,
+    refraction: Annotated[Any, In("", one=True)] = 0.0,
+    blunders_percent: Annotated[Any, In("percent", one=True)] = 0.0,
+    sigma_mm: Annotated[Any, In("mm", one=True)] = None,
+    sigma_ppm: Annotated[Any, In("ppm", one=True)] = None,
     progress: Progress | None = None,
 ) -> PlanResult:
     """A network before it is measured: what it will be worth, where it is weak, what to measure next.
 
-    network    as for `adjust`; observed values are not used
+    network    as for `adjust`; observed values are not used, and may be missing: an empty cell, no column `distance`,
+               no value in TOML. What of a sigma grows with the distance follows the planned one
     datum      as for `adjust`
     interest   points that matter; all that are not held without
     budget_s   time of every ranger for further ranges, s: gives a schedule
@@ -432,7 +437,7 @@ def plan(
     from catseye.gateways.network.plan import PlanFindings, plan_verdict
     from catseye.reduction.network import measured_on_paper
 
-    read, path = _network_of(network, sigma_mm, sigma_ppm)
+    read, path = _network_of(network, sigma_mm, sigma_ppm, planned=True)
     worth = planned(read, datum=datum, interest=interest, most=most)
     picked = () if budget_s is None else schedule(worth, budget_s=budget_s, shot_s=shot_s)
     scatter = None
@@ -505,12 +510,13 @@ class PositionsResult(Result):
         return {"positions": quantities(columns)}
 
 
+@with_units
 def locate(
-    stations: np.ndarray,
-    ranges: np.ndarray,
-    sigma: "np.ndarray | float",
+    stations: Annotated[Any, In("m")],
+    ranges: Annotated[Any, In("m")],
+    sigma: Annotated[Any, In("m")],
     *,
-    near: np.ndarray | None = None,
+    near: Annotated[Any, In("m")] = None,
 ) -> PositionsResult:
     """Positions of many targets, each by least squares from its ranges to known stations.
 
@@ -565,7 +571,11 @@ def require_answer(result: AdjustmentResult) -> AdjustmentResult:
 
 
 def _network_of(
-    network: "str | os.PathLike[str] | ObservationNetwork", sigma_mm: float | None, sigma_ppm: float | None
+    network: "str | os.PathLike[str] | ObservationNetwork",
+    sigma_mm: float | None,
+    sigma_ppm: float | None,
+    *,
+    planned: bool = False,
 ) -> "tuple[ObservationNetwork, Path | None]":
     """The network itself and the path it was read from."""
     from catseye.estimation.network.model import ObservationNetwork
@@ -576,7 +586,7 @@ def _network_of(
     path = place_of(network)
     if not path.exists():
         raise InputError(f"{path}: missing (expected {NETWORKS})")
-    return read_network(path, sigma_mm=sigma_mm, sigma_ppm=sigma_ppm), path
+    return read_network(path, sigma_mm=sigma_mm, sigma_ppm=sigma_ppm, planned=planned), path
 
 
 def _hashes(path: Path | None) -> dict[str, str]:

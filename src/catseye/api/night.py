@@ -3,12 +3,13 @@
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from catseye.api.reading import place_of
 from catseye.api.result import Progress, Result, quantities
+from catseye.api.units import In, with_units
 from catseye.constants import MILLIMETRE
 
 if TYPE_CHECKING:
@@ -243,13 +244,14 @@ class ExplanationResult(Result):
         return (self.campaign.directory,)
 
 
+@with_units
 def explain(
     campaign: "str | os.PathLike[str] | Campaign",
-    shot: int,
+    shot: Annotated[Any, In("", whole=True)],
     *,
     air_model: str = "rueger1990",
-    monte_carlo: int = 200_000,
-    seed: int = 1,
+    monte_carlo: Annotated[Any, In("", whole=True)] = 200_000,
+    seed: Annotated[Any, In("", whole=True)] = 1,
     progress: Progress | None = None,
 ) -> ExplanationResult:
     """The range of one shot and every cause of its uncertainty, before any adjustment.
@@ -289,16 +291,17 @@ def campaign_of(source: "str | os.PathLike[str] | Campaign") -> "Campaign":
     return source if isinstance(source, Campaign) else read_campaign(place_of(source))
 
 
+@with_units
 def night(
     directory: "str | os.PathLike[str]",
     *,
-    seed: int = 2209,
-    dish_prisms: int = 2209,
-    azimuth_deg: float = 145.3,
-    elevation_deg: float = 30.0,
-    interval_s: float = 8.0,
-    again: float = 0.43,
-    nature: float = 1.0,
+    seed: Annotated[Any, In("", whole=True)] = 2209,
+    dish_prisms: Annotated[Any, In("", whole=True)] = 2209,
+    azimuth_deg: Annotated[Any, In("deg", one=True)] = 145.3,
+    elevation_deg: Annotated[Any, In("deg", one=True)] = 30.0,
+    interval_s: Annotated[Any, In("s", one=True)] = 8.0,
+    again: Annotated[Any, In("", one=True)] = 0.43,
+    nature: Annotated[Any, In("", one=True)] = 1.0,
 ) -> Path:
     """A simulated night as a campaign that `reduce` reads, and beside it `truth.json`, which `reduce` does not read.
 

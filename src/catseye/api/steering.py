@@ -4,12 +4,13 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from catseye.api.reading import place_of
 from catseye.api.result import Result, digest_of, quantities
+from catseye.api.units import In, with_units
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
@@ -100,19 +101,20 @@ class PointingResult(Result):
         return self.read
 
 
+@with_units
 def point(
     monument: "str | os.PathLike[str] | MonumentGeometry",
     mirror: "str | os.PathLike[str] | MirrorGeometry",
-    to: Any,
+    to: Annotated[Any, In("m", text=True)],
     *,
-    at_mjd: float | None = None,
-    latitude_deg: float | None = None,
-    longitude_deg: float | None = None,
+    at_mjd: Annotated[Any, In("mjd", one=True)] = None,
+    latitude_deg: Annotated[Any, In("deg", one=True)] = None,
+    longitude_deg: Annotated[Any, In("deg", one=True)] = None,
     keep_out: "KeepOut | None" = None,
     reflector: str | None = None,
-    facing: Sequence[float] | None = None,
+    facing: Annotated[Any, In("", many=True)] = None,
     solids: "str | os.PathLike[str] | None" = None,
-    posture_deg: Sequence[float] | None = None,
+    posture_deg: Annotated[Any, In("deg", many=True)] = None,
 ) -> PointingResult:
     """Encoder counts of a mirror for points, both pointings, with stops, Sun, keep-out boxes and visibility.
 
@@ -249,18 +251,19 @@ class TrackResult(Result):
         return {"misses": miss_figure(self.followed, self.misses[:, :, None, :], SHARES)}
 
 
+@with_units
 def track(
     monument: "str | os.PathLike[str] | MonumentGeometry",
     mirror: "str | os.PathLike[str] | MirrorGeometry",
-    points: Any,
+    points: Annotated[Any, In("m")],
     *,
-    start_deg: Sequence[float],
-    end_deg: Sequence[float],
+    start_deg: Annotated[Any, In("deg", many=True)],
+    end_deg: Annotated[Any, In("deg", many=True)],
     frame: str = "reflector",
-    start_mjd: float = 60_635.125,
-    interval_s: float = 0.128,
-    azimuth_rate_deg_per_s: float | None = None,
-    elevation_rate_deg_per_s: float | None = None,
+    start_mjd: Annotated[Any, In("mjd", one=True)] = 60_635.125,
+    interval_s: Annotated[Any, In("s", one=True)] = 0.128,
+    azimuth_rate_deg_per_s: Annotated[Any, In("deg / s", one=True)] = None,
+    elevation_rate_deg_per_s: Annotated[Any, In("deg / s", one=True)] = None,
 ) -> TrackResult:
     """Counts at t0 and t1 of each interval for points that move with the telescope as it slews or tracks.
 

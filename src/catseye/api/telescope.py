@@ -4,13 +4,14 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
 from catseye.api.night import NightResult
 from catseye.api.reading import place_of
 from catseye.api.result import Progress, Result, quantities
+from catseye.api.units import In, with_units
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import EstimationError, InputError
 
@@ -18,12 +19,12 @@ if TYPE_CHECKING:
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
-    from catseye.gateways.pose.objects import PoseFindings
-    from catseye.gateways.surface.objects import SurfaceFindings
     from catseye.gateways.writers.passage import Passage
     from catseye.records.network.solved_points import SolvedPoints
     from catseye.records.site.folder import SiteFolder
+    from catseye.reduction.pose.verdicts import PoseFindings
     from catseye.reduction.surface.shape import Prisms
+    from catseye.reduction.surface.verdict import SurfaceFindings
 
 Optics = Literal["prime", "gregorian"]
 CARRIED = {"prime": "feed-arm", "gregorian": "subreflector"}
@@ -126,6 +127,7 @@ class PoseResult(Result):
         return self.read
 
 
+@with_units
 def pose(
     epoch: "str | os.PathLike[str] | SolvedPoints | NightResult",
     earlier: "str | os.PathLike[str] | SolvedPoints | NightResult | None" = None,
@@ -134,12 +136,12 @@ def pose(
     group: str | None = None,
     points: Sequence[str] | None = None,
     frame: str | None = None,
-    pivot: Sequence[float] | np.ndarray | None = None,
+    pivot: Annotated[Any, In("m", many=True)] = None,
     robust: str | None = None,
     pointing: Optics | None = None,
-    tilt_arcsec: Sequence[float] | None = None,
-    posture_deg: Sequence[float] | None = None,
-    earlier_posture_deg: Sequence[float] | None = None,
+    tilt_arcsec: Annotated[Any, In("arcsec", many=True)] = None,
+    posture_deg: Annotated[Any, In("deg", many=True)] = None,
+    earlier_posture_deg: Annotated[Any, In("deg", many=True)] = None,
 ) -> PoseResult:
     """Six degrees of freedom of a part of the antenna between two epochs or against design; beam and focus too.
 
@@ -157,9 +159,9 @@ def pose(
 
     Raises InputError where points, postures or files are missing and EstimationError where nothing can be fitted.
     """
-    from catseye.gateways.pose.objects import pose_status, pose_verdict
     from catseye.records.site.folder import SiteFolder, read_site
     from catseye.reduction.pose.pose import at_posture
+    from catseye.reduction.pose.verdicts import pose_status, pose_verdict
 
     records = site if isinstance(site, SiteFolder) else read_site(place_of(site))
     later, before = _solved(epoch, posture_deg), None if earlier is None else _solved(earlier, earlier_posture_deg)
@@ -206,10 +208,10 @@ def _posed(
     tilt_arcsec: Sequence[float] | None,
 ) -> "PoseFindings":
     """The pose, with an inclinometer joined or the beam derived where asked for."""
-    from catseye.gateways.pose.objects import PoseFindings
     from catseye.reduction.pose.pointing_offsets import cross_covariance, pointing_offset
     from catseye.reduction.pose.pose import pose_of_group
     from catseye.reduction.pose.track_profile import pose_with_tilt
+    from catseye.reduction.pose.verdicts import PoseFindings
 
     group_pose = pose_of_group(later, before, site, **chosen)
     if tilt_arcsec is not None:
@@ -231,7 +233,7 @@ def _solved(
     from catseye.reduction.pose.dish_ways import solved_points
 
     if isinstance(epoch, NightResult):
-        solved = solved_points(epoch.reduction)
+        solved = replace(solved_points(epoch.reduction), verdict=epoch.verdict)
     else:
         solved = epoch if isinstance(epoch, SolvedPoints) else read_solved_points(place_of(epoch, output=True))
     if posture_deg is None:
@@ -350,18 +352,19 @@ class SurfaceResult(Result):
         return self.read
 
 
+@with_units
 def surface(
     *epochs: "str | os.PathLike[str] | NightResult",
     site: "str | os.PathLike[str] | SiteFolder" = "gbt",
     free: Sequence[str] = ("vertex", "axis", "focal-length"),
-    taper_db: float = 0.0,
-    frequency_ghz: Sequence[float] = (),
-    zernike: int = 15,
+    taper_db: Annotated[Any, In("dB", one=True)] = 0.0,
+    frequency_ghz: Annotated[Any, In("GHz", many=True)] = (),
+    zernike: Annotated[Any, In("", whole=True)] = 15,
     order: Literal["noll", "ansi"] = "noll",
     frame: Literal["reflector", "ground"] = "reflector",
-    azimuth_deg: float | None = None,
-    elevation_deg: Sequence[float] = (),
-    temperature_c: Sequence[float] = (),
+    azimuth_deg: Annotated[Any, In("deg", one=True)] = None,
+    elevation_deg: Annotated[Any, In("deg", many=True)] = (),
+    temperature_c: Annotated[Any, In("deg_C", many=True)] = (),
     actuators: bool = False,
     positions: "str | os.PathLike[str] | None" = None,
     travel: Literal["normal", "axis"] = "normal",
@@ -386,13 +389,14 @@ def surface(
     Raises InputError for what cannot be used, EstimationError for too few prisms, ValidityError for settings.
     """
     from catseye.gateways.surface.inputs import prisms_of, read_prisms
-    from catseye.gateways.surface.objects import SurfaceFindings, surface_verdict
     from catseye.records.panels.actuators import read_positions
     from catseye.records.site.folder import SiteFolder, read_site
     from catseye.reduction.surface.actuators import actuators_of, corrections
     from catseye.reduction.surface.change import change_between
     from catseye.reduction.surface.lookup import lookup_of
+    from catseye.reduction.surface.placement import design_places, placement_of
     from catseye.reduction.surface.shape import LitAperture, ShapeSettings, shape_of
+    from catseye.reduction.surface.verdict import SurfaceFindings, surface_verdict
 
     if not epochs:
         raise InputError("surface needs an epoch: what reduce gave or wrote, or a table of prisms")
@@ -403,7 +407,7 @@ def surface(
     hashes: dict[str, str] = {}
     for k, epoch in enumerate(epochs):
         if isinstance(epoch, NightResult):
-            prisms.append(prisms_of(epoch.reduction))
+            prisms.append(replace(prisms_of(epoch.reduction), verdict=epoch.verdict))
             hashes |= epoch.reduction.campaign.hashes
             continue
         table, read = read_prisms(
@@ -416,21 +420,26 @@ def surface(
         )
         prisms.append(table)
         hashes |= read
-    shapes = []
+    design = design_places(records)
+    shapes, placements = [], []
     for k, each in enumerate(prisms):
         if progress is not None:
             progress("fitting epochs", k, len(prisms))
+        placement = placement_of(each, aperture, design)
         try:
+            if np.all(placement.outside > 0.0):
+                raise EstimationError(placement.doubt)
             shapes.append(shape_of(each, aperture, settings))
         except EstimationError as problem:
-            raise EstimationError(f"{each.source}: {problem}") from problem
+            raise EstimationError(f"{each.source}: {placement.doubt or problem}") from problem
+        placements.append(placement)
     change = change_between(prisms[0], prisms[1], aperture, settings=settings) if len(prisms) == 2 else None
     lookup = lookup_of(shapes) if len(prisms) >= 3 else None
     moved = None
     if actuators:
         known = None if positions is None else read_positions(place_of(positions))
         moved = corrections(shapes[-1], *actuators_of(records), positions=known, travel=travel)
-    found = SurfaceFindings(tuple(shapes), change, lookup, moved)
+    found = SurfaceFindings(tuple(shapes), change, lookup, moved, tuple(placements))
     fit = shapes[-1].fit
     return SurfaceResult(
         surface_verdict(found),

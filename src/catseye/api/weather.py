@@ -4,12 +4,13 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from catseye.api.reading import place_of
 from catseye.api.result import Progress, Result, quantities
+from catseye.api.units import In, with_units
 from catseye.atmosphere.index.model import IndexSensitivity
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ class AirResult(Result):
     standard_uncertainty         of the group index: the formula's, and the instruments' as far as they were given
     formula_uncertainty          the formula's own part
     model                        name of the formula
+    uncertainty_of               inputs whose uncertainty the standard uncertainty has
     """
 
     temperature_c: Any
@@ -52,6 +54,7 @@ class AirResult(Result):
     formula_uncertainty: Any
     model: str
     state: "AirState"
+    uncertainty_of: tuple[str, ...]
 
     def passages(self) -> "Sequence[Passage]":
         """The index, its uncertainty and its slopes."""
@@ -63,7 +66,9 @@ class AirResult(Result):
         """As `catseye air --json`."""
         from catseye.gateways.air.objects import air_object
 
-        return air_object(self.state, self.wavelength_um, self.standard_uncertainty, verdict=self.verdict)
+        return air_object(
+            self.state, self.wavelength_um, self.standard_uncertainty, verdict=self.verdict, stated=self.uncertainty_of
+        )
 
     def tables(self) -> "dict[str, QTable]":
         """One table, a row for each state."""
@@ -83,18 +88,19 @@ class AirResult(Result):
         return {"air": quantities(rows, model=self.model)}
 
 
+@with_units
 def air(
-    temperature_c: Any,
-    pressure_hpa: Any,
-    humidity_percent: Any,
+    temperature_c: Annotated[Any, In("deg_C")],
+    pressure_hpa: Annotated[Any, In("hPa")],
+    humidity_percent: Annotated[Any, In("percent")],
     *,
-    wavelength_um: Any = 0.780,
+    wavelength_um: Annotated[Any, In("um")] = 0.780,
     model: str = "ciddor_hill1999",
-    co2_ppm: Any = 450.0,
-    u_temperature_c: Any = 0.0,
-    u_pressure_hpa: Any = 0.0,
-    u_humidity_percent: Any = 0.0,
-    u_co2_ppm: Any = 0.0,
+    co2_ppm: Annotated[Any, In("ppm")] = 450.0,
+    u_temperature_c: Annotated[Any, In("deg_C", difference=True)] = 0.0,
+    u_pressure_hpa: Annotated[Any, In("hPa")] = 0.0,
+    u_humidity_percent: Annotated[Any, In("percent")] = 0.0,
+    u_co2_ppm: Annotated[Any, In("ppm")] = 0.0,
 ) -> AirResult:
     """Index of air, with sensitivities and uncertainty.
 
@@ -113,14 +119,17 @@ def air(
     1.000253319
     """
     from catseye.atmosphere.index.air import air as state_of
-    from catseye.gateways.air.objects import air_verdict
+    from catseye.gateways.air.objects import air_verdict, stated_inputs
 
     state = state_of(
         temperature_c, pressure_hpa, humidity_percent, wavelength_um=wavelength_um, model=model, co2_ppm=co2_ppm
     )
     u = state.combined_uncertainty(u_temperature_c, u_pressure_hpa, u_humidity_percent, u_co2_ppm=u_co2_ppm)
+    stated = stated_inputs(
+        temperature=u_temperature_c, pressure=u_pressure_hpa, humidity=u_humidity_percent, carbon_dioxide=u_co2_ppm
+    )
     return AirResult(
-        air_verdict(state, u),
+        air_verdict(state, u, stated),
         state.temperature_c,
         state.pressure_hpa,
         state.humidity_percent,
@@ -135,6 +144,7 @@ def air(
         state.standard_uncertainty,
         model,
         state,
+        stated,
     )
 
 
@@ -149,6 +159,7 @@ class SoundResult(Result):
     standard_uncertainty   of the speed, m/s: the formula's, and the instruments' as far as they were given
     formula_uncertainty    the formula's own part
     model                  name of the formula
+    uncertainty_of         inputs whose uncertainty the standard uncertainty has
     """
 
     temperature_c: Any
@@ -163,6 +174,7 @@ class SoundResult(Result):
     model: str
     state: "Sound"
     co2_ppm: Any
+    uncertainty_of: tuple[str, ...]
 
     def passages(self) -> "Sequence[Passage]":
         """The speed, its slopes and what other formulas say; of an array, how far it goes."""
@@ -175,7 +187,7 @@ class SoundResult(Result):
         from catseye.gateways.air.sound_objects import sound_object
 
         weather = (self.temperature_c, self.pressure_hpa, self.humidity_percent)
-        return sound_object(self.state, weather, self.co2_ppm, u=self.standard_uncertainty)
+        return sound_object(self.state, weather, self.co2_ppm, u=self.standard_uncertainty, stated=self.uncertainty_of)
 
     def tables(self) -> "dict[str, QTable]":
         """One table, a row for each state."""
@@ -192,17 +204,18 @@ class SoundResult(Result):
         return {"sound": quantities(rows, model=self.model)}
 
 
+@with_units
 def sound(
-    temperature_c: Any,
-    pressure_hpa: Any,
-    humidity_percent: Any,
+    temperature_c: Annotated[Any, In("deg_C")],
+    pressure_hpa: Annotated[Any, In("hPa")],
+    humidity_percent: Annotated[Any, In("percent")],
     *,
     model: str = "parker2004",
-    co2_ppm: Any = 450.0,
-    u_temperature_c: Any = 0.0,
-    u_pressure_hpa: Any = 0.0,
-    u_humidity_percent: Any = 0.0,
-    u_co2_ppm: Any = 0.0,
+    co2_ppm: Annotated[Any, In("ppm")] = 450.0,
+    u_temperature_c: Annotated[Any, In("deg_C", difference=True)] = 0.0,
+    u_pressure_hpa: Annotated[Any, In("hPa")] = 0.0,
+    u_humidity_percent: Annotated[Any, In("percent")] = 0.0,
+    u_co2_ppm: Annotated[Any, In("ppm")] = 0.0,
 ) -> SoundResult:
     """Speed of sound in air, with sensitivities and uncertainty.
 
@@ -217,12 +230,21 @@ def sound(
     343.577
     """
     from catseye.atmosphere.sound.speed import sound as state_of
+    from catseye.atmosphere.weather.humidity import fraction_words, likely_fraction
+    from catseye.gateways.air.objects import stated_inputs
     from catseye.gateways.air.sound_objects import sound_verdict
+    from catseye.gateways.writers.verdict import Verdict
 
     state = state_of(temperature_c, pressure_hpa, humidity_percent, model=model, co2_ppm=co2_ppm)
     u = state.combined_uncertainty(u_temperature_c, u_pressure_hpa, u_humidity_percent, u_co2_ppm)
+    stated = stated_inputs(
+        temperature=u_temperature_c, pressure=u_pressure_hpa, humidity=u_humidity_percent, carbon_dioxide=u_co2_ppm
+    )
+    judged = sound_verdict(state, u, stated)
+    if likely_fraction(humidity_percent):
+        judged = Verdict("doubtful", fraction_words(humidity_percent))
     return SoundResult(
-        sound_verdict(state, u),
+        judged,
         temperature_c,
         pressure_hpa,
         humidity_percent,
@@ -235,6 +257,7 @@ def sound(
         model,
         state,
         co2_ppm,
+        stated,
     )
 
 
@@ -301,8 +324,11 @@ class RefractometerResult(Result):
         return (self.path,)
 
 
+@with_units
 def refractometer(
-    readings: "str | os.PathLike[str]", sheet: "str | os.PathLike[str] | None" = None, **known: Any
+    readings: "str | os.PathLike[str]",
+    sheet: "str | os.PathLike[str] | None" = None,
+    **known: Annotated[Any, In("name")],
 ) -> RefractometerResult:
     """The group index along a fixed path: calibrated by a night of phases and weather, then from each phase.
 

@@ -76,7 +76,7 @@ def _write(calibration: "Calibration", write: Path | None, certificate: Path | N
     from contextlib import ExitStack
     from datetime import UTC, datetime
 
-    from catseye.gateways.writers.output import whole_file
+    from catseye.gateways.writers.output import refuse_suffix, whole_file
 
     pages = []
     if write is not None:
@@ -87,6 +87,7 @@ def _write(calibration: "Calibration", write: Path | None, certificate: Path | N
         from catseye.gateways.calibrations.certificate import MARK as PAGE_MARK
         from catseye.gateways.calibrations.certificate import certificate as drawn
 
+        refuse_suffix(certificate, "--certificate")
         pages.append((certificate, "--certificate", PAGE_MARK, drawn(calibration, datetime.now(UTC))))
     with ExitStack() as files:
         for path, option, mark, text in pages:

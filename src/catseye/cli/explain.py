@@ -74,8 +74,9 @@ def _page(page: Path | None) -> AbstractContextManager[list[str]]:
     if page is None:
         return nullcontext([])
     from catseye.gateways.epoch.explain_page import MARK
-    from catseye.gateways.writers.output import whole_file
+    from catseye.gateways.writers.output import refuse_suffix, whole_file
 
+    refuse_suffix(page, "--page")
     return whole_file(page, "--page", MARK)
 
 

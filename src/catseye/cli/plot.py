@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,7 +14,10 @@ from catseye.cli.vocabularies import AIR_MODELS, one_of
 from catseye.constants import DEGREE
 from catseye.errors import InputError
 
-MARK = "<!-- catseye plot"
+if TYPE_CHECKING:
+    from catseye.gateways.writers.drawing import Svg
+
+MARK = "catseye plot"
 
 plots = typer.Typer(
     no_args_is_help=True,
@@ -25,7 +28,9 @@ plots = typer.Typer(
 )
 app.add_typer(plots, name="plot")
 
-Out = Annotated[Path, typer.Option("--out", metavar="FIGURE.svg", help="Figure to write: new, or an earlier one.")]
+Out = Annotated[
+    Path, typer.Option("--out", metavar="FIGURE", help="Figure to write, .svg, .pdf or .png: new, or an earlier one.")
+]
 U = {"callback": uncertainty}
 
 
@@ -179,7 +184,7 @@ def coating(
 def polarization(
     out: Out,
     glass: Annotated[str, typer.Option("--glass", help="Of the solid corner.")] = "BK7-old",
-    wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="µm.")] = 0.780,
+    wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Of air, µm.")] = 0.780,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -204,7 +209,7 @@ def beam(
 
 def _finish(
     kind: str,
-    drawn: tuple[str, dict[str, Any]],
+    drawn: "tuple[Svg, dict[str, Any]]",
     out: Path,
     json: bool,
     quiet: bool,
@@ -212,15 +217,16 @@ def _finish(
     inputs: Sequence[Path | None] = (),
 ) -> None:
     """Write the figure whole or not at all, and say what it says."""
+    from catseye.gateways.writers.drawing import picture_file
     from catseye.gateways.writers.objects import json_line
-    from catseye.gateways.writers.output import whole_file
+    from catseye.gateways.writers.output import write_whole
 
     text, summary = drawn
     for given in inputs:
         if given is not None and given.resolve() == out.resolve():
             raise InputError(f"--out {out}: is an input of this figure (expected another name)")
-    with whole_file(out, "--out", MARK) as pieces:
-        pieces.append(text.replace("<svg ", f"{MARK} {kind} -->\n<svg ", 1))
+    content = picture_file(text, out, "--out", mark=f"{MARK} {kind}")
+    write_whole(out, content, option="--out", ours=lambda there: MARK.encode() in there)
     if json:
         verdict = {"word": "good", "why": "the figure is drawn from these inputs"}
         say(json_line({"verdict": verdict, "kind": kind, "written": str(out), **summary}))

@@ -17,6 +17,9 @@ CHORDS_PER_RADIAN = 0.85  # over a whole chord, for each radian that the phase r
 FEWEST_CHORDS, MOST_CHORDS = 16, 320
 WIDE = 4.5  # beam radii: exp(-40) of the light is beyond
 WIDEST = 6.0  # the same where 1e-12 counts
+# rad, k a r/B: beyond, an edge of radius a sends 2/(pi spread) = 0.5 % of the light, lit evenly; fewer where more are
+# more than is followed
+SPREADS = (120.0, 60.0, 30.0, 15.0)
 
 
 def radius(distance: ArrayLike, *, waist: ArrayLike, wavelength: ArrayLike, quality: ArrayLike = 1.0) -> NDArray:
@@ -198,6 +201,9 @@ def powers_through(
     discs         (d,) m, above 0: radii of the apertures, centred
     systems       (d - 1, 2, 2, 2) matrices from one aperture to the next, in the two planes; their B not 0
 
+    An aperture wider than the light on it is followed as far as that (`lit_edges`); what is beyond falls with
+    1/radius, as the rings of every edge do ([BORN99] section 8.5.2).
+
     M^2 above 1 is an ideal beam of that longer wavelength: exact as long as nothing clips it; diffraction by an edge
     is then M^2 times too wide, so that what returns is rather too small.
 
@@ -214,14 +220,13 @@ def powers_through(
     _positive(wavelengths=wavelengths, discs=discs)
     k, z, steps = 2.0 * np.pi / np.asarray(wavelengths, float), np.asarray(q, complex), np.asarray(systems, float)
     w = np.sqrt(-2.0 / (k * np.imag(1.0 / z)))
-    edges = np.array([min(discs[0], WIDE * float(w.max())), *discs[1:]])
-    counts = _chord_counts(edges, np.real(1.0 / z), steps, k)
+    edges, counts = _followed(np.array([min(discs[0], WIDE * float(w.max())), *discs[1:]]), z, steps, k)
     outer, inner, area = _chords(edges[0], counts[0])
     chirp = 0.5j * k / z
     field = np.sqrt(2.0 / (np.pi * w[0] * w[1])) * np.exp(-chirp[0] * outer[:, None] ** 2 - chirp[1] * inner**2)
     shares = [float(np.sum(area * np.abs(field) ** 2))]
     axes = np.array([0, 1])  # of the outer and of the inner coordinate
-    for edge, count, step in zip(edges[1:], counts[1:], steps, strict=True):
+    for edge, whole, count, step in zip(edges[1:], discs[1:], counts[1:], steps, strict=True):
         (a, _, _, d), rates = step[axes].reshape(2, 4).T, k[axes] / step[axes, 0, 1]
         chirped = np.exp(-0.5j * (rates[0] * a[0] * outer[:, None] ** 2 + rates[1] * a[1] * inner**2))
         lit = field * chirped * area * np.sqrt(np.abs(rates[0] * rates[1])) / (2.0 * np.pi)
@@ -232,8 +237,56 @@ def powers_through(
         bend = rates[1] * d[1] * far_outer[:, None] ** 2 + rates[0] * d[0] * far_inner**2
         field *= np.exp(-0.5j * bend)
         outer, inner, area, axes = far_outer, far_inner, far_area, axes[::-1]
-        shares.append(float(np.sum(area * np.abs(field) ** 2)))
+        within = float(np.sum(area * np.abs(field) ** 2))
+        shares.append(within + (1.0 - edge / whole) * max(shares[-1] - within, 0.0))
     return np.array(shares)
+
+
+def lit_edges(
+    q: ArrayLike,
+    *,
+    wavelengths: ArrayLike,
+    discs: Sequence[float],
+    systems: Sequence[ArrayLike],
+    spread: float = SPREADS[0],
+) -> NDArray[np.float64]:
+    """Radii (d,), m, of apertures as far as light falls on them: rays of the first, and diffraction by all before.
+
+    spread   rad, of diffraction by each edge: see SPREADS
+    others   as of `powers_through`
+
+    Source: the rings of an edge fall off as [BORN99] section 8.5.2 says.
+
+    >>> from catseye.optics.abcd import beam_at_waist, free_space
+    >>> q, on = beam_at_waist(0.010, 0.78e-6), free_space(10.0)
+    >>> lit_edges([q, q], wavelengths=[0.78e-6] * 2, discs=[0.02, 1.0], systems=[[on, on]]).round(4).tolist()
+    [0.02, 0.0274]
+    """
+    k, curvature = 2.0 * np.pi / np.asarray(wavelengths, float), np.real(1.0 / np.asarray(q, complex))
+    edges, steps = np.array(discs, dtype=float), np.asarray(systems, float)
+    for i in range(1, len(edges)):
+        system, diffracted = np.broadcast_to(np.eye(2), (2, 2, 2)), 0.0
+        for j in range(i - 1, -1, -1):
+            system = system @ steps[j]  # from disc j to disc i
+            diffracted += float(np.max(spread * np.abs(system[:, 0, 1]) / (k * edges[j])))
+        rays = float(np.max(edges[0] * np.abs(system[:, 0, 0] + system[:, 0, 1] * curvature)))
+        edges[i] = min(edges[i], rays + diffracted)
+    return edges
+
+
+def _followed(
+    discs: NDArray[np.float64], q: NDArray[np.complex128], steps: NDArray[np.float64], k: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], list[int]]:
+    """Radii (d,), m, of the discs as far as they are followed, and nodes on half a chord of each."""
+    light = {"wavelengths": 2.0 * np.pi / k, "discs": discs.tolist(), "systems": steps}
+    for spread in SPREADS:
+        edges = lit_edges(q, **light, spread=spread)
+        try:
+            return edges, _chord_counts(edges, np.real(1.0 / q), steps, k)
+        except ValidityError:
+            if spread == SPREADS[-1]:
+                raise
+    raise AssertionError("SPREADS is empty")
 
 
 def _chord_counts(

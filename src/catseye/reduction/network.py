@@ -9,8 +9,10 @@ from threadpoolctl import threadpool_limits
 from catseye.constants import PPM
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import CONVERGED, GroupFit
-from catseye.estimation.network.adjustment import NetworkSettings, adjust_network, fits_near, with_datum
+from catseye.estimation.network.adjustment import NetworkSettings, adjust_network, fits_near
 from catseye.estimation.network.approximate.start import approximate
+from catseye.estimation.network.cures import inflation_of, targets_of_ranges
+from catseye.estimation.network.datum import with_datum
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
 from catseye.estimation.network.monte_carlo import Disturbance, MonteCarloScatter, scatter
 from catseye.estimation.network.ranging_engine import RangingCovariance
@@ -118,7 +120,9 @@ def adjusted(
     if not treated:
         return replace(result, likely=_likely(plain, solve, level))
     if robust is not None:
-        estimate = estimate_robustly(solve, sizes, options=RobustOptions(method=robust), places=_places(network))
+        estimate = estimate_robustly(
+            solve, sizes, options=RobustOptions(method=robust), places=targets_of_ranges(network)
+        )
         inflation = [1.0 / np.sqrt(np.maximum(w, MOST_INFLATION**-2)) for w in estimate.weights]
         solution = _final(network, inflation, placed, alone=True)
         notes = () if estimate.status == CONVERGED else (f"robust estimation {estimate.status}",)
@@ -146,7 +150,11 @@ def _likely(
     tests = observation_tests(plain.fits, level=level)
     if not any(np.any(p < level) for p in tests.adjusted):
         return tuple(np.zeros(m, dtype=bool) for m in sizes)
-    return snoop(solve, sizes, options=SnoopingOptions(level=level), weigh=False).rejected
+    options = SnoopingOptions(level=level)
+    if plain.status.startswith(CONVERGED):
+        return snoop(solve, sizes, options=options, weigh=False).rejected
+    start = estimate_robustly(solve, sizes, places=targets_of_ranges(plain.network))  # its tests say nothing
+    return snoop(solve, sizes, options=options, start=start.rejected, doubtful=start.undecided, weigh=False).rejected
 
 
 def _with_rejections(
@@ -157,12 +165,9 @@ def _with_rejections(
     level: float,
 ) -> AdjustedNetwork:
     """The answer without the observations that the w test rejects, by data snooping from a robust start."""
-    start = estimate_robustly(solve, sizes, places=_places(network))
+    start = estimate_robustly(solve, sizes, places=targets_of_ranges(network))
     chosen = snoop(solve, sizes, options=SnoopingOptions(level=level), start=start.rejected, doubtful=start.undecided)
-    inflation = [
-        np.where(r, np.inf, np.where(u, MOST_INFLATION, 1.0))
-        for r, u in zip(chosen.rejected, chosen.undecided, strict=True)
-    ]
+    inflation = inflation_of(chosen.rejected, chosen.undecided)
     return AdjustedNetwork(
         solution=_final(network, inflation, placed, alone=True),
         treatment="rejected",
@@ -172,11 +177,6 @@ def _with_rejections(
         rejections=chosen.rejections,
         notes=() if chosen.status == CONVERGED else (f"rejection {chosen.status}",),
     )
-
-
-def _places(network: ObservationNetwork) -> list[np.ndarray]:
-    """For the search at single points: the target of each range, -1 for other observations."""
-    return [points_of(g)[1] if isinstance(g, Distances) else np.full(len(g.observed), -1) for g in network.groups]
 
 
 def _placed(network: ObservationNetwork) -> tuple[ObservationNetwork, Placed]:

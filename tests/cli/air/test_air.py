@@ -90,6 +90,40 @@ def test_uncertainties_of_the_instruments_add(catseye):
     assert both["standard_uncertainty"] * 1e6 == pytest.approx(expected, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("way", "its_u"),
+    [
+        ("--humidity-percent=50", "--u-humidity-percent=2"),
+        ("--dew-point-c=9.267", "--u-dew-point-c=0.2"),
+        ("--wet-bulb-c=14", "--u-wet-bulb-c=0.1"),
+        ("--vapour-pressure-hpa=11.73", "--u-vapour-pressure-hpa=0.1"),
+    ],
+)
+@pytest.mark.parametrize("above", [0, 100])
+def test_no_way_to_the_index_counts_sensors_that_were_not_given(catseye, way, its_u, above):
+    """The formulas of the instruments have their own parts, and are no sensors."""
+    bare = (*WEATHER[1:], way, "--above-barometer-m", above)
+    found = asked(catseye, *bare)
+    assert found["uncertainty_of"] == []
+    assert found["standard_uncertainty"] == found["formula_uncertainty"] >= 5e-8
+    assert "u is the formula's alone until" in found["verdict"]["why"]
+    assert "the formula's alone until" in " ".join(catseye("air", *bare)[1].split("uncertainty")[1].split())
+    one = asked(catseye, *bare, "--u-temperature-c", 0.1)
+    assert one["uncertainty_of"] == ["temperature"]
+    assert one["formula_uncertainty"] == found["formula_uncertainty"]
+    assert "that of temperature; not given: pressure, humidity" in one["verdict"]["why"]
+    every = ("--u-temperature-c", 0.1, "--u-pressure-hpa", 0.1, its_u)
+    assert "the formula's part and the sensors'" in asked(catseye, *bare, *every)["verdict"]["why"]
+
+
+def test_mercury_alone_counts_its_formula_and_no_sensor(catseye):
+    found = asked(catseye, *MERCURY[1:], "--latitude-deg", 38.45, "--elevation-m", 797.3)
+    assert found["uncertainty_of"] == []
+    assert found["standard_uncertainty"] == found["formula_uncertainty"] > 5e-8  # gravity from a formula: 3e-4 m/s²
+    read = asked(catseye, *MERCURY[1:], "--gravity", 9.79784, "--u-barometer-mmhg", 0.05)
+    assert read["uncertainty_of"] == ["pressure"]
+
+
 def test_the_text_says_what_the_object_says(catseye):
     status, out, err = catseye(*WEATHER, "--humidity-percent", 50, "--model", "rueger1990")
     assert (status, err) == (0, "")

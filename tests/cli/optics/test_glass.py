@@ -5,7 +5,7 @@ from functools import partial
 
 import pytest
 
-from catseye.optics.glass import GLASSES, group_index
+from catseye.optics.glass import GLASSES, group_index, reference_air
 from catseye.optics.retroreflector import prism
 
 
@@ -28,9 +28,10 @@ def test_the_notes_glass_gives_the_notes_numbers(asked):
     status, out, err = asked("BK7-old", "--height-mm", 38.4, "--json")
     assert (status, err) == (0, "")
     found = json.loads(out)
-    assert found["phase_index"] == pytest.approx(1.51118682, abs=5e-9)
-    assert found["group_index"] == pytest.approx(1.52746375, abs=5e-9)
-    assert found["group_wavelength"] == pytest.approx(0.130845422, abs=1e-9)
+    # the notes put 0.780 um, which the option takes in vacuum, into a formula for the wavelength in air
+    assert found["notes_phase_index"] == pytest.approx(1.51118682, abs=5e-9)
+    assert found["notes_group_index"] == pytest.approx(1.52746375, abs=5e-9)
+    assert found["notes_group_wavelength"] == pytest.approx(0.130845422, abs=1e-9)
     own = found["prism"]
     assert own["notes_group_index_over_air"] == pytest.approx(1.527077, abs=5e-7)
     assert own["notes_range_constant"] * 1e3 == pytest.approx(-33.4937, abs=5.1e-5)
@@ -51,10 +52,42 @@ def test_a_kelvin_changes_the_range_constant_as_told(asked):
     assert constants[2] - constants[0] == pytest.approx(slope, rel=1e-4, abs=0.0)
 
 
+def test_the_range_constant_at_minus_20_is_that_of_the_shrunk_prism(asked):
+    """By hand: -(n - 1/n) h with h = 38.1 mm (1 - 40 x 7.1e-6); the height as at 20 °C would be 9.4 um off."""
+    own = json.loads(asked("N-BK7", "--temperature-c=-20", "--json")[1])["prism"]
+    n, h = own["group_index_over_air"], 0.0381 * (1.0 - 40.0 * 7.1e-6)
+    assert own["range_constant"] == pytest.approx(-(n - 1.0 / n) * h, abs=1e-12)
+    assert own["range_constant"] + (n - 1.0 / n) * 0.0381 == pytest.approx(9.44e-6, abs=5e-8)
+    assert own["reference_depth"] == pytest.approx(h / n, abs=1e-12)
+    assert own["range_constant_per_c"] == pytest.approx(-0.30e-6, abs=5e-9)
+
+
+def test_the_wavelength_is_in_vacuum_as_the_help_says(asked):
+    """A mercury line: 0.5462268 um in vacuum is the e line, 0.5460740 um in air of 15 °C, of the data sheet."""
+    found = json.loads(asked("N-BK7", "--wavelength-um", 0.5462268, "--json")[1])
+    assert found["wavelength_in_air_um"] == pytest.approx(0.5460740, abs=5e-6)  # 5 °C: 2.6e-6
+    square = 1.0 + sum(
+        b * found["wavelength_in_air_um"] ** 2 / (found["wavelength_in_air_um"] ** 2 - c)
+        for b, c in ((1.03961212, 0.00600069867), (0.231792344, 0.0200179144), (1.01046945, 103.560653))
+    )
+    assert found["phase_index"] == pytest.approx(square**0.5, abs=1e-12)
+    air = float(reference_air(0.5462268).phase)
+    assert found["absolute_phase_index"] == pytest.approx(found["phase_index"] * air, abs=1e-12)
+
+
+@pytest.mark.parametrize("temperature_c", [-100, 140])
+def test_at_the_ends_of_the_formula_there_is_an_answer_and_a_doubt(asked, temperature_c):
+    found = json.loads(asked("N-BK7", f"--temperature-c={temperature_c}", "--json")[1])
+    assert found["verdict"]["word"] == "doubtful"
+    assert "-30 to 70 °C" in found["verdict"]["why"]
+    assert -5e-7 < found["prism"]["range_constant_per_c"] < -2e-7
+
+
 def test_the_other_glass_is_reckoned_at_the_wavelength_asked_for(asked):
     found = json.loads(asked("N-BK7", "--wavelength-um", 1.55, "--json")[1])
     assert found["others"]["BK7-old"] is None  # the old series ends at 1.014 um
-    difference = float(group_index(1.55, "fused-silica") - group_index(1.55, "N-BK7"))
+    in_air = 1.55 / float(reference_air(1.55).phase)  # 1.55 um is asked for in vacuum, both makers' air is at 20 °C
+    difference = float(group_index(in_air, "fused-silica") - group_index(in_air, "N-BK7"))
     assert found["others"]["fused-silica"]["group_index"] == pytest.approx(difference, abs=1e-15)
     assert "does not reach" in asked("N-BK7", "--wavelength-um", 1.55)[1]
 
@@ -85,6 +118,8 @@ def test_a_glass_beyond_the_notes_air_is_told_in_the_makers_air(catseye):
     assert (status, err) == (0, "")
     told = json.loads(out)
     assert told["prism"]["air"] == "20 °C, 1013.25 hPa, dry"
-    assert told["phase_index"] == pytest.approx(1.50745, abs=2e-5)  # [MALITSON65] at 0.25 um
+    # [MALITSON65] at 0.25 um of his own formula, in air; 0.25 um in vacuum is 75 pm less, by -0.49/um 3.7e-5 more
+    assert told["notes_phase_index"] == pytest.approx(1.50745, abs=2e-5)
+    assert told["phase_index"] == pytest.approx(1.50745 + 3.7e-5, abs=2e-5)
     assert told["prism"]["group_index_over_air"] == pytest.approx(told["group_index"], abs=2e-4)
     assert json.loads(catseye("glass", "N-BK7", "--json")[1])["prism"]["air"] == "20 °C, 933 hPa, 50 %"

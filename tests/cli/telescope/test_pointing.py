@@ -106,9 +106,32 @@ def test_the_track_under_an_inclinometer_and_poses(catseye, tmp_path):
         off = found["coefficients"][name] / ARCSECOND - wanted
         assert abs(off) < 4 * found["u_coefficients"][name] / ARCSECOND
     assert found["p"] > 1e-3
-    status, _, complained = catseye("pointing", "track", "--tilts", TILTS, "--harmonics", "1")
-    assert status == 1
-    assert "zero x" in complained
+
+
+def test_the_shipped_inclinometer_alone_gives_all_waves_but_the_first(catseye, tmp_path):
+    """Planted: mean 2.96 and 2.18, cos 3A -1.2 east, sin 3A 1.5 north, cos 2A 0.9 north, sin 2A 0.8 east."""
+    told = ("pointing", "track", "--tilts", TILTS, "--harmonics", "3")
+    status, said, complained = catseye(*told, "--json")
+    assert (status, complained) == (0, "")
+    found = json.loads(said)
+    assert found["verdict"]["word"] == "good"
+    assert "an inclinometer alone cannot tell from its zero" in found["verdict"]["why"]
+    lost = [f"{f} 1A {axis}" for f in ("cos", "sin") for axis in ("east", "north")]
+    assert found["undetermined"] == lost
+    assert found["inclinometer_zero"] is None
+    for k, (name, value) in enumerate(found["coefficients"].items()):
+        assert (value is None) == (name in lost)
+        assert (found["covariance"][k][k] is None) == (name in lost)
+    planted = {"mean east": 2.96, "mean north": 2.18, "cos 3A east": -1.2, "sin 3A north": 1.5, "cos 2A north": 0.9,
+               "sin 2A east": 0.8}  # fmt: skip
+    for name in set(found["coefficients"]) - set(lost):
+        off = found["coefficients"][name] / ARCSECOND - planted.get(name, 0.0)
+        assert abs(off) < 4 * found["u_coefficients"][name] / ARCSECOND
+    out = tmp_path / "out"
+    assert catseye(*told, "--out", out)[0] == 0
+    assert (out / "tilt.csv").read_text().startswith("azimuth_deg,tilt_east_without_wave_1_arcsec,")
+    assert ">nan<" not in (out / "report.html").read_text()
+    assert "AN -2.9" in " ".join(catseye(*told)[1].split())
 
 
 @pytest.mark.parametrize(
@@ -130,3 +153,92 @@ def test_what_cannot_be_done_is_said(catseye, told, status, said):
     found, _, complained = catseye("pointing", *told)
     assert found == status
     assert said in complained
+
+
+def rows_of(path):
+    """The observations of a TPOINT file, by hand."""
+    lines = [line for line in path.read_text().splitlines() if line and line[0] not in "!:"]
+    return np.array([[float(word) for word in line.split()[:4]] for line in lines[2:] if line != "END"])
+
+
+def written(path, rows, run="38 25 59.2"):
+    text = "\n".join(" ".join(f"{v:.7f}" for v in row) for row in rows)
+    path.write_text("\n".join(line for line in ("made", ": ALTAZ", run, text, "END") if line) + "\n")
+    return path
+
+
+def test_zenith_distances_for_elevations_are_doubtful_and_named_with_what_elevations_leave(catseye, tmp_path):
+    rows = rows_of(STARS)
+    status, said, _ = catseye(
+        "pointing", "fit", written(tmp_path / "zd.dat", rows * [1, -1, 1, -1] + [0, 90, 0, 90]), "--json"
+    )
+    found = json.loads(said)
+    assert status == 0
+    assert found["verdict"]["word"] == "doubtful"
+    a, e = rows[:, 0] * DEGREE, rows[:, 1] * DEGREE  # numpy's own least squares of the right table
+    across = (rows[:, 2] - rows[:, 0] + 180) % 360 - 180
+    right = np.column_stack([across * np.cos(e), rows[:, 3] - rows[:, 1]])
+    s, c, z = np.sin, np.cos, np.zeros_like(a)
+    one = np.ones_like(a)
+    x = np.column_stack([c(e), z, one, s(e), c(a) * s(e), s(a) * s(e), z, z])
+    y = np.column_stack([z, -one, z, z, -s(a), c(a), s(e), c(e)])
+    both, observed = np.concatenate([x, y]), right.T.ravel() * 3600
+    left = observed - both @ np.linalg.lstsq(both, observed, rcond=None)[0]
+    rms = np.sqrt(np.sum(left**2) / len(rows))
+    assert f"elevations are zenith distances ({rms:.2f} arc seconds rms)" in found["verdict"]["why"]
+    assert catseye("pointing", "fit", tmp_path / "zd.dat", "--strict", "--quiet")[0] == 1
+
+
+def test_without_the_latitude_line_no_star_is_taken_for_it(catseye, tmp_path):
+    for rows in (rows_of(STARS), np.round(rows_of(STARS))):  # whole degrees read as a latitude, too
+        status, said, complained = catseye("pointing", "fit", written(tmp_path / "n.dat", rows, run=""))
+        assert (status, said) == (1, "")
+        assert "line 3" in complained
+        assert "the line with the latitude is missing" in complained
+    one = written(tmp_path / "f.dat", rows_of(STARS), run="38.5 25.5 59.2")
+    assert "expected whole degrees, minutes" in catseye("pointing", "fit", one)[2]
+
+
+def test_residuals_beyond_a_tenth_of_the_widest_beam_are_doubtful(catseye, tmp_path):
+    rows = rows_of(STARS)
+    noise = np.random.default_rng(2).normal(0, 60 / 3600, (len(rows), 2))
+    rows[:, 2:] += noise / np.column_stack([np.cos(rows[:, 1] * DEGREE), np.ones(len(rows))])
+    found = json.loads(catseye("pointing", "fit", written(tmp_path / "n.dat", rows), "--json")[1])
+    assert found["verdict"]["word"] == "doubtful"
+    assert "beyond 65, a tenth of the beam" in found["verdict"]["why"]
+
+
+@pytest.mark.parametrize(("u", "word"), [("5.2", "good"), ("0.05", "doubtful"), ("500", "doubtful")])
+def test_a_stated_uncertainty_is_held_against_the_scatter_on_both_sides(catseye, u, word):
+    found = json.loads(catseye("pointing", "fit", STARS, "--u-arcsec", u, "--json")[1])
+    assert found["verdict"]["word"] == word
+    assert ("less than claimed" in found["verdict"]["why"]) == (u == "500")
+
+
+def test_a_model_from_a_doubtful_fit_makes_predictions_and_comparisons_doubtful(catseye, tmp_path):
+    model = tmp_path / "m.toml"
+    catseye("pointing", "fit", STARS, "--u-arcsec", "500", "--write", model, "--quiet")
+    told = ["pointing", "predict", "--azimuth-deg", "0", "--elevation-deg", "45", "--model", model]
+    assert json.loads(catseye(*told, "--json")[1])["verdict"]["word"] == "doubtful"
+    assert "Doubtful: it rests on" in catseye(*told)[1]
+    found = json.loads(catseye("pointing", "fit", STARS, "--against", model, "--json")[1])
+    assert found["verdict"]["word"] == "doubtful"
+
+
+@pytest.mark.parametrize("word", ["doubtful", "failed"])
+def test_poses_that_are_not_good_make_a_series_and_a_track_no_better(catseye, tmp_path, word):
+    judged, q = {"word": word, "why": "the night was foggy"}, np.diag([1e-12] * 3).tolist()
+    rng, files, tilts = np.random.default_rng(5), [], []
+    for k in range(12):
+        a, e = 30.0 * k, float(rng.uniform(20, 70))
+        value = published().correction(a * DEGREE, e * DEGREE) + rng.normal(size=2) * 1e-6
+        files.append(pose_file(tmp_path / f"p{k}", a, pointing={"correction": [*value, 0.0], "covariance": q}))
+        stored = json.loads(files[-1].read_text())
+        stored["posture"]["elevation_deg"] = e
+        files[-1].write_text(json.dumps(stored | ({"verdict": judged} if k == 3 else {})))
+        turn = {"frame": "alidade", "rotation": [*(rng.normal(size=2) * 1e-6), 0.0], "covariance": np.eye(6).tolist()}
+        tilts.append(pose_file(tmp_path / f"t{k}", a, **turn, **({"verdict": judged} if k == 3 else {})))
+    for told in (["fit", *files], ["track", *tilts]):
+        found = json.loads(catseye("pointing", *told, "--json")[1])
+        assert found["verdict"]["word"] == word
+        assert "the night was foggy" in found["verdict"]["why"]

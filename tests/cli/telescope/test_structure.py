@@ -200,3 +200,26 @@ def test_ranges_at_full_rate_show_the_planted_vibration(catseye, journal, tmp_pa
     status, _, err = catseye("structure", "--vibration", journal, "--points", "NOWHERE")
     assert status == 1
     assert "no target NOWHERE" in err
+
+
+@pytest.mark.parametrize("word", ["doubtful", "failed"])
+def test_a_model_is_no_better_than_the_worst_of_its_epochs(catseye, nights, word):
+    told = ["structure", "--epochs", nights / "epochs.csv", "--points", "ZEG*", "--json"]
+    assert json.loads(catseye(*told)[1])["verdict"]["word"] == "good"
+    place = nights / "night-05" / "coordinates.json"
+    document = json.loads(place.read_text()) | {"verdict": {"word": word, "why": "the night was foggy"}}
+    place.write_text(json.dumps(document))
+    found = json.loads(catseye(*told)[1])["verdict"]
+    assert found["word"] == word
+    assert "night-05" in found["why"]
+    assert catseye(*told, "--strict")[0] == 1
+
+
+def test_notes_that_claims_are_too_small_make_a_model_doubtful(catseye, nights):
+    told = ["structure", "--epochs", nights / "epochs.csv", "--points", "ZEG*", "--json"]
+    alone = json.loads(catseye(*told, "--independent")[1])
+    assert alone["verdict"]["word"] == "doubtful"
+    assert alone["verdict"]["why"] == alone["notes"][0].rstrip(".")
+    far = json.loads(catseye(*told, "--predict", 88)[1])
+    assert far["verdict"]["word"] == "doubtful"
+    assert "extrapolated" in far["verdict"]["why"]

@@ -180,3 +180,16 @@ def test_another_programs_file_is_not_overwritten(catseye, tmp_path):
         assert status == 1
         assert "exists and is not catseye's" in complaint
         assert (tmp_path / name).read_text() == "mine"
+
+
+@pytest.mark.parametrize("word", ["doubtful", "failed"])
+def test_a_surface_and_a_pose_are_no_better_than_their_reduction(catseye, tmp_path, word):
+    for source in reduction_directory().iterdir():
+        (tmp_path / source.name).write_bytes(source.read_bytes())
+    place = tmp_path / "coordinates.json"
+    document = json.loads(place.read_text()) | {"verdict": {"word": word, "why": "the night was foggy"}}
+    place.write_text(json.dumps(document))
+    for source in (tmp_path, tmp_path / "surface.csv"):
+        found = json.loads(catseye(source, "--json", "--free", "vertex,axis", "--zernike", "6")[1])["verdict"]
+        assert found["word"] == word
+        assert "the night was foggy" in found["why"]

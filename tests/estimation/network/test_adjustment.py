@@ -159,7 +159,7 @@ def test_a_flat_network_floats_out_of_its_plane(ranging_network, engine):
 
 
 def test_two_stations_exchanged_are_named(ranging_network):
-    network, _ = ranging_network(13, targets=5)  # 55 pairs are tried
+    network, _ = ranging_network(13, targets=5, off=0.0)  # 55 pairs are tried
     held = network.points.fixed.copy()
     held[:6] = True
     exchanged = network.points.xyz.copy()
@@ -170,6 +170,17 @@ def test_two_stations_exchanged_are_named(ranging_network):
         assert solution.status != "converged"
         assert "S02" in solution.status
         assert "S05" in solution.status
+
+
+def test_an_exchange_that_does_not_explain_all_is_not_named(ranging_network):
+    network, _ = ranging_network(13, targets=5)  # what is held is 1 cm off: exchanged back, the factor is 6.7e4
+    held = network.points.fixed.copy()
+    held[:6] = True
+    exchanged = network.points.xyz.copy()
+    exchanged[[1, 4]] = exchanged[[4, 1]]
+    status = adjust_network(replace(network, points=replace(network.points, xyz=exchanged, fixed=held))).status
+    assert status.startswith("converged, but the observations contradict each other")
+    assert "exchanged" not in status
 
 
 def test_ranges_that_contradict_are_named_with_their_place(ranging_network):

@@ -189,3 +189,20 @@ def test_the_weakest_direction_of_a_chain_is_its_free_end():
     assert u**2 == pytest.approx(1 / (4 * np.sin(np.pi / 14) ** 2), rel=1e-9)  # of a random walk of three steps
     with pytest.raises(EstimationError, match="leave it out"):
         weakest_direction(np.full((3, 3), np.nan))
+
+
+@pytest.mark.parametrize("gone", [(2,), (0, 1), (1,), (0, 2)])
+def test_coordinates_that_do_not_exist_leave_the_ellipsoid_of_the_others(gone):
+    rng = np.random.default_rng(4)
+    root = rng.normal(size=(5, 3, 3))
+    covariance = root @ np.swapaxes(root, 1, 2)
+    covariance[1] *= 1e-12  # below a metre squared by far
+    there = [k for k in range(3) if k not in gone]
+    right = np.sqrt(np.linalg.eigvalsh(covariance[:, there][:, :, there])[:, ::-1])
+    covariance[:, gone] = covariance[:, :, gone] = np.nan
+    covariance[4] = np.nan  # nothing known at all
+    e = ellipsoid(covariance)
+    assert e.semi_axes[:4, : len(there)] == pytest.approx(right[:4], rel=1e-9)
+    assert np.isnan(e.semi_axes[:, len(there) :]).all()
+    assert np.isnan(e.semi_axes[4]).all()
+    assert np.abs(e.directions[:4][:, list(gone), : len(there)]).max() < 1e-12

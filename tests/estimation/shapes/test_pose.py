@@ -223,3 +223,32 @@ def test_what_both_epochs_share_counts_once_in_every_row():
     cofactor = np.linalg.inv(weight) - columns @ np.linalg.inv(columns.T @ weight @ columns) @ columns.T
     w = np.abs(weight @ left) / np.sqrt(np.diag(weight @ cofactor @ weight))
     assert found.w == pytest.approx(w.reshape(n, 3).max(axis=1), rel=1e-3)
+
+
+def four(seed, moved, u=1e-4):
+    """Four points of a site, one or more moved by some centimetres."""
+    rng = np.random.default_rng(seed)
+    x = rng.uniform(-20, 20, (4, 3))
+    y = x + rng.normal(0, u, (4, 3))
+    for k in moved:
+        y[k] += rng.normal(0, 0.03, 3)
+    return [f"P{k}" for k in range(4)], x, y, PlaceCovariances(second=u**2 * np.eye(12))
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("seed", range(6))
+def test_of_four_points_the_one_that_moved_is_left_out_by_every_robust_method(method, seed):
+    called, x, y, covariance = four(seed, [seed % 4])
+    found = fit_pose(called, x, y, frame="ground", covariance=covariance, robust=method)
+    assert list(found.left_out) == [f"P{seed % 4}"]
+    plain = fit_pose(found.names, *(np.delete(v, seed % 4, axis=0) for v in (x, y)), frame="ground",
+                     covariance=PlaceCovariances(second=1e-8 * np.eye(9)))  # fmt: skip
+    np.testing.assert_allclose(found.about(plain.pivot).translation, plain.translation, atol=1e-9)
+
+
+def test_four_points_of_which_two_moved_are_refused_with_what_was_tried():
+    called, x, y, covariance = four(2, [0, 3])
+    with pytest.raises(
+        EstimationError, match=r"without any of the 4 points \(best without P\d, p .*more than one moved"
+    ):
+        fit_pose(called, x, y, frame="ground", covariance=covariance, robust="huber")

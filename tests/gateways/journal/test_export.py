@@ -319,6 +319,20 @@ def exported(tmp_path, entries, **more):
     return done, read_campaign(tmp_path / "out")
 
 
+def test_an_export_of_a_telescope_that_moved_is_doubtful_and_so_is_what_is_read_from_it(tmp_path):
+    done, campaign = exported(tmp_path, campaign_entries())
+    assert done.verdict.word == "good"
+    assert campaign.verdict == done.verdict
+    far = [LivePosture(START + SECOND * 3 + 1, np.radians(3.0), np.radians(41.25))]
+    (tmp_path / "moved").mkdir()
+    done, campaign = exported(tmp_path / "moved", campaign_entries() + far)
+    assert done.verdict.word == "doubtful"
+    assert "the telescope moved by" in done.verdict.why
+    assert campaign.verdict == done.verdict
+    document = json.loads((tmp_path / "moved" / "out" / "provenance.json").read_text())
+    assert document["verdict"] == done.verdict.to_object()
+
+
 def test_a_night_that_went_through_a_journal_is_the_same_night(tmp_path, night_01):
     """Every sample and reading of the example night; times to the half of a tick that a ZY's stamp has."""
     night, adc = night_01, night_01.site.adc

@@ -129,3 +129,11 @@ def test_missing_files_and_times_are_named(files, tmp_path):
 def test_hours_count_from_the_first_reading(files):
     found = read_readings(files("range_m,mjd_utc\n1,61280.5\n1,61280.25\n"), LAYOUT)
     np.testing.assert_allclose(found.hours(), [6.0, 0.0])
+
+
+@pytest.mark.parametrize("name", ["EDM 7", "Leica TM50 / 2", "Messgerät Süd"])
+def test_an_instrument_has_the_name_that_people_call_it(files, name):
+    sheet = SHEET.replace('instrument = "ZP1"', f'instrument = "{name}"')
+    assert read_readings(files("range_m\n1\n2\n", sheet), LAYOUT).sheet.instrument == name
+    with pytest.raises(InputError, match="instrument"):
+        read_readings(files("range_m\n1\n2\n", sheet.replace(name, "")), LAYOUT)

@@ -181,9 +181,10 @@ def test_implied_stdevs_follow_the_formula_and_the_unit_of_the_value():
     assert np.allclose(distances.covariance, [((5 + 3 * 0.1**0.5) * MM) ** 2, (2 * MM) ** 2], rtol=1e-12)
 
 
-def test_a_plane_network_holds_the_heights_that_it_does_not_have(solve):
+def test_a_plane_network_has_no_heights(solve):
     network = small('<obs><distance from="1" to="3" val="100.003"/><distance from="2" to="3" val="89.44"/></obs>')
-    assert network.points.fixed.tolist() == [[True] * 3, [True] * 3, [False, False, True]]
+    assert network.points.fixed.tolist() == [[True, True, False], [True, True, False], [False] * 3]
+    assert network.points.absent.tolist() == [[False, False, True]] * 3
     assert network.points.datum.tolist()[2] == [True, True, False]
     assert np.allclose(solve(network).x[2, :2], (80.0, 60.0), atol=0.01)
 
@@ -194,7 +195,8 @@ def test_levelling_weighs_by_the_length_of_its_sections():
     inside = '<height-differences><dh from="1" to="2" val="1.01" dist="2.25"/></height-differences>'
     network = small(inside, points, head)
     assert network.groups[0].covariance.tolist() == pytest.approx([(6 * MM) ** 2])
-    assert network.points.fixed.tolist() == [[True] * 3, [True, True, False]]
+    assert network.points.fixed.tolist() == [[False, False, True], [False] * 3]
+    assert network.points.absent.tolist() == [[True, True, False]] * 2
 
 
 def test_orientations_start_where_the_coordinates_point():

@@ -183,10 +183,10 @@ def test_missing_parts_switched_off_data_and_continued_lines():
     assert "DUMMY" not in network.points.names
 
 
-def test_a_plane_survey_holds_its_heights_and_needs_none(solve):
+def test_a_plane_survey_has_no_heights_and_needs_none(solve):
     network = read(".2D\nC 1 0 0 ! !\nC 2 0 100 ! !\nC 3 78 62\nD 1-3 100 0.01\nD 2-3 89.4427191 0.01")
     assert [g.kinds[0] for g in network.groups] == ["horizontal_distance"]
-    assert network.points.fixed[:, 2].all()
+    assert network.points.absent.tolist() == [[False, False, True]] * 3
     assert solve(network).x[2, :2] == pytest.approx((60.0, 80.0), abs=1e-6)
 
 

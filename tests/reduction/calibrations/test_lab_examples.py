@@ -8,9 +8,11 @@ from repository import ROOT
 HERE = ROOT / "examples" / "calibrations"
 
 
+@pytest.mark.parametrize("planted", [False, True])
 @pytest.mark.parametrize("kind", EXAMPLES)
-def test_an_example_is_what_its_maker_writes(kind, tmp_path):
-    write_example(kind, tmp_path)
+def test_an_example_is_what_its_maker_writes(kind, planted, tmp_path):
+    write_example(kind, tmp_path, planted)
+    name = f"{kind}-planted" if planted else kind
     for ending in (".csv", ".toml"):
-        made, kept = ((folder / (kind + ending)).read_text(encoding="utf-8") for folder in (tmp_path, HERE))
+        made, kept = ((folder / (name + ending)).read_text(encoding="utf-8") for folder in (tmp_path, HERE))
         assert made == kept

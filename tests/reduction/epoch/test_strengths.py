@@ -22,7 +22,7 @@ from catseye.reduction.epoch.strengths import (
     _Shown,
     with_processes,
 )
-from catseye.reduction.epoch.telescope_motion import TelescopeKnots
+from catseye.reduction.epoch.telescope_motion import PARTS, WALK, TelescopeKnots
 from catseye.reduction.site.places import RangedPoint
 
 LOW, HIGH = (1e-3,), (10.0,)
@@ -190,7 +190,7 @@ def processes(*, hours=2.0, sunshine=False):
     air = SimpleNamespace(knots=knots, heights=np.array([0.0, 50.0]))
     between = first + np.arange(k)
     across = first + k + np.arange(2 * j).reshape(2, j)
-    moving = first + k + 2 * j + np.arange(5 * len(telescope.knots)).reshape(5, -1)
+    moving = first + k + 2 * j + np.arange(len(PARTS) * len(telescope.knots)).reshape(len(PARTS), -1)
     return Processes(air, (between, across), errors, telescope, moving), int(moving.max()) + 1
 
 
@@ -209,9 +209,7 @@ def test_priors_hold_every_parameter_once_with_its_own_uncertainty(sunshine):
     level = np.sqrt(2e-4 + WIDE.level_c**2 + WIDE.level_fast_c**2)
     np.testing.assert_allclose(u[every.columns[0][:5]], level, rtol=1e-4)
     np.testing.assert_allclose(u[every.columns[1]], WIDE.across_c_per_m, rtol=1e-6)
-    np.testing.assert_allclose(
-        u[every.moving[:, -1]], [3.0, 1.0, 0.05, 0.05, 0.05], rtol=1e-6
-    )  # an hour from the middle
+    np.testing.assert_allclose(u[every.moving[:, -1]], WALK, rtol=1e-6)  # an hour from the middle
 
 
 def seen_processes(rng, truth, *, sigma):
@@ -224,7 +222,7 @@ def seen_processes(rng, truth, *, sigma):
     noise = np.full(count, np.inf)
     noise[every.columns[0]] = sigma
     noise[every.columns[1].ravel()] = sigma / 50.0  # °C/m: at 50 m
-    noise[every.moving[:2].ravel()], noise[every.moving[2:].ravel()] = 0.3, 0.01
+    noise[every.moving] = 0.1 * np.array(WALK)[:, None]
     on = np.flatnonzero(np.isfinite(noise))
     values = x[on] + noise[on] * rng.standard_normal(len(on))
     return every, Linear("seen", values, noise[on] ** 2, on, np.eye(len(on))), count
@@ -239,7 +237,8 @@ def estimated(every, group, count, before):
 
 def test_a_campaigns_strengths_are_recovered_where_everything_is_seen():
     rng = np.random.default_rng(8)
-    truth = ProcessStrength(AirStrength(0.25, 0.1, 0.08, 0.04, 0.008), telescope=(2.0, 3.0, 4.0, 4.0, 0.5))
+    walks = (2.0, 3.0, 4.0, 2.0, 3.0, 3.0, 0.5, 0.5, 4.0, 4.0, 0.5)
+    truth = ProcessStrength(AirStrength(0.25, 0.1, 0.08, 0.04, 0.008), telescope=walks)
     found, spread = [], []
     for _ in range(12):
         every, group, count = seen_processes(rng, truth, sigma=0.01)
@@ -250,9 +249,9 @@ def test_a_campaigns_strengths_are_recovered_where_everything_is_seen():
     # knots and six of experience at a third of the strength: 15 % low, and a tenth of scatter over three.
     np.testing.assert_allclose(np.mean(spread, axis=0), spreads(every, truth), rtol=0.25)
     # twice 25 knots that forget in six, and four steps of each walk, beside six of experience at the usual strength;
-    # east and north are of one strength
-    seen = np.array([24, 4, 4, 8, 8, 4], dtype=float)
-    true, usual = np.array([0.008, *truth.telescope]), np.array([USUAL.across_c_per_m, *(1.0,) * 5])
+    # two tilts are of one strength, and so are two bends, and east and north
+    seen = np.array([24, 4, 4, 4, 4, 8, 8, 8, 8, 8, 8, 4], dtype=float)
+    true, usual = np.array([0.008, *truth.telescope]), np.array([USUAL.across_c_per_m, *(1.0,) * len(PARTS)])
     expected = np.sqrt((seen * true**2 + EXPERIENCE * usual**2) / (seen + EXPERIENCE))
     # the mean square of twelve times four steps scatters by a fifth, its root by a tenth
     np.testing.assert_allclose(np.sqrt(np.mean(np.square(found), axis=0)), expected, rtol=0.3)
@@ -277,12 +276,12 @@ def test_a_campaign_that_shows_nothing_keeps_the_usual_strengths():
 
 def test_quiet_air_and_wild_air_stay_within_what_air_can_be():
     rng = np.random.default_rng(9)
-    quiet = ProcessStrength(AirStrength(1e-4, 1e-4, 1e-4, 1e-4, 1e-6), telescope=(1e-3,) * 5)
+    quiet = ProcessStrength(AirStrength(1e-4, 1e-4, 1e-4, 1e-4, 1e-6), telescope=(1e-3,) * len(PARTS))
     one = estimated(*seen_processes(rng, quiet, sigma=1e-4), ProcessStrength())
     low = np.array(dataclasses.astuple(LEAST))
     assert np.all(np.array(dataclasses.astuple(one.air)) >= low)
     assert np.all(np.array(dataclasses.astuple(one.air)) < dataclasses.astuple(USUAL))
-    wild = ProcessStrength(AirStrength(30.0, 10.0, 10.0, 5.0, 0.5), telescope=(300.0,) * 5)
+    wild = ProcessStrength(AirStrength(30.0, 10.0, 10.0, 5.0, 0.5), telescope=(300.0,) * len(PARTS))
     two = estimated(*seen_processes(rng, wild, sigma=0.01), ProcessStrength())
     assert np.all(np.array(dataclasses.astuple(two.air)) <= dataclasses.astuple(MOST))
     assert two.air.level_fast_c == MOST.level_fast_c
@@ -300,7 +299,7 @@ def test_other_strengths_change_the_processes_priors_and_leave_all_others_as_the
         own, observed=own.observed[1:], covariance=own.covariance[1:], columns=own.columns[1:], matrix=own.matrix[1:]
     )
     mine = [*others, *priors[:errors], trimmed, *priors[errors + 1 :]]
-    strength = ProcessStrength(USUAL, telescope=(2.0,) * 5)
+    strength = ProcessStrength(USUAL, telescope=(2.0,) * len(PARTS))
     found = with_processes(mine, every, strength)
     assert [p.name for p in found] == ["others", *names]
     assert found[0] is others[0]
@@ -320,7 +319,7 @@ def test_strengths_are_near_where_none_differs_by_more_than_a_quarter():
         air = dataclasses.replace(USUAL, **{change: 1.4 * getattr(USUAL, change)})
         assert not one.near(dataclasses.replace(one, air=air))
         assert not dataclasses.replace(one, air=air).near(one)
-    assert not one.near(dataclasses.replace(one, telescope=(1.0, 1.0, 1.0, 1.0, 2.0)))
+    assert not one.near(dataclasses.replace(one, telescope=(*(1.0,) * (len(PARTS) - 1), 2.0)))
     assert not one.near(dataclasses.replace(one, eddies_ppm=0.5))
     none = dataclasses.replace(one, eddies_ppm=0.0)
     assert none.near(dataclasses.replace(none, eddies_ppm=0.015))  # as good as none

@@ -1,7 +1,8 @@
-"""How the telescope expands and moves during a campaign: derivatives by moving points, and the walk by hand."""
+"""Motion of the telescope during a campaign: derivatives by moving points, and the walk by hand."""
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from catseye.constants import MILLIMETRE, PPM
 from catseye.reduction.epoch.telescope_motion import PARTS, STEP, UNITS, TelescopeKnots
@@ -15,25 +16,40 @@ PLACES = {
     "DP001": RangedPoint("DP001", "prism", np.array([-40.0, 10.0, 60.0]), body="dish"),
     "DP002": RangedPoint("DP002", "prism", np.array([30.0, -20.0, 80.0]), body="dish"),
     "DP003": RangedPoint("DP003", "prism", np.array([25.0, 40.0, 70.0]), body="dish"),
+    "DP004": RangedPoint("DP004", "prism", np.array([-5.0, -30.0, 72.0]), body="dish"),
+    "DP005": RangedPoint("DP005", "prism", np.array([8.0, 9.0, 64.0]), body="dish"),
+    "DP006": RangedPoint("DP006", "prism", np.array([-20.0, 33.0, 66.0]), body="dish"),
 }
+DISH = [name for name in PLACES if name.startswith("DP")]
 HOURS = 3.0
 KNOTS = TelescopeKnots.of(HOURS * 3600.0, PLACES)
 
 
 def moved(name, amounts):
-    """(3,) m, a point moved by amounts (5,) ppm and mm: the formula of the module's docstring, word for word."""
+    """(3,) m, a point moved by amounts of `PARTS`, ppm, µrad and mm: the module's docstring, word for word."""
     place, body = PLACES[name].start, PLACES[name].body
     if not body:
         return place
-    scale, dish, *shift = amounts
-    middle = np.mean([PLACES[n].start for n in ("DP001", "DP002", "DP003")], axis=0)
-    where = place + 1e-6 * scale * place + 1e-3 * np.array(shift)
-    return where + 1e-6 * dish * (place - middle) if body == "dish" else where
+    by = dict(zip(PARTS, amounts, strict=True))
+    middle = np.mean([PLACES[n].start for n in DISH], axis=0)
+    reach = max(np.linalg.norm(PLACES[n].start - middle) for n in DISH)
+    where = place + 1e-6 * by["scale"] * place
+    where = where + Rotation.from_rotvec([0.0, 0.0, 1e-6 * by["turn"]]).apply(place) - place
+    where = where + 1e-3 * np.array([by["east"], by["north"], by["up"]])
+    away = place - middle
+    if body in ("dish", "arm"):
+        tilt = Rotation.from_rotvec([1e-6 * by["tilt east"], 1e-6 * by["tilt north"], 0.0])
+        where = where + tilt.apply(away) - away + 1e-6 * by[f"{body} scale"] * away
+    if body == "dish":
+        first, second, normal = KNOTS.axes
+        u, v = away @ first / reach, away @ second / reach
+        where = where + 1e-3 * (by["bend upright"] * (u**2 - v**2) + by["bend diagonal"] * 2.0 * u * v) * normal
+    return where
 
 
 @pytest.mark.parametrize("ranger", ["ZY101", "ZY113"])
 def test_slopes_are_the_derivatives_of_the_exact_distance(ranger):
-    targets = ["ZRG", "ZEG", "ZY113" if ranger == "ZY101" else "ZY101", "DP001", "DP002", "DP003"]
+    targets = ["ZRG", "ZEG", "ZY113" if ranger == "ZY101" else "ZY101", *DISH]
     a = np.tile(PLACES[ranger].start, (len(targets), 1))
     b = np.array([PLACES[t].start for t in targets])
     apart = a - b
@@ -59,8 +75,29 @@ def test_signs_by_hand():
     assert by["up"] == pytest.approx(1e-3)
     assert by["east"] == by["north"] == 0.0
     assert by["scale"] == pytest.approx(60e-6)  # a ppm of 60 m
-    assert by["dish scale"] == pytest.approx(-10e-6)  # it is 10 m below the dish's middle, at 70 m
-    assert UNITS == (PPM, PPM, MILLIMETRE, MILLIMETRE, MILLIMETRE)
+    middle = np.mean([PLACES[n].start for n in DISH], axis=0)
+    assert by["dish scale"] == pytest.approx((60.0 - middle[2]) * 1e-6)
+    assert by["arm scale"] == by["turn"] == 0.0  # it is no arm; a turn about the vertical lifts nothing
+    assert by["tilt east"] == pytest.approx((10.0 - middle[1]) * 1e-6)  # about the east: the north rises
+    assert by["tilt north"] == pytest.approx(-(-40.0 - middle[0]) * 1e-6)  # about the north: the east sinks
+    assert (PPM, PPM, PPM, 1e-6, 1e-6, 1e-6, *(MILLIMETRE,) * 5) == UNITS
+    np.testing.assert_allclose(KNOTS.axes @ KNOTS.axes.T, np.eye(3), atol=1e-12)
+
+
+def test_a_turn_about_the_vertical_moves_the_east_to_the_north():
+    a, b = np.array([[-10.0, 0.0, 100.0]]), np.array([[-10.0, 30.0, 100.0]])
+    (slopes,) = KNOTS.slopes("ZY101", ["ZY113"], a, b, np.array([[0.0, -1.0, 0.0]]))
+    assert dict(zip(PARTS, slopes, strict=True))["turn"] == pytest.approx(-10e-6)  # at x = -10 m the north comes nearer
+
+
+def test_a_dish_of_few_points_does_not_bend():
+    few = {n: p for n, p in PLACES.items() if n not in ("DP005", "DP006")}
+    knots = TelescopeKnots.of(HOURS * 3600.0, few)
+    a, b = np.array([[120.0, 0.0, 1.0]]), PLACES["DP001"].start[None]
+    towards = (a - b) / np.linalg.norm(a - b)
+    at = [PARTS.index("bend upright"), PARTS.index("bend diagonal")]
+    np.testing.assert_array_equal(knots.slopes("ZY101", ["DP001"], a, b, towards)[0, at], 0.0)
+    assert np.all(KNOTS.slopes("ZY101", ["DP001"], a, b, towards)[0, at] != 0.0)
 
 
 def test_between_points_of_the_ground_nothing_moves_and_on_the_telescope_no_shift_shows():
@@ -68,9 +105,10 @@ def test_between_points_of_the_ground_nothing_moves_and_on_the_telescope_no_shif
     b = PLACES["ZEG"].start[None]
     towards = (a - b) / np.linalg.norm(a - b)
     (on_it,) = KNOTS.slopes("ZY113", ["ZEG"], a, b, towards)
-    np.testing.assert_array_equal(on_it[2:], 0.0)
     assert on_it[0] == pytest.approx(PPM * np.linalg.norm(a - b))  # it grows with its distance
-    assert on_it[1] == 0.0
+    by = dict(zip(PARTS, on_it, strict=True))
+    assert all(abs(by[part]) < 1e-20 for part in ("turn", "east", "north", "up"))  # both move alike
+    assert by["dish scale"] == by["bend upright"] == by["bend diagonal"] == 0.0
     a, b = PLACES["ZY101"].start[None], PLACES["ZRG"].start[None]
     np.testing.assert_array_equal(KNOTS.slopes("ZY101", ["ZRG"], a, b, (a - b) / np.linalg.norm(a - b)), 0.0)
 

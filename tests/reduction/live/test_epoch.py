@@ -111,7 +111,8 @@ def test_an_epoch_is_carried_in_the_frames_of_its_points(second_epoch):
         np.testing.assert_allclose(live.place(name, found.ticks / TICKS_PER_DAY), ground, rtol=0, atol=1e-9)
         at = live.carried.columns(point_parameters(ParameterKind.POINT, [name]))
         own, own_covariance = live.carried.x[at], live.carried.covariance[np.ix_(at, at)]
-        np.testing.assert_allclose(np.trace(own_covariance), np.trace(covariance), rtol=1e-9)
+        # what is considered (`epoch.common_errors`) stays in every epoch's own answer, and is not carried on
+        assert 0.99 * np.trace(covariance) < np.trace(own_covariance) < np.trace(covariance)
         moves = live.frames[name] != "ground"
         assert (np.linalg.norm(own - ground) > 1.0) == moves
         latest = live.track.latest

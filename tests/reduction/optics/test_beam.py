@@ -49,6 +49,25 @@ def test_what_returns_is_the_round_formula_of_the_link_budget():
         assert found.places[-1].power == pytest.approx(1e-3 * known, abs=2e-8)
 
 
+def test_a_wider_detector_takes_more_light_and_never_none():
+    """Up to half a metre: what passes the lens is all there is, and the last of it falls off as the rings do."""
+    train = read_record(EXAMPLE, BeamTrain).model_copy(update={"distances_m": (20.0, 120.0, 300.0, 400.0)})
+    before = np.zeros(4)
+    for radius_mm in (0.05, 0.1, 0.3, 0.5, 2.0, 20.0, 500.0):
+        plate = train.detector.model_copy(update={"radius_mm": radius_mm})
+        found = reduce_beam(train.model_copy(update={"detector": plate}))
+        assert [row.status for row in found.returned] == ["ok"] * 4
+        power = np.array([row.power for row in found.returned])
+        assert np.all(power >= before * (1.0 - 1e-6))
+        before = power
+    # 0.1 mm was followed before; 99.99 % of its light at 300 m lies within 2 mm by Airy's 2/(pi v) at a dim edge
+    assert [row.collected for row in found.returned][2] == pytest.approx(0.9742, abs=2e-3)
+    unfocused = train.detector.model_copy(update={"radius_mm": 50.0})
+    inward = (*train.inward[:-1], train.inward[-1].model_copy(update={"length_mm": 230.0}))
+    found = reduce_beam(train.model_copy(update={"detector": unfocused, "inward": inward}))
+    assert [row.status for row in found.returned] == ["ok"] * 4
+
+
 def test_power_is_what_is_left_by_each_place(head):
     power = head.train.laser.power_mw * 1e-3
     for place in head.places:

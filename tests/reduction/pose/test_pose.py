@@ -14,7 +14,9 @@ from catseye.reduction.live.pose import live_pose
 from catseye.reduction.live.state import Carried
 from catseye.reduction.pose.pointing_offsets import cross_covariance, pointing_offset
 from catseye.reduction.pose.pose import at_posture, frame_transform, group_names, pose_of_group
+from catseye.reduction.pose.verdicts import PoseFindings, pose_verdict
 from catseye.reduction.site.places import nominal_frame, places_of
+from catseye.verdict import Verdict
 
 POSTURE = 145.3 * DEGREE, 30.0 * DEGREE
 NAMES = ("DP001", "DP002", "DP010", "DP020", "DP030", "DP040", "ZY113", "ZY114", "ZY115", "ZY118")
@@ -141,3 +143,35 @@ def test_what_cannot_be_asked_is_refused(night_01):
     ground = pose_of_group(later, later, night_01, group="dish").pose
     with pytest.raises(FrameError, match="expected 'reflector'"):
         pointing_offset(ground, ground, night_01)
+
+
+@pytest.mark.parametrize(("wrong", "said"), [((0.0, 0.5), "in elevation"), ((0.6, 0.0), "across the elevation axis")])
+def test_a_posture_that_is_not_the_dish_s_is_told_with_its_size_and_accuses_nobody(night_01, wrong, said):
+    """By hand: half a degree of elevation; 0.6 degrees of azimuth times cos 30 degrees, 0.520."""
+    real = epoch(night_01)
+    told = replace(real, posture=(POSTURE[0] - wrong[0] * DEGREE, POSTURE[1] - wrong[1] * DEGREE))
+    found = pose_of_group(told, None, at_posture(night_01, *told.posture), group="dish")
+    size = wrong[1] or wrong[0] * np.cos(np.radians(30.0))
+    verdict = pose_verdict(PoseFindings(found, None))
+    assert verdict.word == "doubtful"
+    assert said in found.posture.doubt
+    assert abs(np.linalg.norm(found.posture.offset) / DEGREE - size) < 0.01
+    assert "nothing here says which is wrong" in found.posture.doubt
+
+
+@pytest.mark.parametrize("frame", ["ground", "alidade", "reflector"])
+def test_a_dish_within_what_the_pointing_series_corrects_agrees_with_its_posture(night_01, frame):
+    turned = epoch(night_01, dish=(np.array([200.0, 30.0, 0.0]) * ARCSECOND, SHIFT))
+    found = pose_of_group(turned, epoch(night_01, seed=1), night_01, group="dish", frame=frame)
+    assert found.posture.doubt == ""
+    assert found.posture.offset[1] / ARCSECOND == pytest.approx(200.0, abs=0.1)  # about the elevation axis, upwards
+
+
+@pytest.mark.parametrize("word", ["doubtful", "failed"])
+@pytest.mark.parametrize("which", [0, 1])
+def test_a_pose_is_no_better_than_either_of_its_epochs(night_01, word, which):
+    epochs = [epoch(night_01), epoch(night_01, seed=1)]
+    epochs[which] = replace(epochs[which], verdict=Verdict(word, "the night was foggy"))
+    found = pose_verdict(PoseFindings(pose_of_group(*epochs, night_01, group="dish"), None))
+    assert found.word == word
+    assert "the night was foggy" in found.why

@@ -68,6 +68,24 @@ def test_an_inclinometer_alone_cannot_tell_its_zero_from_one_wave():
     assert found.poses == 0  # the mean alone is held: the zero goes round, the axis does not
 
 
+@pytest.mark.parametrize("harmonics", [1, 2, 3, 4])
+def test_an_inclinometer_alone_gives_every_other_wave_as_poses_that_know_nothing_would(harmonics):
+    """The same by a second way: with poses of u 1 rad beside it only the wave of one turn and the zero are open."""
+    a, none = ROUND + 0.1 * np.sin(5 * ROUND), (np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2, 2)))
+    alone = track_profile(*none, tilts=readings(a), harmonics=harmonics, partial=True)
+    beside = track_profile(AT, of_the_alidade(AT), spread(12, 206265.0), tilts=readings(a), harmonics=harmonics)
+    names = coefficient_names(harmonics)
+    assert alone.series.undetermined == tuple(name for name in names if " 1A " in name)
+    assert alone.zero is None
+    known = np.isfinite(alone.series.values)
+    np.testing.assert_allclose(alone.series.values[known], beside.series.values[known], rtol=0, atol=1e-6 * ARCSECOND)
+    u, v = (np.sqrt(np.diag(p.series.covariance))[known] for p in (alone, beside))
+    np.testing.assert_allclose(u, v, rtol=1e-4)
+    assert alone.degrees_of_freedom == 2 * len(a) - (4 * harmonics + 2)
+    if harmonics >= 3:
+        np.testing.assert_allclose(alone.series.at(a)[0][:, 0], tilt(a)[:, 0] - 0.8 * np.sin(a) * ARCSECOND, atol=1e-15)
+
+
 def test_too_few_azimuths_are_refused_by_name():
     with pytest.raises(EstimationError, match="not held"):
         track_profile(AT[:2], of_the_alidade(AT[:2]), spread(2), harmonics=2)

@@ -307,6 +307,17 @@ def test_the_dish_expands_by_its_own_share_about_its_middle():
     assert np.linalg.norm(dish.mean(axis=0) - plain.dish_middle) < 6.0  # of a radius of 50 m; 20 prisms
 
 
+def test_the_arm_expands_by_its_own_share_away_from_the_dish():
+    shares = {share: small(Nature(expansion=SteelExpansion(1.0, 3600.0, 0.1, share))) for share in (0.0, -0.1)}
+    plain, less = shares[0.0].truth.moving, shares[-0.1].truth.moving
+    late = np.array([plain.reference_s + 1800.0])
+    for name in ("DP020", "TR03-L"):
+        assert np.array_equal(plain.at([name], late), less.at([name], late))
+    own = (less.at(["ZY114"], late) - plain.at(["ZY114"], late))[0]
+    expected = -0.1 * float(plain.scale(late)[0]) * (plain.points["ZY114"] - plain.dish_middle)
+    np.testing.assert_allclose(own, expected, atol=1e-12)
+
+
 def test_steel_follows_waves_late_and_less():
     made = small(Nature(waves=(AirWave(0.3, 3600.0),), expansion=SteelExpansion(1.0, 3600.0)))
     t = np.arange(0.0, 3600.0, 60.0)

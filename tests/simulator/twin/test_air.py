@@ -172,3 +172,18 @@ def test_a_station_reads_the_air_where_it_stands_its_offset_and_its_scatter():
     )
     assert reads.std(axis=0) == pytest.approx([0.05, 0.05, 0.5], rel=0.15)  # 300 draws: 4 %
     assert noisy.weather("WX2", 50.0) == noisy.weather("WX2", 50.0)
+
+
+@pytest.mark.parametrize(("elevation_m", "expected"), [(319.0, 986.7), (0.0, 1024.9), (2600.0, 745.9)])
+def test_pressure_follows_the_standard_atmosphere_to_the_site_s_height(elevation_m, expected):
+    """By hand: 930.6 hPa at 806.42 m times ((288.15 - 0.0065 h) / 282.908)^5.25588."""
+    whole = site()
+    there = whole.site.model_copy(
+        update={"site": whole.site.site.model_copy(update={"elevation_of_z0_m": elevation_m})}
+    )
+    made = twin(planted=STILL, at=replace(whole, site=there))
+    pressure = made.air.weather(np.zeros((1, 1, 3)), np.zeros(1))[1]
+    assert pressure[0, 0] == pytest.approx(expected, abs=0.1)
+    assert twin(planted=STILL).air.conditions == LIVING_NIGHT
+    kept = LivingConditions(pressure_hpa=1000.0, elevation_m=elevation_m)  # what is said of this very height stands
+    assert twin(planted=STILL, at=replace(whole, site=there), conditions=kept).air.conditions.pressure_hpa == 1000.0

@@ -282,7 +282,7 @@ def _air(
         group_wavelength=SPEED_OF_LIGHT / ((1.0 + group) * np.asarray(modulation_hz, float)),
         sensitivity=chosen.partials(*state, **light).with_humidity_held(saturation, relative),
         phase_sensitivity=chosen.partials(*state, **light, kind="phase").with_humidity_held(saturation, relative),
-        standard_uncertainty=chosen.uncertainty(vapour),
+        standard_uncertainty=chosen.uncertainty(*state, **light),
         co2_ppm=co2_ppm if chosen.co2_slope else chosen.co2_ppm,
         model=chosen.name,
     )

@@ -8,7 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catseye.atmosphere.index.model import DensitySlopes, Gases, IndexModel, RefractiveDispersion
+from catseye.atmosphere.index.model import (
+    CO2_OF_TODAY_PPM,
+    CO2_SLOPE,
+    DensitySlopes,
+    Gases,
+    IndexModel,
+    RefractiveDispersion,
+)
 from catseye.atmosphere.limit import ValidInterval
 from catseye.atmosphere.weather.humidity import PA_PER_HPA
 from catseye.constants import ZERO_CELSIUS_K
@@ -17,7 +24,7 @@ from catseye.constants import ZERO_CELSIUS_K
 DRY_TERMS = ((5792105.0, 238.0185), (167917.0, 57.362))
 # [CIDDOR96] appendix A: 1e8 refractivity of standard vapour in 1, sigma², sigma^4, sigma^6, and its correction factor
 VAPOUR_TERMS, VAPOUR_FACTOR = (295.235, 2.6422, -0.032380, 0.004028), 1.022
-CO2_SLOPE, CO2_STANDARD_PPM = 0.534e-6, 450.0  # [CIDDOR96] eq. 2: per ppm
+CO2_STANDARD_PPM = CO2_OF_TODAY_PPM  # [CIDDOR96] eq. 2
 # [CIDDOR96] appendix A, compressibility: K/Pa, 1/Pa, 1/(K Pa); K/Pa, 1/Pa; K/Pa, 1/Pa; K²/Pa²; K²/Pa²
 A0, A1, A2 = 1.58123e-6, -2.9331e-8, 1.1043e-10
 B0, B1 = 5.707e-6, -2.051e-8

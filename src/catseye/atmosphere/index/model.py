@@ -14,6 +14,8 @@ import numpy as np
 from catseye.atmosphere.limit import ValidInterval
 
 Kind = Literal["group", "phase"]
+CO2_OF_TODAY_PPM = 450.0  # ppm, [CIDDOR96]: of the air that models without carbon dioxide are compared in
+CO2_SLOPE = 0.534e-6  # of the dry refractivity for each ppm, [CIDDOR96] eq. 2
 
 
 class IndexSensitivity(NamedTuple):
@@ -139,8 +141,9 @@ class IndexModel:
     densities              function of (temperature_c, pressure_hpa, vapour_pressure_hpa) giving each gas's factor
     density_slopes         function of the same giving each factor's DensitySlopes
     vapour_formula         the saturation formula it goes with, a name in `atmosphere.weather.humidity.FORMULAS`
-    standard_uncertainty   of the formula itself in the group index of dry air, perfect weather given
+    standard_uncertainty   of the formula itself in the group index of dry air, perfect weather given; the least
     vapour_uncertainty     what each hPa of vapour adds to it in squares; see `uncertainty`
+    standard               the model that this one is compared with where it is worse; None: it has no better
     limits                 argument's name -> Limit
     co2_ppm                carbon dioxide for which `dispersion` holds
     co2_slope              share by which each further ppm raises the dry air's refractivity; 0: no such term
@@ -157,17 +160,35 @@ class IndexModel:
     co2_ppm: float
     co2_slope: float = 0.0
     vapour_uncertainty: float = 0.0
+    standard: "IndexModel | None" = None
 
     def check(self, **arguments) -> None:
         """Raise ValidityError for the first argument outside its limit."""
         for argument, value in arguments.items():
             self.limits[argument].check(value)
 
-    def uncertainty(self, vapour_pressure_hpa):
-        """Standard uncertainty of the formula itself in the group index of air with this vapour, hPa."""
-        if not self.vapour_uncertainty:
-            return self.standard_uncertainty
-        return np.hypot(self.standard_uncertainty, self.vapour_uncertainty * np.asarray(vapour_pressure_hpa, float))
+    def uncertainty(
+        self, temperature_c, pressure_hpa, vapour_pressure_hpa, *, wavelength_um=0.780, co2_ppm=CO2_OF_TODAY_PPM
+    ):
+        """Standard uncertainty of the formula itself in the group index, perfect weather given.
+
+        co2_ppm   carbon dioxide that is there: a model without it is off by what it lacks
+
+        With a standard: how far the two are apart in this weather and the standard's own, in squares, but never less
+        than `standard_uncertainty`, for where the two happen to cross neither is better. Nothing is checked.
+        """
+        weather, light = (temperature_c, pressure_hpa, vapour_pressure_hpa), {"wavelength_um": wavelength_um}
+        if self.standard is not None:
+            off = self.refractivity(*weather, **light, co2_ppm=self.co2_ppm)
+            off = off - self.standard.refractivity(*weather, **light, co2_ppm=co2_ppm)
+            return np.maximum(self.standard_uncertainty, np.hypot(self.standard.standard_uncertainty, off))
+        least: Any = self.standard_uncertainty
+        if self.vapour_uncertainty:
+            least = np.hypot(least, self.vapour_uncertainty * np.asarray(vapour_pressure_hpa, float))
+        if self.co2_slope or not np.any(np.asarray(co2_ppm) != CO2_OF_TODAY_PPM):
+            return least
+        lacking = CO2_SLOPE * (np.asarray(co2_ppm, float) - CO2_OF_TODAY_PPM)
+        return np.hypot(least, lacking * self.refractivity(*weather, **light, co2_ppm=self.co2_ppm))
 
     def coefficients(self, wavelength_um, co2_ppm, kind: Kind = "group") -> Gases:
         """Refractivity that each gas adds per unit of its density factor."""

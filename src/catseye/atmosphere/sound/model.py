@@ -62,9 +62,11 @@ class SoundModel:
     speed                  function giving m/s
     partials               function giving SoundPartials
     vapour_formula         the saturation formula it goes with, a name in `atmosphere.weather.humidity.FORMULAS`
-    standard_uncertainty   of the formula itself, m/s, perfect weather given
+    standard_uncertainty   of the formula itself, m/s, perfect weather given; the least
     limits                 argument's name -> Limit
-    has_co2                whether carbon dioxide enters
+    has_co2                carbon dioxide enters
+    departure              function giving (m/s that the formula may be off in this weather, m/s of what that was
+                           found by), or None where it is the same in all; see `uncertainty`
     """
 
     name: str
@@ -75,6 +77,18 @@ class SoundModel:
     standard_uncertainty: float
     limits: dict[str, ValidInterval]
     has_co2: bool
+    departure: Callable[..., tuple[Any, Any]] | None = None
+
+    def uncertainty(self, temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm=450.0):
+        """Standard uncertainty of the formula itself, m/s, perfect weather given; nothing is checked.
+
+        What it is off here and the uncertainty of that in squares, but never less than `standard_uncertainty`: where
+        two formulas happen to cross neither is better.
+        """
+        if self.departure is None:
+            return self.standard_uncertainty
+        off, u = self.departure(temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm)
+        return np.maximum(self.standard_uncertainty, np.hypot(off, u))
 
     def check(self, **arguments) -> None:
         """Raise ValidityError for the first argument outside its limit."""

@@ -46,7 +46,7 @@ class Sound:
     dry_speed: Any
     vapour_pressure_hpa: Any
     sensitivity: SoundSensitivity
-    standard_uncertainty: float
+    standard_uncertainty: Any
     model: str
 
     @property
@@ -106,7 +106,7 @@ def sound(temperature_c, pressure_hpa, humidity_percent, *, model="parker2004", 
         dry_speed=chosen.speed(*weather, np.zeros_like(e), co2_ppm),
         vapour_pressure_hpa=e,
         sensitivity=chosen.partials(*weather, e, co2_ppm).with_humidity_held(saturation, humidity_percent),
-        standard_uncertainty=chosen.standard_uncertainty,
+        standard_uncertainty=chosen.uncertainty(*weather, e, co2_ppm),
         model=chosen.name,
     )
 

@@ -418,3 +418,26 @@ def _if97(kelvin):
 
 FORMULAS: dict[str, Callable[..., Saturation]] = {"buck": _buck, "ciddor": _ciddor, "iapws": _iapws}
 ICE_FORMULAS: dict[str, Callable[..., Saturation]] = {"buck": _buck_ice, "iapws": _iapws_ice}
+
+
+LEAST_RESOLVED = (
+    1.0  # %: hygrometers have u of 1 to 3 %, so that what lies between 0 and this is none of their readings
+)
+
+
+def likely_fraction(humidity_percent) -> bool:
+    """True where every relative humidity is above 0 and at most 1 %: more likely a fraction of 1 than percent.
+
+    humidity_percent   relative humidity, %
+
+    >>> likely_fraction(0.5), likely_fraction(0.0), likely_fraction([0.5, 40.0])
+    (True, False, False)
+    """
+    values = np.asarray(humidity_percent, float)
+    return bool(values.size and np.all((values > 0.0) & (values <= LEAST_RESOLVED)))
+
+
+def fraction_words(humidity_percent) -> str:
+    """Both readings of a humidity that is likely a fraction."""
+    first = float(np.ravel(np.asarray(humidity_percent, float))[0])
+    return f"a humidity of {first:g} % is below what hygrometers resolve; as a fraction it would be {100.0 * first:g} %"

@@ -1,7 +1,7 @@
 """The command of the air."""
 
 import math
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -69,10 +69,10 @@ def air(  # noqa: PLR0913 - its options are its command line
     json: Json = False,
 ) -> None:
     """Index of air, its sensitivities and its uncertainty, from whatever instruments stand there."""
-    from catseye.gateways.air.objects import air_object, air_passages, air_verdict
+    from catseye.gateways.air.objects import air_object, air_passages, air_verdict, stated_inputs
     from catseye.gateways.writers.objects import json_line
     from catseye.gateways.writers.passage import Passage
-    from catseye.reduction.air.routes import IndexFormula, air_by, station_pressure, surface_of
+    from catseye.reduction.air.routes import IndexFormula, air_by, formula_uncertainty, station_pressure, surface_of
 
     u_of = {
         "u-humidity-percent": (u_humidity_percent, ("humidity_percent",)),
@@ -91,30 +91,40 @@ def air(  # noqa: PLR0913 - its options are its command line
     moisture = _moisture(given, u_of)
     if u_surface_c > 0.0 and surface_c is None:
         raise typer.BadParameter("belongs to --surface-c.", param_hint="'--u-surface-c'")
+    stated = stated_inputs(
+        temperature=u_temperature_c,
+        pressure=max(u_pressure_hpa, u_barometer_mmhg, u_mercury_c),
+        humidity=moisture.u,
+        carbon_dioxide=u_co2_ppm,
+    )
+    u_of_formula = 0.0
     _one_pressure(pressure_hpa, barometer_mmhg, mercury_c, gravity, latitude_deg, elevation_m)
     if pressure_hpa is None:
         assert barometer_mmhg is not None  # else `_one_pressure` has refused
         assert mercury_c is not None
         latitude = None if latitude_deg is None else latitude_deg * DEGREE
         read = {"u_reading_mmhg": u_barometer_mmhg, "u_mercury_c": u_mercury_c}
-        found_p, u_p = station_pressure(
-            barometer_mmhg, mercury_c, gravity=gravity, latitude=latitude, elevation=elevation_m, **read
-        )
+        place: dict[str, Any] = {"gravity": gravity, "latitude": latitude, "elevation": elevation_m}
+        found_p, u_p = station_pressure(barometer_mmhg, mercury_c, **place, **read)
+        u_of_formula = float(station_pressure(barometer_mmhg, mercury_c, **place)[1])
         pressure_hpa, u_pressure_hpa = float(found_p), math.hypot(u_pressure_hpa, float(u_p))
     elif u_barometer_mmhg > 0.0 or u_mercury_c > 0.0:
         raise typer.BadParameter("belong to --barometer-mmhg.", param_hint="'--u-barometer-mmhg', '--u-mercury-c'")
+    formula = IndexFormula(wavelength_um=wavelength_um, model=model, co2_ppm=co2_ppm)
+    known = (temperature_c, pressure_hpa, moisture)
     state, u = air_by(
-        temperature_c,
-        pressure_hpa,
-        moisture,
+        *known,
         above_barometer=above_barometer_m,
         u_temperature_c=u_temperature_c,
         u_pressure_hpa=u_pressure_hpa,
         u_co2_ppm=u_co2_ppm,
-        formula=IndexFormula(wavelength_um=wavelength_um, model=model, co2_ppm=co2_ppm),
+        formula=formula,
     )
-    verdict = air_verdict(state, u)
-    answer = air_object(state, wavelength_um, u, verdict=verdict)
+    u_formula = formula_uncertainty(
+        *known, above_barometer=above_barometer_m, u_pressure_hpa=u_of_formula, formula=formula
+    )
+    verdict = air_verdict(state, u, stated)
+    answer = air_object(state, wavelength_um, u, verdict=verdict, stated=stated, u_formula=u_formula)
     if surface_c is not None:
         u_weather = {"u_temperature_c": u_temperature_c, "u_pressure_hpa": u_pressure_hpa}
         surface = surface_of(state, moisture, surface_c, u_surface_c=u_surface_c, **u_weather)

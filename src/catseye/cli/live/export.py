@@ -61,6 +61,7 @@ def export(
     refuse_output(out, Path(journal))
     progress = ProgressLine(quiet)
     notes: tuple[str, ...] = ()
+    verdict = None
     with JournalReader(journal) as reader:
         number = reader.run(run_of(which.run)).run
         try:
@@ -73,6 +74,7 @@ def export(
             if to == "campaign":
                 written = export_campaign(reader, out, run=number, span=span, chain=chain)
                 counts, notes = {"shots": written.shots, "weather": written.readings}, written.notes
+                verdict = written.verdict
             else:
                 form: Literal["csv", "fits"] = "csv" if to == "csv" else "fits"
                 counts = export_tables(
@@ -80,14 +82,13 @@ def export(
                 )
         finally:
             progress.clear()
-    from catseye.gateways.journal.chain import chain_object, chain_words
+    from catseye.gateways.journal.chain import chain_object, chain_words, export_verdict
 
     if json:
         from catseye.gateways.writers.objects import json_line
 
-        word, why = ("doubtful", ", without what is not as it was written") if chain.count else ("good", "")
         summary = {
-            "verdict": {"word": word, "why": f"{sum(counts.values())} rows written{why}"},
+            "verdict": (verdict or export_verdict(chain, sum(counts.values()))).to_object(),
             "chain": chain_object(chain),
             "run": number,
             "out": str(out),

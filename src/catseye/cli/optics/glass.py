@@ -25,7 +25,8 @@ def glass(
     wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Vacuum wavelength, µm.")] = 0.780,
     temperature_c: Annotated[float, typer.Option("--temperature-c", help="Temperature of the glass, °C.")] = 20.0,
     height_mm: Annotated[
-        float, typer.Option("--height-mm", callback=_height, help="Height of a prism of it, face to corner, mm.")
+        float,
+        typer.Option("--height-mm", callback=_height, help="Height of a prism of it at 20 °C, face to corner, mm."),
     ] = 38.1,
     json: Json = False,
 ) -> None:

@@ -95,8 +95,9 @@ def fit(  # noqa: PLR0913 - its options are its command line
 ) -> None:
     """The eight-term series by least squares, with covariance and what it cannot tell apart."""
     from catseye.gateways.pose.pointing_series_files import write_fit, write_model
-    from catseye.gateways.pose.pointing_series_objects import fit_object, fit_verdict
+    from catseye.gateways.pose.pointing_series_objects import fit_object
     from catseye.gateways.writers.output import refuse_output, whole_directory
+    from catseye.reduction.pose.verdicts import fit_verdict
 
     if out is not None:
         for file in files:
@@ -129,7 +130,8 @@ def _tell_fit(
     pointing_fit: "PointingFit", observed: "Observed", compared: "SeriesComparison | None", out: Path | None
 ) -> None:
     """The fit in sentences, and its terms."""
-    from catseye.gateways.pose.pointing_series_objects import fit_rows, fit_verdict, fit_words
+    from catseye.gateways.pose.pointing_series_objects import fit_rows, fit_words
+    from catseye.reduction.pose.verdicts import fit_verdict
 
     say(wrapped("Verdict", fit_verdict(pointing_fit).text))
     for title, text in fit_words(pointing_fit, observed, compared):
@@ -144,11 +146,14 @@ def _tell_fit(
 def _fitted(
     files: list[Path], against: str | None, terms: list[str], u_arcsec: float | None, reject: bool
 ) -> "tuple[PointingFit, Observed, SeriesComparison | None]":
+    from dataclasses import replace
+
     from catseye.gateways.pose.pointing_series_objects import read_observed, read_series
     from catseye.reduction.pose.pointing_fit import compare_series, fit_pointing
+    from catseye.reduction.pose.verdicts import fit_verdict
 
     def fitted(observed: "Observed") -> "PointingFit":
-        return fit_pointing(
+        found = fit_pointing(
             observed.azimuth,
             observed.elevation,
             observed.correction,
@@ -158,17 +163,20 @@ def _fitted(
             reject=reject,
             where=observed.where,
         )
+        return replace(found, sources=observed.sources)
 
     observed = read_observed(files)
     pointing_fit = fitted(observed)
     if against is None:
         return pointing_fit, observed, None
     if against == "published" or against.endswith(".toml"):
-        other, hashes = read_series(against)
+        other, hashes, judged = read_series(against)
     else:
         second = read_observed([Path(against)])
-        other, hashes = fitted(second).series, second.hashes
+        other_fit = fitted(second)
+        other, hashes, judged = other_fit.series, second.hashes, fit_verdict(other_fit)
     observed.hashes.update(hashes)
+    pointing_fit = replace(pointing_fit, sources={**pointing_fit.sources, against: judged})
     return pointing_fit, observed, compare_series(other, pointing_fit.series)
 
 
@@ -202,8 +210,10 @@ def predict(
 
     from catseye.gateways.pose.pointing_series_objects import read_series
     from catseye.gateways.writers.objects import json_line
+    from catseye.verdict import Verdict
 
-    series, _ = read_series(model)
+    series, _, judged = read_series(model)
+    verdict = Verdict("good", "the series of the model").resting_on({model: judged})
     a, e = azimuth_deg * DEGREE, elevation_deg * DEGREE
     correction, spread = series.correction(a, e), series.covariance_of_correction(a, e)
     encoder = series.encoders(a, e)
@@ -211,6 +221,7 @@ def predict(
     u = np.sqrt(np.diag(spread))
     if json:
         answer = {
+            "verdict": verdict.to_object(),
             "model": model,
             "order": ["azimuth times cos E", "elevation"],
             "correction": correction,
@@ -219,6 +230,8 @@ def predict(
         }
         say(json_line(answer))
         return
+    if verdict.word != "good":
+        say(wrapped("Verdict", verdict.text))
     for name, value, w in zip(("azimuth times cos E", "elevation"), correction, u, strict=True):
         u_text = f"   u {w / ARCSECOND:.3f}" if known else "   u unknown"
         say(f"{name:<22}{value / ARCSECOND:+12.3f} arcsec{u_text}")
@@ -226,7 +239,8 @@ def predict(
 
 
 @pointing.command(
-    epilog="\b\nExample: catseye pointing track pose-000/pose.json pose-090/pose.json --tilts tilts.csv --harmonics 2\n"
+    epilog="\b\nExample: catseye pointing track --tilts examples/pointing/tilts.csv --harmonics 3\n"
+    "Example: catseye pointing track pose-000/pose.json pose-090/pose.json --tilts tilts.csv --harmonics 2\n"
     "POSE.json: catseye pose --group alidade --frame alidade --out; TILTS.csv: docs/formats/star-offsets.md"
 )
 def track(
@@ -242,11 +256,13 @@ def track(
     quiet: Quiet = False,
 ) -> None:
     """How the alidade tilts as it goes round: poses and inclinometer in one least squares, as a Fourier series."""
+    from dataclasses import replace
+
     import numpy as np
 
     from catseye.gateways.pose.objects import tilt_of_pose
     from catseye.gateways.pose.pointing_series_files import track_rows, track_words, write_track
-    from catseye.gateways.pose.pointing_series_objects import track_object
+    from catseye.gateways.pose.pointing_series_objects import track_object, track_verdict
     from catseye.gateways.writers.output import refuse_output, whole_directory
     from catseye.records.files.reading import Folder
     from catseye.records.laboratory.tilts import read_tilts
@@ -274,7 +290,9 @@ def track(
         tilts=readings,
         harmonics=harmonics,
         names=[str(p) for p in poses or []],
+        partial=True,
     )
+    profile = replace(profile, sources={str(p): t.verdict for p, t in zip(poses or [], tilts_of_poses, strict=True)})
     if out is not None:
         with whole_directory(out, sources[0]) as directory:
             write_track(profile, directory, hashes)
@@ -285,6 +303,7 @@ def track(
         return
     if quiet:
         return
+    say(wrapped("Verdict", track_verdict(profile).text))
     for title, text in track_words(profile):
         say(wrapped(title, text))
     for name, value, u in track_rows(profile):

@@ -13,7 +13,7 @@ from catseye.cli.vocabularies import OPTICS, POSE_FRAMES, POSE_GROUPS, POSE_WEIG
 from catseye.constants import ARCSECOND
 
 if TYPE_CHECKING:
-    from catseye.gateways.pose.objects import PoseFindings
+    from catseye.reduction.pose.verdicts import PoseFindings
 
 
 def _numbers(text: str, count: int, what: str) -> list[float]:

@@ -177,13 +177,14 @@ def _structure(
     import numpy as np
 
     from catseye.constants import DEGREE
-    from catseye.gateways.structure.objects import structure_object, structure_verdict
+    from catseye.gateways.structure.objects import structure_object
     from catseye.reduction.structure.check import left_out
     from catseye.reduction.structure.series import fit_structure
+    from catseye.reduction.structure.verdict import structure_verdict
 
-    notes = given.notes
+    notes, doubts = given.notes, given.doubts
     if series.spread.full is None:  # the command was asked to take points as independent
-        notes += ("Points of an epoch were taken as independent: what they share makes the claims too small.",)
+        doubts += ("Points of an epoch were taken as independent: what they share makes the claims too small.",)
     if model.temperature and not np.isfinite(np.asarray(series.posture.temperature_c)).any():
         notes += ("No epoch says a temperature: the model has no coefficient of it.",)
         model = replace(model, temperature=False)
@@ -193,8 +194,9 @@ def _structure(
     if asked["elevation_deg"]:
         e = np.array(asked["elevation_deg"]) * DEGREE
         predicted = fit.predict(e, temperature_c=asked["temperature_c"], way=asked["way"])
-        notes += predicted.outside
-    answer = structure_object(fit, check, predicted, asked=asked, notes=notes)
+        doubts += predicted.outside
+    verdict = structure_verdict(check, sources=given.sources, doubts=doubts)
+    answer = structure_object(fit, check, predicted, asked=asked, notes=(*doubts, *notes), verdict=verdict)
     if to.out is not None:
         from catseye.gateways.structure.files import write_structure
         from catseye.gateways.writers.output import whole_directory
@@ -214,9 +216,9 @@ def _structure(
 
         say(json_line(answer))
     elif not to.quiet:
-        say(wrapped("Verdict", structure_verdict(fit, check).text))
+        say(wrapped("Verdict", verdict.text))
         _tell(fit, answer, predicted, to.out)
-    judge(structure_verdict(fit, check), strict=to.strict)
+    judge(verdict, strict=to.strict)
 
 
 def _tell(fit: "StructureFit", answer: dict[str, Any], predicted: "Prediction | None", out: Path | None) -> None:

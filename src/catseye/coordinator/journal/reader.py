@@ -1,6 +1,5 @@
 """A journal read: its runs, and what happened in each, in order, a piece at a time; nothing is ever written."""
 
-import json
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from typing import Literal
 from sqlalchemy import Connection, Engine, Select, func, select
 from sqlalchemy.exc import SQLAlchemyError
 
+from catseye.coordinator.journal.cells import check_cells, damaged, json_object
 from catseye.coordinator.journal.entries import AnsweredShot, Entry, EpochSolution
 from catseye.coordinator.journal.place import place_of, reading_engine, refuse_foreign, refused
 from catseye.coordinator.journal.rows import StoredRow, entry_of, unpack
@@ -88,10 +88,13 @@ class JournalReader:
         with self.reading() as connection:
             files: dict[int, dict[str, str]] = {}
             for row in connection.execute(select(RUN_FILES).order_by(RUN_FILES.c.path)):
+                check_cells(RUN_FILES, row, f"journal {self.place}")
                 files.setdefault(row.run, {})[row.path] = row.sha256
-            return tuple(
-                _stored(row, files.get(row.run, {})) for row in connection.execute(select(RUNS).order_by(RUNS.c.run))
-            )
+            runs = []
+            for row in connection.execute(select(RUNS).order_by(RUNS.c.run)):
+                check_cells(RUNS, row, f"journal {self.place}: run {row.run}")
+                runs.append(_stored(row, files.get(row.run, {}), self.place))
+            return tuple(runs)
 
     def run(self, which: int | str | None = None) -> StoredRun:
         """One run: by number, by its uuid or the beginning of it, or the last.
@@ -191,12 +194,17 @@ class JournalReader:
         """The texts of a run's files by relative path."""
         wanted = (
             select(RUN_FILES.c.path, TEXTS.c.text)
-            .join(TEXTS, RUN_FILES.c.sha256 == TEXTS.c.sha256)
+            .join(TEXTS, RUN_FILES.c.sha256 == TEXTS.c.sha256, isouter=True)
             .where(RUN_FILES.c.run == run)
             .order_by(RUN_FILES.c.path)
         )
         with self.reading() as connection:
-            return {row.path: row.text for row in connection.execute(wanted)}
+            texts = {row.path: row.text for row in connection.execute(wanted)}
+        for path, text in texts.items():
+            if not isinstance(text, str):
+                what = "no text" if text is None else "bytes (expected text)"
+                raise damaged(f"journal {self.place}: file {path!r} of run {run}", what)
+        return texts
 
     def site(self, run: int) -> SiteFolder:
         """The site of a run, from its files, in a temporary directory that lasts as long as this reader."""
@@ -246,12 +254,19 @@ class JournalReader:
                 samples = {row.seq: row for row in connection.execute(_between(BUFFERS, run, after, upto))}
             for table in tables:
                 for row in connection.execute(_between(table, run, after, upto)):
+                    place = f"journal {self.place}: run {run}, event {row.seq}"
+                    check_cells(table, row, place)
                     buffer = samples.get(row.seq) if table is SHOTS else None
                     unpacked = None
                     if buffer is not None:
-                        place = f"journal {self.place}: run {run}, event {row.seq}"
+                        check_cells(BUFFERS, buffer, place)
                         unpacked = unpack(buffer, max(1, row.samples_per_cycle), place)
-                    events.append((row.seq, entry_of(table.name, row, unpacked)))
+                    try:
+                        events.append((row.seq, entry_of(table.name, row, unpacked)))
+                    except (ValueError, RecursionError) as problem:  # JSON that is none, a covariance of another size
+                        raise damaged(
+                            f"{place}: a row of {table.name!r}", f"what no catseye wrote ({problem})"
+                        ) from None
         events.sort(key=lambda pair: pair[0])
         return events
 
@@ -269,7 +284,11 @@ def _is(run: StoredRun, which: int | str) -> bool:
     return run.run == which if isinstance(which, int) else run.uuid.startswith(which)
 
 
-def _stored(row: StoredRow, files: dict[str, str]) -> StoredRun:
+def _stored(row: StoredRow, files: dict[str, str], place: str) -> StoredRun:
+    try:
+        settings = json_object(row.settings)
+    except (ValueError, RecursionError) as problem:
+        raise damaged(f"journal {place}: the settings of run {row.run}", f"no JSON object ({problem})") from None
     return StoredRun(
         run=row.run,
         uuid=row.uuid,
@@ -277,7 +296,7 @@ def _stored(row: StoredRow, files: dict[str, str]) -> StoredRun:
         ended=row.ended_ticks,
         site=row.site,
         seed=row.seed,
-        settings=json.loads(row.settings),
+        settings=settings,
         host=row.host,
         pid=row.pid,
         versions={"catseye": row.catseye, "python": row.python, "numpy": row.numpy},

@@ -8,6 +8,7 @@ import numpy as np
 import sqlalchemy
 from numpy.typing import NDArray
 
+from catseye.coordinator.journal.cells import json_object
 from catseye.coordinator.journal.entries import AnsweredShot, Document, Entry, EpochSolution, Item, SentCommand
 from catseye.errors import InputError
 from catseye.records.night.live import Happening, LivePosture, LiveShot, LiveWeather
@@ -176,7 +177,7 @@ def _read_solution(row: StoredRow, _: object) -> EpochSolution:
     matrix = None
     if row.covariance is not None:
         matrix = np.frombuffer(row.covariance, dtype="<f8").reshape(row.size, -1 if row.size else 0)
-    return EpochSolution(row.ticks, json.loads(row.answer), matrix)
+    return EpochSolution(row.ticks, json_object(row.answer), matrix)
 
 
 READERS: Mapping[str, Callable[[StoredRow, Samples | None], Entry]] = {
@@ -193,7 +194,7 @@ READERS: Mapping[str, Callable[[StoredRow, Samples | None], Entry]] = {
     ),
     "commands": lambda row, _: SentCommand(row.ticks, row.ranger, row.tid, row.line, row.reply, row.ok),
     "happenings": lambda row, _: Happening(
-        row.ticks, row.who, row.kind, row.text, row.severity, json.loads(row.details)
+        row.ticks, row.who, row.kind, row.text, row.severity, json_object(row.details)
     ),
     "solutions": _read_solution,
     "documents": lambda row, _: Document(row.ticks, row.name, row.text),

@@ -214,7 +214,12 @@ def version_of(connection: Connection, place: str) -> int:
             f"journal {place}: holds other tables, such as {min(tables)!r}: it is no journal of catseye "
             "(expected one, or a new name)"
         )
-    version = int(row[0])
+    version = row[0]
+    if not isinstance(version, int):
+        raise InputError(
+            f"journal {place}: its version is {version!r} (expected a whole number): the journal is damaged; restore "
+            "it from a copy"
+        )
     if version > VERSION:
         raise InputError(
             f"journal {place}: version {version} is newer than {VERSION}, the newest that this catseye, {__version__}, "

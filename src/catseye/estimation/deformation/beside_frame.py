@@ -134,7 +134,7 @@ def _untested(between: Differences, options: dict[str, Any]) -> Deformation:
         p=nothing,
         p_adjusted=nothing,
         moved=no,
-        held=held,
+        held=np.asarray(held),
         stable=~no,
         before=none,
         after=none,
@@ -193,7 +193,7 @@ def _predicted(
 def _spread(model: EpochModel, points: np.ndarray) -> np.ndarray:
     """(k, 3) m^2, sum of both epochs' variances of each coordinate."""
     at = [columns.reshape(-1, 3)[points] for columns in model.columns]
-    return sum(np.diagonal(q.blocks(c[:, 0]), axis1=1, axis2=2) for q, c in zip(model.q, at, strict=True))
+    return np.sum([np.diagonal(q.blocks(c[:, 0]), axis1=1, axis2=2) for q, c in zip(model.q, at, strict=True)], axis=0)
 
 
 def _tested(displacement: np.ndarray, covariance: np.ndarray, compared: np.ndarray, spread: np.ndarray) -> _Others:

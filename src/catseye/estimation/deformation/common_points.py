@@ -82,7 +82,7 @@ def far_points(epochs: Epochs, *, level: float, scaled: bool) -> list[int]:
         arms = [np.where(both, p - p[i], 0.0) for p in (x, y)]
         lengths = [np.linalg.norm(arm, axis=1) for arm in arms]
         e = [arm / np.where(size > 0.0, size, 1.0)[:, None] for arm, size in zip(arms, lengths, strict=True)]
-        variance = sum(_along(q, i, e[k], e[k]) for k, q in enumerate(blocks[:2]))
+        variance = _along(blocks[0], i, e[0], e[0]) + _along(blocks[1], i, e[1], e[1])
         if len(blocks) > 2:
             variance = variance - 2.0 * _along(blocks[2], i, e[0], e[1])
         change = np.abs(lengths[1] - lengths[0])

@@ -267,7 +267,7 @@ def differences(epochs: Epochs, datum: str, stable: np.ndarray) -> Differences:
     _check_held(epochs.names, np.where(held, np.abs((y - x).ravel()), 0.0))
     fully_held = held.reshape(n, 3).all(axis=1)
     pivot = x[fully_held].mean(axis=0) if fully_held.any() else x[stable].mean(axis=0)
-    axes = compared.reshape(n, 3).any(axis=0)
+    axes = np.asarray(compared.reshape(n, 3).any(axis=0))
     combination = _combination(x, datum, pivot, axes)
     base = motion_columns(x, pivot)
     called = tuple(MOTIONS[i] for i in DATUMS[datum] if np.any(axes[CHANGED[i]]))

@@ -186,9 +186,7 @@ def _outcome(
     return {"conclusive": stopped is None and text != MAJORITY, "status": stopped or words}
 
 
-def _point_arrays(
-    epochs: Epochs, search: DeletionSearch, state: DeletionState, stable: np.ndarray
-) -> dict[str, np.ndarray]:
+def _point_arrays(epochs: Epochs, search: DeletionSearch, state: DeletionState, stable: np.ndarray) -> dict[str, Any]:
     """Tests of the points spread over arrays: 0 where held, nan where not compared."""
     n = len(epochs.names)
     compared = np.ones((n, 3), dtype=bool) if epochs.compared is None else np.asarray(epochs.compared, dtype=bool)

@@ -29,8 +29,8 @@ FOREIGN = (
     "adjust it free (datum 'free'), or say what the datums may differ by (datum=)"
 )
 STRANGE = (
-    "the {which} epoch holds {names}, which the other epoch does not have{alike}; adjust it free (datum 'free'), or say "
-    "what the datums may differ by (datum=)"
+    "the {which} epoch holds {names}, which the other epoch does not have{alike}; adjust it free (datum 'free'), or "
+    "say what the datums may differ by (datum=)"
 )
 PARTLY = "{names} are held in the second epoch {apart:.3g} m from the first's result, others at it; hold all at it"
 REWEIGHTED = (
@@ -109,7 +109,8 @@ class DatumConnection:
                 by = abs(value - there)
                 (carried if of_second and by <= max(rounding, HELD_APART) else strange)[name, axis] = by
         if datum is None:
-            _refuse_foreign(foreign, carried, max(rounding, HELD_APART), alike)
+            names = [s.network.points.names for s in (first, second)]
+            _refuse_foreign(foreign, carried, max(rounding, HELD_APART), names=names)
             datum = _least_datum(np.concatenate([f.kinds for f in floats], axis=1))
         departure = max(carried.values(), default=0.0)
         same = dict.fromkeys(name for name, axis in owns[1] if (name, axis) in owns[0])
@@ -143,18 +144,24 @@ def _refuse_foreign(
     foreign: list[dict[tuple[str, int], float]],
     carried: dict[tuple[str, int], float],
     tolerance: float,
-    alike: Sequence[tuple[str, str]],
+    *,
+    names: Sequence[Sequence[str]],
 ) -> None:
+    """Refuse coordinates held in one epoch alone; names are those of both epochs' points."""
     if foreign[0] and max(foreign[0].values()) <= tolerance:
         raise EstimationError(EXCHANGED.format(names=listed([name for name, _ in foreign[0]])))
     for which, strange in zip(("first", "second"), foreign, strict=True):
         if strange:
             known = [by for by in strange.values() if np.isfinite(by)]
-            names = listed([name for name, _ in strange])
+            held = listed([name for name, _ in strange])
             if not known:
-                raise EstimationError(STRANGE.format(which=which, names=names, alike=_alike(alike, strange)))
+                folded = {name.casefold(): name for name in names[which == "first"]}
+                pairs = {name: folded[name.casefold()] for name, _ in strange if name.casefold() in folded}
+                said = listed([f"{name} and {other}" for name, other in pairs.items()])
+                alike = f" (by another case: {said})" if pairs else ""
+                raise EstimationError(STRANGE.format(which=which, names=held, alike=alike))
             text = PARTLY if which == "second" and carried else FOREIGN
-            raise EstimationError(text.format(which=which, names=names, apart=max(known)))
+            raise EstimationError(text.format(which=which, names=held, apart=max(known)))
 
 
 def _alike(alike: Sequence[tuple[str, str]], strange: dict[tuple[str, int], float]) -> str:

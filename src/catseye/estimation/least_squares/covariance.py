@@ -266,6 +266,10 @@ class Widened:
         return self.inner.diagonal() + np.sum(self.reach**2, axis=1)
 
 
+def _held_whole(q: Covariance) -> bool:
+    return isinstance(q, Dense) or (isinstance(q, Widened) and _held_whole(q.inner))
+
+
 @dataclass(frozen=True, eq=False)
 class JointPoints:
     """The joint covariance of p points, of which only what is asked for is computed.
@@ -280,7 +284,7 @@ class JointPoints:
     @staticmethod
     def of(q: Covariance, columns: np.ndarray) -> "JointPoints":
         """Of some parameters; a covariance that is whole is cut to them."""
-        if not isinstance(q, Dense):
+        if not _held_whole(q):
             return JointPoints(q, columns)
         return JointPoints(Dense(q.within(columns.ravel())), np.arange(columns.size).reshape(columns.shape))
 

@@ -20,18 +20,19 @@ from catseye.estimation.network.datum import (
     datum_conditions,
     floating_motions,
     minimal_coordinates,
+    motion_limit,
     to_datum,
     transformed,
+    with_datum,
+    with_reference,
 )
-from catseye.estimation.network.diagnosis import diagnosed, floating_text, unconnected
+from catseye.estimation.network.diagnosis import contradicted, diagnosed, floating_text, unconnected
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork
 from catseye.estimation.observations.kinds import Linear, ObservationGroup
 
 FEWEST_POINTS = 200  # from which exchanged points are tried only where the ranging engine serves
-DATUMS = ("free", "fixed")
 PASSES = 8  # of solving with the fewest coordinates held and moving into the datum
-SETTLED = 1e-7  # of the network's size: a last motion below it changes nothing to second order,
-UNDONE = 1e-6  # nor does one that leaves less than this share of the usual standard uncertainty undone
+REACHED = 0.9  # of the variance factor, from which another start reached nothing better
 
 NO_DATUM = "rank deficient: the network floats ({motions}) and nothing holds it; hold coordinates, mark datum points, \
 or adjust it free (--datum free)"
@@ -39,30 +40,6 @@ WEAK_DATUM = "rank deficient: the datum's coordinates do not hold the network ag
 NOT_SETTLED = "not converged: the network does not come to rest in its datum after {passes} passes; \
 check the starting coordinates"
 NOT_PLACED = "no approximate coordinates: {points}; give some, or observe more"
-
-
-def with_datum(network: ObservationNetwork, datum: str | None) -> ObservationNetwork:
-    """The network with its datum as asked.
-
-    datum   None: as the file marks it. "fixed": what is marked either way is held. "free": nothing is held, inner
-            constraints on the points marked fixed or datum; where none is, on all with given coordinates; where
-            nothing is given, on all
-    """
-    if datum is None:
-        return network
-    if datum not in DATUMS:
-        raise EstimationError(f"datum {datum!r} is not known (expected one of {', '.join(DATUMS)})")
-    points = network.points
-    marked = points.fixed | points.datum
-    nothing = np.zeros_like(marked)
-    if datum == "fixed":
-        if not marked.any():
-            raise EstimationError("datum 'fixed': no point of the network is marked fixed or datum; mark some")
-        return replace(network, points=replace(points, fixed=marked, datum=nothing))
-    chosen = marked if marked.any() else np.isfinite(points.xyz)
-    if not chosen.any():
-        chosen = points.existing
-    return replace(network, points=replace(points, fixed=nothing, datum=chosen))
 
 
 @dataclass(frozen=True)
@@ -109,7 +86,7 @@ def adjust_network(
 
     Source: [FOERSTNER16] chapter 4; datum by S-transformation, [BAARDA73].
     """
-    network = _with_reference(with_datum(network, datum))
+    network = with_reference(with_datum(network, datum))
     if inflation is not None:
         kept = [np.isfinite(f) for f in inflation]
         active = kept if active is None else [a & k for a, k in zip(active, kept, strict=True)]
@@ -127,7 +104,7 @@ def adjust_network(
             forced=engine is not None,
         )
         if solution is not None:
-            return replace(solution, status=diagnosed(solution, _factor_alone)) if diagnose else solution
+            return replace(solution, status=diagnosed(solution, _trial)) if diagnose else solution
     problem = _Problem.of(network, start)
     if problem.missing:
         return problem.unanswered(NOT_PLACED.format(points=_listed(problem.missing)))
@@ -135,7 +112,9 @@ def adjust_network(
     solver = SolverSettings(settings.iterations, settings.tests, sparse)
     solution = problem.solve(active, (inflation, alone), solver)
     if diagnose and solution.answered:
-        return replace(solution, status=diagnosed(solution, _factor_alone))
+        if start is None and contradicted(solution):
+            solution = _from_observations(solution, active, (inflation, alone), solver)
+        return replace(solution, status=diagnosed(solution, _trial))
     return solution
 
 
@@ -169,31 +148,48 @@ def fits_near(
     return solve
 
 
-def _with_reference(network: ObservationNetwork) -> ObservationNetwork:
-    """The network, with the places found for its points as their coordinates where not one is given.
+def _from_observations(
+    solution: NetworkSolution,
+    active: Sequence[np.ndarray] | None,
+    inflation: tuple[Sequence[np.ndarray] | None, bool],
+    solver: SolverSettings,
+) -> NetworkSolution:
+    """The better of a solution and one that begins where the observations put the points, not the given coordinates.
 
-    The inner constraints then refer to these; where the network lies is a convention in any case.
+    A poor start may end in another minimum, or in none. What is held or in the datum stays as it is given.
     """
-    points = network.points
-    if np.isfinite(points.xyz).any() or not points.datum.any():
-        return network
-    from catseye.estimation.network.approximate.start import approximate
+    points = solution.network.points
+    begun = points.free & ~points.datum & np.isfinite(points.xyz)
+    if not begun.any():
+        return solution
+    network = replace(solution.network, points=replace(points, xyz=np.where(begun, np.nan, points.xyz)))
+    problem = _Problem.of(network, None)
+    trial = problem if problem.missing else problem.solve(active, inflation, solver)
+    if isinstance(trial, _Problem) or trial.status != CONVERGED or not trial.answered:
+        return solution
+    if solution.status == CONVERGED and trial.variance_factor > REACHED * solution.variance_factor:
+        return solution
+    moved = tuple(points.names[i] for i in np.flatnonzero(begun.any(axis=1)))
+    return replace(trial, network=solution.network, approximate=solution.approximate, replaced=moved)
 
-    return replace(network, points=replace(points, xyz=approximate(network).xyz))
 
-
-def _factor_alone(network: ObservationNetwork) -> NetworkSolution:
-    """A quick trial: coordinates and variance factor, no tests."""
+def _trial(network: ObservationNetwork, inflation: Sequence[np.ndarray] | None) -> NetworkSolution:
+    """A trial of a copy: coordinates and variance factor; tests only where single observations are weighed."""
     large = len(network.points.names) >= FEWEST_POINTS
+    weighed = inflation is not None
+    settings = NetworkSettings(iterations=50 if weighed else 15, tests=weighed, diagnose=False)
     try:
-        trial = adjust_network(
-            network, settings=NetworkSettings(iterations=15, tests=False), engine="ranging" if large else None
+        return adjust_network(
+            network,
+            inflation=inflation,
+            alone=weighed,
+            settings=settings,
+            engine="ranging" if large and not weighed else None,
         )
     except EstimationError:  # large, and of another kind: it would take too long to try
+        if weighed:
+            raise
         return replace(_Problem.of(network, None).unanswered("not tried"), variance_factor=np.inf)
-    degrees = sum(len(g.observed) for g in network.groups) - 3 * len(network.points.names)
-    cost = sum(f.pvv for f in trial.fits)
-    return replace(trial, variance_factor=cost / max(1.0, degrees))
 
 
 def _listed(reasons: dict[str, str], most: int = 4) -> str:
@@ -271,7 +267,8 @@ class _Problem:
             conditions, loose = datum_conditions(floating, datum, points.xyz)
             if loose.shape[1]:
                 text = WEAK_DATUM if datum.any() else NO_DATUM
-                return self.unanswered(unconnected(self.network) or text.format(motions=floating.words(loose)), x)
+                status = unconnected(self.network, self._afloat(rows, x))
+                return self.unanswered(status or text.format(motions=floating.words(loose)), x)
             held = self.free.copy()
             held[minimal_coordinates(conditions)] = False
             solution = adjust(
@@ -296,7 +293,7 @@ class _Problem:
             moved, t = to_datum(x, points.xyz.ravel(), floating.motions, conditions=conditions)
             x = x + moved
             u = np.sqrt(np.maximum(solution.q.diagonal()[:n][held[:n]], 0.0)) if solver.tests else np.zeros(0)
-            settled = bool(np.abs(moved[:n]).max() <= _motion_limit(x[:n].reshape(-1, 3), points.existing, u))
+            settled = bool(np.abs(moved[:n]).max() <= motion_limit(x[:n].reshape(-1, 3), points.existing, u))
             if settled and solver.tests:
                 solution = replace(solution, q=transformed(solution.q, t, conditions))
             if settled:
@@ -306,7 +303,7 @@ class _Problem:
         if not settled and solution.status == CONVERGED:
             solution = replace(solution, status=NOT_SETTLED.format(passes=PASSES))
         if len(solution.floating):
-            status = unconnected(self.network) or floating_text(self.network, solution)
+            status = unconnected(self.network, self._afloat(rows, x)) or floating_text(self.network, solution)
             return self.unanswered(status, solution.x)
         degrees = sum(int(r.active.sum()) for r in rows) - int(held.sum())  # the sum of redundancies, without rounding
         factor = sum(f.pvv for f in solution.fits) / degrees if degrees else float("nan")
@@ -316,6 +313,19 @@ class _Problem:
     def _floating(self, rows: list[ActiveRows], x: np.ndarray) -> Floating:
         absent = self.network.points.absent
         return floating_motions(rows, x, x[: absent.size].reshape(-1, 3), free=self.free, absent=absent)
+
+    def _afloat(self, rows: list[ActiveRows], x: np.ndarray) -> Callable[[np.ndarray], bool]:
+        """Tells of some points (n,) bool whether they can move as a whole, the others left out of sight."""
+
+        def afloat(piece: np.ndarray) -> bool:
+            absent = self.network.points.absent | ~piece[:, None]
+            xyz = x[: absent.size].reshape(-1, 3)
+            try:
+                return floating_motions(rows, x, xyz, free=self.free, absent=absent).motions.shape[1] > 0
+            except np.linalg.LinAlgError:  # too poor a start to tell
+                return True
+
+        return afloat
 
     def _motions(self, rows: list[ActiveRows], x: np.ndarray) -> Floating:
         """Motions at x that nothing holds; none where the start is too poor to tell them."""
@@ -381,16 +391,6 @@ class _Problem:
             variance_factor=float("nan"),
             degrees_of_freedom=float("nan"),
         )
-
-
-def _motion_limit(points: np.ndarray, existing: np.ndarray, u: np.ndarray) -> float:
-    """Motion of the datum that points (n, 3) m may make in a last pass; u (k,) m of coordinates, empty if not known.
-
-    What a motion s leaves undone is s^2 / size: nothing beside the standard uncertainties.
-    """
-    low, high = np.where(existing, points, np.inf).min(axis=0), np.where(existing, points, -np.inf).max(axis=0)
-    size = float(np.max(high - low, where=existing.any(axis=0), initial=0.0))
-    return max(SETTLED * size, float(np.sqrt(UNDONE * np.median(u) * size)) if len(u) else 0.0)
 
 
 def _padded(

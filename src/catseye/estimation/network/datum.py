@@ -5,17 +5,59 @@ orientations of direction sets along, a change of scale the scales of rangers. I
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import qr
 
+from catseye.errors import EstimationError
 from catseye.estimation.least_squares.covariance import Covariance, Transformed
 from catseye.estimation.least_squares.normal import FLOATS
 from catseye.estimation.least_squares.rows import ActiveRows
+from catseye.estimation.network.model import ObservationNetwork
 from catseye.estimation.shapes.motions import MOTIONS, figure_size, motions
 
+DATUMS = ("free", "fixed")
+SETTLED = 1e-7  # of the network's size: a last motion below it changes nothing to second order,
+UNDONE = 1e-6  # nor does one that leaves less than this share of the usual standard uncertainty undone
 UNHELD = 1e-7  # share of a unit motion in the datum's coordinates, below which they do not hold it
+
+
+def with_datum(network: ObservationNetwork, datum: str | None) -> ObservationNetwork:
+    """The network with its datum as asked.
+
+    datum   None: as the file marks it. "fixed": what is marked either way is held. "free": nothing is held, inner
+            constraints on the points marked fixed or datum; where none is, on all with given coordinates; where
+            nothing is given, on all
+    """
+    if datum is None:
+        return network
+    if datum not in DATUMS:
+        raise EstimationError(f"datum {datum!r} is not known (expected one of {', '.join(DATUMS)})")
+    points = network.points
+    marked = points.fixed | points.datum
+    nothing = np.zeros_like(marked)
+    if datum == "fixed":
+        if not marked.any():
+            raise EstimationError("datum 'fixed': no point of the network is marked fixed or datum; mark some")
+        return replace(network, points=replace(points, fixed=marked, datum=nothing))
+    chosen = marked if marked.any() else np.isfinite(points.xyz)
+    if not chosen.any():
+        chosen = points.existing
+    return replace(network, points=replace(points, fixed=nothing, datum=chosen))
+
+
+def with_reference(network: ObservationNetwork) -> ObservationNetwork:
+    """The network, with the places found for its points as their coordinates where not one is given.
+
+    The inner constraints then refer to these; where the network lies is a convention in any case.
+    """
+    points = network.points
+    if np.isfinite(points.xyz).any() or not points.datum.any():
+        return network
+    from catseye.estimation.network.approximate.start import approximate
+
+    return replace(network, points=replace(points, xyz=approximate(network).xyz))
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,3 +199,13 @@ def transformed(q: Covariance, t: np.ndarray, conditions: np.ndarray) -> Covaria
     used = np.flatnonzero(np.any(conditions != 0.0, axis=0))
     b = q.across(used) @ conditions[:, used].T
     return Transformed(q, t, b, conditions @ b)
+
+
+def motion_limit(points: np.ndarray, existing: np.ndarray, u: np.ndarray) -> float:
+    """Motion of the datum that points (n, 3) m may make in a last pass; u (k,) m of coordinates, empty if not known.
+
+    What a motion s leaves undone is s^2 / size: nothing beside the standard uncertainties.
+    """
+    low, high = np.where(existing, points, np.inf).min(axis=0), np.where(existing, points, -np.inf).max(axis=0)
+    size = float(np.max(high - low, where=existing.any(axis=0), initial=0.0))
+    return max(SETTLED * size, float(np.sqrt(UNDONE * np.median(u) * size)) if len(u) else 0.0)

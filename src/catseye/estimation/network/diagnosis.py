@@ -1,7 +1,6 @@
 """What is wrong with a network, in one line that names it: pieces, points that float, observations that contradict."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -10,28 +9,27 @@ from scipy.sparse.csgraph import connected_components
 from scipy.special import chdtrc
 
 from catseye.estimation.least_squares.adjustment import CONVERGED, LeastSquaresSolution
-from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
+from catseye.estimation.network.cures import EXCHANGE_ALL, Adjust, reason
+from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, label, points_of
 from catseye.estimation.shapes.rigid_body import closed_form
 
 PIECES = "rank deficient: the network is in {count} pieces that no observation joins: {pieces}; observe between them, \
-or hold each"
+or hold {loose}"
 FLOATS = "rank deficient: {points} floats; {advice}"
 CONTRADICTS = "converged, but the observations contradict each other: variance factor {factor:.3g} with \
 {degrees:.0f} degrees of freedom, worst {worst}{guess}"
 TIED_BY_PARAMETERS = ("rigid_body", "frame_point", "tilt", "joint")  # kinds whose points hang together by a pose
+ADVICE = "; check the starting coordinates"  # of a solution without answer, wrong where a reason is known
 DATUM_EXCHANGED = "converged, but {first} and {second} lie at each other's given places: the datum's coordinates fit \
 the measured shape to {now:.3g} m, with the two exchanged to {best:.3g} m; exchange them, or take them out of the datum"
 DISPLACED = 0.01  # of the network's size: a worse fit of the datum's given coordinates is looked into
 EXCHANGED_BACK = 0.1  # of the misfit, below which it falls when the right two are exchanged
 LIKELY = 1e-6  # probability of [pvv] below which, with the next two, observations contradict
 GROSS_FACTOR, GROSS_TEST = 9.0, 10.0  # variance factor, |w|: what wrong weights or a single blunder would not explain
-EXCHANGE_FROM, EXCHANGE_GAIN = 1e3, 1e-2  # variance factor from which exchanged points are tried, and its fall if true
-EXCHANGE_ALL = 300  # points up to which all pairs are tried
-EXCHANGEABLE = 20  # points with the most observations, that are tried: 190 pairs
 
 
-def unconnected(network: ObservationNetwork) -> str | None:
-    """The status of a network in pieces; None where it is in one, or each piece is held by itself."""
+def pieces_of(network: ObservationNetwork) -> np.ndarray:
+    """Number (n,) of the piece that each point belongs to; no observation joins two pieces."""
     count = len(network.points.names)
     size = 3 * count + len(network.parameters)
     pairs = [np.stack([np.arange(3 * count) // 3 * 3, np.arange(3 * count)])]
@@ -44,15 +42,30 @@ def unconnected(network: ObservationNetwork) -> str | None:
     joined = np.concatenate(pairs, axis=1)
     graph = coo_array((np.ones(joined.shape[1]), (joined[0], joined[1])), shape=(size, size))
     label = connected_components(graph, directed=False)[1][: 3 * count : 3]
-    _, label = np.unique(label, return_inverse=True)
+    return np.asarray(np.unique(label, return_inverse=True)[1])
+
+
+def unconnected(network: ObservationNetwork, afloat: Callable[[np.ndarray], bool]) -> str | None:
+    """The status of a network in pieces; None where it is in one, or each piece is held by itself.
+
+    afloat   whether a piece of the network, (n,) bool of its points, can move as a whole
+    """
+    label = pieces_of(network)
     number = int(label.max(initial=-1)) + 1
     if number < 2:
         return None
-    members = [[network.points.names[i] for i in np.flatnonzero(label == k)] for k in range(number)]
-    members.sort(key=len)
-    words = [", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "") for names in members]
-    text = " | ".join(words[:4]) + (" | ..." if number > 4 else "")
-    return PIECES.format(count=number, pieces=text)
+    pieces = sorted((label == k for k in range(number)), key=np.count_nonzero)
+    loose = [piece for piece in pieces if afloat(piece)]
+    if not loose:
+        return None
+    text = " | ".join(_members(network, piece) for piece in pieces[:4]) + (" | ..." if number > 4 else "")
+    which = "each" if len(loose) == number else f"that of {_members(network, loose[0])}"
+    return PIECES.format(count=number, pieces=text, loose=which)
+
+
+def _members(network: ObservationNetwork, piece: np.ndarray) -> str:
+    names = [network.points.names[i] for i in np.flatnonzero(piece)]
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
 
 
 def floating_text(network: ObservationNetwork, solution: LeastSquaresSolution) -> str:
@@ -104,39 +117,48 @@ def _advice(network: ObservationNetwork, solution: LeastSquaresSolution, point: 
     return f"{text}: no range within the network would hold it, its {network.axis_names[axis]} or a height would"
 
 
-def diagnosed(solution: NetworkSolution, solve: Callable[[ObservationNetwork], NetworkSolution]) -> str:
-    """The status of a solution, which says more where it did not converge or its observations contradict grossly.
-
-    solution   with an answer, converged or not
-    solve      how to try the network with two points exchanged
+def contradicted(solution: NetworkSolution) -> bool:
+    """Whether a solution did not converge or its observations contradict each other grossly.
 
     Grossly: the a-priori chi-square test fails at one in a million and either the variance factor exceeds 9, which
     wrong weights hardly explain, or a test statistic exceeds 10. Smaller contradictions are the suspects' business.
     """
     factor, degrees = solution.variance_factor, solution.degrees_of_freedom
     if not degrees > 0.5:
+        return False
+    largest = max((float(t.max(initial=0.0)) for t in _tests(solution)), default=0.0)
+    gross = chdtrc(degrees, factor * degrees) < LIKELY and (factor > GROSS_FACTOR or largest > GROSS_TEST)
+    return bool(gross) or solution.status != CONVERGED
+
+
+def _tests(solution: NetworkSolution) -> list[np.ndarray]:
+    return [np.where(f.active & (f.redundancy > 1e-6), np.abs(f.standardised), 0.0) for f in solution.fits]
+
+
+def diagnosed(solution: NetworkSolution, adjust: Adjust) -> str:
+    """The status of a solution, which says more where it did not converge or its observations contradict grossly.
+
+    solution   with an answer, converged or not
+    adjust     how copies of the network are tried, see `cures.reason`
+    """
+    if not solution.degrees_of_freedom > 0.5:
         return solution.status
-    if solution.status != CONVERGED:
-        return solution.status + _guess(solution, solve)
-    tests = [np.where(f.active & (f.redundancy > 1e-6), np.abs(f.standardised), 0.0) for f in solution.fits]
-    largest = [float(t.max(initial=0.0)) for t in tests]
-    if not (chdtrc(degrees, factor * degrees) < LIKELY and (factor > GROSS_FACTOR or max(largest) > GROSS_TEST)):
+    if not contradicted(solution):
         return _datum_exchanged(solution) or CONVERGED
-    group = int(np.argmax(largest))
+    if solution.status != CONVERGED:
+        cause = reason(solution, adjust)
+        return (solution.status.removesuffix(ADVICE) if cause.named else solution.status) + cause.text
+    tests, network = _tests(solution), solution.network
+    group = int(np.argmax([float(t.max(initial=0.0)) for t in tests]))
     row = int(np.argmax(tests[group]))
-    fit, network = solution.fits[group], solution.network
     unit = getattr(network.groups[group], "unit", "m")
-    shown = f"{fit.residual[row]:+.4g} {unit}, {tests[group][row]:.3g} standard deviations"
-    worst = f"{label(network, group, row)} (residual {shown})"
-    return CONTRADICTS.format(factor=factor, degrees=degrees, worst=worst, guess=_guess(solution, solve))
-
-
-def label(network: ObservationNetwork, group: int, row: int) -> str:
-    """What an observation is called: its kind, its points, and its place in the file."""
-    kind = getattr(network.groups[group], "kind", network.groups[group].name).replace("_", " ")
-    ends = [network.points.names[int(end[row])] for end in points_of(network.groups[group]) if end[row] >= 0]
-    where = network.places[group][row] if network.places and network.places[group] else ""
-    return f"{kind} {' - '.join(ends)}" + (f", {where}" if where else "")
+    shown = f"{solution.fits[group].residual[row]:+.4g} {unit}, {tests[group][row]:.3g} standard deviations"
+    return CONTRADICTS.format(
+        factor=solution.variance_factor,
+        degrees=solution.degrees_of_freedom,
+        worst=f"{label(network, group, row)} (residual {shown})",
+        guess=reason(solution, adjust).text,
+    )
 
 
 def _datum_exchanged(solution: NetworkSolution) -> str | None:
@@ -171,39 +193,3 @@ def _misfit(x: np.ndarray, given: np.ndarray) -> float:
     rotation, _ = closed_form(x, given)
     off = (x - x.mean(axis=0)) @ rotation.T - (given - given.mean(axis=0))
     return float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
-
-
-def _one_explains(solution: NetworkSolution) -> bool:
-    """Whether all but a hundredth of [pvv] is due to a single observation: without it [pvv] would fall by its w^2."""
-    largest = max(float(np.max(np.where(f.active, f.standardised**2, 0.0), initial=0.0)) for f in solution.fits)
-    squares = solution.variance_factor * solution.degrees_of_freedom
-    return solution.status == CONVERGED and squares - largest < EXCHANGE_GAIN * squares
-
-
-def _guess(solution: NetworkSolution, solve: Callable[[ObservationNetwork], NetworkSolution]) -> str:
-    """A guess, in words, at the cause: two points exchanged, or where most of the contradiction is."""
-    network, names = solution.network, solution.network.points.names
-    total, number = np.zeros(len(names)), np.zeros(len(names))
-    for group, fit in zip(network.groups, solution.fits, strict=True):
-        for end in points_of(group):
-            used = (end >= 0) & fit.active
-            total += np.bincount(end[used], (fit.residual[used] / fit.sigma[used]) ** 2, len(names))
-            number += np.bincount(end[used], minlength=len(names))
-    if solution.variance_factor > EXCHANGE_FROM and not _one_explains(solution):
-        few = len(names) <= EXCHANGE_ALL
-        likely = np.argsort(-number, kind="stable")[:EXCHANGEABLE]
-        if not few:  # only the worst fitting of them, for the trials take long
-            likely = likely[np.argsort(-total[likely] / number[likely])][:6]
-        trials = []
-        for i, j in combinations(sorted(int(k) for k in likely), 2):
-            xyz, order = network.points.xyz.copy(), [j, i]
-            xyz[[i, j]] = xyz[order]
-            trial = solve(replace(network, points=replace(network.points, xyz=xyz)))
-            if trial.variance_factor < EXCHANGE_GAIN * solution.variance_factor:
-                trials.append((float(np.nansum((trial.x - xyz) ** 2)), i, j, trial.variance_factor))
-        if trials:  # a symmetric network fits after other exchanges too, but far from the given coordinates
-            _, i, j, factor = min(trials)
-            return f"; with {names[i]} and {names[j]} exchanged the variance factor is {factor:.3g}"
-    share = total / np.maximum(number, 1.0)
-    stands = [names[i] for i in np.argsort(-share)[:2] if share[i] > 4.0 * np.median(share[number > 0])]
-    return f"; most of it at {' and '.join(stands)}" if stands else ""

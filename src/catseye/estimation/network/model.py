@@ -14,6 +14,7 @@ import numpy as np
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import GroupFit
 from catseye.estimation.least_squares.covariance import Covariance
+from catseye.estimation.network.names import PointIndex
 from catseye.estimation.observations.kinds import ObservationGroup
 
 
@@ -35,10 +36,10 @@ class NetworkPoints:
     xyz: np.ndarray
     fixed: np.ndarray
     datum: np.ndarray
-    absent: np.ndarray = None  # type: ignore[assignment]  # none absent, once made
+    absent: np.ndarray = field(default_factory=lambda: np.zeros((0, 3), dtype=bool))  # becomes (n, 3), none absent
 
     def __post_init__(self) -> None:
-        if self.absent is None:
+        if not len(self.absent):
             object.__setattr__(self, "absent", np.zeros(self.xyz.shape, dtype=bool))
         for state, wrong in (("held", self.fixed), ("datum", self.datum), ("given", np.isfinite(self.xyz))):
             if np.any(self.absent & wrong):
@@ -100,10 +101,14 @@ class ObservationNetwork:
     parameters   beside the points, in the order of the parameter vector after 3 n coordinates
     groups       of observations, over columns of the parameter vector; see `catseye.estimation.observations`
     places       one tuple a group with where each of its rows stands in the file ("line 12"), or () where unknown
+    claims       one (m, 3) a group, or None: a, b, c of standard uncertainties a + b D^c (m, m, 1) of lengths D, which
+                 a plan computes from the points; where b is 0 the covariance says all. () where there are none
     axes         (3, 3) signed permutation: coordinates here = axes @ coordinates of the file
     axis_names   what the file calls its axes, in its order
     source       the file's name, for reports
     description  the file's own words
+    notes        what a person should know of how the file was read, one line each
+    doubts       what in it is unlikely, one line each: no answer that rests on it is good
     """
 
     points: NetworkPoints
@@ -114,6 +119,9 @@ class ObservationNetwork:
     axis_names: tuple[str, str, str] = ("x", "y", "z")
     source: str = ""
     description: str = ""
+    claims: tuple[np.ndarray | None, ...] = ()
+    notes: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         observed = ", ".join(f"{len(group.observed)} {group.name}" for group in self.groups)
@@ -160,9 +168,9 @@ class NetworkSolution:
     q: Covariance = field(kw_only=True)
 
     @cached_property
-    def index(self) -> dict[str, int]:
-        """Row of each point by its name."""
-        return {name: i for i, name in enumerate(self.network.points.names)}
+    def index(self) -> PointIndex:
+        """Row of each point by its name, however it is written."""
+        return PointIndex(self.network.points.names)
 
     @cached_property
     def state(self) -> np.ndarray:
@@ -193,3 +201,11 @@ class NetworkSolution:
 def points_of(group: ObservationGroup) -> tuple[np.ndarray, ...]:
     """For each role of an observation, from, to and so on, the rows (m,) of its points in the network; -1 for none."""
     return tuple(np.where(end < 0, -1, end // 3) for end in getattr(group, "ends", ()))
+
+
+def label(network: ObservationNetwork, group: int, row: int) -> str:
+    """What an observation is called: its kind, its points, and its place in the file."""
+    kind = getattr(network.groups[group], "kind", network.groups[group].name).replace("_", " ")
+    ends = [network.points.names[int(end[row])] for end in points_of(network.groups[group]) if end[row] >= 0]
+    where = network.places[group][row] if network.places and network.places[group] else ""
+    return f"{kind} {' - '.join(ends)}" + (f", {where}" if where else "")

@@ -11,9 +11,10 @@ import numpy as np
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.covariance import LARGEST_MATRIX
 from catseye.estimation.least_squares.rows import variances
-from catseye.estimation.network.adjustment import adjust_network, with_datum
+from catseye.estimation.network.adjustment import adjust_network
+from catseye.estimation.network.datum import with_datum
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
-from catseye.estimation.observations.kinds import Distances
+from catseye.estimation.observations.kinds import Distances, ObservationGroup
 
 BATCH = 200  # ranges whose effect is computed at once
 
@@ -61,8 +62,9 @@ class Candidate:
 
 
 def predicted(network: ObservationNetwork) -> ObservationNetwork:
-    """The network with every observation replaced by what its points and parameters predict.
+    """The network with every observation replaced by what its points and parameters predict, and its sigma by theirs.
 
+    Observed values may be nan: not measured yet.
     Raises EstimationError where a point has no coordinates: a plan needs a place for everything.
     """
     points = network.points
@@ -74,12 +76,27 @@ def predicted(network: ObservationNetwork) -> ObservationNetwork:
         )
     x = np.concatenate([np.where(points.absent, 0.0, points.xyz).ravel(), [p.start for p in network.parameters]])
     groups = []
-    for group in network.groups:
-        values = group.predict(x)[0]
+    for group, claim in zip(network.groups, network.claims or (None,) * len(network.groups), strict=True):
+        near = replace(group, observed=np.nan_to_num(group.observed))  # type: ignore[type-var]
+        values = near.predict(x)[0]
         if not np.isfinite(values).all():
             raise EstimationError(f"{group.name}: not defined at the planned coordinates; two points may coincide")
-        groups.append(replace(group, observed=values))  # type: ignore[type-var]
+        covariance = _claimed(group, claim, np.abs(values))
+        groups.append(replace(near, observed=values, covariance=covariance))  # type: ignore[type-var]
     return replace(network, groups=tuple(groups))
+
+
+def _claimed(group: ObservationGroup, claim: np.ndarray | None, length: np.ndarray) -> np.ndarray:
+    """The covariance of a group whose uncertainties grow with its lengths (m,), at the planned ones."""
+    if claim is None or not claim[:, 1].any():
+        return group.covariance
+    a, b, c = claim.T
+    larger = np.where(b > 0.0, (a + b * length**c) / np.sqrt(variances(group)), 1.0)
+    if group.covariance.ndim == 1:
+        return group.covariance * larger**2
+    size = group.covariance.shape[-1]
+    pairs = larger.reshape(-1, size)
+    return group.covariance * (pairs[:, :, None] * pairs[:, None, :]).reshape(group.covariance.shape)
 
 
 def plan(

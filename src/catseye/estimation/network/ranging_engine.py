@@ -43,7 +43,8 @@ def adjusted_as_ranges(
     """
     if not forced and len(network.points.names) < FEWEST_POINTS:
         return None
-    reason, split = _split(network)
+    absent = ("some of its coordinates do not exist", None)
+    reason, split = absent if network.points.absent.any() else _split(network)
     if split is None:
         if forced:
             raise EstimationError(f"not a network for the ranging engine: {reason}; use another engine")

@@ -62,7 +62,8 @@ def _eigen(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     pairs = ~(gone[..., :, None] | gone[..., None, :])
     known = (np.isfinite(covariance) | ~pairs).all(axis=(-2, -1))
     inside = np.where(pairs & known[..., None, None], covariance, 0.0)
-    last = np.where(gone, 1.0 + np.abs(inside).max(axis=(-2, -1))[..., None], 0.0)  # below all others
+    scale = np.abs(inside).max(axis=(-2, -1))[..., None]
+    last = np.where(gone, np.where(scale > 0.0, scale, 1.0), 0.0)  # below all others, and no larger: rounding
     values, vectors = np.linalg.eigh(inside - last[..., None] * np.eye(size))
     there = known[..., None] & (np.arange(size) >= gone.sum(axis=-1)[..., None])
     return np.where(there, values, np.nan), np.where(there[..., None, :], vectors, np.nan)

@@ -14,6 +14,7 @@ from scipy.special import chdtr, chdtrc, chdtri, nctdtr, ndtr, ndtri, stdtr, std
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit
 
+TOO_GOOD = 1e-4  # probability of a [pvv] so small, below which the claimed sigmas are doubtful: a unit, most likely
 UNCHECKED = 1e-4  # sigma^2 over the variance of the estimated error below which w is a ratio of rounding and curvature
 
 ACCEPTED = "accepted"
@@ -291,6 +292,15 @@ def global_test(pvv: float, degrees_of_freedom: float, level: float = 0.05) -> G
     below, above = float(chdtr(f, pvv)), float(chdtrc(f, pvv))
     outcome = TOO_LARGE if above < half else TOO_SMALL if below < half else ACCEPTED
     return GlobalTest(pvv / f, lower, upper, min(2.0 * min(below, above), 1.0), outcome)
+
+
+def too_good(pvv: float, degrees_of_freedom: float) -> bool:
+    """Whether chance makes [pvv] as small as this less often than once in ten thousand.
+
+    >>> too_good(1e-5, 10.0), too_good(2.0, 10.0)
+    (True, False)
+    """
+    return bool(degrees_of_freedom > 0.5 and chdtr(degrees_of_freedom, pvv) < TOO_GOOD)
 
 
 @dataclass(frozen=True, eq=False)

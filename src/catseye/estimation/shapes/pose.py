@@ -6,6 +6,7 @@ on its own against the others can be found (robust start) or named (single tests
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,6 +27,7 @@ from catseye.geometry.frames.frame import Transform
 
 COMPONENTS = tuple(f"{kind} {axis}" for kind in ("translation", "rotation") for axis in "xyz")
 METHODS = ("l1", "huber", "igg3", "biweight")
+RIGID = 0.01  # chance below which points do not move as one
 LIMIT = 4.0  # |w| from which a coordinate speaks against its point: one good coordinate in 16 000
 
 
@@ -239,15 +241,38 @@ def _kept(problem: _Problem, method: str, limit: float) -> tuple[np.ndarray, np.
 
     estimate = estimate_robustly(solve, [len(sigma)], options=RobustOptions(method=method, start="l1", limit=limit))
     if estimate.status != CONVERGED:
-        raise EstimationError(f"the robust pose did not settle: {estimate.status}")
+        return _one_left_out(problem, f"robust weights ({method}) did not settle")
     statistic = np.abs(np.nan_to_num(estimate.statistic[0])).reshape(-1, 3).max(axis=1)
     keep = np.asarray(~np.any(estimate.rejected[0].reshape(-1, 3), axis=1))
-    if int(keep.sum()) < POINTS["rigid"]:
-        raise EstimationError(
-            f"a robust pose of {len(keep)} points would leave {int(keep.sum())} (expected 3 or more): the group does "
-            "not move as one, or its covariance is too small; fit without robust and look at the residuals"
-        )
+    if (left := int(keep.sum())) < POINTS["rigid"]:
+        text = f"robust weights ({method}) would leave {left} of {len(keep)} points (expected 3 or more)"
+        return _one_left_out(problem, text)
+    if left <= POINTS["rigid"] + 1 and _chance(problem.of(keep).fit()) < RIGID:  # few points: weights found a wrong one
+        with suppress(EstimationError):  # else the weights' answer, whose chance says what it is worth
+            return _one_left_out(problem, f"what robust weights ({method}) leave does not move as one")
     return keep, statistic
+
+
+def _one_left_out(problem: _Problem, why: str) -> tuple[np.ndarray, np.ndarray]:
+    """As `_kept`, where weights fail: the one point without which the others move as one.
+
+    Each is left out of a copy in turn. Raises EstimationError where none or more than one does, with their chances.
+    """
+    everyone = np.arange(len(problem.names))
+    chance = np.array([_chance(problem.of(everyone != k).fit()) for k in everyone])
+    good = np.flatnonzero(chance >= RIGID)
+    if len(good) == 1:
+        return everyone != good[0], np.nan_to_num(_largest_w(problem.linear(problem.fit())))
+    if len(good):
+        named = " or ".join(f"{problem.names[k]} (p {chance[k]:.2g})" for k in good)
+        text = f"without {named} the others move as one, and nothing says which of them moved"
+    else:
+        best = int(np.argmax(np.nan_to_num(chance)))
+        text = (
+            f"the others do not move as one without any of the {len(everyone)} points (best without "
+            f"{problem.names[best]}, p {chance[best]:.2g}): more than one moved, or the covariance is too small"
+        )
+    raise EstimationError(f"{why}; {text}; fit without robust and look at the residuals, or take other points")
 
 
 def _fit(linear: LinearEstimate, motion: Transformation, spread: np.ndarray, sigma: np.ndarray) -> GroupFit:

@@ -18,7 +18,7 @@ def acoustic_figures(path: "AcousticPath") -> dict[str, str]:
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
-        drawn = {}
+        drawn: dict[str, str] = {}
         if path.shots.traces:
             drawn["recording"] = svg(_recording(path.shots.traces))
             drawn["correlation"] = svg(_correlation(path.shots.traces))

@@ -15,7 +15,7 @@ from catseye.atmosphere.index.model import IndexModel
 from catseye.atmosphere.limit import ValidInterval
 from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import PPM
-from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, Svg, mpl, svg
 
 WIDTH, HEIGHT = 9.4, 10.4  # inches
 POINTS = 121
@@ -97,7 +97,7 @@ def air_plot(
     model: str = "ciddor_hill1999",
     co2_ppm: float = 450.0,
     uncertainty: StateUncertainty = CERTAIN,
-) -> tuple[str, dict[str, Any]]:
+) -> tuple[Svg, dict[str, Any]]:
     """The group index about one state of air as SVG text, and what it says in numbers.
 
     temperature_c, pressure_hpa, humidity_percent   the state: °C, hPa, % over liquid water

@@ -1,9 +1,11 @@
 """The index of air on the way out: its verdict, its lines for people, a plain object for JSON in SI units."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from catseye.atmosphere.weather.humidity import fraction_words, likely_fraction
 from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.verdict import Verdict
 
@@ -11,23 +13,63 @@ if TYPE_CHECKING:
     from catseye.atmosphere.index.air import AirState
 
 FORMULA_ALONE = "u is the formula's alone until the sensors' are given (--u-temperature-c and its like)"
+WEATHER = ("temperature", "pressure", "humidity")  # that every index and every speed of sound depends on
 
 
-def air_verdict(air: "AirState", u: Any) -> Verdict:
+def stated_inputs(**u: Any) -> tuple[str, ...]:
+    """Names of the inputs with an uncertainty above zero, in the order given.
+
+    >>> stated_inputs(temperature=0.1, pressure=0.0, humidity=[0.0, 2.0])
+    ('temperature', 'humidity')
+    """
+    return tuple(name for name, value in u.items() if np.any(np.asarray(value, dtype=float) > 0.0))
+
+
+def uncertainty_words(stated: Sequence[str]) -> str:
+    """A sentence on what an uncertainty contains.
+
+    stated   of `stated_inputs`
+
+    >>> uncertainty_words(("temperature",))
+    "u has the formula's part and that of temperature; not given: pressure, humidity"
+    """
+    missing = [name for name in WEATHER if name not in stated]
+    if not stated:
+        return FORMULA_ALONE
+    if not missing:
+        return "u has the formula's part and the sensors'"
+    return f"u has the formula's part and that of {', '.join(stated)}; not given: {', '.join(missing)}"
+
+
+def air_verdict(air: "AirState", u: Any, stated: Sequence[str] | None = None) -> Verdict:
     """Good within the formula's limits, which were checked; what its uncertainty stands for.
 
-    u   standard uncertainty of the group index, as told
+    u        standard uncertainty of the group index, as told
+    stated   inputs whose uncertainty it has, of `stated_inputs`; None: all if it is more than the formula's
     """
-    alone = bool(np.all(np.asarray(u) <= np.asarray(air.standard_uncertainty) * (1.0 + 1e-12)))
-    what = FORMULA_ALONE if alone else "u has the formula's part and the sensors'"
-    return Verdict("good", f"within the limits of {air.model}; {what}")
+    if likely_fraction(air.humidity_percent):
+        return Verdict("doubtful", fraction_words(air.humidity_percent))
+    if stated is None:
+        stated = WEATHER if np.any(np.asarray(u) > np.asarray(air.standard_uncertainty) * (1.0 + 1e-12)) else ()
+    return Verdict("good", f"within the limits of {air.model}; {uncertainty_words(stated)}")
 
 
-def air_object(air: "AirState", wavelength_um: Any, u: Any, *, verdict: Verdict) -> dict[str, Any]:
+def air_object(
+    air: "AirState",
+    wavelength_um: Any,
+    u: Any,
+    *,
+    verdict: Verdict,
+    stated: Sequence[str] | None = None,
+    u_formula: Any = None,
+) -> dict[str, Any]:
     """The air as `catseye air --json` gives it.
 
-    u   standard uncertainty of the group index, formula and instruments
+    u           standard uncertainty of the group index, formula and instruments
+    stated      inputs whose uncertainty it has, of `stated_inputs`
+    u_formula   its part of formulas; None: the index's alone
     """
+    alone = air.standard_uncertainty if u_formula is None else u_formula
     return {
         "verdict": verdict.to_object(),
         "model": air.model,
@@ -44,7 +86,8 @@ def air_object(air: "AirState", wavelength_um: Any, u: Any, *, verdict: Verdict)
         "sensitivity": air.sensitivity._asdict(),
         "phase_sensitivity": air.phase_sensitivity._asdict(),
         "standard_uncertainty": u,
-        "formula_uncertainty": air.standard_uncertainty,
+        "formula_uncertainty": alone,
+        "uncertainty_of": None if stated is None else list(stated),
     }
 
 
@@ -59,10 +102,10 @@ def air_passages(answer: dict[str, Any]) -> list[Passage]:
         if np.any(slope["co2_ppm"])
         else f"the formula's air has {spread(answer['co2_ppm'], '.0f')} ppm of carbon dioxide"
     )
-    alone = answer["standard_uncertainty"] is answer["formula_uncertainty"] or np.array_equal(
-        answer["standard_uncertainty"], answer["formula_uncertainty"]
-    )
-    whose = "the formula's alone: the sensors' are not given" if alone else "the formula's and the sensors'"
+    stated = answer["uncertainty_of"]
+    if stated is None:
+        stated = () if np.array_equal(answer["standard_uncertainty"], answer["formula_uncertainty"]) else WEATHER
+    whose = uncertainty_words(stated).removeprefix("u is ").removeprefix("u has ")
     dew_point = spread(answer["dew_point_c"], ".2f")
     rows = {
         "group index": spread(answer["group_index"], ".9f"),

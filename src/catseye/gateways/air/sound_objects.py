@@ -1,5 +1,6 @@
 """The speed of sound as a plain object for JSON and as rows for people, the other models beside the one asked for."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,8 @@ from catseye.atmosphere.sound import parker2004 as sound_parker2004
 from catseye.atmosphere.sound.dispersion import dispersion
 from catseye.atmosphere.sound.speed import MODELS, Sound, sound
 from catseye.errors import ValidityError
-from catseye.gateways.air.objects import FORMULA_ALONE, spread
+from catseye.gateways.air.objects import WEATHER as SENSED
+from catseye.gateways.air.objects import spread, uncertainty_words
 from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.verdict import Verdict
 
@@ -16,18 +18,21 @@ Weather = tuple[Any, Any, Any]
 FREQUENCIES_HZ = (1e3, 10e3)  # what loudspeakers give
 
 
-def sound_object(state: Sound, weather: Weather, co2_ppm: Any, *, u: Any) -> dict[str, Any]:
+def sound_object(
+    state: Sound, weather: Weather, co2_ppm: Any, *, u: Any, stated: Sequence[str] | None = None
+) -> dict[str, Any]:
     """Sound as `catseye sound --json` gives it.
 
     weather   temperature °C, pressure hPa, relative humidity %, numbers or arrays
     u         standard uncertainty of the speed, formula and inputs, m/s
+    stated    inputs whose uncertainty it has, of `stated_inputs`
     """
     slopes = state.sensitivity._asdict()
     if not MODELS[state.model].has_co2:
         del slopes["co2_ppm"]
     t, p, h = weather
     return {
-        "verdict": sound_verdict(state, u).to_object(),
+        "verdict": sound_verdict(state, u, stated).to_object(),
         "model": state.model,
         "temperature_c": t,
         "pressure_hpa": p,
@@ -41,6 +46,7 @@ def sound_object(state: Sound, weather: Weather, co2_ppm: Any, *, u: Any) -> dic
         "travel_time_per_m_per_c": state.time_sensitivity.temperature_c,
         "standard_uncertainty": u,
         "formula_uncertainty": state.standard_uncertainty,
+        "uncertainty_of": None if stated is None else list(stated),
         "models": {name: _speed_by(name, weather, co2_ppm) for name in MODELS},
         "notes_gamma_w": gamma_water_cost(state, weather),
         "dispersion": [_dispersed(state, weather, frequency) for frequency in FREQUENCIES_HZ],
@@ -61,14 +67,15 @@ def gamma_water_cost(state: Sound, weather: Weather) -> dict[str, Any]:
     }
 
 
-def sound_verdict(state: Sound, u: Any) -> Verdict:
+def sound_verdict(state: Sound, u: Any, stated: Sequence[str] | None = None) -> Verdict:
     """Good within the formula's limits, which were checked; what its uncertainty stands for.
 
-    u   standard uncertainty of the speed, m/s, as told
+    u        standard uncertainty of the speed, m/s, as told
+    stated   inputs whose uncertainty it has, of `stated_inputs`; None: all if it is more than the formula's
     """
-    alone = bool(np.all(np.asarray(u) <= state.standard_uncertainty * (1.0 + 1e-12)))
-    what = FORMULA_ALONE if alone else "u has the formula's part and the sensors'"
-    return Verdict("good", f"within the limits of {state.model}; {what}")
+    if stated is None:
+        stated = SENSED if np.any(np.asarray(u) > np.asarray(state.standard_uncertainty) * (1.0 + 1e-12)) else ()
+    return Verdict("good", f"within the limits of {state.model}; {uncertainty_words(stated)}")
 
 
 def sound_passages(answer: dict[str, Any]) -> list[Passage]:
@@ -83,7 +90,7 @@ def sound_passages(answer: dict[str, Any]) -> list[Passage]:
         else "the formula's air has its own carbon dioxide"
     )
     others = "; ".join(
-        f"{name} {spread(item['speed'], '.3f')} ± {item['standard_uncertainty']:.2g} m/s"
+        f"{name} {spread(item['speed'], '.3f')} ± {spread(item['standard_uncertainty'], '.2g')} m/s"
         if item["speed"] is not None
         else f"{name}: {item['reason']}"
         for name, item in answer["models"].items()

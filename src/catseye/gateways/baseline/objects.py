@@ -14,6 +14,8 @@ from catseye.records.laboratory.baseline import FORMAT
 if TYPE_CHECKING:
     from catseye.reduction.baseline.instrument import BaselineCalibration
 
+TEST_KEYS = ("name", "statistic", "limit", "passed", "text")
+
 
 class Span(NamedTuple):
     """Distance between two pillars along the straight line, with its standard uncertainty, m."""
@@ -81,7 +83,7 @@ def baseline_object(calibration: "BaselineCalibration") -> dict[str, Any]:
         "s": full.s if full else None,
         "u_s": full.s / np.sqrt(2.0 * full.degrees_of_freedom) if full else None,
         "degrees_of_freedom": full.degrees_of_freedom if full else None,
-        "tests": [d.__dict__ for d in calibration.decisions],
+        "tests": [{key: getattr(d, key) for key in TEST_KEYS} for d in calibration.decisions],
         "iso17123_4": _full(calibration),
         "noise": _noise(calibration),
         "variance_factor": s.variance_factor,

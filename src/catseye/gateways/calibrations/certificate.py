@@ -12,7 +12,8 @@ from catseye.gateways.writers.drawing import svg
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import folded, page, paragraph, picture, section, table
 from catseye.gateways.writers.verdict import verdict_line
-from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome, Quantity
+from catseye.reduction.calibrations.calibration import Calibration, Quantity
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 
 TITLE = "Certificate of calibration"
 MARK = f"<title>{TITLE}"  # by which a page is known as ours
@@ -141,8 +142,8 @@ def _readable(value: Any) -> Any:
 
 def _tests(calibration: Calibration) -> str:
     rows = [
-        (d.name, _number(d.statistic, ".4g"), _number(d.limit, ".4g"), _outcome(d), d.text)
-        for d in calibration.decisions
+        (d.name, _number(d.statistic, ".4g"), _limit(d), _outcome(d), d.text)
+        for d in (*calibration.decisions, *calibration.plausible)
     ]
     degrees = (
         f"Variance factor {calibration.variance_factor:.3g} from {calibration.degrees_of_freedom} degrees of freedom "
@@ -153,6 +154,12 @@ def _tests(calibration: Calibration) -> str:
     return section(
         "tests", "Tests", paragraph(degrees), table(("test", "value", "limit", "", "what it means"), rows, "tnntw")
     )
+
+
+def _limit(decision: CheckOutcome) -> str:
+    """A limit of a test with the side on which it stands: ≤ or ≥."""
+    shown = _number(decision.limit, ".4g")
+    return shown if decision.limit != decision.limit else f"{'≥' if decision.least else '≤'} {shown}"
 
 
 def _outcome(decision: CheckOutcome) -> str:
@@ -205,6 +212,22 @@ def _number(value: float, form: str) -> str:
     return str(value) if isinstance(value, int) else format(value, form)
 
 
+def test_line(decision: CheckOutcome) -> str:
+    """One test in a line: its number and limit, passed or failed, and what it means.
+
+    A comparison that chose a model has no outcome but what its text says.
+
+    >>> test_line(CheckOutcome("cyclic order 1: F", 1816.0, 4.541, None, "significant: kept"))
+    'cyclic order 1: F 1816, limit 4.541: significant: kept'
+    """
+    if decision.passed is None:
+        known = f" {decision.statistic:.4g}, limit {decision.limit:.4g}" if decision.comparison else ""
+        return f"{decision.name}{known}: {'' if known else 'not judged; '}{decision.text}"
+    outcome = "passed" if decision.passed else "FAILED"
+    numbers = f" {decision.comparison}" if decision.comparison else ""
+    return f"{decision.name}{numbers}: {outcome}; {decision.text}"
+
+
 def passages(calibration: Calibration) -> Iterator[tuple[str, str]]:
     """(title, text) of each paragraph that a terminal shows of a calibration."""
     provenance = calibration.provenance
@@ -216,10 +239,8 @@ def passages(calibration: Calibration) -> Iterator[tuple[str, str]]:
     for number, q in enumerate(calibration.quantities):
         value, u = rounded(q.value, q.u)
         yield "" if number else "Found", f"{q.key} = {value}, u {u} {q.unit}: {q.meaning}"
-    for number, decision in enumerate(calibration.decisions):
-        outcome = {True: "passed", False: "FAILED", None: "not judged"}[decision.passed]
-        numbers = f" {decision.statistic:.4g}, limit {decision.limit:.4g}" if decision.limit == decision.limit else ""
-        yield "" if number else "Tests", f"{decision.name}{numbers}: {outcome}; {decision.text}"
+    for number, decision in enumerate((*calibration.decisions, *calibration.plausible)):
+        yield "" if number else "Tests", test_line(decision)
     odd = [f"{number} ({state})" for number, state in enumerate(calibration.states, start=1) if state != "used"]
     if odd:
         more = f" and {len(odd) - SHOWN} more" if len(odd) > SHOWN else ""

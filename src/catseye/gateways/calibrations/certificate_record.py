@@ -22,10 +22,16 @@ BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 def calibration_verdict(calibration: Calibration) -> Verdict:
     """Whether the calibration's own tests bear it out; what failed is named, and nothing found is dropped."""
-    failed = [decision.name for decision in calibration.decisions if decision.passed is False]
-    if failed:
+    off = sorted((o for o in calibration.plausible if o.passed is False), key=lambda o: not o.grave)
+    if off and off[0].grave:
+        return Verdict("failed", off[0].text)
+    failed = [decision for decision in calibration.decisions if decision.passed is False]
+    if any(decision.grave for decision in failed):
         plural = "s" if len(failed) > 1 else ""
-        return Verdict("failed", f"{len(failed)} of its own test{plural} failed: {'; '.join(failed)}")
+        names = "; ".join(decision.name for decision in failed)
+        return Verdict("failed", f"{len(failed)} of its own test{plural} failed: {names}")
+    if off or failed:
+        return Verdict("doubtful", "; ".join(outcome.text for outcome in (*failed, *off)))
     if calibration.degrees_of_freedom < 1 and not any(d.passed for d in calibration.decisions):
         return Verdict("doubtful", "nothing was measured twice and no test could be made")
     suspects = [number for number, state in enumerate(calibration.states, start=1) if state == "suspect"]
@@ -63,6 +69,7 @@ def calibration_object(calibration: Calibration) -> dict[str, Any]:
             "variance_factor": calibration.variance_factor,
             "degrees_of_freedom": calibration.degrees_of_freedom,
             "decisions": [vars(decision) for decision in calibration.decisions],
+            "plausible": [vars(outcome) for outcome in calibration.plausible],
             "notes": calibration.notes,
             "readings": [dict(zip(calibration.columns, row, strict=True)) for row in calibration.rows],
             "not_used": [number for number, state in enumerate(calibration.states) if state not in ("used", "suspect")],
@@ -95,8 +102,9 @@ def calibration_toml(calibration: Calibration) -> str:
         f"order = {_value([q.key for q in calibration.quantities])}",
         f"matrix = [\n{matrix},\n]",
     ]
-    for decision in calibration.decisions:
-        lines += ["", "[[decision]]", *_pairs(vars(decision))]
+    for name, outcomes in (("decision", calibration.decisions), ("plausible", calibration.plausible)):
+        for outcome in outcomes:
+            lines += ["", f"[[{name}]]", *_pairs(vars(outcome))]
     rows = ",\n".join(f"  {_value([_cell(cell) for cell in row])}" for row in calibration.rows)
     lines += ["", "[readings]", f"columns = {_value(list(calibration.columns))}", f"rows = [\n{rows},\n]"]
     for name in ("inputs_sha256", "sheet"):

@@ -10,6 +10,7 @@ from catseye.gateways.epoch.tables import kind_of
 from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.verdict import Verdict
 from catseye.records.night.campaign import REFERENCE
+from catseye.records.site.validity import expired_of_site
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.epoch.reason import ShotStatus
 
@@ -27,7 +28,11 @@ MEANING = {
 
 
 def verdict(reduction: Reduction) -> Verdict:
-    """Whether the night may be relied on: its scatter bears out what is claimed, and few shots were lost."""
+    """Scatter against what is claimed, shots lost, and the verdict of an exported campaign."""
+    return _own_verdict(reduction).resting_on({"the exported campaign": reduction.campaign.verdict})
+
+
+def _own_verdict(reduction: Reduction) -> Verdict:
     coordinates = reduction.coordinates
     factor, degrees = coordinates.variance_factor, coordinates.degrees_of_freedom
     if coordinates.status != CONVERGED:
@@ -49,6 +54,8 @@ def verdict(reduction: Reduction) -> Verdict:
         )
     if coordinates.doubts:
         return Verdict("doubtful", coordinates.doubts[0])
+    if ended := expired_of_site(reduction.campaign):
+        return Verdict("doubtful", "; ".join(ended))
     says = "as their uncertainties claim" if factor >= 1.0 - 2.0 * spread else "less than their uncertainties claim"
     return Verdict("good", f"the measurements scatter {says}, and {rejected} of {shots} shots were rejected")
 

@@ -21,7 +21,7 @@ from catseye.coordinator.journal.check import ChainReport
 from catseye.coordinator.journal.entries import AnsweredShot
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
-from catseye.gateways.journal.chain import chain_object
+from catseye.gateways.journal.chain import chain_object, export_verdict
 from catseye.gateways.journal.export import seal, stamp
 from catseye.gateways.writers.output import whole_directory
 from catseye.gateways.writers.written import origin
@@ -33,6 +33,7 @@ from catseye.records.night.weather import WeatherSample
 from catseye.records.site.folder import REFERENCE, SiteFolder, site_files
 from catseye.reduction.epoch.reason import ShotStatus, status_of
 from catseye.reduction.live.weather import StationWatch
+from catseye.verdict import Verdict
 
 STEADY = 0.01 * DEGREE  # rad that the telescope may move before it is told
 MARGIN = round(WEATHER_MARGIN * TICKS_PER_DAY)  # ticks
@@ -67,12 +68,14 @@ class CampaignExport:
     shots, readings   how many
     left_out          how many of each reason
     notes             lines for people: what was left out, what was changed
+    verdict           a reduction of the campaign is no better
     """
 
     shots: int
     readings: int
     left_out: dict[str, int]
     notes: tuple[str, ...]
+    verdict: Verdict
 
 
 @dataclass(frozen=True)
@@ -116,9 +119,10 @@ def export_campaign(
     if not chosen:
         reasons = "; ".join(left.notes()) or "no shots in the span"
         raise InputError(f"journal {reader.place}: run {run} has no shot that a campaign can hold: {reasons}")
-    notes = left.notes()
-    doubts = _doubts(reader, run, chosen, readings, why, notes)
-    site = _as_it_stood(reader, run, site, chosen, readings, notes)
+    notes, wrong = left.notes(), list[str]()
+    doubts = _doubts(reader, run, chosen, readings, why, notes, wrong)
+    site = _as_it_stood(reader, run, site, chosen, readings, notes, wrong)
+    verdict = export_verdict(chain, len(chosen) + len(readings), wrong)
     with whole_directory(out, Path(reader.place)) as directory:
         for path, text in site_files(site).items():
             (directory / path).parent.mkdir(exist_ok=True)
@@ -132,9 +136,10 @@ def export_campaign(
         _write_frames(reader, run, chosen, directory / "frames.npy")
         read_campaign(directory)
         provenance = origin(datetime.now(UTC), stored.hashes)
-        told = {"run": stored.uuid, "notes": notes, "chains": [] if chain is None else [chain_object(chain)]}
+        chains = [] if chain is None else [chain_object(chain)]
+        told = {"run": stored.uuid, "notes": notes, "chains": chains, "verdict": verdict.to_object()}
         seal(directory, reader, {"made_by": "catseye export", **provenance, **told})
-    return CampaignExport(len(chosen), len(readings), dict(left.counts), tuple(notes))
+    return CampaignExport(len(chosen), len(readings), dict(left.counts), tuple(notes), verdict)
 
 
 def _readings(
@@ -175,8 +180,9 @@ def _doubts(
     readings: list[LiveWeather],
     why: dict[tuple[str, int], str],
     notes: list[str],
+    wrong: list[str],
 ) -> list[DoubtRow]:
-    """Readings and shots that the live reduction did not believe, of those that are exported."""
+    """Exported readings and shots that the live reduction did not believe; `wrong` hears what spoils the campaign."""
     made = [
         DoubtRow(what="weather", name=read.station, mjd_utc=float(stamp(read.ticks)), why=why[read.station, read.ticks])
         for read in readings
@@ -188,6 +194,7 @@ def _doubts(
             told = believed_samples([_sample(read) for read in readings], made, times)[1]
         except InputError:
             told, made = ["no weather station was believed throughout: all readings are exported as they are"], []
+            wrong += told
         notes += told
     reasons: dict[int, str] = {}
     for _, solution in reader.solutions(run):
@@ -304,8 +311,9 @@ def _as_it_stood(
     chosen: list[ExportedShot],
     readings: list[LiveWeather],
     notes: list[str],
+    wrong: list[str],
 ) -> SiteFolder:
-    """The site with the campaign's start and posture, and the stations that spoke."""
+    """The site with the campaign's start and posture, and the stations that spoke; `wrong` as for `_doubts`."""
     start, end = chosen[0].ticks, chosen[-1].ticks
     named: dict[str, object] = {"start_mjd_utc": start / TICKS_PER_DAY}
     postures = [
@@ -319,12 +327,14 @@ def _as_it_stood(
         named |= {"azimuth_deg": float(middle[0] / DEGREE % 360.0), "elevation_deg": float(middle[1] / DEGREE)}
         moved = max(np.ptp(azimuth), np.ptp(elevation))
         if moved > STEADY:
-            notes.append(
+            wrong.append(
                 f"the telescope moved by {moved / DEGREE:.3f} deg: a campaign has one posture, the median's "
                 "(choose a span in which it stood still)"
             )
+            notes.append(wrong[-1])
     else:
-        notes.append("no posture was journalled in the span: azimuth and elevation are site.toml's")
+        wrong.append("no posture was journalled in the span: azimuth and elevation are site.toml's")
+        notes.append(wrong[-1])
     spoke = {read.station for read in readings}
     stations = tuple(station for station in site.site.weather_station if station.name in spoke)
     if silent := sorted({station.name for station in site.site.weather_station} - spoke):

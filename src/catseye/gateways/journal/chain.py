@@ -1,5 +1,6 @@
 """What a journal's chain says, for programs and for people."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from catseye.coordinator.journal.check import ChainReport
@@ -39,6 +40,19 @@ def chain_words(report: ChainReport) -> list[str]:
     end = "" if report.ended else "; it has no end: it lasts, was killed, or was cut there"
     told = f", and has the {report.heads} heads that were told" if report.heads else ""
     return [f"{report.events} events are as they were written up to head {report.head}{told}{end}."]
+
+
+def export_verdict(chain: ChainReport | None, rows: int, doubts: Sequence[str] = ()) -> Verdict:
+    """The verdict of what was exported.
+
+    chain    the check of the run's events; None: they were not checked
+    rows     how many were written
+    doubts   notes that speak against the export
+    """
+    altered = (
+        [f"exported without {chain.count} events that are not as they were written"] if chain and chain.count else []
+    )
+    return Verdict("good", f"{rows} rows written").hearing([*altered, *doubts])
 
 
 def chain_verdict(reports: list[ChainReport]) -> Verdict:

@@ -26,9 +26,10 @@ from catseye.gateways.writers.cells import harmless
 from catseye.gateways.writers.objects import json_page, plain
 from catseye.gateways.writers.output import PROVENANCE, whole_directory
 from catseye.gateways.writers.written import Progress, origin
+from catseye.records.files.verdicts import EXPORT
 from catseye.records.night.live import TICKS_PER_DAY
 
-FORMAT = "catseye-journal-export-1"
+FORMAT = EXPORT
 Form = Literal["csv", "fits"]
 Cells = tuple[Any, ...]
 

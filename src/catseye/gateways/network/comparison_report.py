@@ -172,8 +172,10 @@ def comparison_figures(compared: ComparedEpochs) -> dict[str, CaptionedFigure]:
 def _view(compared: ComparedEpochs, bearing: float | None) -> tuple[Figure, str]:
     d, first = compared.deformation, compared.first
     axes = PLAN if bearing is None else elevation_view(bearing)
-    there = first.network.points.existing[:, :2] if bearing is None else first.network.points.existing
-    flat = np.where(there.all(axis=1)[:, None], np.nan_to_num(first.solution.x) @ axes.T, np.nan)
+    existing = first.network.points.existing
+    there = existing[:, :2] if bearing is None else existing
+    placed = np.asarray(there.all(axis=1))
+    flat = np.where(placed[:, None], np.nan_to_num(first.solution.x) @ axes.T, np.nan)
     shown = compared.rows[np.isfinite(flat[compared.rows]).all(axis=1)]
     if not len(shown):
         shown = np.flatnonzero(np.isfinite(flat).all(axis=1))

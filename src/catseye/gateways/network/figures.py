@@ -98,7 +98,7 @@ def _view(findings: Findings, bearing: float | None) -> tuple[Figure, str]:
     solution = findings.solution
     axes = PLAN if bearing is None else elevation_view(bearing)
     there = findings.network.points.existing[:, :2] if bearing is None else findings.network.points.existing
-    flat = np.where(there.all(axis=1)[:, None], np.nan_to_num(solution.x) @ axes.T, np.nan)
+    flat = np.where(there.all(axis=1, keepdims=True), np.nan_to_num(solution.x) @ axes.T, np.nan)
     known = np.isfinite(flat).all(axis=1)
     if bearing is not None:
         flat[:, 0] -= flat[known, 0].min(initial=np.inf if known.any() else 0.0)

@@ -10,9 +10,8 @@ import numpy as np
 
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import CONVERGED, NONCENTRALITY
-from catseye.estimation.network.diagnosis import label
 from catseye.estimation.network.external import effects_at_ends
-from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
+from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, label, points_of
 from catseye.estimation.quality.ellipsoid import Ellipsoid, ellipsoid, relative_covariance
 from catseye.estimation.quality.reliability import (
     GlobalTest,

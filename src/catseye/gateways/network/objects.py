@@ -98,6 +98,7 @@ def _head(findings: Findings, treated: "AdjustedNetwork | None") -> dict[str, An
             "description": findings.network.description,
             "status": solution.status,
             "datum": solution.datum,
+            "notes": [*findings.network.notes, *findings.network.doubts],
             "axes": list(findings.network.axis_names),
             "iterations": solution.iterations,
             "approximate": list(solution.approximate),

@@ -123,12 +123,13 @@ def _candidate(c: Candidate, *, scheduled: bool) -> dict[str, Any]:
 def _scatter(scatter: MonteCarloScatter | None) -> dict[str, Any] | None:
     if scatter is None:
         return None
+    free = scatter.predicted > 0.0  # neither held nor absent
     return {
         "runs": scatter.runs,
         "asked": scatter.asked,
         "ratio": scatter.ratio,
-        "rms": float(np.sqrt(np.mean(scatter.rms**2))),
-        "predicted": float(np.sqrt(np.mean(scatter.predicted**2))),
+        "rms": float(np.sqrt(np.mean(scatter.rms[free] ** 2))),
+        "predicted": float(np.sqrt(np.mean(scatter.predicted[free] ** 2))),
         "blunders_found": scatter.found,
         "good_lost": scatter.false,
     }

@@ -10,7 +10,7 @@ import numpy as np
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.gateways.network.figures import CaptionedFigure, network_figures
 from catseye.gateways.network.findings import Findings
-from catseye.gateways.network.summary import passages, quantity, treatment_passages, verdict
+from catseye.gateways.network.summary import factor_words, passages, quantity, treatment_passages, verdict
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
 from catseye.gateways.writers.verdict import verdict_line
@@ -108,7 +108,7 @@ def network_cards(findings: Findings) -> list[str]:
     return [
         card(
             "Variance factor",
-            f"{whole.factor:.3f}" if np.isfinite(whole.p) else "unknown",
+            factor_words(whole.factor) if np.isfinite(whole.p) else "unknown",
             f"{interval}, {degrees:.0f} degrees of freedom" if np.isfinite(degrees) else interval,
         ),
         card("Suspect observations", suspects, f"of {int(active.sum())}, level {findings.level:g} for all"),

@@ -6,7 +6,7 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.estimation.least_squares.adjustment import CONVERGED
-from catseye.estimation.quality.reliability import TOO_LARGE, TOO_SMALL
+from catseye.estimation.quality.reliability import TOO_LARGE, TOO_SMALL, too_good
 from catseye.gateways.network.findings import Findings
 from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.verdict import Verdict
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from catseye.reduction.network import AdjustedNetwork
 
 NAMED = 5  # names in a sentence at most
+UNIT = 300.0  # times too large: from half way (in powers) between 100 and 1000 on, mm for m is the likely cause
 WEAK = 5.0  # times the usual uncertainty: such a point is named
 
 
@@ -39,8 +40,13 @@ def verdict(findings: Findings) -> Verdict:
     status, whole = findings.solution.status, findings.whole
     if not findings.answered:
         return Verdict("failed", f"no answer: {status}")
-    if status != CONVERGED:
-        return Verdict("doubtful", status)
+    if status != CONVERGED or findings.network.doubts:
+        reasons = [*findings.network.doubts[:NAMED], *([status] if status != CONVERGED else [])]
+        return Verdict("doubtful", "; ".join(reasons))
+    sides = findings.solution.assumed if findings.network.points.fixed.any() else ()
+    if sides:  # a free network may lie on either side: that is a convention
+        text = f"nothing says on which side these points lie, and a mirror image fits as well: {_listed(sides)}"
+        return Verdict("doubtful", f"{text}; give them a rough place, or measure a zenith angle or a height")
     if not np.isfinite(whole.p):
         return Verdict("doubtful", "unchecked: nothing was measured twice, so nothing would show an error")
     if whole.outcome == TOO_LARGE:
@@ -50,6 +56,8 @@ def verdict(findings: Findings) -> Verdict:
     if len(findings.suspects):
         text = "the whole agrees with the claimed uncertainties, single observations do not"
         return Verdict("doubtful", f"{text}; {_suspects(findings)}")
+    if too_good(whole.factor * findings.solution.degrees_of_freedom, findings.solution.degrees_of_freedom):
+        return Verdict("doubtful", _too_good(findings))
     if whole.outcome == TOO_SMALL:
         less = 100.0 * (1.0 - np.sqrt(whole.factor))
         text = f"better than claimed: the observations scatter {less:.0f} % less than their uncertainties claim"
@@ -58,6 +66,28 @@ def verdict(findings: Findings) -> Verdict:
     unchecked, out = int(np.sum(findings.table.active & ~findings.table.checked)), int(np.sum(~findings.table.active))
     text += f", {out} left out" if out else ""
     return Verdict("good", text + (f", but {unchecked} of them are checked by no other" if unchecked else ""))
+
+
+def factor_words(factor: float) -> str:
+    """A variance factor with three decimals, or three digits where it is so small that they say nothing.
+
+    >>> factor_words(1.01842), factor_words(2.24e-7)
+    ('1.018', '2.24e-07')
+    """
+    return f"{factor:.3f}" if not 0.0 < factor < 0.01 else f"{factor:.3g}"
+
+
+def _too_good(findings: Findings) -> str:
+    """Why a variance factor that chance does not make so small is no good sign, with the factor of the sigmas."""
+    factor = findings.whole.factor
+    times = 1.0 / np.sqrt(factor) if factor > 0.0 else np.inf
+    less = 100.0 * (1.0 - np.sqrt(factor))
+    text = f"the observations scatter {less:.0f} % less than their uncertainties claim, too little for chance "
+    text += f"(variance factor {factor:.3g}): the uncertainties are "
+    text += f"about {times:.2g} times too large" if np.isfinite(times) else "not those of these observations"
+    if times >= UNIT:
+        return f"{text}; most likely their unit: sigmas in mm typed as m, or in the wrong column"
+    return f"{text}; most likely their unit, or the claim of another instrument"
 
 
 def _suspects(findings: Findings) -> str:
@@ -156,6 +186,7 @@ def _network(findings: Findings) -> str:
     if solution.replaced:
         named = _listed(solution.replaced)
         text += f" Given coordinates that the observations contradict grossly were no start: {named}."
+    text += "".join(f" {note[0].upper()}{note[1:]}." for note in findings.network.notes)
     lonely = [findings.names[i] for i in np.flatnonzero(findings.seen == 0)]
     return text + (f" Not observed at all: {_listed(lonely)}." if lonely else "")
 
@@ -207,8 +238,9 @@ def _observations(findings: Findings) -> str:
     if not np.isfinite(whole.p):
         return "Nothing is left over to compare them with."
     text = (
-        f"Variance factor {whole.factor:.3f} with {findings.solution.degrees_of_freedom:.0f} degrees of freedom; by "
-        f"chance it lies between {whole.lower:.3f} and {whole.upper:.3f} (level {findings.level:g}): {whole.outcome}."
+        f"Variance factor {factor_words(whole.factor)} with {findings.solution.degrees_of_freedom:.0f} degrees of "
+        f"freedom; by chance it lies between {whole.lower:.3f} and {whole.upper:.3f} (level {findings.level:g}): "
+        f"{whole.outcome}."
     )
     text += f" {_suspects(findings)}." if len(findings.suspects) else ""
     if np.isfinite(table.standardised).any() and not len(findings.suspects):

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import ndtri, stdtrit
 
 from catseye.constants import MILLIMETRE, TWO_PI
-from catseye.estimation.network.diagnosis import unconnected
+from catseye.estimation.network.diagnosis import pieces_of
 from catseye.gateways.network.findings import Findings
 from catseye.version import __version__
 
@@ -193,7 +193,7 @@ def _summary(findings: Findings, unknowns: _Unknowns) -> str:
             f"</observations-summary>\n<project-equations><equations>{equations}</equations><unknowns>{free}</unknowns>"
             f"<degrees-of-freedom>{degrees}</degrees-of-freedom><defect>{degrees - equations + free}</defect>"
             f"<sum-of-squares>{ratio**2 * degrees:.7e}</sum-of-squares>",
-            "<connected-network/>" if unconnected(network) is None else "<disconnected-network/>",
+            "<connected-network/>" if not pieces_of(network).any() else "<disconnected-network/>",
             f"</project-equations>\n<standard-deviation><apriori>1</apriori><aposteriori>{ratio:.7e}</aposteriori>"
             f"<used>{'aposteriori' if findings.scaled else 'apriori'}</used><probability>{1.0 - findings.level:.3f}"
             f"</probability><ratio>{ratio:.6f}</ratio><lower>{lower:.6f}</lower><upper>{upper:.6f}</upper>",

@@ -11,7 +11,7 @@ import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import ValidityError
-from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, Svg, mpl, svg
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.verdict import Verdict
 from catseye.gateways.writers.written import Files, origin, write_files
@@ -28,7 +28,7 @@ WIDTHS = (10, 17, 19, 9, 9, 9)
 POLARIZATIONS: tuple[coating.Polarization, ...] = ("s", "p")
 
 
-def beam_figure(beam_path: BeamPath) -> str:
+def beam_figure(beam_path: BeamPath) -> Svg:
     """SVG text: the beam's radii along its path, and the power that returns by distance.
 
     beam_path   a reduced beam train
@@ -99,7 +99,7 @@ def _power(ax, beam_path: BeamPath) -> None:
     ax.legend(loc="lower left")
 
 
-def coating_figure(names: Sequence[str] = DRAWN, wavelength_um: float = 0.780, incidence: float = 0.0) -> str:
+def coating_figure(names: Sequence[str] = DRAWN, wavelength_um: float = 0.780, incidence: float = 0.0) -> Svg:
     """SVG text: reflectance by angle and by wavelength, and what a mirror adds to a range by angle.
 
     names           of `coating.named`
@@ -135,7 +135,7 @@ def coating_figure(names: Sequence[str] = DRAWN, wavelength_um: float = 0.780, i
         return svg(figure)
 
 
-def beam_plot(file: Path) -> tuple[str, dict[str, Any]]:
+def beam_plot(file: Path) -> tuple[Svg, dict[str, Any]]:
     """The figure of a beam train as SVG text, and what it says in numbers.
 
     file   the record
@@ -146,7 +146,7 @@ def beam_plot(file: Path) -> tuple[str, dict[str, Any]]:
 
 def coating_plot(
     names: Sequence[str] = DRAWN, wavelength_um: float = 0.780, incidence: float = 0.0
-) -> tuple[str, dict[str, Any]]:
+) -> tuple[Svg, dict[str, Any]]:
     """Coating curves as SVG text, and reflectance and range at the angle that they are made for.
 
     names           of `coating.named`, at most 6; one that is not known raises ValidityError
@@ -186,8 +186,11 @@ def beam_object(beam_path: BeamPath) -> dict[str, Any]:
     """
     keys = ("leg", "name", "way", "radius", "curvature", "aperture", "clipped", "power")
     rows = ("distance", "radius", "hit", "collected", "power", "status")
-    good = beam_path.status == "ok"
+    lost = [row for row in beam_path.returned if row.status != "ok"]
+    good = beam_path.status == "ok" and not lost
     why = "every element passes the beam" if good else beam_path.status
+    if lost and beam_path.status == "ok":
+        why = f"no power from {', '.join(f'{row.distance:g}' for row in lost)} m: {lost[0].status}"
     return {
         "verdict": Verdict("good" if good else "doubtful", why).to_object(),
         "name": beam_path.train.name,

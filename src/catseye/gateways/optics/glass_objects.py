@@ -12,13 +12,14 @@ from catseye.optics.glass import (
     glass_named,
     group_index,
     group_wavelength,
-    index_over_air,
     phase_index,
     reference_air,
     slopes,
     temperature_slopes,
+    wavelength_in_air_um,
 )
 from catseye.optics.retroreflector import prism
+from catseye.optics.retroreflector.warm_prism import EXPANSION_C, warm_prism, warm_prism_slopes
 
 MODULATION_HZ = 1.5e9  # the GBT's
 AIR = (20.0, 933.0, 50.0)  # °C, hPa, %: of the notes' example, [PARKER04] eq. 1.49, by their model
@@ -31,24 +32,14 @@ def glass_object(name: str, wavelength_um: float, temperature_c: float, *, heigh
     name            in GLASSES
     wavelength_um   in vacuum, um
     temperature_c   °C, of the glass
-    height_mm       of a prism of it, mm, above 0
+    height_mm       of a prism of it at 20 °C, mm, above 0
     """
     glass = glass_named(name)
-    height = height_mm * MILLIMETRE
     vacuum = absolute_index(wavelength_um, name, temperature_c)
-    here = wavelength_um / float(reference_air(wavelength_um, glass.reference_c).phase)
+    here = float(wavelength_in_air_um(wavelength_um, name))
     by_wavelength, by_temperature = slopes(here, name), temperature_slopes(wavelength_um, name, temperature_c)
-    about, air_index = _air_about(wavelength_um)
-    true = index_over_air(wavelength_um, name, temperature_c, **air_index)
-    over_air = {
-        **{f"{key}_index": value for key, value in air_index.items()},
-        "phase_index_over_air": float(true.phase),
-        "group_index_over_air": float(true.group),
-        "notes_group_index_over_air": float(group_index(wavelength_um, name)) / air_index["air_group"],
-    }
-    per_c = (float(by_temperature.group), glass.expansion)
     return {
-        "verdict": Verdict("good", f"within the limits of {name}'s dispersion formula, {glass.source}").to_object(),
+        "verdict": glass_verdict(name, temperature_c).to_object(),
         "name": name,
         "what": glass.what,
         "formula": glass.formula,
@@ -56,24 +47,33 @@ def glass_object(name: str, wavelength_um: float, temperature_c: float, *, heigh
         "limits_um": [glass.shortest_um, glass.longest_um],
         "reference_c": glass.reference_c,
         "wavelength_um": wavelength_um,
+        "wavelength_in_air_um": here,
         "temperature_c": temperature_c,
-        "phase_index": phase_index(wavelength_um, name),
-        "group_index": group_index(wavelength_um, name),
+        "phase_index": phase_index(here, name),
+        "group_index": group_index(here, name),
         "phase_index_per_um": by_wavelength.phase,
         "group_index_per_um": by_wavelength.group,
-        "group_wavelength": group_wavelength(MODULATION_HZ, wavelength_um, name),
+        "group_wavelength": group_wavelength(MODULATION_HZ, here, name),
+        "notes_phase_index": phase_index(wavelength_um, name),
+        "notes_group_index": group_index(wavelength_um, name),
+        "notes_group_wavelength": group_wavelength(MODULATION_HZ, wavelength_um, name),
         "absolute_phase_index": vacuum.phase,
         "absolute_group_index": vacuum.group,
         "absolute_phase_index_per_c": by_temperature.phase,
         "absolute_group_index_per_c": by_temperature.group,
         "expansion_per_c": glass.expansion,
-        "prism": {"air": about, **_prism_object(height, over_air, per_c)},
-        "others": {
-            other: _other(other, name, wavelength_um, height, air_index["air_group"])
-            for other in GLASSES
-            if other != name
-        },
+        **_in_air(name, wavelength_um, temperature_c, height_mm * MILLIMETRE),
     }
+
+
+def glass_verdict(name: str, temperature_c: float) -> Verdict:
+    """Good within the limits of the formulas, which were checked; doubtful beyond those of the expansion."""
+    glass = glass_named(name)
+    if not EXPANSION_C[0] <= temperature_c <= EXPANSION_C[1]:
+        low, high = EXPANSION_C
+        why = f"{temperature_c:g} °C is outside {low:g} to {high:g} °C, for which the expansion of {name} is stated"
+        return Verdict("doubtful", why)
+    return Verdict("good", f"within the limits of {name}'s dispersion formula, {glass.source}")
 
 
 def _air_about(wavelength_um: float) -> tuple[str, dict[str, float]]:
@@ -86,19 +86,41 @@ def _air_about(wavelength_um: float) -> tuple[str, dict[str, float]]:
     return "20 °C, 933 hPa, 50 %", {"air_phase": float(about.phase_index), "air_group": float(about.group_index)}
 
 
-def _prism_object(height: float, over_air: dict[str, float], per_c: tuple[float, float]) -> dict[str, Any]:
-    """What a prism so high does, in the air about it; `per_c`: of group index and length, 1/K."""
-    group, notes = over_air["group_index_over_air"], over_air["notes_group_index_over_air"]
-    constant = float(prism.range_constant(height, group))
+def _in_air(name: str, wavelength_um: float, temperature_c: float, height: float) -> dict[str, Any]:
+    """A prism of the glass in the air about it, and what another glass costs there."""
+    about, index = _air_about(wavelength_um)
+    asked = (height, name, wavelength_um, temperature_c)
+    return {
+        "prism": {"air": about, **index_keys(index), **_prism_object(asked, index)},
+        "others": {
+            other: _other(other, name, wavelength_um, height, index["air_group"]) for other in GLASSES if other != name
+        },
+    }
+
+
+def index_keys(index: dict[str, float]) -> dict[str, float]:
+    """The air's indices by their names in JSON."""
+    return {f"{key}_index": value for key, value in index.items()}
+
+
+def _prism_object(asked: tuple[float, str, float, float], index: dict[str, float]) -> dict[str, Any]:
+    """A prism at its temperature, in the air about it; `asked`: height at 20 °C, glass, vacuum um, °C."""
+    height, name, wavelength_um, _ = asked
+    phase, group = index["air_phase"], index["air_group"]
+    found = warm_prism(*asked, air_phase=phase, air_group=group)
+    per_c = warm_prism_slopes(*asked, air_phase=phase, air_group=group)
+    notes = float(group_index(wavelength_um, name)) / index["air_group"]
     return {
         "height": height,
-        **over_air,
-        "range_constant": constant,
-        "range_constant_per_c": constant * per_c[1] - (1.0 + group**-2) * height * per_c[0],
-        "reference_depth": prism.reference_depth(height, group),
-        "range_change_at_30_deg": prism.oblique_change(
-            height, OBLIQUE, group=group, phase=over_air["phase_index_over_air"]
-        ),
+        "height_at_temperature": found.height,
+        "phase_index_over_air": found.phase,
+        "group_index_over_air": found.group,
+        "notes_group_index_over_air": notes,
+        "range_constant": found.range_constant,
+        "range_constant_per_c": per_c.range_constant,
+        "reference_depth": found.reference_depth,
+        "reference_depth_per_c": per_c.reference_depth,
+        "range_change_at_30_deg": prism.oblique_change(found.height, OBLIQUE, group=found.group, phase=found.phase),
         "notes_range_constant": prism.range_constant(height, notes),
     }
 
@@ -106,13 +128,14 @@ def _prism_object(height: float, over_air: dict[str, float], per_c: tuple[float,
 def _other(other: str, name: str, wavelength_um: float, height: float, air_group: float) -> dict[str, Any] | None:
     """What it costs to take one glass for another; None where the other's formula does not reach."""
     known = GLASSES[other]
-    if not known.shortest_um <= wavelength_um <= known.longest_um:
+    here = {which: float(wavelength_in_air_um(wavelength_um, which)) for which in (name, other)}
+    if not known.shortest_um <= here[other] <= known.longest_um:
         return None
-    n, m = (float(group_index(wavelength_um, which)) / air_group for which in (name, other))
+    n, m = (float(group_index(um, which)) / air_group for which, um in here.items())
     wrong = prism.wrong_glass(height, assumed=n, true=m)
     return {
-        "phase_index": phase_index(wavelength_um, other) - phase_index(wavelength_um, name),
-        "group_index": group_index(wavelength_um, other) - group_index(wavelength_um, name),
+        "phase_index": phase_index(here[other], other) - phase_index(here[name], name),
+        "group_index": group_index(here[other], other) - group_index(here[name], name),
         "range_too_long_about_point": wrong.about_point,
         "range_too_long_about_face": wrong.about_face,
     }
@@ -124,7 +147,7 @@ def glass_rows(answer: dict[str, Any]) -> list[tuple[str, str]]:
     rows = [
         (answer["name"], f"{answer['what']}; {answer['source']}, {_limits(answer)}"),
         ("air", f"phase index {answer['phase_index']:.8f}, group index {answer['group_index']:.8f} at "
-                f"{answer['wavelength_um']:g} µm, relative to air as the notes take them"),
+                f"{answer['wavelength_in_air_um']:.6g} µm in air, {answer['wavelength_um']:g} µm in vacuum"),
         ("slopes", f"{answer['phase_index_per_um']:+.5f} and {answer['group_index_per_um']:+.5f} per µm"),
         ("modulation", f"{answer['group_wavelength'] * 1e3:.6f} mm at 1500 MHz, half of it "
                        f"{answer['group_wavelength'] * 5e2:.6f} mm"),
@@ -133,11 +156,16 @@ def glass_rows(answer: dict[str, Any]) -> list[tuple[str, str]]:
                    f"{answer['absolute_phase_index_per_c'] * 1e6:+.2f} and "
                    f"{answer['absolute_group_index_per_c'] * 1e6:+.2f} ppm per °C"),
         ("expansion", f"{answer['expansion_per_c'] * 1e6:.1f} ppm per °C"),
-        ("prism", f"{own['height'] * 1e3:g} mm high in air of {own['air']}: range constant "
+        ("prism", f"{own['height'] * 1e3:g} mm high at 20 °C, now at {answer['temperature_c']:g} °C in air of "
+                  f"{own['air']}: range constant "
                   f"{own['range_constant'] * 1e3:.4f} mm ({own['range_constant_per_c'] * 1e6:+.2f} µm per °C), point "
                   f"{own['reference_depth'] * 1e3:.4f} mm below the face, "
                   f"{own['range_change_at_30_deg'] * 1e6:+.2f} µm more at 30°"),
-        ("the notes", f"take the index as relative to vacuum: n = {own['notes_group_index_over_air']:.6f} instead of "
+        ("the notes", f"take {answer['wavelength_um']:g} µm as in air: phase index {answer['notes_phase_index']:.8f}, "
+                      f"group index {answer['notes_group_index']:.8f}, modulation "
+                      f"{answer['notes_group_wavelength'] * 1e3:.6f} mm, half of it "
+                      f"{answer['notes_group_wavelength'] * 5e2:.6f} mm"),
+        ("", f"and the index as relative to vacuum: n = {own['notes_group_index_over_air']:.6f} instead of "
                       f"{own['group_index_over_air']:.6f}, range constant {own['notes_range_constant'] * 1e3:.4f} mm, "
                       f"{(own['notes_range_constant'] - own['range_constant']) * 1e6:+.1f} µm"),
     ]  # fmt: skip

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, Svg, mpl, svg
 from catseye.optics.coating import index
 from catseye.optics.glass import phase_index
 from catseye.optics.polarization import ellipse, linear, retarder
@@ -39,7 +39,7 @@ def corners(wavelength_um: float, glass: str) -> dict[str, Corner]:
     return corners
 
 
-def polarization_plot(wavelength_um: float = 0.780, glass: str = "BK7-old") -> tuple[str, dict[str, Any]]:
+def polarization_plot(wavelength_um: float = 0.780, glass: str = "BK7-old") -> tuple[Svg, dict[str, Any]]:
     """Three panels as SVG text, and their numbers.
 
     wavelength_um   um, in air, 0.62 to 1.01: where the metals and the glass are known

@@ -8,7 +8,7 @@ import numpy as np
 from catseye.atmosphere.index.air import air
 from catseye.constants import DEGREE
 from catseye.errors import ValidityError
-from catseye.gateways.writers.drawing import FAINT, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import FAINT, SERIES, STYLE, Figure, Svg, mpl, svg
 from catseye.optics.glass import index_over_air
 from catseye.optics.retroreflector import prism
 from catseye.optics.retroreflector.cats_eye import BallCatsEye, focal_radius
@@ -55,7 +55,7 @@ class Dimensions:
         )
 
 
-def return_plot(dimensions: Dimensions | None = None) -> tuple[str, dict[str, Any]]:
+def return_plot(dimensions: Dimensions | None = None) -> tuple[Svg, dict[str, Any]]:
     """What each kind returns against the incidence, and how its range changes, as SVG text; and in numbers.
 
     dimensions   of the targets; the GBT's if None
@@ -99,7 +99,7 @@ def return_plot(dimensions: Dimensions | None = None) -> tuple[str, dict[str, An
     return text, summary
 
 
-def aberration_plot(dimensions: Dimensions | None = None, *, beam_radius: float = 0.010) -> tuple[str, dict[str, Any]]:
+def aberration_plot(dimensions: Dimensions | None = None, *, beam_radius: float = 0.010) -> tuple[Svg, dict[str, Any]]:
     """Range change, deviation and collected light of the ball, as SVG text; and in numbers.
 
     dimensions    of the ball; the memo's if None

@@ -20,7 +20,11 @@ def panel_figures(work: "PanelWork") -> dict[str, str]:
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
-        drawn = {"corners": svg(_corners(work)), "surface": svg(_surface(work.latest)), "lie": svg(_lie(work))}
+        drawn: dict[str, str] = {
+            "corners": svg(_corners(work)),
+            "surface": svg(_surface(work.latest)),
+            "lie": svg(_lie(work)),
+        }
         drawn["control"] = svg(_control(work))
         if work.setting is not None:
             drawn["turning"] = svg(_turning(work))

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
-from catseye.gateways.pose.objects import PoseFindings
 from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, Figure, nice, styled
 from catseye.reduction.pose.pointing_offsets import PointingOffset
+from catseye.reduction.pose.verdicts import PoseFindings
 
 NAMED = 14  # points up to which each is named
 LENGTH = 0.12  # of the group's size, drawn for the largest residual

@@ -14,11 +14,9 @@ from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.estimation.shapes.pose import Pose
 from catseye.gateways.pose.objects import (
     FORMAT,
-    PoseFindings,
     beam_rows,
     pose_result_object,
     pose_rows,
-    pose_verdict,
     pose_words,
 )
 from catseye.gateways.writers.objects import json_page, versions
@@ -27,6 +25,7 @@ from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, 
 from catseye.gateways.writers.verdict import verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.pose.pointing_offsets import PointingOffset
+from catseye.reduction.pose.verdicts import PoseFindings, pose_verdict
 
 HEADER = (
     "point",

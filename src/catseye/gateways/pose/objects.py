@@ -6,44 +6,15 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import InputError
-from catseye.estimation.shapes.pose import COMPONENTS
-from catseye.gateways.writers.verdict import Verdict
+from catseye.estimation.shapes.pose import COMPONENTS, RIGID
 from catseye.records.files.reading import Folder
+from catseye.records.files.verdicts import stored_verdict
 from catseye.reduction.pose.pointing_offsets import COMPONENTS as BEAM
 from catseye.reduction.pose.pointing_offsets import PointingOffset
-from catseye.reduction.pose.pose import GroupPose
+from catseye.reduction.pose.verdicts import PoseFindings, pose_status, pose_verdict
+from catseye.verdict import Verdict
 
 FORMAT = "catseye-pose-1"
-WEAK_LEVEL = 0.01  # chance below which a group is said not to move as one
-
-
-class PoseFindings(NamedTuple):
-    """What `catseye pose` found: the group's pose, and the beam where it was asked for."""
-
-    pose: GroupPose
-    beam: PointingOffset | None
-
-
-def pose_status(result: PoseFindings) -> str:
-    """ "converged", or what speaks against the pose: of the fit, or of its own test, in words."""
-    pose = result.pose.pose
-    if pose.motion.status != "converged":
-        return pose.motion.status
-    if pose.motion.degrees_of_freedom and pose.p < WEAK_LEVEL:
-        what = "the pose, and the beam that follows from it," if result.beam is not None else "the pose"
-        return f"the group does not move as one (p {pose.p:.2g}): {what} is a mean of what its points do; see residuals"
-    return "converged"
-
-
-def pose_verdict(result: PoseFindings) -> Verdict:
-    """Whether the group moved as one body, which is what a pose says of it."""
-    pose, status = result.pose.pose, pose_status(result)
-    if status != "converged":
-        return Verdict("doubtful", status)
-    if not pose.motion.degrees_of_freedom:
-        return Verdict("doubtful", "as many coordinates as unknowns: nothing checks that the group moved as one")
-    left = f", {len(pose.left_out)} left out" if pose.left_out else ""
-    return Verdict("good", f"{len(pose.names)} points move as one{left} (p {pose.p:.2g})")
 
 
 def pose_result_object(result: PoseFindings) -> dict[str, Any]:
@@ -130,7 +101,7 @@ def pose_words(result: PoseFindings) -> list[tuple[str, str]]:
         ("Frame", f"{pose.frame}, turned about the pivot ({pivot}) m"),
     ]
     if pose.motion.degrees_of_freedom:
-        fits = "moves as one" if pose.p >= WEAK_LEVEL else "does not move as one: look at the residuals"
+        fits = "moves as one" if pose.p >= RIGID else "does not move as one: look at the residuals"
         passages.append(
             (
                 "Rigid",
@@ -158,12 +129,13 @@ def pose_words(result: PoseFindings) -> list[tuple[str, str]]:
 
 
 class TiltOfPose(NamedTuple):
-    """What a track profile takes from a written pose: file, azimuth (rad), turn (2,) and covariance (2, 2), rad."""
+    """What a track profile takes from a written pose: file, azimuth (rad), turn (2,), covariance (2, 2), verdict."""
 
     file: str
     azimuth: float
     turn: np.ndarray
     covariance: np.ndarray
+    verdict: Verdict | None = None
 
 
 def tilt_of_pose(folder: Folder, name: str) -> TiltOfPose:
@@ -186,4 +158,4 @@ def tilt_of_pose(folder: Folder, name: str) -> TiltOfPose:
         raise InputError(f"{name}: rotation, covariance or posture cannot be read: {problem}") from problem
     if turn.shape != (2,) or spread.shape != (2, 2) or not np.isfinite([*turn, *spread.ravel(), azimuth]).all():
         raise InputError(f"{name}: rotation and covariance have other sizes (expected 3 and 6 x 6 numbers)")
-    return TiltOfPose(name, azimuth, turn, spread)
+    return TiltOfPose(name, azimuth, turn, spread, stored_verdict(name, stored))

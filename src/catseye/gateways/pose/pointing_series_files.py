@@ -15,7 +15,6 @@ from catseye.gateways.pose.pointing_series_objects import (
     Observed,
     fit_object,
     fit_rows,
-    fit_verdict,
     fit_words,
     model_record,
     track_object,
@@ -31,6 +30,7 @@ from catseye.records.files.toml_text import record_toml
 from catseye.records.site.pointing_model import FORMAT as MODEL
 from catseye.reduction.pose.pointing_fit import PointingFit, SeriesComparison
 from catseye.reduction.pose.track_profile import TrackProfile
+from catseye.reduction.pose.verdicts import fit_verdict
 
 OBSERVATIONS = (
     "place", "azimuth_deg", "elevation_deg", "correction_azimuth_cos_e_arcsec", "correction_elevation_arcsec",
@@ -158,21 +158,23 @@ def write_track(profile: TrackProfile, directory: Path, hashes: Mapping[str, str
 
 
 def tilt_csv(profile: TrackProfile) -> str:
-    """The tilt every five degrees."""
+    """The tilt every five degrees; its columns name what is not determined and so not in it."""
     azimuth = np.arange(0.0, 360.0, 5.0)
     tilt, spread = profile.series.at(azimuth * DEGREE)
     rows = [
         [f"{a:.1f}", *(f"{v / ARCSECOND:.4f}" for v in (*t, q[0, 0] ** 0.5, q[1, 1] ** 0.5))]
         for a, t, q in zip(azimuth, tilt, spread, strict=True)
     ]
-    return csv_text(("azimuth_deg", "tilt_east_arcsec", "tilt_north_arcsec", "u_east_arcsec", "u_north_arcsec"), rows)
+    part = "_without_wave_1" if profile.series.undetermined else ""
+    heads = ("azimuth_deg", *(f"{q}{part}_arcsec" for q in ("tilt_east", "tilt_north", "u_east", "u_north")))
+    return csv_text(heads, rows)
 
 
 def track_rows(profile: TrackProfile) -> list[tuple[str, str, str]]:
-    """Coefficient, value, u in arcsec."""
+    """Coefficient, value, u in arcsec; dashes where it is not determined."""
     u = np.sqrt(np.diag(profile.series.covariance)) / ARCSECOND
     return [
-        (name, f"{v / ARCSECOND:+.3f}", f"{w:.3f}")
+        (name, f"{v / ARCSECOND:+.3f}", f"{w:.3f}") if np.isfinite(v) else (name, "-", "-")
         for name, v, w in zip(profile.series.names, profile.series.values, u, strict=True)
     ]
 
@@ -194,6 +196,10 @@ def track_words(profile: TrackProfile) -> list[tuple[str, str]]:
         passages.append(
             ("Zero", f"of the inclinometer {zero[0]:+.2f} ± {u[0]:.2f}, {zero[1]:+.2f} ± {u[1]:.2f} arcsec about x, y")
         )
+    if profile.series.undetermined:
+        names = ", ".join(profile.series.undetermined)
+        text = f"{names}: an inclinometer's zero does the same; poses of the alidade tell them apart"
+        passages.append(("Not known", text))
     if profile.degrees_of_freedom:
         passages.append(
             (
@@ -202,6 +208,11 @@ def track_words(profile: TrackProfile) -> list[tuple[str, str]]:
             )
         )
     return passages
+
+
+def _tilt_caption(profile: TrackProfile) -> str:
+    without = " Without the wave of one turn, which is not determined." if profile.series.undetermined else ""
+    return f"Turn of the alidade about east and north; dotted: the mean, the axis's lean.{without}"
 
 
 def track_report(profile: TrackProfile, hashes: Mapping[str, str], when: datetime) -> str:
@@ -217,7 +228,7 @@ def track_report(profile: TrackProfile, hashes: Mapping[str, str], when: datetim
         section(
             "tilt",
             "Tilt by azimuth",
-            picture(drawn["tilt"], "Turn of the alidade about east and north; dotted: the mean, the axis's lean."),
+            picture(drawn["tilt"], _tilt_caption(profile)),
             table(("coefficient", "arcsec", "u"), track_rows(profile), "tnn"),
             picture(drawn["left"], "What the series leaves of poses and inclinometer."),
         ),

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
@@ -11,13 +11,15 @@ import numpy as np
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import InputError
 from catseye.gateways.pose.objects import FORMAT as POSE
-from catseye.gateways.writers.verdict import Verdict
 from catseye.geometry.antenna.pointing_series import PointingSeries, published
 from catseye.records.files.reading import Folder, read_record
+from catseye.records.files.verdicts import stored_verdict
 from catseye.records.laboratory.star_offsets import StarOffsets, read_star_offsets
 from catseye.records.site.pointing_model import PointingModel, Term
 from catseye.reduction.pose.pointing_fit import PointingFit, SeriesComparison
 from catseye.reduction.pose.track_profile import TrackProfile
+from catseye.reduction.pose.verdicts import fit_verdict
+from catseye.verdict import Verdict
 
 FORMAT = "catseye-pointing-1"
 TRACK = "catseye-track-profile-1"
@@ -35,6 +37,7 @@ class Observed:
     where       n places for messages
     stars       the file's, where it is one
     hashes      SHA-256 by name
+    sources     verdicts of poses
     """
 
     source: str
@@ -45,6 +48,7 @@ class Observed:
     where: tuple[str, ...]
     stars: StarOffsets | None
     hashes: dict[str, str]
+    sources: dict[str, Verdict | None] = field(default_factory=dict)
 
 
 def read_observed(files: Sequence[Path]) -> Observed:
@@ -63,16 +67,18 @@ def read_observed(files: Sequence[Path]) -> Observed:
     folders = [Folder(f.parent) for f in files]
     rows = [_pose(folder, f) for folder, f in zip(folders, files, strict=True)]
     q = np.zeros((2 * len(rows), 2 * len(rows)))
-    for k, (_, _, spread) in enumerate(rows):
+    for k, (_, _, spread, _) in enumerate(rows):
         q[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = spread
     hashes = {str(f): d for folder, f in zip(folders, files, strict=True) for d in folder.hashes.values()}
     angles = np.array([r[0] for r in rows])
     values = np.array([r[1] for r in rows])
-    return Observed("metrology", angles[:, 0], angles[:, 1], values, q, tuple(map(str, files)), None, hashes)
+    names = tuple(map(str, files))
+    sources = dict(zip(names, (r[3] for r in rows), strict=True))
+    return Observed("metrology", angles[:, 0], angles[:, 1], values, q, names, None, hashes, sources)
 
 
-def _pose(folder: Folder, path: Path) -> tuple[tuple[float, float], np.ndarray, np.ndarray]:
-    """Azimuth and elevation (rad), correction (2,) and covariance (2, 2) of a pose.json with pointing."""
+def _pose(folder: Folder, path: Path) -> tuple[tuple[float, float], np.ndarray, np.ndarray, Verdict | None]:
+    """Azimuth and elevation (rad), correction (2,), covariance (2, 2) and verdict of a pose.json with pointing."""
     try:
         stored = json.loads(folder.text(path.name))
     except (ValueError, RecursionError) as problem:
@@ -90,17 +96,17 @@ def _pose(folder: Folder, path: Path) -> tuple[tuple[float, float], np.ndarray, 
         raise InputError(f"{path}: pointing cannot be read: {problem}") from problem
     if value.shape != (2,) or spread.shape != (2, 2) or not np.isfinite([*angles, *value, *spread.ravel()]).all():
         raise InputError(f"{path}: pointing has other sizes (expected 3 numbers and 3 x 3, finite)")
-    return angles, value, spread
+    return angles, value, spread, stored_verdict(str(path), stored)
 
 
-def read_series(text: str) -> tuple[PointingSeries, dict[str, str]]:
-    """A series by name ("published") or from its TOML file, and the SHA-256 of what was read."""
+def read_series(text: str) -> tuple[PointingSeries, dict[str, str], Verdict | None]:
+    """A series by name ("published") or from its TOML file, the SHA-256 of what was read, the file's verdict."""
     if text == PUBLISHED:
-        return published(), {}
+        return published(), {}, None
     path = Path(text)
     folder = Folder(path.parent)
     record = folder.record(path.name, PointingModel) if path.suffix == ".toml" else read_record(path, PointingModel)
-    return record.series, dict(folder.hashes)
+    return record.series, dict(folder.hashes), record.judged
 
 
 def series_object(series: PointingSeries) -> dict[str, Any]:
@@ -113,21 +119,6 @@ def series_object(series: PointingSeries) -> dict[str, Any]:
         "u_arcsec": dict(zip(series.terms, u, strict=True)) if known else None,
         "covariance_arcsec2": series.covariance / ARCSECOND**2 if known else None,
     }
-
-
-def fit_verdict(fit: PointingFit) -> Verdict:
-    """Whether the observations hold the terms apart and scatter as they claim, where they claim anything."""
-    if fit.degrees_of_freedom < 1:
-        return Verdict("doubtful", "as many observations as terms: nothing checks the series")
-    lost = [w for w in fit.weak if w.u_on_the_sky > fit.sky_rms]
-    if lost:
-        return Verdict("doubtful", f"the observations do not tell {', '.join(lost[0].parts)} apart")
-    if not fit.scaled and fit.variance_factor > 1.0 + 3.0 * (2.0 / fit.degrees_of_freedom) ** 0.5:
-        return Verdict(
-            "doubtful", f"observations scatter more than claimed (variance factor {fit.variance_factor:.2f})"
-        )
-    rms = fit.sky_rms / ARCSECOND
-    return Verdict("good", f"{int(fit.used.sum())} observations hold the terms, {rms:.2f} arc seconds rms on the sky")
 
 
 def fit_object(fit: PointingFit, observed: Observed, compared: SeriesComparison | None) -> dict[str, Any]:
@@ -208,7 +199,7 @@ def fit_rows(fit: PointingFit, compared: SeriesComparison | None) -> list[tuple[
 
 def model_record(fit: PointingFit, name: str) -> PointingModel:
     """The fit as a record, rounded to a micro arc second."""
-    q = fit.series.covariance / ARCSECOND**2
+    q, judged = fit.series.covariance / ARCSECOND**2, fit_verdict(fit)
     return PointingModel(
         format="catseye-pointing-series-1",
         name=name[:200] or "pointing",
@@ -216,18 +207,26 @@ def model_record(fit: PointingFit, name: str) -> PointingModel:
         values_arcsec=tuple(round(float(v), 6) for v in fit.series.values / ARCSECOND),
         covariance_arcsec2=tuple(tuple(float(f"{v:.12g}") for v in row) for row in 0.5 * (q + q.T)),
         sky_rms_arcsec=round(fit.sky_rms / ARCSECOND, 6),
+        verdict=None if judged.word == "good" else judged.word,
+        why="" if judged.word == "good" else judged.why,
     )
 
 
 def track_verdict(profile: TrackProfile) -> Verdict:
-    """Whether poses and readings scatter about the profile as they claim."""
+    """Scatter of poses and readings against what they claim, what they do not determine, the poses' own verdicts."""
+    return _track_verdict(profile).resting_on(profile.sources)
+
+
+def _track_verdict(profile: TrackProfile) -> Verdict:
     degrees = profile.degrees_of_freedom
     if degrees < 1:
         return Verdict("doubtful", "as many readings as coefficients: nothing checks the profile")
-    factor = profile.pvv / degrees
+    factor, without = profile.pvv / degrees, ""
+    if profile.series.undetermined:
+        without = "; without the wave of one turn, which an inclinometer alone cannot tell from its zero"
     if factor > 1.0 + 3.0 * (2.0 / degrees) ** 0.5:
-        return Verdict("doubtful", f"readings scatter more than claimed (variance factor {factor:.2f})")
-    return Verdict("good", f"readings scatter about the profile as claimed (variance factor {factor:.2f})")
+        return Verdict("doubtful", f"readings scatter more than claimed (variance factor {factor:.2f}){without}")
+    return Verdict("good", f"readings scatter about the profile as claimed (variance factor {factor:.2f}){without}")
 
 
 def track_object(profile: TrackProfile) -> dict[str, Any]:
@@ -241,6 +240,7 @@ def track_object(profile: TrackProfile) -> dict[str, Any]:
         "harmonics": series.harmonics,
         "coefficients": dict(zip(series.names, series.values, strict=True)),
         "u_coefficients": dict(zip(series.names, np.sqrt(np.diag(series.covariance)), strict=True)),
+        "undetermined": list(series.undetermined),
         "covariance": series.covariance,
         "AN": axis[0],
         "AW": axis[1],

@@ -7,6 +7,7 @@ from catseye.constants import DEGREE
 from catseye.errors import InputError
 from catseye.gateways.steering.servo_figures import move_figure
 from catseye.gateways.steering.sky_figures import sky_figure
+from catseye.gateways.writers.drawing import Svg
 from catseye.geometry.mirror.slew import Pace
 from catseye.ranger.motion_units import SAMPLE_TIME, acceleration_integer, pace_of, velocity_integer
 from catseye.records.files.reading import read_record
@@ -33,7 +34,7 @@ def sky_plot(
     keep_out: Path | None,
     latitude_deg: float | None,
     longitude_deg: float | None,
-) -> tuple[str, dict[str, Any]]:
+) -> tuple[Svg, dict[str, Any]]:
     """The sky of a ranger as SVG text, and what it says in words and numbers.
 
     monument, mirror   records
@@ -69,7 +70,7 @@ def sky_plot(
     }
 
 
-def servo_plot(mirror: Path | None, axis: int, counts: int) -> tuple[str, dict[str, Any]]:
+def servo_plot(mirror: Path | None, axis: int, counts: int) -> tuple[Svg, dict[str, Any]]:
     """A move of the assumed axis as SVG text, and what it says in words and numbers.
 
     mirror   record whose settings to take; those of the tuning study if None

@@ -29,6 +29,8 @@ def point_verdict(
             return Verdict("failed", refused[0].reason.rstrip("."))
     if visibility is not None and not visibility.seen[0, point]:
         return Verdict("failed", visibility.reason(0, point).rstrip("."))
+    if unusual := pointings.unusual(point):
+        return Verdict("doubtful", unusual)
     which = "direct" if pointings.allowed[point] else "prime"
     unknown = "; u of the counts is unknown: the records lack what it needs" if pointings.lacking else ""
     return Verdict("good", f"allowed in the {which} pointing{unknown}")

@@ -5,14 +5,14 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, Svg, mpl, svg
 from catseye.simulator.servo.axis import AxisTrace
 from catseye.simulator.servo.tuning import Plant
 
 WIDTH = 9.4  # inches, as all figures
 
 
-def move_figure(trace: AxisTrace, *, target: float, plant: Plant | None = None) -> str:
+def move_figure(trace: AxisTrace, *, target: float, plant: Plant | None = None) -> Svg:
     """Position, velocity, following error and drive of one move, as SVG text.
 
     trace    of the move, from its start
@@ -48,7 +48,7 @@ def move_figure(trace: AxisTrace, *, target: float, plant: Plant | None = None) 
 
 def step_figure(
     responses: Mapping[str, AxisTrace], *, target: float, linear: Mapping[str, NDArray[np.float64]] | None = None
-) -> str:
+) -> Svg:
     """Step responses beside one another, as SVG text: the first moments, and what is left at the end.
 
     responses   traces by name, each from its step at zero

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import DEGREE
-from catseye.gateways.writers.drawing import BAD, FAINT, GRID, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, GRID, INK, SERIES, STYLE, Figure, Svg, mpl, svg
 from catseye.geometry.clearance.keep_out import TOUCH
 from catseye.geometry.mirror.encoder import COUNTS_PER_TURN
 from catseye.geometry.mirror.pointing import ray
@@ -31,7 +31,7 @@ PLATE = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.7
 
 def sky_figure(
     guard: Guard, mjd: float, *, slew: tuple[ArrayLike, ArrayLike] | None = None, route: Route | None = None
-) -> str:
+) -> Svg:
     """SVG text: the sky of a ranger and its counts at a time.
 
     guard    of the ranger

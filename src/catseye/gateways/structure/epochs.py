@@ -16,9 +16,11 @@ from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
 from catseye.records.files.columns import columns_of
 from catseye.records.files.covariance_file import stored_covariance
+from catseye.records.files.verdicts import stored_verdict
 from catseye.records.night.live import TICKS_PER_DAY, LiveWeather
 from catseye.reduction.structure.group import PlacesEpoch
 from catseye.reduction.structure.vibration import RangeSeries
+from catseye.verdict import Verdict
 
 RESULT, POSE = "coordinates.json", "pose.json"
 REQUIRED = ("reduction", "azimuth_deg", "elevation_deg")
@@ -36,11 +38,19 @@ class ReadEpochs:
     """Epochs, where they came from, and what people should know.
 
     inputs   SHA-256 of each file read, by its name
+    notes    for people
+    doubts   notes that the epochs make a model claim too much
     """
 
     epochs: tuple[PlacesEpoch, ...]
     inputs: dict[str, str]
     notes: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+
+    @property
+    def sources(self) -> dict[str, Verdict | None]:
+        """Verdict of each epoch, by its label."""
+        return {epoch.label: epoch.verdict for epoch in self.epochs}
 
 
 def read_epochs(sources: Sequence[Path], listed: Path | None = None) -> ReadEpochs:
@@ -115,6 +125,7 @@ def _epoch(place: Path, numbers: Mapping[str, float], inputs: dict[str, str], la
         names,
         x,
         covariance,
+        stored_verdict(str(place), document),
     )
 
 
@@ -177,11 +188,11 @@ def read_journal_epochs(journal: str, *, run: int | str | None = None, every_s: 
         hashes = {f"run {number}: {path}": digest for path, digest in reader.run(number).hashes.items()}
     if not epochs:
         raise InputError(f"journal {journal}: run {number} has no solution with points and their covariance")
-    notes = [CARRIED, AIR]
+    notes = [AIR]
     if without:
         notes.append(f"{without} solutions gave no points and were left out.")
     times, warm = (np.array(v) for v in zip(*weather, strict=True)) if weather else (np.zeros(0), np.zeros(0))
-    return ReadEpochs(tuple(_warmed(epoch, times, warm) for epoch in epochs), hashes, tuple(notes))
+    return ReadEpochs(tuple(_warmed(epoch, times, warm) for epoch in epochs), hashes, tuple(notes), (CARRIED,))
 
 
 def _solved(entry: EpochSolution, mjd: float) -> PlacesEpoch | None:

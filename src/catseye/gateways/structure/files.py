@@ -12,14 +12,13 @@ from catseye.gateways.structure.figures import motion_figure, residual_figure, s
 from catseye.gateways.structure.objects import (
     FORMAT,
     structure_samplers,
-    structure_verdict,
     vibration_object,
     vibration_samplers,
 )
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import SAMPLERS, join_samplers
-from catseye.gateways.writers.verdict import verdict_line
+from catseye.gateways.writers.verdict import Verdict, verdict_line
 from catseye.gateways.writers.written import Files, Progress, cell, csv_text, origin, write_files
 from catseye.reduction.structure.check import LeaveOut
 from catseye.reduction.structure.series import Prediction, StructureFit
@@ -168,7 +167,7 @@ def _structure_page(
     head = ["function", *(f"shift {a}, mm" for a in "xyz"), *(f"turn {a}, arcsec" for a in "xyz")]
     parts = [
         f"<header><h1>Structure: {s.group}</h1></header>",
-        verdict_line(structure_verdict(fit, check)),
+        verdict_line(Verdict(**answer["verdict"])),
         '<div class="cards">' + "".join(cards) + "</div>",
         *(paragraph(note) for note in answer["notes"]),
         section(

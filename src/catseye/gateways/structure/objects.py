@@ -6,27 +6,14 @@ import numpy as np
 
 from catseye.constants import DEGREE, SECONDS_PER_DAY, ZERO_CELSIUS_K
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable
-from catseye.gateways.writers.verdict import Verdict
 from catseye.geometry.antenna.deformation import COMPONENTS
 from catseye.reduction.structure.check import LeaveOut
 from catseye.reduction.structure.series import Prediction, StructureFit
 from catseye.reduction.structure.vibration import Vibration
+from catseye.verdict import Verdict
 
 FORMAT = "catseye-structure-1"
 PSD = "m2 / Hz"
-
-LARGEST_RATIO = 1.5  # of departure over claim, epochs left out
-
-
-def structure_verdict(fit: StructureFit, check: LeaveOut | None) -> Verdict:
-    """Whether epochs left out are foretold as the model claims."""
-    if check is None:
-        return Verdict("doubtful", "no epoch was left out to check what the model foretells")
-    if not np.isfinite(check.ratio):
-        return Verdict("doubtful", "too few epochs to check what the model foretells")
-    if check.ratio > LARGEST_RATIO:
-        return Verdict("doubtful", f"epochs left out miss what was foretold {check.ratio:.2f} times as far as claimed")
-    return Verdict("good", f"epochs left out are foretold as claimed (ratio {check.ratio:.2f})")
 
 
 def structure_object(
@@ -36,6 +23,7 @@ def structure_object(
     *,
     asked: dict[str, Any],
     notes: tuple[str, ...],
+    verdict: Verdict,
 ) -> dict[str, Any]:
     """A fit as `catseye structure --json` gives it.
 
@@ -44,13 +32,14 @@ def structure_object(
     predicted   what was foretold, if asked for
     asked       the prediction's elevation_deg, temperature_c and way
     notes       for people
+    verdict     `reduction.structure.verdict.structure_verdict`'s
     """
     six, covariance = fit.six_of()
     u = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(-1, 6).T
     series, motion = fit.series, fit.fit
     rms = np.sqrt(np.nanmean(motion.residual**2, axis=(0, 2)))
     return {
-        "verdict": structure_verdict(fit, check).to_object(),
+        "verdict": verdict.to_object(),
         "group": series.group,
         "frame": series.frame,
         "pivot": series.pivot,

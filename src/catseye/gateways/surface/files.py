@@ -9,12 +9,10 @@ from typing import Any
 from catseye.errors import InputError
 from catseye.gateways.surface.objects import (
     FORMAT,
-    SurfaceFindings,
     actuators_object,
     change_object,
     lookup_object,
     shape_object,
-    surface_verdict,
 )
 from catseye.gateways.surface.report import surface_report
 from catseye.gateways.surface.tables import (
@@ -32,6 +30,7 @@ from catseye.gateways.writers.output import whole_file
 from catseye.gateways.writers.samplers_fits import join_tables, write_samplers
 from catseye.gateways.writers.written import Files, Progress, origin, write_files
 from catseye.reduction.surface.actuators import rows_of
+from catseye.reduction.surface.verdict import SurfaceFindings, surface_verdict
 
 
 def surface_object(result: SurfaceFindings) -> dict[str, Any]:

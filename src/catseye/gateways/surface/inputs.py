@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,6 +16,7 @@ from catseye.records.files.columns import TextColumns, columns_of
 from catseye.records.files.covariance_file import stored_covariance
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import refusal, shown
+from catseye.records.files.verdicts import stored_verdict, verdict_of_table
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.surface.shape import Prisms
@@ -131,7 +133,8 @@ def _reduced(
         raise InputError(f"{source}: was measured at elevation {elevation:g}°, --elevation-deg says {elevation_deg:g}")
     hashes = {f"{source.name}/{name}": digest for name, digest in folder.hashes.items()}
     nominal = _frame(site, azimuth, elevation)
-    return Prisms(names, points, covariance, nominal, str(source), elevation, azimuth, temperature_c), hashes
+    prisms = Prisms(names, points, covariance, nominal, str(source), elevation, azimuth, temperature_c)
+    return replace(prisms, verdict=stored_verdict(f"{source}/coordinates.json", answer)), hashes
 
 
 def _table(
@@ -172,7 +175,8 @@ def _table(
         nominal = _frame(site, azimuth, elevation)
     else:
         nominal = Transform("reflector", "reflector", np.eye(3), np.zeros(3))
-    return Prisms(names, points, covariance, nominal, str(source), elevation, azimuth, temperature_c), folder.hashes
+    prisms = Prisms(names, points, covariance, nominal, str(source), elevation, azimuth, temperature_c)
+    return replace(prisms, verdict=verdict_of_table(source)), folder.hashes
 
 
 def _of_kind(columns: TextColumns) -> TextColumns:

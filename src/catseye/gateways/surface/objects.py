@@ -1,54 +1,22 @@
 """Surfaces as plain objects for JSON, and as text for people; SI, with the unit in the key elsewhere."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.gateways.writers.passage import Passage
-from catseye.gateways.writers.verdict import Verdict
 from catseye.optics.zernike import Numbering, number
 from catseye.reduction.surface.actuators import Actuators
 from catseye.reduction.surface.change import Change
 from catseye.reduction.surface.lookup import Lookup
 from catseye.reduction.surface.shape import Expansion, Gain, MeanSquare, SurfaceShape
+from catseye.reduction.surface.verdict import SurfaceFindings, stands_out
 
 FORMAT = "catseye-surface-1"
-LARGEST_FACTOR = 2.0  # variance factor of a look-up table's model beyond which its epochs disagree
 TAKEN = 0.5  # share of a term's square from which a note is due
 UNOBSERVED = "rotation about the dish's own axis: a paraboloid does not show it"
-
-
-@dataclass(frozen=True, eq=False)
-class SurfaceFindings:
-    """All that one call of `catseye surface` found: an epoch, a change, a look-up table; perhaps actuators."""
-
-    shapes: tuple[SurfaceShape, ...]
-    change: Change | None = None
-    lookup: Lookup | None = None
-    actuators: Actuators | None = None
-
-
-def surface_verdict(result: SurfaceFindings) -> Verdict:
-    """Whether the surface stands out from the noise of its measurement, and the look-up table fits its epochs."""
-    if result.lookup is not None:
-        factors = [m.variance_factor for m in result.lookup.models if np.isfinite(m.variance_factor)]
-        if not factors:
-            return Verdict("doubtful", "as many terms as epochs: nothing checks the look-up table")
-        if max(factors) > LARGEST_FACTOR:
-            most = max(factors)
-            return Verdict(
-                "doubtful", f"epochs scatter about the look-up table with a variance factor up to {most:.1f}"
-            )
-        return Verdict("good", f"a look-up table of {len(result.shapes)} epochs, which scatter about it as they claim")
-    noisy = [shape for shape in result.shapes if root(shape.square.own) is None]
-    if noisy:
-        return Verdict("doubtful", f"{noisy[0].prisms.source}: no error of the surface stands out from the noise")
-    prisms = ", ".join(str(len(shape.prisms.names)) for shape in result.shapes)
-    held = "" if "focal-length" in result.shapes[-1].fit.free else ", focal length held"
-    return Verdict("good", f"{prisms} prisms hold the paraboloid{held}, and its errors stand out from the noise")
 
 
 def root(square: float) -> float | None:
@@ -261,13 +229,9 @@ def _rms(square: MeanSquare, taper_db: float) -> str:
     own = root(square.own)
     lit = f"weighted for an edge taper of {taper_db:g} dB" if taper_db else "uniform weight over the aperture"
     text = f"{(root(square.measured) or 0.0) * 1e3:.4f} mm rms as measured, {lit}; "
-    if own is None:
+    if not own or not stands_out(square):
         return text + "not above the measurement's own noise"
-    return text + (
-        f"{own * 1e3:.4f} ± {square.u / (2.0 * own) * 1e3:.4f} mm without the measurement's noise"
-        if own > 0.0
-        else "nothing beyond the measurement's noise"
-    )
+    return text + f"{own * 1e3:.4f} ± {square.u / (2.0 * own) * 1e3:.4f} mm without the measurement's noise"
 
 
 def _gain_passage(gain: Gain) -> Passage:

@@ -9,13 +9,11 @@ import numpy as np
 from catseye.constants import MILLIMETRE
 from catseye.gateways.surface.figures import actuator_map, change_map, elevation_terms, shape_map, zernike_bars
 from catseye.gateways.surface.objects import (
-    SurfaceFindings,
     actuators_passage,
     change_passages,
     lookup_passages,
     root,
     shape_passages,
-    surface_verdict,
 )
 from catseye.gateways.writers.drawing import svg
 from catseye.gateways.writers.objects import versions
@@ -27,6 +25,7 @@ from catseye.reduction.surface.actuators import Actuators
 from catseye.reduction.surface.change import Change
 from catseye.reduction.surface.lookup import Lookup
 from catseye.reduction.surface.shape import Expansion, MeanSquare, ShapeSettings, SurfaceShape
+from catseye.reduction.surface.verdict import SurfaceFindings, surface_verdict
 
 
 def surface_report(result: SurfaceFindings, when: datetime, inputs: Mapping[str, str]) -> str:

@@ -4,10 +4,12 @@ import io
 import logging
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from catseye.errors import InputError
 from catseye.gateways.writers.interruption import deferred
 
 logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it announces its font cache on stderr
@@ -16,8 +18,26 @@ with deferred():  # its first import writes that cache under a lock file
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
-__all__ = ["BAD", "FAINT", "GRID", "INK", "SERIES", "STYLE", "Figure", "mpl", "nice", "styled", "svg", "svgs"]
+__all__ = [
+    "BAD",
+    "FAINT",
+    "GRID",
+    "INK",
+    "SERIES",
+    "STYLE",
+    "Figure",
+    "Svg",
+    "mpl",
+    "nice",
+    "picture_file",
+    "styled",
+    "svg",
+    "svgs",
+]
 
+PICTURES = (".svg", ".pdf", ".png")
+PICTURES_TEXT = "a name that ends in .svg, .pdf or .png"
+DPI = 200.0  # of a PNG: sharp on paper
 INK, FAINT, GRID, BAD = "#22303c", "#6b7883", "#e3e8ec", "#c8323c"
 SERIES = ("#1f5a99", "#d9641e", "#1e8e74", "#8a5fa8", "#b08a1e", "#6f8fa8")
 STYLE: Any = {
@@ -58,11 +78,46 @@ def styled() -> Iterator[None]:
         yield
 
 
-def svg(figure: Figure) -> str:
+class Svg(str):
+    """SVG text of a figure, and the figure itself for other formats."""
+
+    figure: Figure
+
+
+def svg(figure: Figure) -> Svg:
     """A figure as SVG text, the same for the same figure."""
     stream = io.StringIO()
     with styled():
         FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None, "Creator": None})
+    text = Svg(stream.getvalue())
+    text.figure = figure
+    return text
+
+
+def picture_file(text: Svg, path: Path, option: str, *, mark: str) -> bytes:
+    """A figure in the format that a file's suffix says, with our mark in it.
+
+    path     .svg, .pdf or .png
+    option   that named it, for messages
+    mark     by which the file is known as ours
+
+    Raises InputError for another suffix.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.backends.backend_pdf import FigureCanvasPdf
+
+    suffix, stream = path.suffix.lower(), io.BytesIO()
+    if suffix not in PICTURES:
+        raise InputError(f"{option} {path}: no figure is written as {suffix or 'nothing'!r} (expected {PICTURES_TEXT})")
+    if suffix == ".svg":
+        return text.replace("<svg ", f"<!-- {mark} -->\n<svg ", 1).encode("utf-8")
+    with styled():
+        if suffix == ".pdf":
+            about = {"Creator": mark, "Producer": None, "CreationDate": None}
+            FigureCanvasPdf(text.figure).print_pdf(stream, metadata=about)
+        else:
+            text.figure.set_dpi(DPI)
+            FigureCanvasAgg(text.figure).print_png(stream, metadata={"Software": mark})
     return stream.getvalue()
 
 

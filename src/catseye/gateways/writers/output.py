@@ -13,6 +13,7 @@ from catseye.errors import InputError
 from catseye.gateways.writers.interruption import deferred, undone_when_interrupted
 
 PROVENANCE = "provenance.json"
+PAGES = (".html", ".htm")
 FORMAT = "catseye-reduction-1"  # marks a directory as ours, so that it may be replaced; as do the next
 FORMATS = (
     FORMAT,
@@ -157,6 +158,14 @@ def whole_file(path: Path, option: str, mark: str) -> Iterator[list[str]]:
             raise InputError(f"{option} {path}: cannot be written: {problem.strerror or problem}") from problem
         finally:
             fresh.unlink(missing_ok=True)
+
+
+def refuse_suffix(path: Path, option: str) -> None:
+    """InputError for the name of a page that says another format than HTML."""
+    suffix = path.suffix.lower()
+    if suffix not in PAGES:
+        hint = "; a browser prints a page as PDF" if suffix == ".pdf" else ""
+        raise InputError(f"{option} {path}: a page is HTML (expected a name that ends in .html{hint})")
 
 
 def write_whole(path: Path, content: bytes, *, option: str, ours: Callable[[bytes], bool]) -> None:

@@ -20,6 +20,7 @@ AVERSION = 0.25  # s, until somebody turns away from visible light
 TIME_BASE, LONG_TIME_BASE = 100.0, 3e4  # s, of classes: unless viewing is intended; where it is
 WIDEST = 1.0  # rad, full angle: the tangent of its half is 9 % more than the half
 NEAREST = 0.1  # m, at which a naked eye can be
+ROUNDING = 1e-12  # of a power: what units, exponential and root may leave of a value that is the limit itself
 
 
 @dataclass(frozen=True)
@@ -197,20 +198,45 @@ def classify(
             continue
         limit, most = limits[name.rstrip("M")], max(aided, naked)
         if name.endswith("M"):
-            fits = naked <= limit < aided <= CLASS_3B
-            power = f"{naked * 1e3:.4g} mW through 7 mm at 0.1 m, {aided * 1e3:.4g} mW through 50 mm at 2 m"
+            fits = not exceeds(naked, limit) and exceeds(aided, limit) and not exceeds(aided, CLASS_3B)
+            texts = _milliwatts(naked, aided, limit)
+            power = f"{texts[0]} mW through 7 mm at 0.1 m, {texts[1]} mW through 50 mm at 2 m"
         else:
-            fits = most <= limit
-            power = f"{most * 1e3:.4g} mW, the more of both measurements,"
-        reasons.append(
-            f"class {name}: {power} {'keeps' if fits else 'does not keep'} the limit of {limit * 1e3:.4g} mW"
-        )
+            fits = not exceeds(most, limit)
+            texts = _milliwatts(most, limit)
+            power = f"{texts[0]} mW, the more of both measurements,"
+        reasons.append(f"class {name}: {power} {'keeps' if fits else 'does not keep'} the limit of {texts[-1]} mW")
         if fits:
             break
     else:
         name = "4"
         reasons.append("class 4: more than class 3B")
     return LaserClassification(name, tuple(reasons), {"condition_1": aided, "condition_3": naked}, limits)
+
+
+def exceeds(power: float, limit: float) -> bool:
+    """True for a power above its limit; one that is the limit but for rounding keeps it.
+
+    power, limit   W
+
+    >>> exceeds(0.39 * 1e-3, 3.9e-4), exceeds(0.39000001e-3, 3.9e-4)
+    (False, True)
+    """
+    return power > limit * (1.0 + ROUNDING)
+
+
+def _milliwatts(*powers: float) -> list[str]:
+    """Powers, W, the limit last, as texts in mW with as many digits as tell each from the limit."""
+    limit = powers[-1]
+    for digits in range(4, 17):
+        texts = [f"{power * 1e3:.{digits}g}" for power in powers]
+        if all(text != texts[-1] or not _differ(power, limit) for text, power in zip(texts, powers, strict=True)):
+            break
+    return texts
+
+
+def _differ(power: float, limit: float) -> bool:
+    return exceeds(power, limit) or exceeds(limit, power)
 
 
 def returned_power(
@@ -256,7 +282,7 @@ def returned_power(
 def _zone(beam: LaserBeam, limit: ExposureLimit, viewer: Viewer) -> tuple[float, float]:
     """Where one limit is exceeded."""
     share = limit.power / (viewer.transmission * beam.power)
-    if share >= 1.0:
+    if not exceeds(1.0, share):
         return 0.0, 0.0
     square = -2.0 * viewer.collecting(limit.aperture) ** 2 / np.log1p(-share) - beam.waist_diameter**2
     if square <= 0.0:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from catseye.errors import ValidityError
 from catseye.optics import gaussian_beam
-from catseye.optics.safety.hazard import NAKED, NEAREST, TIME_BASE, LaserBeam, Viewer, hazard_zone
+from catseye.optics.safety.hazard import NAKED, NEAREST, ROUNDING, TIME_BASE, LaserBeam, Viewer, hazard_zone
 from catseye.optics.safety.limits import ALPHA_MIN, SHORTEST, eye_limits, factors
 
 SEARCH = 150  # distances at which a sweeping beam is tried
@@ -157,7 +157,7 @@ def sweep_hazard_distance(
             "subtense": subtense,
             "edition": edition,
         }
-        return sweep_ratio(beam, float(np.exp(log_distance)), rate, **given) - 1.0
+        return sweep_ratio(beam, float(np.exp(log_distance)), rate, **given) - 1.0 - ROUNDING
 
     tried: NDArray[np.float64] = np.linspace(np.log(NEAREST), np.log(far), SEARCH)
     for k in range(SEARCH - 1, -1, -1):

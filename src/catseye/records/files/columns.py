@@ -42,7 +42,7 @@ class TextColumns:
         """A column as finite numbers (rows,); a blank cell is `blank`, refused if None."""
         cells = self.cells[name]
         if self.comma:
-            cells = [cell.replace(",", ".") if cell.count(",") == 1 and "." not in cell else cell for cell in cells]
+            cells = list(map(pointed, cells))
         if blank is not None and "" in cells:
             cells = [cell or repr(blank) for cell in cells]
         try:
@@ -68,6 +68,15 @@ class TextColumns:
     def where(self) -> tuple[str, ...]:
         """The place of every row, in words."""
         return tuple(map("line {}".format, self.lines))
+
+
+def pointed(cell: str) -> str:
+    """A cell with its decimal comma as a point, where it has one and no point.
+
+    >>> pointed("1,5"), pointed("1,500.0")
+    ('1.5', '1,500.0')
+    """
+    return cell.replace(",", ".") if cell.count(",") == 1 and "." not in cell else cell
 
 
 def columns_of(text: str, file: str, required: Sequence[str], *, optional: Sequence[str] = ()) -> TextColumns:
@@ -100,9 +109,11 @@ def columns_of(text: str, file: str, required: Sequence[str], *, optional: Seque
 
 def _check_header(file: str, header: list[str], required: Sequence[str], optional: Sequence[str]) -> None:
     wanted = f"(expected the header {','.join(required)}" + (f", perhaps {','.join(optional)})" if optional else ")")
+    strange = [name for name in header if name not in required and name not in optional]
+    if strange:
+        verb = "is not known" if len(strange) == 1 else "are not known"
+        raise refusal(file, f"line 1, column {', '.join(map(shown, strange))} {verb} {wanted}")
     for name in header:
-        if name not in required and name not in optional:
-            raise refusal(file, f"line 1, column {shown(name)} is not known {wanted}")
         if header.count(name) > 1:
             raise refusal(file, f"line 1, column {shown(name)} is there {header.count(name)} times {wanted}")
     for name in required:

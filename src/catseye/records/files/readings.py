@@ -32,7 +32,7 @@ class Sheet(Record):
     """What every calibration says about its readings.
 
     kind                     of calibration, as the command calls it
-    instrument               what was calibrated: "ZP103"
+    instrument               what was calibrated: "ZP103", "EDM 7"
     serial                   of it
     measured_on, valid_until dates
     by                       who measured
@@ -42,7 +42,7 @@ class Sheet(Record):
 
     format: Annotated[int | str, Version("readings")] = 1
     kind: Name
-    instrument: Name
+    instrument: Words
     serial: int | Words
     measured_on: date
     valid_until: date

@@ -12,6 +12,7 @@ from catseye.constants import DEGREE, ZERO_CELSIUS_K
 from catseye.errors import InputError
 from catseye.records.files.record import Record
 
+MANY = 20  # other invalid keys, from which rows of a table are not told apart
 LONGEST_VALUE = 60  # characters of an offending value that a refusal repeats
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
 
@@ -69,7 +70,10 @@ def shown(value: object) -> str:
 
 
 def explained(problem: ValidationError, document: dict[str, Any], kind: type[Record]) -> str:
-    """The first of a validation's errors in words; an unknown version explains all others, an unknown key a missing."""
+    """The first of a validation's errors in words, and every other invalid key by its name.
+
+    An unknown version explains all others; an unknown key comes before a missing one, which it may explain.
+    """
     errors = problem.errors(include_url=False)
     version = [error for error in errors if error["type"] == "version"]
     if version:
@@ -78,7 +82,11 @@ def explained(problem: ValidationError, document: dict[str, Any], kind: type[Rec
     first = errors[0]
     place, key, parent = placed(first["loc"], document)
     text = f"{place}{worded(first, key, parent, kind)}"
-    return text if len(errors) == 1 else f"{text} (and {len(errors) - 1} more)"
+    others = dict.fromkeys(placed(error["loc"], document)[0] or error["type"] for error in errors[1:])
+    others.pop(place, None)
+    if len(others) > MANY:  # one key of many rows is named once
+        others = dict.fromkeys(re.sub(r"\[[^]]*\]", "[...]", name) for name in others)
+    return f"{text}; invalid or missing, too: {', '.join(others)}" if others else text
 
 
 def placed(loc: tuple[int | str, ...], document: Any) -> tuple[str, str, Any]:

@@ -141,12 +141,17 @@ class Fields:
         return np.diag((u * key[1]) ** 2)
 
     def done(self) -> None:
-        """Refuses the first key that nothing took."""
-        for key in self.values:
-            if key not in self.taken:
-                close = difflib.get_close_matches(key, sorted(self.asked - set(self.values)), n=1)
-                hint = f"perhaps {close[0]}" if close else "no such key"
-                raise self.refuse(f"{shown(key)} is not a known key here (expected {hint})")
+        """Refuses the keys that nothing took, all of them at once."""
+        strange = [key for key in self.values if key not in self.taken]
+        if not strange:
+            return
+        hints = []
+        for key in strange:
+            close = difflib.get_close_matches(key, sorted(self.asked - set(self.values)), n=1)
+            hints.append(f"perhaps {close[0]}" if close else "no such key")
+        named, verb = ", ".join(map(shown, strange)), "is not a known key" if len(strange) == 1 else "are no known keys"
+        expected = hints[0] if len(set(hints)) == 1 else ", ".join(hints)
+        raise self.refuse(f"{named} {verb} here (expected {expected})")
 
     def _dms(self, key: str) -> float:
         text = self.text(key)

@@ -35,13 +35,19 @@ class CovarianceTable(Record):
 
 
 class DecisionTable(Record):
-    """A test; statistic, limit and passed are missing where the readings did not allow it."""
+    """A test; statistic, limit and passed are missing where the readings did not allow it.
+
+    least   the limit is the least that passes, not the most
+    grave   a failure rejects the answer; otherwise it casts doubt on it
+    """
 
     name: Words
     statistic: float | None = None
     limit: float | None = None
     passed: bool | None = None
     text: str
+    least: bool = False
+    grave: bool = True
 
 
 class ReadingsTable(Record):
@@ -73,6 +79,7 @@ class CalibrationRecord(Record):
     quantity: Annotated[tuple[CalibratedQuantity, ...], Field(strict=False, min_length=1)]
     covariance: CovarianceTable
     decision: Annotated[tuple[DecisionTable, ...], Field(strict=False)] = ()
+    plausible: Annotated[tuple[DecisionTable, ...], Field(strict=False)] = ()
     readings: ReadingsTable
     inputs_sha256: dict[str, str]
     sheet: dict[str, Any]

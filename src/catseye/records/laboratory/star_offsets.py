@@ -85,6 +85,7 @@ def parsed(text: str, file: str, digest: str = "") -> StarOffsets:
     body = body[: ends[0]] if ends else body
     if not body:
         raise refusal(file, "has no line with the latitude (expected degrees, minutes, seconds after the options)")
+    _refuse_missing_run(file, body)
     latitude, run = _run(file, *body[0])
     rows = [_numbers(file, k, row) for k, row in body[1:]]
     if not rows:
@@ -122,12 +123,28 @@ def _refuse_options(file: str, options: Sequence[tuple[int, str]]) -> str:
     return mounts[0]
 
 
+def _refuse_missing_run(file: str, body: Sequence[tuple[int, str]]) -> None:
+    """Raises InputError where the line in the place of the latitude is an observation like those after it."""
+    (line, row), words = body[0], body[0][1].split()
+    if len(body) < 2 or len(words) != len(body[1][1].split()) or not all(NUMBER.fullmatch(word) for word in words):
+        return
+    a, e, b, f = ([float(word) for word in words] + [math.inf] * 4)[:4]
+    if math.hypot((b - a + 180.0) % 360.0 - 180.0, f - e) * DEGREE <= LARGEST_OFFSET:
+        raise refusal(
+            file,
+            f"line {line}, {shown(row)} is an observation like those below it: the line with the latitude is missing "
+            "(expected degrees minutes seconds after the options)",
+        )
+
+
 def _run(file: str, line: int, row: str) -> tuple[float, tuple[str, ...]]:
     """Latitude, rad, from degrees, minutes, seconds, and the words after."""
     words = row.split()
     if len(words) < 3 or not all(NUMBER.fullmatch(w) for w in words[:3]):
         raise refusal(file, f"line {line}, {shown(row)} (expected the latitude: degrees minutes seconds)")
     degrees, minutes, seconds = (float(w) for w in words[:3])
+    if degrees % 1.0 or minutes % 1.0:
+        raise refusal(file, f"line {line}, latitude {' '.join(words[:3])} (expected whole degrees, minutes; seconds)")
     if not (abs(degrees) <= 90.0 and 0.0 <= minutes < 60.0 and 0.0 <= seconds < 60.0):
         raise refusal(file, f"line {line}, latitude {' '.join(words[:3])} (expected -90 to 90, 0 to 60, 0 to 60)")
     size = abs(degrees) + minutes / 60.0 + seconds / 3600.0

@@ -13,6 +13,7 @@ from catseye.records.files.refusal import refusal, shown
 from catseye.records.network.claim import RangeClaim
 from catseye.records.network.folder import read_network_folder
 from catseye.records.network.gama import read_gama
+from catseye.records.network.plausible import with_lengths_checked
 from catseye.records.network.starnet import read_starnet
 from catseye.records.network.toml import read_network_toml
 
@@ -25,20 +26,25 @@ READERS = {
 
 
 def read_network(
-    path: Path | str, *, sigma_mm: float | None = None, sigma_ppm: float | None = None
+    path: Path | str, *, sigma_mm: float | None = None, sigma_ppm: float | None = None, planned: bool = False
 ) -> ObservationNetwork:
     """The network of a file, by the end of its name, or of a folder.
 
     path       a folder with points.csv and ranges.csv, or a file .toml, .gkf, .xml, .dat
     sigma_mm, sigma_ppm   standard uncertainty a + b D of a distance that has none, of a folder or a .dat; what the file
                           says counts where it says something
+    planned    observed values may be missing in a folder or a file of ours: the network is to be planned
 
     Raises InputError, one line, for a file that is missing, of another kind, or that cannot be used.
     """
-    path = Path(path)
+    network = _read(Path(path), sigma_mm=sigma_mm, sigma_ppm=sigma_ppm, planned=planned)
+    return network if planned else with_lengths_checked(network)
+
+
+def _read(path: Path, *, sigma_mm: float | None, sigma_ppm: float | None, planned: bool) -> ObservationNetwork:
     claim = RangeClaim.given(sigma_mm, sigma_ppm)
     if path.is_dir():
-        return read_network_folder(path, claim)
+        return read_network_folder(path, claim, planned=planned)
     if path.suffix.lower() == ".dat":
         return read_starnet(path, claim)
     if claim:
@@ -47,4 +53,4 @@ def read_network(
     if reader is None:
         kinds = f"expected a folder with points.csv and ranges.csv, or {' '.join(READERS)}"
         raise refusal(path.name, f"ends in {shown(path.suffix)} ({kinds})")
-    return reader(path)
+    return reader(path) if reader is not read_network_toml else read_network_toml(path, planned=planned)

@@ -30,6 +30,11 @@ class RangeClaim(NamedTuple):
         """
         return (self.mm or 0.0) * MILLIMETRE + (self.ppm or 0.0) * PPM * distance
 
+    @property
+    def terms(self) -> tuple[float, float, float]:
+        """a, b, c of a + b D^c, m."""
+        return (self.mm or 0.0) * MILLIMETRE, (self.ppm or 0.0) * PPM, 1.0
+
     @classmethod
     def given(cls, mm: float | None, ppm: float | None) -> "RangeClaim":
         """The claim of two options; InputError for what is no standard uncertainty."""

@@ -15,9 +15,11 @@ from catseye.estimation.network.model import (
     ObservationNetwork,
     absent_coordinates,
 )
+from catseye.estimation.network.names import PointIndex, name_key, spelled
 from catseye.estimation.observations.kinds import ObservationGroup, Reported
 from catseye.records.files.refusal import refusal, shown
-from catseye.records.network.kinds import TOUCHES, Row, blocks_of, group_of
+from catseye.records.network.kinds import ANGLES, TOUCHES, Row, blocks_of, group_of
+from catseye.records.network.plausible import beyond_circle
 
 POSITIVE = ("slope_distance", "horizontal_distance", "fixed_distance")
 SYMMETRY = 1e-12  # of the largest element: what writing and reading a matrix may cost
@@ -34,14 +36,16 @@ class NetworkDraft:
     axes         (3, 3) signed permutation: coordinates here = axes @ coordinates of the file
     axis_names   what the file calls its axes
     implied      points that only observations name are free ones (STAR*NET's way), else they are refused
+    planned      observed values may be missing, nan: the network is yet to be measured
     """
 
     file: str
     axes: np.ndarray = field(default_factory=lambda: np.eye(3))
     axis_names: tuple[str, str, str] = ("x", "y", "z")
     implied: bool = False
+    planned: bool = False
     description: str = ""
-    names: dict[str, int] = field(default_factory=dict)
+    names: PointIndex = field(default_factory=PointIndex)
     xyz: list[np.ndarray] = field(default_factory=list)
     fixed: list[np.ndarray] = field(default_factory=list)
     datum: list[np.ndarray] = field(default_factory=list)
@@ -49,6 +53,7 @@ class NetworkDraft:
     rows: list[Row] = field(default_factory=list)
     clusters: list[tuple[range, np.ndarray]] = field(default_factory=list)
     more: list[tuple[Sequence[str], str, Maker]] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
 
     def refuse(self, place: str, problem: str) -> InputError:
         """The error of one place in the file."""
@@ -73,10 +78,13 @@ class NetworkDraft:
 
         Raises InputError for an empty or double name, an infinite coordinate, a held one that is unknown.
         """
+        written, name = name, spelled(name)
         if not name:
             raise self.refuse(place, "point without a name (expected some text)")
         if name in self.names:
-            raise self.refuse(place, f"point {shown(name)} is there twice (expected each name once)")
+            raise self.refuse(place, f"point {shown(written)} is there twice (expected each name once)")
+        if written != name:
+            self.names.aliases[written] = name
         for axis, value, held, in_datum in zip(self.axis_names, xyz, fixed, datum, strict=True):
             if np.isinf(value):
                 raise self.refuse(place, f"point {shown(name)}, {axis} = {value} (expected a finite number)")
@@ -97,7 +105,7 @@ class NetworkDraft:
     def observe(self, row: Row) -> None:
         """Adds a row; InputError for a value that is not finite, a distance or a sigma that is not positive."""
         wrong = ""
-        if not math.isfinite(row.value):
+        if not math.isfinite(row.value) and not (self.planned and math.isnan(row.value)):
             wrong = f" = {row.value} (expected a finite number)"
         elif row.value <= 0.0 and row.kind in POSITIVE:
             wrong = f" = {row.value:.10g} m (expected above 0)"
@@ -106,9 +114,22 @@ class NetworkDraft:
             wrong = f" has the sigma {row.u:.6g} (expected above 0: {shame})"
         elif any(len(set(ends)) < len(ends) for ends in _together(row)):
             wrong = " joins a point with itself (expected points that differ)"
+        if not wrong and row.kind in ANGLES and math.isfinite(row.value):
+            wrong = self._beyond(row)
         if wrong:
             raise self.refuse(row.place, f"{row.kind} {' to '.join(shown(end) for end in row.ends[:2])}{wrong}")
         self.rows.append(row)
+
+    def _beyond(self, row: Row) -> str:
+        """Why an angle beyond the circle is refused, or nothing; one that is only unlikely becomes a doubt."""
+        text, impossible = beyond_circle(row.value, row.unit or "rad")
+        if not text:
+            return ""
+        if impossible:
+            return f" is beyond the circle: {text} (expected at most a turn)"
+        names = " to ".join(shown(end) for end in row.ends)
+        self.doubts.append(f"{row.place}, {row.kind} {names} is beyond the circle: {text}")
+        return ""
 
     def correlate(self, start: int, covariance: np.ndarray, place: str) -> None:
         """Gives the rows from `start` on a joint covariance (m, m) in m and rad; InputError where it is none."""
@@ -135,7 +156,7 @@ class NetworkDraft:
 
     def also(self, points: Sequence[str], place: str, make: Maker) -> None:
         """Adds a group that is made when all points are known: a body, a surface."""
-        if len(set(points)) < len(points):
+        if len(set(map(name_key, points))) < len(points):
             raise self.refuse(place, "names a point twice (expected points that differ)")
         self.more.append((points, place, make))
 
@@ -149,7 +170,7 @@ class NetworkDraft:
         absent = absent_coordinates(xyz, fixed | datum, self._touched(len(xyz)))
         points = NetworkPoints(tuple(self.names), xyz, fixed, datum, absent)
         self._start_orientations(xyz)
-        groups, places = self._groups()
+        groups, places, claims = self._groups()
         return ObservationNetwork(
             points,
             tuple(self.parameters),
@@ -159,6 +180,9 @@ class NetworkDraft:
             axis_names=self.axis_names,
             source=self.file,
             description=self.description.strip(),
+            claims=claims,
+            notes=self.names.notes(),
+            doubts=tuple(self.doubts),
         )
 
     def _resolve(self) -> None:
@@ -199,8 +223,10 @@ class NetworkDraft:
         for at, mean in turned.items():
             self.parameters[at] = replace(self.parameters[at], start=float(np.angle(mean)) % TWO_PI)
 
-    def _groups(self) -> tuple[tuple[ObservationGroup, ...], tuple[tuple[str, ...], ...]]:
-        """Independent rows of a kind are one group; a correlated set is one."""
+    def _groups(
+        self,
+    ) -> tuple[tuple[ObservationGroup, ...], tuple[tuple[str, ...], ...], tuple[np.ndarray | None, ...]]:
+        """Groups, the places of their rows, their claims: independent rows of a kind are one, a correlated set is."""
         first = 3 * len(self.names)
         in_cluster = {i for rows, _ in self.clusters for i in rows}
         kinds: dict[str, list[Row]] = {}
@@ -212,6 +238,7 @@ class NetworkDraft:
         sets += blocks_of(correlated)
         groups: list[ObservationGroup] = []
         places: list[tuple[str, ...]] = []
+        claims: list[np.ndarray | None] = []
         counts: dict[str, int] = {}
         for rows, covariance in sets:
             name = rows[0].kind if len({row.kind for row in rows}) == 1 else "joint"
@@ -219,13 +246,16 @@ class NetworkDraft:
             label = name.replace("_", " ") + (f" {counts[name]}" if counts[name] > 1 else "")
             groups.append(group_of(label, rows, covariance, names=self.names, first=first))
             places.append(tuple(row.place for row in rows))
+            claims.append(np.array([row.claim for row in rows]) if any(row.claim[1] for row in rows) else None)
         for points, place, make in self.more:
             group = make(np.array([3 * self.names[name] for name in points], dtype=int), first)
             groups.append(group)
             places.append((place,) * len(group.observed))
-        return tuple(groups), tuple(places)
+            claims.append(None)
+        return tuple(groups), tuple(places), tuple(claims)
 
 
 def _together(row: Row) -> list[tuple[str, ...]]:
     """Points of a row that must differ: all, or the ends of each of two distances."""
-    return [row.ends[:2], row.ends[2:]] if row.kind == "distance_difference" else [row.ends]
+    ends = tuple(map(name_key, row.ends))
+    return [ends[:2], ends[2:]] if row.kind == "distance_difference" else [ends]

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from catseye.estimation.network.model import NetworkPoints, ObservationNetwork, absent_coordinates
+from catseye.estimation.network.names import PointIndex, name_key, spelled
 from catseye.estimation.observations.kinds import Distances, ObservationGroup, ObservedCoordinates
 from catseye.records.files.columns import TextColumns, columns_of
 from catseye.records.files.reading import Folder
@@ -30,25 +31,29 @@ CLOSE = 0.7  # likeness of two names, 1 the same
 ROLES = ("free", "fixed", "datum")
 
 
-def read_network_folder(path: Path, claim: RangeClaim = NO_CLAIM) -> ObservationNetwork:
+def read_network_folder(path: Path, claim: RangeClaim = NO_CLAIM, *, planned: bool = False) -> ObservationNetwork:
     """The network of a folder; InputError where it cannot be used.
 
     path    a folder with points.csv and ranges.csv
     claim   standard uncertainty of a range whose sigma is blank or not there
+    planned distances may be blank or not there, for a plan
     """
     folder = Folder(path)
     points = columns_of(folder.text("points.csv"), "points.csv", POINT_COLUMNS, optional=("role", *U_COLUMNS))
-    ranges = columns_of(folder.text("ranges.csv"), "ranges.csv", RANGE_COLUMNS, optional=("sigma",))
+    required, optional = (RANGE_COLUMNS[:2], ("distance", "sigma")) if planned else (RANGE_COLUMNS, ("sigma",))
+    ranges = columns_of(folder.text("ranges.csv"), "ranges.csv", required, optional=optional)
     names = names_of(points, "point")
     xyz, fixed, datum, priors = _places(points)
     unlisted = _unlisted(ranges, names)
     if unlisted:
-        names |= {name: len(names) + k for k, name in enumerate(unlisted)}
+        for name in unlisted:
+            names[spelled(name)] = len(names)
         xyz, priors = (np.vstack([rows, np.full((len(unlisted), 3), np.nan)]) for rows in (xyz, priors))
         fixed, datum = (np.vstack([rows, np.zeros((len(unlisted), 3), dtype=bool)]) for rows in (fixed, datum))
-    groups: list[ObservationGroup] = [_distances(ranges, names, claim)]
+    distances, claims = _distances(ranges, names, claim, planned)
+    groups: list[ObservationGroup] = [distances]
     ranged = np.zeros((len(names), 1), dtype=bool)
-    ranged[[groups[0].origin // 3, groups[0].target // 3]] = True  # type: ignore[attr-defined]
+    ranged[[distances.origin // 3, distances.target // 3]] = True
     absent = absent_coordinates(xyz, fixed | datum, np.broadcast_to(ranged, xyz.shape))
     places = [ranges.where()]
     if np.any(priors > 0.0):
@@ -57,15 +62,24 @@ def read_network_folder(path: Path, claim: RangeClaim = NO_CLAIM) -> Observation
         groups.append(ObservedCoordinates("coordinates", observed, variance, 3 * row, axis))
         places.append(tuple(f"points.csv line {points.lines[int(i)]}" for i in row))
     return ObservationNetwork(
-        NetworkPoints(tuple(names), xyz, fixed, datum, absent), (), tuple(groups), tuple(places), source=path.name
+        NetworkPoints(tuple(names), xyz, fixed, datum, absent),
+        (),
+        tuple(groups),
+        tuple(places),
+        source=path.name,
+        claims=(claims, *(None for _ in groups[1:])),
+        notes=names.notes(),
     )
 
 
-def names_of(table: TextColumns, column: str) -> dict[str, int]:
+def names_of(table: TextColumns, column: str) -> PointIndex:
     """Name -> row, each name once."""
-    cells = table.cells[column]
-    names = dict(zip(cells, range(len(cells)), strict=True))
-    if len(names) < len(cells) or "" in names:
+    written = table.cells[column]
+    cells = list(map(spelled, written))
+    names = PointIndex(cells)
+    names.aliases |= {was: now for was, now in zip(written, cells, strict=True) if was != now}
+    if len(set(map(name_key, cells))) < len(cells) or "" in names:
+        cells = list(map(name_key, cells))
         seen: dict[str, int] = {}
         for row, name in enumerate(cells):
             if not name:
@@ -99,9 +113,13 @@ def _places(points: TextColumns) -> tuple[np.ndarray, np.ndarray, np.ndarray, np
     return xyz, fixed, datum, np.where(fixed, np.nan, u)
 
 
-def _unlisted(ranges: TextColumns, names: dict[str, int]) -> list[str]:
+def _unlisted(ranges: TextColumns, names: PointIndex) -> list[str]:
     """Targets that points.csv does not list, in the order of ranges.csv: unknown points."""
-    counts = Counter(ranges.cells["to"])
+    written = Counter(ranges.cells["to"])
+    first: dict[str, str] = {}
+    counts: Counter[str] = Counter()
+    for name, count in written.items():
+        counts[first.setdefault(name_key(name), name)] += count
     strangers = [name for name in counts if name and name not in names]
     for name in strangers:
         close = difflib.get_close_matches(name, names, n=1, cutoff=CLOSE) if counts[name] < FEWEST else []
@@ -112,24 +130,30 @@ def _unlisted(ranges: TextColumns, names: dict[str, int]) -> list[str]:
     return strangers
 
 
-def _distances(ranges: TextColumns, names: dict[str, int], claim: RangeClaim) -> Distances:
+def _distances(
+    ranges: TextColumns, names: PointIndex, claim: RangeClaim, planned: bool
+) -> tuple[Distances, np.ndarray | None]:
+    """The ranges, and a, b, c of their claims; distances that are yet to be measured are nan."""
     origin, target = (_numbered(ranges, end, names) for end in ("from", "to"))
     ranges.check("to", origin != target, "another point than from")
-    distance = ranges.numbers("distance")
-    ranges.check("distance", distance > 0.0, "above 0 m")
+    distance = np.full(len(ranges), np.nan)
+    if "distance" in ranges.cells:
+        distance = ranges.numbers("distance", blank=np.nan if planned else None)
+        ranges.check("distance", ~(distance <= 0.0), "above 0 m")
     sigma = ranges.numbers("sigma", blank=np.nan) if "sigma" in ranges.cells else np.full(len(distance), np.nan)
     without = np.isnan(sigma)
     if without.any():
         if not claim:
             row = int(np.argmax(without))
             raise ranges.refuse(row, "no sigma (expected one, m, or --sigma-mm and --sigma-ppm for ranges without)")
-        sigma = np.where(without, claim.of(distance), sigma)
+        sigma = np.where(without, claim.of(np.where(np.isnan(distance), 1.0, distance)), sigma)  # of a plan: there
     if "sigma" in ranges.cells:
         ranges.check("sigma", sigma > 0.0, "above 0 m: nothing is measured without error")
-    return Distances("slope distance", distance, sigma**2, 3 * origin, 3 * target)
+    claims = np.where(without[:, None], claim.terms, (0.0, 0.0, 1.0))
+    return Distances("slope distance", distance, sigma**2, 3 * origin, 3 * target), claims if without.any() else None
 
 
-def _numbered(ranges: TextColumns, end: str, names: dict[str, int]) -> np.ndarray:
+def _numbered(ranges: TextColumns, end: str, names: PointIndex) -> np.ndarray:
     cells = ranges.cells[end]
     try:
         return np.array(list(map(names.__getitem__, cells)))

@@ -20,6 +20,7 @@ import numpy as np
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.errors import InputError
 from catseye.estimation.network.model import ObservationNetwork
+from catseye.estimation.network.names import name_key
 from catseye.records.files.refusal import refusal, shown, unreadable
 from catseye.records.network.draft import NetworkDraft
 from catseye.records.network.gama_xml import GON, XmlElement, angle_of, band_matrix, number_of, tree_of
@@ -135,8 +136,8 @@ class _Reader:
 
     def note_point(self, element: XmlElement, *, observed: bool) -> None:
         """Coordinates and status of a point; a point may be told in parts, but nothing twice."""
-        name = element.attributes["id"].strip()
-        point = self.points.setdefault(name, {"place": element.place})
+        name = element.attributes["id"]
+        point = self.points.setdefault(name_key(name), {"place": element.place, "name": name})
         if ("x" in element.attributes) != ("y" in element.attributes):
             raise self.refuse(element, f"{shown(name)} has one of x and y (expected both or none)")
         for key in ("x", "y", "z"):
@@ -153,22 +154,22 @@ class _Reader:
                     point[f"is {letter.lower()}"] = status
 
     def _once(self, element: XmlElement, name: str, key: str) -> None:
-        if key in self.points[name]:
-            first = self.points[name]["place"]
+        if key in self.points[name_key(name)]:
+            first = self.points[name_key(name)]["place"]
             raise self.refuse(element, f"{shown(name)} has its {key} in {first} already (expected each name once)")
 
     def add_points(self) -> None:
-        for name, point in self.points.items():
+        for point in self.points.values():
             xyz = [point.get(key, np.nan) for key in "xyz"]
             status = [point.get(f"is {key}") for key in "xyz"]
             fixed = [s == "fix" or (s is None and not np.isnan(v)) for s, v in zip(status, xyz, strict=True)]
             datum = [s == "ADJ" and not np.isnan(value) for s, value in zip(status, xyz, strict=True)]
-            self.draft.point(name, xyz, fixed=fixed, datum=datum, place=point["place"])
+            self.draft.point(point["name"].strip(), xyz, fixed=fixed, datum=datum, place=point["place"])
 
     def need(self, element: XmlElement, name: str, axes: str) -> str:
         """The point's name, which must have a status for each coordinate that the observation depends on."""
         for axis in axes:
-            if name in self.points and f"is {axis}" not in self.points[name]:
+            if f"is {axis}" not in self.points.get(name_key(name), {f"is {axis}": ""}):
                 raise self.refuse(element, f"needs {axis} of {shown(name)}, which is neither fix nor adj there")
         return name
 
@@ -200,9 +201,10 @@ class _Reader:
         for name in ends:
             self.need(child, name, NEEDS.get(child.tag, "xyz"))
         if child.tag in ("distance", "s-distance", "dh"):
-            value, unit, turned = self.number(child, "val"), MILLIMETRE, 1.0
+            value, unit, turned, written = self.number(child, "val"), MILLIMETRE, 1.0, ""
         else:
             value, degrees = angle_of(self.draft.file, child, "val")
+            written = "deg" if degrees else "gon"
             unit, turned = (ARCSECOND if degrees else CC), (1.0 if child.tag == "z-angle" else self.clockwise)
         if child.tag == "z-angle" and not 0.0 < value < np.pi:
             raise self.refuse(child, f"val = {shown(attributes['val'])} (expected the first face, below half a turn)")
@@ -210,7 +212,15 @@ class _Reader:
         heights = tuple(self.number(child, f"{name}_dh", 0.0) for name in others)
         instrument = self.number(child, "from_dh", self.number(parent, "from_dh", 0.0))
         parameters = {"orientation": orientation} if child.tag == "direction" else {}
-        row = Row(KINDS[child.tag], tuple(ends), turned * value, u, child.place, (instrument, *heights), parameters)
+        claim = (0.0, 0.0, 1.0)
+        if not has_matrix and "stdev" not in child.attributes and child.tag in ("distance", "s-distance"):
+            a, b, c = self._distance_stdev(section)
+            claim = (a * MILLIMETRE, b * MILLIMETRE * 1e-3**c, c)  # of a length in km
+        row = Row(
+            *(KINDS[child.tag], tuple(ends), turned * value, u, child.place, (instrument, *heights), parameters),
+            claim=claim,
+            unit=written,
+        )
         self.draft.observe(row)
         return unit * turned
 
@@ -221,16 +231,21 @@ class _Reader:
         if child.tag == "dh" and "dist" in child.attributes:
             return self.sigma_apr * self.number(child, "dist") ** 0.5
         if child.tag in ("distance", "s-distance") and "distance-stdev" in section.attributes:
-            words = section.attributes["distance-stdev"].split()
-            if not 1 <= len(words) <= 3:
-                raise self.refuse(section, f"distance-stdev holds {len(words)} values (expected a, a b or a b c)")
-            given = [number_of(self.draft.file, section, "distance-stdev", word=word) for word in words]
-            a, b, c = [*given, *(0.0, 1.0)[len(given) - 1 :]]
+            a, b, c = self._distance_stdev(section)
             return a + b * (value / 1000.0) ** c
         name = f"{IMPLIED_STDEV.get(child.tag, '')}-stdev"
         if name not in section.attributes:
             raise self.refuse(child, "has no stdev, and neither points-observations nor a cov-mat gives one")
         return self.number(section, name)
+
+    def _distance_stdev(self, section: XmlElement) -> tuple[float, float, float]:
+        """a, b, c of a + b D^c, mm and km."""
+        words = section.attributes["distance-stdev"].split()
+        if not 1 <= len(words) <= 3:
+            raise self.refuse(section, f"distance-stdev holds {len(words)} values (expected a, a b or a b c)")
+        given = [number_of(self.draft.file, section, "distance-stdev", word=word) for word in words]
+        a, b, c = [*given, *(0.0, 1.0)[len(given) - 1 :]]
+        return a, b, c
 
     def _orientation(self, element: XmlElement) -> int:
         """The unknown azimuth of a set's zero; `orientation` in the file is its bearing from the x axis."""

@@ -59,7 +59,9 @@ class Row:
     place        where it stands in the file
     heights      m, of the instrument and of each target above its point, like ends; () for none
     parameters   role -> index among the network's parameters: orientation, zero, scale, refractivity, refraction, level
+    claim        a, b, c of a standard uncertainty a + b D^c that grows with the length; b = 0: it is `u` alone
     component    "x", "y" or "z" of coordinates and vectors
+    unit         "deg" or "gon" in which an angle was written, or ""
     known        what is known beside: "index" (what a metre reads), "offset" m, "refraction" (coefficient), "curved"
     """
 
@@ -71,6 +73,8 @@ class Row:
     heights: tuple[float, ...] = ()
     parameters: Mapping[str, int] = field(default_factory=dict)
     component: str = ""
+    claim: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    unit: str = ""
     known: Mapping[str, float] = field(default_factory=dict)
 
 

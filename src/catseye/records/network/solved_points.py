@@ -13,6 +13,8 @@ from catseye.constants import DEGREE
 from catseye.records.files.covariance_file import stored_covariance
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import refusal, shown
+from catseye.records.files.verdicts import stored_verdict
+from catseye.verdict import Verdict
 
 FORMAT = "catseye-reduction-1"  # of coordinates.json and pose.json
 FILE, BESIDE = "coordinates.json", "pose.json"
@@ -30,6 +32,7 @@ class SolvedPoints:
     covariance   (3n, 3n) m^2; of many points mapped from a file
     posture      azimuth and elevation, rad, if pose.json beside it says
     hashes       SHA-256 of the files read, by their names
+    verdict      of the reduction; None where the file has none
     """
 
     file: str
@@ -39,6 +42,7 @@ class SolvedPoints:
     covariance: np.ndarray
     posture: tuple[float, float] | None
     hashes: dict[str, str]
+    verdict: Verdict | None = None
 
     def __repr__(self) -> str:
         where = Path(self.file).name
@@ -85,7 +89,8 @@ def read_solved_points(path: Path | str) -> SolvedPoints:
     beside = folder.directory / BESIDE
     posture = _posture(_object(folder, BESIDE)) if beside.is_file() else None
     hashes = {f"{path.name}/{f}" if path.is_dir() else f: digest for f, digest in folder.hashes.items()}
-    return SolvedPoints(str(path), str(document.get("campaign", "")), names, x, covariance, posture, hashes)
+    judged = stored_verdict(name, document)
+    return SolvedPoints(str(path), str(document.get("campaign", "")), names, x, covariance, posture, hashes, judged)
 
 
 def _object(folder: Folder, name: str) -> dict[str, Any]:

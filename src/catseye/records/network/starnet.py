@@ -29,6 +29,7 @@ import numpy as np
 from catseye.constants import MILLIMETRE, PPM
 from catseye.errors import InputError
 from catseye.estimation.network.model import ObservationNetwork
+from catseye.estimation.network.names import name_key
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import NUMBER, refusal, shown
 from catseye.records.network.claim import NO_CLAIM, RangeClaim
@@ -95,6 +96,7 @@ class _Reader:
         self.draft = NetworkDraft(file, implied=True)
         self.settings = StarnetSettings()
         self.coordinates: dict[str, dict[str, tuple[float, str, str]]] = {}
+        self.written: dict[str, str] = {}  # key of a name -> as it stands first
         self.sets: dict[str, int] = {}
         self.station, self.orientation = "", -1
         self.left_out: list[str] = []
@@ -122,7 +124,8 @@ class _Reader:
             raise refusal(self.draft.file, f"ends within the direction set at {shown(self.station)} (expected DE)")
         if self.without:
             raise self._refuse_without()
-        for name, known in self.coordinates.items():
+        for key, known in self.coordinates.items():
+            name = self.written[key]
             place = next(iter(known.values()))[2]
             xyz = [known[axis][0] if axis in known else np.nan for axis in "xyz"]
             self.draft.point(name, xyz, fixed=[known.get(a, (0, "", ""))[1] == "!" for a in "xyz"], place=place)
@@ -172,7 +175,8 @@ class _Reader:
             form = f"{len(axes)} coordinates and none or {len(axes)} standard errors"
             raise self.refuse(line, f"{line.code}: {len(numbers)} values (expected a name, {form})")
         errors = numbers[len(axes) :] or ["*"] * len(axes)
-        point = self.coordinates.setdefault(words[1], {})
+        self.written.setdefault(name_key(words[1]), words[1])
+        point = self.coordinates.setdefault(name_key(words[1]), {})
         for axis, word, error in zip(axes, numbers, errors, strict=False):
             if axis in point:
                 raise self.refuse(line, f"{axis} of {shown(words[1])} is in {point[axis][2]} already (expected once)")
@@ -223,15 +227,21 @@ class _Reader:
             if length
             else angle_of(line, word, self.settings, refuse=self.refuse, bearing=kind == "azimuth")
         )
-        if kind == "zenith_angle" and value > np.pi:
+        if kind == "zenith_angle" and np.pi < value < 2.0 * np.pi:
             value = 2.0 * np.pi - value  # the second face
         if error == "*":
             self.left_out.append(f"{kind.replace('_', ' ')} of {line.place}")
             return
         u = self._standard_error(line, kind, error=error, value=value)
+        claim = (0.0, 0.0, 1.0)
+        if error == "&" and kind in DISTANCES:
+            given = self.settings.defaults
+            claim = (given.get("distance_mm", 0.0) * MILLIMETRE, given.get("distance_ppm", 0.0) * PPM, 1.0)
         heights = heights if kind in ("slope_distance", "zenith_angle", "height_difference") else (0.0, 0.0)
         parameters = {"orientation": self.orientation} if kind == "direction" else {}
-        self.draft.observe(Row(kind, ends, value, u, line.place, heights if any(heights) else (), parameters))
+        shifted = heights if any(heights) else ()
+        unit = "" if length else "gon" if self.settings.gons else "deg"
+        self.draft.observe(Row(kind, ends, value, u, line.place, shifted, parameters, claim=claim, unit=unit))
 
     def _standard_error(self, line: StarnetLine, kind: str, *, error: str, value: float) -> float:
         length = kind in LENGTHS

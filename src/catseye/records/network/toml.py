@@ -29,7 +29,8 @@ from typing import Any
 import numpy as np
 
 from catseye.estimation.network.model import ObservationNetwork
-from catseye.records.files.columns import TextColumns, columns_of
+from catseye.estimation.network.names import name_key, spelled
+from catseye.records.files.columns import TextColumns, columns_of, pointed
 from catseye.records.files.reading import Folder, toml_of
 from catseye.records.files.refusal import NUMBER, refusal, shown
 from catseye.records.files.toml_fields import ANGLE, DIMENSIONS, LENGTH, RATIO, Fields
@@ -58,22 +59,23 @@ TOP = (
 )
 
 
-def read_network_toml(path: Path) -> ObservationNetwork:
+def read_network_toml(path: Path, *, planned: bool = False) -> ObservationNetwork:
     """The network of a file of ours; InputError, with the table's number, where it cannot be used.
 
-    path   the file; tables that it names stand beside it
+    path      the file; tables that it names stand beside it
+    planned   observed values may be missing, for a plan
     """
     folder = Folder(path.parent)
     document = toml_of(folder.text(path.name), path.name)
-    return _Reader(path.name, folder, document).network()
+    return _Reader(path.name, folder, document, planned).network()
 
 
 class _Reader:
-    def __init__(self, file: str, folder: Folder, document: dict[str, Any]) -> None:
+    def __init__(self, file: str, folder: Folder, document: dict[str, Any], planned: bool) -> None:
         if document.get("format") != FORMAT:
             raise refusal(file, f"format = {shown(document.get('format'))} (expected {FORMAT!r})")
         self.document = Fields(file, "top", document)
-        self.draft, self.folder = NetworkDraft(file), folder
+        self.draft, self.folder = NetworkDraft(file, planned=planned), folder
         self.named: dict[str, int] = {}
         self.rangers: dict[str, dict[str, int]] = {}
         self.sets: dict[tuple[str, str], int] = {}
@@ -138,7 +140,7 @@ class _Reader:
     def point(self, fields: Fields) -> None:
         name = fields.text("name")
         if fields.has("x_m") or fields.has("y_m") or fields.has("z_m"):
-            xyz = np.array([fields.number(f"{axis}_m", np.nan) for axis in "xyz"])
+            xyz = np.array([fields.number(f"{axis}_m") if fields.has(f"{axis}_m") else np.nan for axis in "xyz"])
         else:
             xyz = fields.vector("xyz", LENGTH, default=(np.nan,) * 3)
         role = fields.text("role", "free")
@@ -195,7 +197,7 @@ class _Reader:
             raise fields.refuse(f"is free and has {key} (expected one of them)")
 
     def ranger(self, fields: Fields) -> None:
-        name = fields.text("name")
+        name = name_key(fields.text("name"))
         if name in self.rangers:
             raise fields.refuse(f"ranger {shown(name)} is there twice (expected each once)")
         if name not in self.draft.names:
@@ -226,7 +228,9 @@ class _Reader:
         fields.done()
 
     def _components(self, fields: Fields, kind: str, ends: tuple[str, ...]) -> None:
-        xyz, covariance, start = fields.vector("xyz", LENGTH), fields.uncertainties(3), len(self.draft.rows)
+        unknown = (np.nan,) * 3 if self.draft.planned else None
+        xyz, start = fields.vector("xyz", LENGTH, default=unknown), len(self.draft.rows)
+        covariance = fields.uncertainties(3)
         if covariance is None:
             raise fields.refuse("u is missing (expected u_mm, one or three, or covariance_mm2)")
         for axis, value in zip("xyz", xyz, strict=True):
@@ -235,10 +239,13 @@ class _Reader:
 
     def _single(self, fields: Fields, kind: str, ends: tuple[str, ...]) -> None:
         units = LENGTH if kind in LENGTHS else ANGLE
-        value = fields.quantity("value", units, 0.0 if kind == "level_plane" else None)
+        missing = 0.0 if kind == "level_plane" else np.nan if self.draft.planned else None
+        value = fields.quantity("value", units, missing)
+        claim = (0.0, 0.0, 1.0)
         default = U_FIXED_DISTANCE if kind == "fixed_distance" else None
         if units is LENGTH and fields.has("u_ppm"):
-            u = fields.quantity("u", units, 0.0) + fields.quantity("u", {"ppm": RATIO["ppm"]}) * abs(value)
+            claim = (fields.quantity("u", units, 0.0), fields.quantity("u", {"ppm": RATIO["ppm"]}), 1.0)
+            u = claim[0] + claim[1] * (1.0 if np.isnan(value) else abs(value))  # of a plan: computed there
         else:
             u = fields.quantity("u", units, default)
         heights: tuple[float, ...] = ()
@@ -255,11 +262,14 @@ class _Reader:
             known["height"] = fields.quantity("height", LENGTH, 0.0)
         parameters = self._parameters(fields, kind, ends)
         shifted = heights if any(heights) else ()
-        self.draft.observe(Row(kind, ends, value, u, fields.place, shifted, parameters, known=known))
+        key = fields.keyed("value", units)
+        unit = "gon" if key is not None and key[0].endswith("gon") else "deg" if units is ANGLE else ""
+        row = Row(kind, ends, value, u, fields.place, shifted, parameters, known=known, claim=claim, unit=unit)
+        self.draft.observe(row)
 
     def _parameters(self, fields: Fields, kind: str, ends: tuple[str, ...]) -> dict[str, int]:
         """Role -> parameter: those that the observation names, its ranger's, its set's orientation."""
-        parameters = dict(self.rangers.get(ends[0], {})) if kind in RANGED else {}
+        parameters = dict(self.rangers.get(name_key(ends[0]), {})) if kind in RANGED else {}
         for role in ALLOWED.get(kind, ()):
             if not fields.has(role):
                 continue
@@ -273,9 +283,9 @@ class _Reader:
                 raise fields.refuse(f"{role} = {shown(name)}, but ranger {shown(ends[0])} has its own (expected one)")
             parameters[role] = self.named[name]
         if kind == "direction" and "orientation" not in parameters:
-            key = (ends[0], fields.text("set", "1"))
+            key = (name_key(ends[0]), fields.text("set", "1"))
             if key not in self.sets:
-                self.sets[key] = self.draft.parameter(f"orientation {key[0]} set {key[1]}", unit="rad")
+                self.sets[key] = self.draft.parameter(f"orientation {spelled(ends[0])} set {key[1]}", unit="rad")
             parameters["orientation"] = self.sets[key]
         return parameters
 
@@ -294,7 +304,9 @@ def _rows_of(table: TextColumns, common: dict[str, Any]) -> list[Fields]:
         if name in common:
             raise refusal(table.file, f"line 1, column {shown(name)} is there twice (expected each key once)")
         is_text: Callable[[str], bool] = TEXT_KEYS.__contains__
-        columns.append(cells if is_text(name) else [float(c) if NUMBER.fullmatch(c) else c for c in cells])
+        numbers = [pointed(c) for c in cells] if table.comma else cells
+        known = [float(n) if NUMBER.fullmatch(n) else c for n, c in zip(numbers, cells, strict=True)]
+        columns.append(cells if is_text(name) else known)
     rows = []
     for line, row in zip(table.lines, zip(*columns, strict=True), strict=True):
         values = {key: value for key, value in zip(table.cells, row, strict=True) if value != ""}

@@ -10,6 +10,7 @@ import numpy as np
 from catseye.constants import SECONDS_PER_DAY
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import in_row, refusal, shown
+from catseye.records.files.verdicts import verdict_of_export
 from catseye.records.night.doubt import DOUBTS, DoubtRow, believed_samples, refuse_doubts
 from catseye.records.night.path_temperature import PathTemperature, PathTemperatureTable, path_temperature_columns
 from catseye.records.night.shot import ShotColumns, ShotRow, read_buffers, refuse_shots, shot_columns
@@ -22,6 +23,7 @@ from catseye.records.site.folder import (
     refuse_stranger,
     refuse_unjoined,
 )
+from catseye.verdict import Verdict
 
 LONGEST_CAMPAIGN = 1.0  # days from its start to any shot
 WEATHER_MARGIN = 3600.0 / SECONDS_PER_DAY  # days that a shot may lie outside the weather
@@ -35,6 +37,7 @@ class ObservedSite(SiteFolder):
 
     `path_temperatures` is None where no line's temperature was measured by sound. `weather` and the site's stations are
     what was believed, `doubted` the shots that were not, by their ids, with why; `doubt_notes` tell of the weather.
+    `verdict` is that of the export that wrote the campaign; None of others.
     """
 
     weather: Weather
@@ -42,6 +45,7 @@ class ObservedSite(SiteFolder):
     path_temperatures: PathTemperatureTable | None = None
     doubted: Mapping[int, str] = field(default_factory=dict)
     doubt_notes: tuple[str, ...] = ()
+    verdict: Verdict | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -78,6 +82,7 @@ def read_campaign(directory: Path | str) -> Campaign:
         shots=shot_columns(shots),
         frames=buffers,
         path_temperatures=path_temperature_columns(lines) if lines else None,
+        verdict=verdict_of_export(folder),
     )
     refuse_unjoined(campaign, records)
     refuse_weather(samples, [station.name for station in campaign.site.weather_station])

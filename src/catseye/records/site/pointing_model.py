@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 from catseye.constants import ARCSECOND
 from catseye.geometry.antenna.pointing_series import TERMS, PointingSeries
 from catseye.records.files.record import Certificate, Within, broken_rule
+from catseye.verdict import Verdict, Word
 
 FORMAT = "catseye-pointing-series-1"
 SYMMETRY = 1e-6  # of two standard uncertainties' product: files carry ten digits
@@ -23,6 +24,7 @@ class PointingModel(Certificate):
     values_arcsec       as many
     covariance_arcsec2  of these, rows in the same order; none where nothing is known of it
     sky_rms_arcsec      of the fit, if it was one
+    verdict, why        of the fit where it was not good: a prediction is no better
     """
 
     format: Literal["catseye-pointing-series-1"]
@@ -31,6 +33,8 @@ class PointingModel(Certificate):
     values_arcsec: Annotated[tuple[Coefficient, ...], Field(strict=False)]
     covariance_arcsec2: Annotated[tuple[Row, ...], Field(strict=False)] | None = None
     sky_rms_arcsec: Annotated[float, Within(0, 36_000)] | None = None
+    verdict: Word | None = None
+    why: str = ""
 
     @model_validator(mode="after")
     def _fits_together(self) -> "PointingModel":
@@ -42,6 +46,11 @@ class PointingModel(Certificate):
         if self.covariance_arcsec2 is not None:
             _refuse_covariance(self.covariance_arcsec2, k)
         return self
+
+    @property
+    def judged(self) -> Verdict | None:
+        """The fit's verdict; None where the file has none."""
+        return None if self.verdict is None else Verdict(self.verdict, self.why)
 
     @property
     def series(self) -> PointingSeries:

@@ -114,6 +114,22 @@ class WeatherStation(Record):
     y_m: float | None = None
 
 
+class InCommon(Record):
+    """[in_common]: standard uncertainties of what records of one kind share; considered, as no range tells them.
+
+    certificate_scale_ppm   of the benchmarks' certificates, by one laboratory; 0: each errs by itself, as its u says
+    survey_scale_ppm        of the monuments, by one survey; likewise
+    glass_index_ratio       of bk7_to_air_group_index_ratio
+    sheets_at_c             where given, heads and prisms were calibrated at that temperature, and what steel and glass
+                            do from there to the campaign's is uncertain as a whole; else their own u cover it
+    """
+
+    certificate_scale_ppm: Annotated[float, Within(0, 1000)] = 0.0
+    survey_scale_ppm: Annotated[float, Within(0, 1000)] = 0.0
+    glass_index_ratio: Annotated[float, Within(0, 0.1)] = 0.0
+    sheets_at_c: Annotated[float, Within(-50, 60)] | None = None
+
+
 class SiteRecord(Certificate):
     """Everything that site.toml holds."""
 
@@ -123,6 +139,7 @@ class SiteRecord(Certificate):
     frames: Frames
     paraboloid: ParaboloidRecord
     ranging: Ranging
+    in_common: InCommon = InCommon()
     adc: Adc
     weather_station: Annotated[tuple[WeatherStation, ...], Field(strict=False, min_length=1)]
 

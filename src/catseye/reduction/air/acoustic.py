@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike
 from catseye.atmosphere.index.air import AirState, air
 from catseye.atmosphere.limit import ValidInterval, check_spreads
 from catseye.atmosphere.sound.dispersion import dispersion
-from catseye.atmosphere.sound.model import SoundSensitivity
 from catseye.atmosphere.sound.path import WIND, bent_ray_excess, pair, straight_line_speed
-from catseye.atmosphere.sound.speed import MODELS, THERMOMETRY, model_named, sound, temperatures_c
+from catseye.atmosphere.sound.speed import MODELS, THERMOMETRY, Sound, model_named, sound, temperatures_c
 from catseye.atmosphere.weather import humidity
 from catseye.errors import ValidityError
 
@@ -178,12 +177,13 @@ def path_temperatures(
     good = np.isfinite(t)
 
     at = np.where(good, t, 20.0)  # only so that slopes exist everywhere; nan again below
-    slope = sound(at, p, h, model=line.model, co2_ppm=station.co2_ppm).sensitivity
+    heard = sound(at, p, h, model=line.model, co2_ppm=station.co2_ppm)
+    slope = heard.sensitivity
     e = humidity.vapour_pressure_hpa(at, p, h, MODELS[line.model].vapour_formula)
     lag = dispersion(at, p, e, frequency_hz=line.frequency_hz).of_a_pulse()[1]
     per_speed = np.where(good, 1.0 / slope.temperature_c, np.nan)
     noise = per_speed * np.sqrt((along.per_forth * u_time[0]) ** 2 + (along.per_back * u_time[1]) ** 2)
-    common = _common_parts(straight, per_speed, slope, lag, line, station)
+    common = _common_parts(straight, per_speed, heard, lag, line, station)
     covariance = np.diag(noise**2) + sum(np.outer(part, part) for part in common.values())
     light = air(at, p, h, wavelength_um=wavelength_um, model=air_model, co2_ppm=station.co2_ppm)
     group = _group_covariance(light, good, noise, common, station)
@@ -204,7 +204,7 @@ def path_temperatures(
 def _common_parts(
     straight: "_StraightSpeed",
     per_speed: np.ndarray,
-    slope: SoundSensitivity,
+    heard: Sound,
     lag: np.ndarray,
     line: SoundLine,
     station: StationAir,
@@ -212,9 +212,10 @@ def _common_parts(
     """What each standard uncertainty that all times share does to the temperatures, °C (k,), by its cause.
 
     per_speed   °C per m/s, at each temperature
-    slope       of the speed, by weather
+    heard       the speed's slopes by weather, and its uncertainty
     lag         standard uncertainty of the dispersion, relative to the speed
     """
+    slope, formula = heard.sensitivity, heard.standard_uncertainty
     along, bend_rms = straight.along, straight.bend_rms
     bend_square = np.where(bend_rms > 0.0, bend_rms**2, 1.0)
     return {
@@ -227,7 +228,7 @@ def _common_parts(
         "crosswind": per_speed * straight.u_crosswind,
         "bend": per_speed * straight.speed * straight.early * straight.spread / bend_square,
         "dispersion": per_speed * straight.speed * lag,
-        "formula": per_speed * MODELS[line.model].standard_uncertainty,
+        "formula": per_speed * formula,
     }
 
 

@@ -180,7 +180,14 @@ def sound_field(
     """
     places, time = np.asarray(stations, float), np.asarray(times.time, float)
     source, receiver, u_time = _ends(places, times, time)
-    sigmas = _sigmas(places.size, u_time, times.u_delay, u_position, weather, model)
+    formula = float(
+        np.max(
+            sound(
+                temperature.mean, weather.pressure_hpa, weather.humidity_percent, model=model, co2_ppm=weather.co2_ppm
+            ).standard_uncertainty
+        )
+    )
+    sigmas = _sigmas(places.size, u_time, times.u_delay, u_position, weather, formula)
     ray = places[receiver] - places[source]
     LENGTH.check(np.linalg.norm(ray, axis=1))
     if temperature.u_mean <= 0.0 and not temperature.scales:
@@ -223,7 +230,7 @@ def sound_field(
 
 
 def _sigmas(
-    coordinates: int, u_time: np.ndarray, u_delay: float, u_position: float, weather: StationAir, model: str
+    coordinates: int, u_time: np.ndarray, u_delay: float, u_position: float, weather: StationAir, formula: float
 ) -> np.ndarray:
     """Standard uncertainties of what all paths share: coordinates of the stations, then `COMMON`."""
     check_spreads(
@@ -235,7 +242,6 @@ def _sigmas(
         u_co2_ppm=weather.u_co2_ppm,
     )
     of_weather = [weather.u_pressure_hpa, weather.u_humidity_percent, weather.u_co2_ppm]
-    formula = model_named(model).standard_uncertainty
     return np.concatenate([np.full(coordinates, u_position), [u_delay, *of_weather, 1.0, formula]])
 
 

@@ -255,7 +255,8 @@ def _series(reduction: "Reduction", benchmark: "BenchmarkRow", rows: np.ndarray)
     air = field.along(mjd, np.tile(a, (len(rows), 1)), np.tile(b, (len(rows), 1)), nothing)
     t, p, h = field.smoothed(mjd).mean(axis=1).T
     chosen = MODELS[field.model]
-    formula = chosen.uncertainty(vapour_pressure_hpa(t, p, h, chosen.vapour_formula))
+    vapour = vapour_pressure_hpa(t, p, h, chosen.vapour_formula)
+    formula = chosen.uncertainty(t, p, vapour, wavelength_um=field.wavelength_um)
     u_weather = np.sqrt(np.sum((air.slopes * field.sigmas) ** 2, axis=1) + formula**2)
     used = ranges.used[rows]
     count = max(int(used.sum()), 1)

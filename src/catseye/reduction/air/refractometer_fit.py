@@ -69,8 +69,9 @@ class PathFit:
         r, sheet = self.readings, self.readings.sheet
         chosen, there = MODELS[sheet.air_model], np.isfinite(self.weather.index)
         p, h = (float(np.mean(column[self.rows])) for column in (r.pressure_hpa, r.humidity_percent))
-        vapour = vapour_pressure_hpa(float(np.nanmean(r.temperature_c[there])), p, h, chosen.vapour_formula)
-        formula = float(chosen.uncertainty(vapour)) / PPM
+        t, light = float(np.nanmean(r.temperature_c[there])), {"wavelength_um": sheet.wavelength_um}
+        vapour = vapour_pressure_hpa(t, p, h, chosen.vapour_formula)
+        formula = float(chosen.uncertainty(t, p, vapour, **light, co2_ppm=sheet.co2_ppm)) / PPM
         u_length = sheet.u_path_length_mm * MILLIMETRE / sheet.path_length_m
         u = [*r.u_temperature_c, sheet.u_pressure_hpa, sheet.u_humidity_percent, formula, u_length]
         names = [f"index {s + 1}" for s in self.calibrated]

@@ -151,6 +151,34 @@ def air_by(
     return state, vapour.index_uncertainty(partials, moisture.u, **u, u_model=u_formula)
 
 
+def formula_uncertainty(
+    temperature_c: ArrayLike,
+    pressure_hpa: ArrayLike,
+    moisture: Moisture,
+    *,
+    above_barometer: ArrayLike = 0.0,
+    u_pressure_hpa: ArrayLike = 0.0,
+    formula: IndexFormula | None = None,
+) -> float | NDArray[np.float64]:
+    """Standard uncertainty that the formulas alone give the group index, with exact readings.
+
+    u_pressure_hpa   of the pressure, hPa, that the barometer's own formulas leave
+    others           as of `air_by`: saturation, psychrometer, and the air between, which is taken at rest, count
+
+    >>> float(formula_uncertainty(20.0, 933.0, Moisture("humidity_percent", 50.0, 2.0)))
+    5e-08
+    """
+    exact = replace(moisture, u=0.0)
+    return air_by(
+        temperature_c,
+        pressure_hpa,
+        exact,
+        above_barometer=above_barometer,
+        u_pressure_hpa=u_pressure_hpa,
+        formula=formula,
+    )[1]
+
+
 def surface_of(
     state: AirState,
     moisture: Moisture,

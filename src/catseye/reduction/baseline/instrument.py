@@ -20,7 +20,7 @@ from catseye.records.laboratory.baseline import Baseline, BaselineShots, Heights
 from catseye.reduction.baseline.job import BaselineJob, Progress
 from catseye.reduction.baseline.lengths import BaselineSettings, Lengths, reduce_lengths
 from catseye.reduction.baseline.statistical_tests import FOLLOWS, SuspectShot, decisions_of
-from catseye.reduction.calibrations.calibration import CheckOutcome
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ import numpy as np
 from catseye.constants import MILLIMETRE, PPM
 from catseye.estimation.baseline.adjustment import BaselineSolution
 from catseye.estimation.baseline.iso17123 import FullTest, is_nothing, same_precision, within_claim
-from catseye.reduction.calibrations.calibration import CheckOutcome
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 
 if TYPE_CHECKING:
     from catseye.records.laboratory.baseline import Baseline

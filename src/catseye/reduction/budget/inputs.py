@@ -254,7 +254,8 @@ def _air(scene: ShotScene) -> list[Item]:
     chosen = MODELS[scene.settings.air_model]
     temperature = float(field.smoothed(scene.campaign.shots.mjd_utc[[scene.row]])[0, :, 0].mean())
     vapour = vapour_pressure_hpa(temperature, pressure, humidity, chosen.vapour_formula)
-    formula = float(chosen.uncertainty(vapour)) / PPM
+    light = {"wavelength_um": field.wavelength_um}
+    formula = float(chosen.uncertainty(temperature, pressure, vapour, **light)) / PPM
     return [
         *items,
         Item(

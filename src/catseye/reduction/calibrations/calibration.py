@@ -4,6 +4,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
+from catseye.reduction.calibrations.fit import CalibrationFit
+
 STATE = "state"  # last column of a table of readings: used, suspect, rejected, or left out with a reason
 Cell = str | int | float  # of a table of readings
 RecordValue = str | float | list[str] | list[float] | dict[str, float]  # a dict where several records have a part
@@ -29,24 +32,6 @@ class Quantity:
     coverage: float = 2.0
 
 
-@dataclass(frozen=True)
-class CheckOutcome:
-    """A statistical test or a comparison with a limit, with its outcome.
-
-    name       "outliers: largest |w|"
-    statistic  what was computed
-    limit      what it was compared with
-    passed     the outcome; None where the data do not allow the test
-    text       what it means, one sentence
-    """
-
-    name: str
-    statistic: float
-    limit: float
-    passed: bool | None
-    text: str
-
-
 @dataclass(frozen=True, eq=False)
 class Calibration:
     """The outcome of one calibration: everything that its record and its certificate show.
@@ -67,6 +52,9 @@ class Calibration:
     method       how the readings became the quantities, in a few sentences for the certificate
     record       what can be copied into the record that the quantities belong to, by its keys: numbers or lists
     equal_axes   the figure is a plane: both axes to one scale
+    fit          the adjustment behind it, if there was one
+    explained    share of the readings' variance that the model explains, where no fit tells
+    plausible    its numbers against what the kind's instruments can give, by `plausibility.judged`
     """
 
     kind: str
@@ -85,6 +73,9 @@ class Calibration:
     method: str = ""
     record: dict[str, RecordValue] = field(default_factory=dict)
     equal_axes: bool = False
+    fit: CalibrationFit | None = None
+    explained: float = float("nan")
+    plausible: tuple[CheckOutcome, ...] = ()
 
     @property
     def states(self) -> tuple[str, ...]:

@@ -14,10 +14,11 @@ from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import LeastSquaresSolution, adjust
 from catseye.estimation.observations.kinds import Linear
 from catseye.estimation.quality.reliability import checked, global_test, single_level, tau_critical, w_critical
-from catseye.reduction.calibrations.calibration import CheckOutcome
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.scatter import effective_degrees, restricted_likelihood
 
-SCATTER_LIMIT = 0.05  # level of the test of the variance factor, two-sided
+TESTS = 3  # that share the level evenly: scatter, single readings, what the kind tests beside them
+SCATTER_LIMIT = 0.05 / TESTS  # level of the test of the variance factor, two-sided
 MOST_REJECTED = 1.0 / 3.0  # of the readings: beyond it the model is wrong, not the readings
 USED, SUSPECT, REJECTED = "used", "suspect", "rejected"
 
@@ -66,6 +67,7 @@ class CalibrationFit:
     test, critical      "w" (scatter claimed) or "tau" (scatter estimated), and the limit of a single test
     variance_factor, degrees_of_freedom   NaN and the degrees where the scatter was estimated: it would be 1
     effective         (p,) degrees of freedom of each parameter's scattered variance; infinite where scatter is claimed
+    independent       no reading's scatter has a part in another's
     """
 
     x: np.ndarray
@@ -84,6 +86,14 @@ class CalibrationFit:
     variance_factor: float
     degrees_of_freedom: float
     effective: np.ndarray
+    independent: bool
+
+    @property
+    def explained(self) -> float:
+        """Share of the variance of the values used that the sought parameters explain; NaN of values all alike."""
+        seen = (self.predicted + self.residual)[self.active]
+        total = float(np.var(seen))
+        return 1.0 - float(np.mean(self.residual[self.active] ** 2)) / total if total > 0.0 else float("nan")
 
     @property
     def suspects(self) -> np.ndarray:
@@ -96,14 +106,15 @@ class CalibrationFit:
         if self.test == "w" and self.degrees_of_freedom > 0.5:
             test = global_test(self.variance_factor * self.degrees_of_freedom, self.degrees_of_freedom, level)
             low, high = test.lower, test.upper
-            limit = high if self.variance_factor >= 1.0 else low
+            below = self.variance_factor < 1.0
             outcomes.append(
                 CheckOutcome(
                     "scatter: variance factor",
                     self.variance_factor,
-                    limit,
+                    low if below else high,
                     bool(low <= self.variance_factor <= high),
-                    f"{low:.3g} to {high:.3g} is expected 19 times in 20 if the claimed scatter is true",
+                    f"{low:.3g} to {high:.3g} is expected {1.0 - level:.1%} of the time if the claimed scatter is true",
+                    least=below,
                 )
             )
         elif self.test == "tau":
@@ -148,7 +159,7 @@ class FitOptions:
     active     (m,) bool: takes part at the start; all if None
     together   (m,) labels: values of one label leave together, as both quadratures of a phasor; each alone if None
     reject     leave out what the test rejects, worst first, one at a time
-    level      of the tests, chance of any false alarm among all
+    level      of the tests together, chance of any false alarm; a third of it is that of the single readings
     """
 
     active: np.ndarray | None = None
@@ -264,7 +275,7 @@ def _outcome(
     degrees = float(np.sum(group.redundancy[on]))
     factor = group.pvv / degrees if degrees > 1e-6 else float("nan")
     tested = checked(group) & on
-    single = single_level(level, max(int(tested.sum()), 1))
+    single = single_level(level / TESTS, max(int(tested.sum()), 1))
     estimated = bool(components) and degrees > 1.5
     critical = tau_critical(single, degrees) if estimated else w_critical(single)
     statistic = group.standardised / (np.sqrt(factor) if estimated and factor > 0.0 else 1.0)
@@ -285,4 +296,5 @@ def _outcome(
         variance_factor=float("nan") if components else factor,
         degrees_of_freedom=degrees,
         effective=effective,
+        independent=not np.any(readings.covariance - np.diag(np.diag(readings.covariance))),
     )

@@ -1,7 +1,7 @@
 """What a kind of calibration is: a layout of table and sheet, and the recipe that makes a Calibration of them."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,17 +14,78 @@ PROVENANCE = ("instrument", "serial", "measured_on", "valid_until", "by", "repor
 
 
 @dataclass(frozen=True)
+class PlausibleSpan:
+    """The values that a number can have.
+
+    low, high   bounds, in the number's own unit
+    reason      whence they are: the instrument, with its source
+    u           largest standard uncertainty that tells anything; that of knowing only the span if None
+    """
+
+    low: float
+    high: float
+    reason: str
+    u: float | None = None
+
+    @property
+    def most_u(self) -> float:
+        """The larger u says no more than the span itself.
+
+        Source: [JCGM100] 4.3.7 (a quantity known to lie between two bounds and nothing else).
+
+        >>> round(PlausibleSpan(-3.0, 3.0, "").most_u, 3)
+        1.732
+        """
+        return (self.high - self.low) / np.sqrt(12.0) if self.u is None else self.u
+
+
+@dataclass(frozen=True)
+class ReadingScatter:
+    """The largest standard deviation that a reading of this kind can have.
+
+    most     in `unit`
+    size     of that unit in the fit's own
+    reason   the instrument, with its source
+    """
+
+    most: float
+    unit: str
+    size: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class Plausibility:
+    """What a calibration of a kind can give at all, stated once beside its recipe; `plausibility.judged` compares.
+
+    scatter     of a reading; None where nothing is adjusted
+    sizes       pattern of quantities' keys -> their span, in the units of the keys
+    explained   least share of the readings' variance that the model explains; 0 where what is sought may be zero
+    columns     column -> span of its readings, beyond which one is more likely mistyped than measured
+    varying     column -> its period, 0 if it has none: modulo that it must take two values at least
+    """
+
+    scatter: ReadingScatter | None = None
+    sizes: Mapping[str, PlausibleSpan] = field(default_factory=dict)
+    explained: float = 0.0
+    columns: Mapping[str, PlausibleSpan] = field(default_factory=dict)
+    varying: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class CalibrationKind:
     """One kind of calibration.
 
-    about     what it finds, one line for the command line
-    layout    of its table and sheet
-    recipe    function (readings, reject) -> Calibration; reject: leave out what the tests reject
+    about       what it finds, one line for the command line
+    layout      of its table and sheet
+    recipe      function (readings, reject) -> Calibration; reject: leave out what the tests reject
+    plausible   what its readings and its answer can be at all
     """
 
     about: str
     layout: SheetLayout
     recipe: Callable[[SheetReadings, bool], Calibration]
+    plausible: Plausibility
 
 
 def provenance(readings: SheetReadings) -> dict[str, object]:

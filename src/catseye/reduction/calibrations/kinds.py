@@ -20,6 +20,7 @@ from catseye.reduction.calibrations.mirror import (
 from catseye.reduction.calibrations.monument import azimuth as monument_azimuth
 from catseye.reduction.calibrations.monument import hydrostatic_level, inclinometer, plate_levels
 from catseye.reduction.calibrations.monument import place as monument_place
+from catseye.reduction.calibrations.plausibility import judged
 from catseye.reduction.calibrations.ranging import (
     amplitude,
     glass_constants,
@@ -76,4 +77,5 @@ def calibrate(kind: str, path: Path | str, sheet: Path | str | None = None, *, r
     if kind not in KINDS:
         raise InputError(f"calibration {kind!r} is unknown (expected one of {', '.join(KINDS)})")
     chosen = KINDS[kind]
-    return chosen.recipe(read_readings(path, chosen.layout, sheet), reject)
+    readings = read_readings(path, chosen.layout, sheet)
+    return judged(chosen, readings, chosen.recipe(readings, reject))

@@ -12,6 +12,7 @@ from catseye.estimation.least_squares.adjustment import (
 )
 from catseye.estimation.least_squares.covariance import JointPoints
 from catseye.records.night.campaign import ObservedSite
+from catseye.reduction.epoch.common_errors import considered
 from catseye.reduction.epoch.cycles import Resolved, resolve_cycles, without_shots
 from catseye.reduction.epoch.head import head_unknowns
 from catseye.reduction.epoch.notes import cycle_notes, doubts_of, loss_notes, record_notes, sound_notes
@@ -155,6 +156,7 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCo
     """
     network, solution, shots = settled
     ranges = ranges_of(network, solution, shots)
+    solution = considered(network, solution, shots)
     solution = network.allowance.considered(network.field, solution, network.layout.air)
     layout, campaign = network.layout, network.campaign
     names = sorted([*network.places, *(str(Parameter(ParameterKind.FIXED_POINT, m)) for m in campaign.monuments)])
@@ -209,6 +211,6 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCo
         unresolved=resolved.rejected,
         sound=sound,
         strength=network.strength,
-        doubts=doubts_of(network, solution),
+        doubts=doubts_of(network, solution, air),
         refuted=tuple(refuted_priors(settled)),
     )

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from threadpoolctl import threadpool_limits
 
 from catseye.records.night.campaign import REFERENCE, Campaign
+from catseye.records.site.validity import expired_of_site
 from catseye.reduction.epoch.coordinates import AdjustedCoordinates, adjust_coordinates
 from catseye.reduction.epoch.dew import dew_risk
 from catseye.reduction.epoch.ranges import (
@@ -71,6 +72,7 @@ def reduce_epoch(
         *campaign.doubt_notes,
         *coordinates.notes,
         *sheet_notes(campaign),
+        *expired_of_site(campaign),
         *_weak_rangers(campaign, phases),
         *walk_notes(campaign, phases, wrong),
         *dew_risk(campaign, surface_minus_air_c=settings.surface_minus_air_c).notes,

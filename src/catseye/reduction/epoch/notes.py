@@ -20,6 +20,7 @@ from catseye.reduction.epoch.unknowns import (
     ZEROS,
     CampaignNetwork,
 )
+from catseye.reduction.site.agreement import StationSeries, weather_disagreements
 
 
 def cycle_notes(ranges: RangeShots) -> list[str]:
@@ -86,11 +87,14 @@ def loss_notes(ranges: RangeShots) -> list[str]:
     return notes
 
 
-def record_notes(
-    network: CampaignNetwork, solution: LeastSquaresSolution, air: dict[str, tuple[float, float]], count: dict[str, int]
+def wrong_records(
+    network: CampaignNetwork, solution: LeastSquaresSolution, air: dict[str, tuple[float, float]]
 ) -> list[str]:
-    """What the adjustment noticed about the records, one line each; `count` are the used shots at each point."""
-    notes = []
+    """Records that the ranges, or each other, contradict: thermometers, zeros, effects of heads, weather stations.
+
+    air   estimate and standard uncertainty of each thermometer's offset, °C
+    """
+    notes = disagreements(network)
     for group, fit in zip(network.priors, solution.fits[-len(network.priors) :], strict=True):
         if fit.name in (THERMOMETERS, ZEROS):  # not of all, where earlier epochs know some already
             owners = [network.layout.parameters[c].of for c in np.ravel(group.columns).tolist()]
@@ -113,6 +117,25 @@ def record_notes(
                 f"{called}: not the mirror sheet's, the ranges contradict it (w {fit.standardised[worst]:.1f}, limit "
                 f"{network.settings.critical}); check the sheet's value and u"
             )
+    return notes
+
+
+def disagreements(network: CampaignNetwork) -> list[str]:
+    """Barometers and hygrometers of the stations that cannot both be right."""
+    weather = network.campaign.weather
+    names, series = np.array(weather.station), []
+    for station in network.campaign.site.weather_station:
+        own = names == station.name
+        readings = weather.mjd_utc[own], weather.temperature_c[own], weather.pressure_hpa[own]
+        series.append(StationSeries(station.name, station.elevation_m, *readings, weather.humidity_percent[own]))
+    return [each.text for each in weather_disagreements([s for s in series if len(s.mjd)])]
+
+
+def record_notes(
+    network: CampaignNetwork, solution: LeastSquaresSolution, air: dict[str, tuple[float, float]], count: dict[str, int]
+) -> list[str]:
+    """What the adjustment noticed about the records, one line each; `count` are the used shots at each point."""
+    notes = wrong_records(network, solution, air)
     notes += network.allowance.texts
     left_out = max((states.neglected for states in network.states.values()), default=0.0)
     if left_out > WEAK:
@@ -136,14 +159,16 @@ def record_notes(
     return notes
 
 
-def doubts_of(network: CampaignNetwork, solution: LeastSquaresSolution) -> tuple[str, ...]:
-    """Why the answer is not good: what had to be allowed for, and thermometers at the end of their priors."""
-    doubts = list(network.allowance.texts)
+def doubts_of(
+    network: CampaignNetwork, solution: LeastSquaresSolution, air_offsets: dict[str, tuple[float, float]]
+) -> tuple[str, ...]:
+    """Reasons that the answer is not good: wrong records, allowances, thermometers at the end of their priors."""
+    doubts = [*wrong_records(network, solution, air_offsets), *network.allowance.texts]
     air = network.field
     sigmas = network.allowance.sigmas(air)
     for station, column, sigma in zip(air.stations, network.layout.air, sigmas, strict=False):
         value = float(solution.x[column])
-        if abs(value) > DOUBTED_C * sigma:
+        if abs(value) > DOUBTED_C * sigma and not any(text.startswith(f"{station}'s") for text in doubts):
             doubts.append(f"{station}'s thermometer is biased by {value:+.2f} °C, {abs(value) / sigma:.1f} of its u")
     return tuple(doubts)
 

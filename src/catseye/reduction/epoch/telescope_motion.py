@@ -1,11 +1,12 @@
-"""How the telescope expands, contracts and settles during a campaign: its points are those of the middle of it.
+"""Motion of the telescope during a campaign: its points are those of the middle of it.
 
-    place(t) = place + scale(t) place + dish scale(t) (place - middle of the dish) + (east, north, up)(t)
+    place(t) = place + sum over parts of motion(t) shape(place)
 
 Everything on the telescope expands about the pintle bearing with the temperature of its steel (11.7 ppm/K: an hour of
-a clear night moves the rim by half a millimetre), the dish by a share of its own, and the whole may move on its
-foundation. Each is a random walk from zero in the middle of the campaign, with straight lines between knots, whose
-strength the ranges tell. A body that turns or bends meanwhile is not modelled.
+a clear night moves the rim by half a millimetre), the dish about its own middle and the arm away from that by shares of
+their own. The whole may turn about the pintle bearing and move on its foundation; dish and arm may tilt about the
+dish's middle, and the dish may bend to a saddle. Each is a random walk from zero in the middle of the campaign, with
+straight lines between knots, whose strength the ranges tell.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,10 +20,24 @@ from catseye.reduction.site.places import RangedPoint
 
 STEP = 1800.0  # s between knots
 SHORTEST = 900.0  # s, of a campaign in which nothing expands that a range sees
-PARTS = ("scale", "dish scale", "east", "north", "up")
-UNITS = (PPM, PPM, MILLIMETRE, MILLIMETRE, MILLIMETRE)
-WALK = (3.0, 1.0, 0.05, 0.05, 0.05)  # a root hour, ppm and mm: a quarter of a degree of steel; a foundation
-ALIKE = ((0,), (1,), (2, 3), (4,))  # parts of one strength: no direction on the ground is another
+MICRORADIAN = 1e-6
+FEWEST = 6  # points of a dish that may bend
+PARTS = (
+    "scale",
+    "dish scale",
+    "arm scale",
+    "turn",
+    "tilt east",
+    "tilt north",
+    "bend upright",
+    "bend diagonal",
+    "east",
+    "north",
+    "up",
+)
+UNITS = (PPM, PPM, PPM, *(MICRORADIAN,) * 3, *(MILLIMETRE,) * 5)  # bends at the rim
+WALK = (3.0, 1.0, 0.5, 0.25, 0.25, 0.25, 0.02, 0.02, 0.05, 0.05, 0.05)  # a root hour: 0.25 K of steel; 0.05", 20 um
+ALIKE = ((0,), (1,), (2,), (3,), (4, 5), (6, 7), (8, 9), (10,))  # parts of one strength: no direction is another
 LEAST_WALK, MOST_WALK = 0.02, 30.0  # factors on these
 
 
@@ -32,11 +47,15 @@ class TelescopeKnots:
 
     knots      (k,) s since the campaign's middle, without that itself
     middle     (3,) m, of the dish
+    axes       (3, 3) unit: two across the dish, and its normal
+    radius     m, of the dish's farthest point; infinite of a dish of so few points that no bend shows
     bodies     point: body that carries it
     """
 
     knots: np.ndarray
     middle: np.ndarray
+    axes: np.ndarray
+    radius: float
     bodies: Mapping[str, str]
 
     @staticmethod
@@ -51,7 +70,11 @@ class TelescopeKnots:
             return None
         half = max(1, round(0.5 * span / STEP))
         steps = np.concatenate([np.arange(-half, 0), np.arange(1, half + 1)])
-        return TelescopeKnots(0.5 * span / half * steps, np.mean(dish, axis=0), bodies)
+        middle = np.mean(dish, axis=0)
+        away = np.array(dish) - middle
+        axes = np.linalg.svd(away)[2]
+        radius = float(np.max(np.linalg.norm(away, axis=1))) if len(dish) >= FEWEST else np.inf
+        return TelescopeKnots(0.5 * span / half * steps, middle, axes, radius, bodies)
 
     @property
     def covariance(self) -> np.ndarray:
@@ -69,7 +92,7 @@ class TelescopeKnots:
     def slopes(
         self, ranger: str, targets: Sequence[str], a: np.ndarray, b: np.ndarray, towards: np.ndarray
     ) -> np.ndarray:
-        """(m, 5) m: derivatives of distances by each of `PARTS`, a ppm or a millimetre.
+        """(m, parts) m: derivatives of distances by each of `PARTS`, in its unit.
 
         a, b      (m, 3) m, scan points and targets
         towards   (m, 3) unit, from target to ranger
@@ -79,9 +102,18 @@ class TelescopeKnots:
         return np.asarray(np.einsum("mpi,mi->mp", near - far, towards)) * UNITS
 
     def _moved(self, bodies: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """(m, 5, 3) m: how points move by each part."""
-        moved = np.zeros((len(points), 5, 3))
+        """(m, parts, 3) m: how points move by each part."""
+        moved = np.zeros((len(points), len(PARTS), 3))
+        dish, arm = (bodies == "dish")[:, None], (bodies == "arm")[:, None]
+        away, axis = points - self.middle, np.eye(3)
+        u, v = (away @ self.axes[:2].T / self.radius).T
         moved[:, 0] = points
-        moved[:, 1] = np.where((bodies == "dish")[:, None], points - self.middle, 0.0)
-        moved[:, 2:] = np.eye(3)
+        moved[:, 1] = np.where(dish, away, 0.0)
+        moved[:, 2] = np.where(arm, away, 0.0)
+        moved[:, 3] = np.cross(axis[2], points)
+        for i in (0, 1):
+            moved[:, 4 + i] = np.where(dish | arm, np.cross(axis[i], away), 0.0)
+        for i, shape in enumerate((u**2 - v**2, 2.0 * u * v)):
+            moved[:, 6 + i] = np.where(dish, shape[:, None] * self.axes[2], 0.0)
+        moved[:, 8:] = axis
         return np.where((bodies != "")[:, None, None], moved, 0.0)

@@ -32,6 +32,8 @@ APPROXIMATE = "approximate positions"
 THERMOMETERS = "thermometers"
 SOUND = "path temperatures"
 ZEROS = "ranger zeros"
+BENCHMARKS, MONUMENTS, OFFSETS = "benchmarks", "monuments", "mirror offsets"
+TRIPLET_BALLS, GLASS = "triplet balls", "glass constants"
 LIMITS = "instruments' limits"
 FAMILIES_PRIOR = "unexplained averages"
 UNJUDGED = (APPROXIMATE, LIMITS)  # priors that say little on purpose and count in no variance factor
@@ -415,7 +417,7 @@ def _priors(
         if benchmark.target in seen and benchmark.ranger in seen:
             u = _positive(benchmark.u_mm * MILLIMETRE, f"benchmarks.csv: {benchmark.target}, u_mm")
             length = benchmark.certified_distance_mm * MILLIMETRE
-            priors.append(_length("benchmarks", length, u, layout, benchmark.ranger, benchmark.target))
+            priors.append(_length(BENCHMARKS, length, u, layout, benchmark.ranger, benchmark.target))
     return priors
 
 
@@ -485,7 +487,7 @@ def _survey(campaign: ObservedSite, seen: dict[str, RangedPoint], layout: Unknow
         u_offset = _positive(mirror.u_offset_mm * MILLIMETRE, f"mirrors/{mirror.zp}.toml: u_offset_mm")
         priors.append(
             Linear(
-                "mirror offsets",
+                OFFSETS,
                 seen[name].start - np.array(layout.start)[fixed],
                 np.full(3, u_offset**2),
                 np.concatenate([layout.columns(name), fixed]),
@@ -493,7 +495,7 @@ def _survey(campaign: ObservedSite, seen: dict[str, RangedPoint], layout: Unknow
             )
         )
     if columns:
-        priors.append(_independent("monuments", columns, observed, sigma))
+        priors.append(_independent(MONUMENTS, columns, observed, sigma))
     return priors
 
 
@@ -541,7 +543,7 @@ def _glass(seen: dict[str, RangedPoint], layout: UnknownsLayout) -> list[Observa
     if not names:
         return []
     columns = [layout.at[Parameter(ParameterKind.GLASS, name)] for name in names]
-    return [_independent("glass constants", columns, np.zeros(len(names)), [seen[n].u_constant for n in names])]
+    return [_independent(GLASS, columns, np.zeros(len(names)), [seen[n].u_constant for n in names])]
 
 
 def _positive(u: float, where: str) -> float:
@@ -586,7 +588,7 @@ def _triplet(
     across = np.linalg.svd(axis[None])[2][1:]
     return [
         Linear(
-            "triplet balls",
+            TRIPLET_BALLS,
             triplet.h_corr_mm * MILLIMETRE * normal,
             u_h**2 * along + u_lateral**2 * (eye - along),
             np.concatenate([layout.columns(ball), layout.columns(left), layout.columns(right)]),

@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import takewhile
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from catseye.signal.systematics.feedback import fringe_contrast
 Array = NDArray[np.float64]
 WIDE = 5.0  # beam radii: what a missing aperture stands for
 UNCLIPPED = 1e-5  # of the power lost: the beam then stays Gaussian, to 1e-3 of a share, 5e-3 through a pinhole
+ALL_LIGHT = 30.0  # rad of diffraction beyond the rays, see `gaussian_beam.SPREADS`
 HALF_MAXIMUM = math.sqrt(2.0 / math.log(2.0)) / 2.0  # full angle at half maximum to half angle at 1/e^2
 MICROMETRE = 1e-6
 
@@ -259,10 +261,10 @@ def _returned(
                         share = float(gaussian_beam.share_within_ellipse(edge, *abcd.radius(now, light)))
                         passed = min(kept, share) if not ending else kept * share
                         if ending and stop is not None and np.all(past_stop[:, 0, 1] != 0.0):
-                            shares = _diffracted(abcd.onward(q, stop[1]), light, [stop[0], edge], [past_stop])
+                            shares = _detected(abcd.onward(q, stop[1]), light, [stop[0], edge], [past_stop])
                             passed = kept * float(shares[1] / shares[0])
                     elif ending and stop is not None and np.all(past_stop[:, 0, 1] != 0.0):
-                        shares = _diffracted(q, light, [face, stop[0], edge], [stop[1], past_stop])
+                        shares = _detected(q, light, [face, stop[0], edge], [stop[1], past_stop])
                         passed = kept * float(shares[2] / shares[1])
                     else:
                         shares = _diffracted(q, light, [face, edge], [system])
@@ -312,6 +314,21 @@ def beam_profile(train: BeamTrain, points: int = 60) -> dict[str, tuple[Array, A
 
 def _diffracted(q: NDArray[np.complex128], light: Array, discs: list[float], systems: list[Array]) -> Array:
     return gaussian_beam.powers_through(q, wavelengths=light, discs=discs, systems=systems)
+
+
+def _detected(q: NDArray[np.complex128], light: Array, discs: list[float], systems: list[Array]) -> Array:
+    """Shares (d,) of the light within discs, the detector last; one that is wider than all light takes it all.
+
+    That is within the 2/(pi ALL_LIGHT), 2 %, that an evenly lit edge spreads beyond; within 0.5 % of usual beams.
+    """
+    try:
+        return _diffracted(q, light, discs, systems)
+    except ValidityError:
+        given: dict[str, Any] = {"wavelengths": light, "discs": discs, "systems": systems}
+        if gaussian_beam.lit_edges(q, **given, spread=ALL_LIGHT)[-1] >= discs[-1]:
+            raise
+    shares = _diffracted(q, light, discs[:-1], systems[:-1])
+    return np.append(shares, shares[-1])
 
 
 def _light(train: BeamTrain) -> Array:

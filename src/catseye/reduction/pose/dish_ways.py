@@ -13,6 +13,7 @@ from catseye.records.network.solved_points import SolvedPoints
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.pose.pose import pose_of_group
 from catseye.reduction.site.places import nominal_frame
+from catseye.reduction.site.posture import axis_lean
 from catseye.reduction.surface.shape import LitAperture, Prisms, ShapeSettings, shape_of
 
 
@@ -43,7 +44,7 @@ def dish_ways(reduction: Reduction) -> tuple[DishWay, ...]:
     surface, campaign = reduction.surface, reduction.campaign
     if surface is None:
         return ()
-    lean = _lean(campaign.site.campaign.azimuth_deg, campaign.site.campaign.elevation_deg)
+    lean = axis_lean(*np.radians([campaign.site.campaign.azimuth_deg, campaign.site.campaign.elevation_deg]))
     names = surface.names
     prisms = Prisms(
         names,
@@ -91,12 +92,3 @@ def _way(
     u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     u_axis = np.sqrt(np.einsum("ai,ij,aj->a", lean, covariance[3:6, 3:6], lean))
     return DishWay(command, fitted, translation, rotation, u, lean @ rotation, u_axis)
-
-
-def _lean(azimuth_deg: float, elevation_deg: float) -> np.ndarray:
-    """(2, 3): how a small turn w of the dish moves its axis a, as w x a along larger azimuth and elevation."""
-    az, el = np.radians([azimuth_deg, elevation_deg])
-    along = np.array([np.sin(az) * np.cos(el), np.cos(az) * np.cos(el), np.sin(el)])
-    across = np.array([np.cos(az), -np.sin(az), 0.0])
-    up = np.array([-np.sin(az) * np.sin(el), -np.cos(az) * np.sin(el), np.cos(el)])
-    return np.stack([np.cross(along, across), np.cross(along, up)])  # e . (w x a) = w . (a x e)

@@ -5,8 +5,8 @@ does not fail there, it says so: their covariance is large, the weak combination
 the combination does to the sky where stars were seen is small. Predictions use the covariance and stay good.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.singular import LinearEstimate, best_linear_estimate
 from catseye.geometry.antenna.pointing_series import TERMS, PointingSeries, columns, design
+from catseye.verdict import Verdict
 
 LIMIT = 4.0  # |w| of a star's coordinate beyond which `reject` leaves the star out
 PART = 0.2  # of the largest part of a combination: smaller parts are not named
@@ -58,6 +59,8 @@ class PointingFit:
     pvv, degrees_of_freedom
     condition           of the design with unit columns
     weak                the worst known combination of each family of terms that resemble each other
+    stars               of stars, independent of each other; else of metrology
+    sources             verdicts of the results that were read, by their names
     """
 
     series: PointingSeries
@@ -73,6 +76,8 @@ class PointingFit:
     degrees_of_freedom: int
     condition: float
     weak: tuple[WeakDirection, ...]
+    stars: bool = False
+    sources: Mapping[str, Verdict | None] = field(default_factory=dict)
 
     @property
     def sky_rms(self) -> float:
@@ -147,6 +152,7 @@ def fit_pointing(
         degrees_of_freedom=solution.degrees_of_freedom,
         condition=float(np.linalg.cond(unit / np.linalg.norm(unit, axis=0))),
         weak=_weak(tuple(terms), spread, unit),
+        stars=covariance is None,
     )
 
 

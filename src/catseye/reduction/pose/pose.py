@@ -26,6 +26,7 @@ from catseye.records.site.folder import SiteFolder
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.site.bodies import bodies_of
 from catseye.reduction.site.places import RangedPoint, nominal_frame, places_of
+from catseye.reduction.site.posture import PostureOffset, offset_of
 
 GROUPS = ("dish", "feed-arm", "alidade", "subreflector")
 FRAMES = ("ground", "alidade", "reflector")
@@ -46,6 +47,8 @@ class GroupPose:
     places    (n, 3) m, first places of the points that count, in the pose's frame
     missing   names of the group that one side does not have
     epoch     the later one
+    earlier   the earlier one; None against the design
+    posture   direction of a part that the telescope carries less the told posture; None of others
     """
 
     group: str
@@ -54,6 +57,8 @@ class GroupPose:
     places: np.ndarray
     missing: tuple[str, ...]
     epoch: SolvedPoints
+    earlier: SolvedPoints | None = None
+    posture: PostureOffset | None = None
 
 
 def at_posture(site: SiteFolder, azimuth: float, elevation: float) -> SiteFolder:
@@ -156,7 +161,20 @@ def pose_of_group(
     shown = shown if wanted is None else shown.about(wanted)
     against = "design" if earlier is None else earlier.campaign or earlier.file
     places = first[kept] if to_frame.to == to_frame.from_ else to_frame.points(first[kept])
-    return GroupPose(group or "points", shown, against, places, missing, later)
+    off = _posture_offset(group, pose, there, later, earlier) if carrier == "reflector" else None
+    return GroupPose(group or "points", shown, against, places, missing, later, earlier, off)
+
+
+def _posture_offset(
+    group: str | None, pose: Pose, reflector_from_ground: Transform, later: SolvedPoints, earlier: SolvedPoints | None
+) -> PostureOffset | None:
+    """The group's direction against the told posture; None where the epoch tells none."""
+    if later.posture is None:
+        return None
+    turn = reflector_from_ground.rotation.T
+    spread = turn @ pose.covariance[3:, 3:] @ turn.T
+    found = offset_of(str(group), turn @ pose.rotation, spread, later.posture)
+    return found if earlier is None else replace(found, postures=2)
 
 
 def _posture_of(epoch: SolvedPoints, site: SiteFolder, carrier: str) -> SiteFolder:

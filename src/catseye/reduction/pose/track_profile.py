@@ -6,12 +6,13 @@ The tilt is told in the ground frame, as the turn of the alidade about east and 
 
 Ranges see it in poses of the alidade, r = R tilt with R from the ground's axes to the alidade's; an inclinometer on the
 alidade sees r + zero. Its zero goes round with the telescope: it is a tilt with one wave a turn, so that inclinometers
-alone cannot tell it from the part (c_1, s_1) that does the same. Ranges can, coarsely; the inclinometers then give the
-shape. Both go into one least squares. The mean is the azimuth axis's lean: AN and AW of the pointing series.
+alone cannot tell it from the part (c_1, s_1) that does the same; all other waves they can. Ranges can tell that, too,
+coarsely; the inclinometers then give the shape. Both go into one least squares. The mean is the azimuth axis's lean: AN
+and AW of the pointing series.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,8 +23,10 @@ from catseye.geometry.antenna.pointing_series import axis_terms
 from catseye.geometry.frames.rotation import from_vector, rz
 from catseye.records.laboratory.tilts import TiltReadings
 from catseye.reduction.pose.pose import GroupPose
+from catseye.verdict import Verdict
 
 MOST_HARMONICS = 36
+WAVE_1 = slice(2, 6)  # of the coefficients: cos 1A and sin 1A, about east and north
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +35,8 @@ class TiltSeries:
 
     harmonics    K
     names        (4 K + 2) coefficients: "mean east", "mean north", "cos 1A east", ...
-    values       (4 K + 2,) rad, turns about east and north
-    covariance   (4 K + 2, 4 K + 2) rad^2
+    values       (4 K + 2,) rad, turns about east and north; nan where an inclinometer alone cannot tell
+    covariance   (4 K + 2, 4 K + 2) rad^2, nan likewise
     """
 
     harmonics: int
@@ -42,9 +45,18 @@ class TiltSeries:
     covariance: np.ndarray
 
     def at(self, azimuth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Tilt (..., 2) rad about east and north at azimuths (...), and its covariance (..., 2, 2) rad^2."""
-        rows = _rows(np.asarray(azimuth, dtype=float), self.harmonics)
-        return rows @ self.values, rows @ self.covariance @ np.swapaxes(rows, -1, -2)
+        """Tilt (..., 2) rad about east and north at azimuths (...), and its covariance (..., 2, 2) rad^2.
+
+        Coefficients that are not determined are left out: see `undetermined`.
+        """
+        known = np.isfinite(self.values)
+        rows = _rows(np.asarray(azimuth, dtype=float), self.harmonics)[..., known]
+        return rows @ self.values[known], rows @ self.covariance[np.ix_(known, known)] @ np.swapaxes(rows, -1, -2)
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Names of the coefficients that the observations do not determine."""
+        return tuple(name for name, value in zip(self.names, self.values, strict=True) if not np.isfinite(value))
 
     @property
     def axis(self) -> tuple[np.ndarray, np.ndarray]:
@@ -59,11 +71,13 @@ class TrackProfile:
 
     series       see there
     zero         (2,) rad, of the inclinometer about the alidade's x and y, with covariance (2, 2); None without one
+                 or where nothing determines it
     azimuth      (n,) rad, of all observations, poses first
     residual     (n, 2) rad, observed minus fitted, alidade's axes
     w            (n, 2) standardised residuals; nan where nothing checks one
     poses        how many of the n are poses
     pvv, degrees_of_freedom, p   of the fit
+    sources      verdicts of the poses, by their files
     """
 
     series: TiltSeries
@@ -75,6 +89,7 @@ class TrackProfile:
     pvv: float
     degrees_of_freedom: int
     p: float
+    sources: Mapping[str, Verdict | None] = field(default_factory=dict)
 
 
 def _rows(azimuth: np.ndarray, harmonics: int) -> np.ndarray:
@@ -100,6 +115,7 @@ def track_profile(
     tilts: TiltReadings | None = None,
     harmonics: int = 2,
     names: Sequence[str] | None = None,
+    partial: bool = False,
 ) -> TrackProfile:
     """The tilt of the alidade by azimuth, from poses and inclinometers in one least squares.
 
@@ -109,6 +125,7 @@ def track_profile(
     tilts        readings of an inclinometer, or None
     harmonics    K, waves a turn, 0 to 36
     names        m, of the poses, for errors
+    partial      an inclinometer alone gives all waves but the first, which its zero does like; else it is refused
 
     Raises EstimationError naming the coefficients that nothing holds: too few azimuths, or an inclinometer alone.
     """
@@ -119,9 +136,12 @@ def track_profile(
     every = np.concatenate([np.asarray(azimuth, dtype=float), np.zeros(0) if tilts is None else tilts.azimuth])
     if not len(every):
         raise EstimationError("a track profile needs poses or inclinometer readings, none given")
+    alone = partial and not m and harmonics > 0
     own = np.swapaxes(rz(every)[..., :2, :2], -1, -2) @ _rows(every, harmonics)  # rz: ground from alidade
-    zero = np.zeros((m + n, 2, 2 if n else 0))
-    if n:
+    # a zero makes two of the four coefficients of one wave: with all four free it may as well stay 0
+    free_zero = n > 0 and not alone
+    zero = np.zeros((m + n, 2, 2 if free_zero else 0))
+    if free_zero:
         zero[m:] = np.eye(2)
     design = np.concatenate([own, zero], axis=-1).reshape(2 * (m + n), -1)
     read = np.zeros((0, 2)) if tilts is None else tilts.tilt
@@ -131,12 +151,15 @@ def track_profile(
         q[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = covariance[k]
     if tilts is not None:
         q[2 * m :, 2 * m :] = np.diag(np.repeat(tilts.u**2, 2))
-    parameters = [*coefficient_names(harmonics), *(("zero x", "zero y") if n else ())]
+    parameters = [*coefficient_names(harmonics), *(("zero x", "zero y") if free_zero else ())]
     solution = best_linear_estimate(
         design, values.ravel(), q, parameters=parameters, rows=[f"{c} {a}" for c in called for a in "xy"]
     )
     size = 4 * harmonics + 2
-    values_of_series, spread = solution.estimate[:size], solution.covariance[:size, :size]
+    values_of_series, spread = solution.estimate[:size].copy(), solution.covariance[:size, :size].copy()
+    if alone:
+        values_of_series[WAVE_1] = np.nan
+        spread[WAVE_1], spread[:, WAVE_1] = np.nan, np.nan
     series = TiltSeries(harmonics, coefficient_names(harmonics), values_of_series, spread)
     from scipy import special
 
@@ -146,7 +169,7 @@ def track_profile(
     w = np.where(good, solution.weighted_residual / np.sqrt(np.where(good, weight, 1.0)), np.nan)
     return TrackProfile(
         series=series,
-        zero=(solution.estimate[size:], solution.covariance[size:, size:]) if n else None,
+        zero=(solution.estimate[size:], solution.covariance[size:, size:]) if free_zero else None,
         azimuth=every,
         residual=(values.ravel() - design @ solution.estimate).reshape(-1, 2),
         w=w.reshape(-1, 2),

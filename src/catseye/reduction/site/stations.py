@@ -27,7 +27,8 @@ from catseye.records.site.monument import MonumentGeometry
 from catseye.records.site.target import FeedArmRanger
 from catseye.reduction.site.places import nominal_frame
 
-FARTHEST = 1e12  # m, beyond the Sun; farther is a slip
+FARTHEST = 2e4  # m between two points of a site whose coordinates lie within 10 km (`records.files.record.Coordinate`)
+UNUSUAL = 1e3  # m, six times the longest line of the Green Bank site: more likely typed in millimetres
 ANY_TURN = COUNTS_PER_TURN / np.sqrt(12.0)  # counts: nothing is known of an azimuth, uniform over a turn
 STEPS = {"axes": 1e-6, "tilts": 1e-7}  # m, rad, for derivatives
 AXES = ("axis_offset_mm", "mirror_offset_mm", "beam_x_mm", "beam_y_mm")
@@ -177,6 +178,13 @@ class Pointings:
     u: np.ndarray
     lacking: tuple[str, ...]
 
+    def unusual(self, k: int) -> str:
+        """Both readings of a point that is farther than any target of a site; "" of a usual one."""
+        if self.aim.range[k] <= UNUSUAL:
+            return ""
+        less = ", ".join(f"{v:g}" for v in self.to[k] * MILLIMETRE)
+        return f"the point is {self.aim.range[k]:.0f} m away; in millimetres it would be {less} m"
+
 
 def point(monument: MonumentGeometry, mirror: MirrorGeometry, to: np.ndarray) -> Pointings:
     """Encoder counts of one mirror for points (n, 3), m, ground.
@@ -188,7 +196,13 @@ def point(monument: MonumentGeometry, mirror: MirrorGeometry, to: np.ndarray) ->
     """
     station, imperfections = station_of(monument, mirror), imperfections_of(mirror)
     for at in to[~np.all(np.abs(to) <= FARTHEST, axis=1)]:
-        raise InputError(f"point {', '.join(f'{v:.10g}' for v in at)} m is too far (expected within {FARTHEST:g} m)")
+        less = at * MILLIMETRE
+        hint = (
+            f": read as millimetres it is {', '.join(f'{v:g}' for v in less)} m" if np.all(abs(less) < UNUSUAL) else ""
+        )
+        raise InputError(
+            f"point {', '.join(f'{v:.10g}' for v in at)} m is too far (expected within {FARTHEST:g} m){hint}"
+        )
     aimed = aim(station, to)
     low, high = mirror.az_low_limit, mirror.az_high_limit
     direct = np.stack([aimed.azimuth_counts, aimed.elevation_counts], axis=-1)

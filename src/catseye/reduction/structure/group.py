@@ -19,6 +19,7 @@ from catseye.geometry.antenna.frames import (
 )
 from catseye.geometry.frames.frame import Transforms
 from catseye.reduction.structure.series import GroupSeries
+from catseye.verdict import Verdict
 
 Array = NDArray[np.float64]
 FRAMES = ("ground", "alidade", "reflector")
@@ -45,6 +46,7 @@ class PlacesEpoch:
     names          n
     coordinates    (n, 3) m, ground frame
     covariance     (3n, 3n) m^2
+    verdict        of the reduction; None where it says none
     """
 
     label: str
@@ -55,6 +57,7 @@ class PlacesEpoch:
     names: tuple[str, ...]
     coordinates: Array
     covariance: Array
+    verdict: Verdict | None = None
 
 
 def group_series(

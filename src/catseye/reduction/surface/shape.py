@@ -11,6 +11,7 @@ from catseye.geometry.frames.frame import Transform
 from catseye.optics.aperture import cells, coherent_gain, ruze_gain
 from catseye.optics.zernike import Numbering, Term, orthonormal, terms, zernike
 from catseye.records.site.site import ParaboloidRecord
+from catseye.verdict import Verdict
 
 HELD = 1e-8  # smallest singular value of Zernike terms beside the paraboloid: below it nothing tells them apart
 
@@ -70,6 +71,7 @@ class Prisms:
     nominal       that frame from the nominal paraboloid's
     source        where they come from
     elevation_deg, azimuth_deg, temperature_c   of the epoch, where known
+    verdict       of the reduction that they come from; None where there is none
     """
 
     names: tuple[str, ...]
@@ -80,6 +82,7 @@ class Prisms:
     elevation_deg: float | None = None
     azimuth_deg: float | None = None
     temperature_c: float | None = None
+    verdict: Verdict | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,16 +20,19 @@ class SteelExpansion:
     share        of steel's whole coefficient, about the pintle bearing
     lag_s        time constant of the steel behind the air
     dish_share   by which the dish expands about its own middle on top, as a share of the telescope's expansion
+    arm_share    by which the feed arm expands away from the dish's middle on top, likewise
     """
 
     share: float = 1.0
     lag_s: float = 3600.0
     dish_share: float = 0.0
+    arm_share: float = 0.0
 
     def __post_init__(self):
         require("share of the steel's expansion", self.share, -10.0, 10.0)
         require("lag_s of the steel", self.lag_s, 60.0, 86_400.0)
         require("dish_share of the expansion", self.dish_share, -1.0, 1.0)
+        require("arm_share of the expansion", self.arm_share, -1.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +40,7 @@ class MovingPoints:
     """Points of a night at any time; without a law they stay where they are.
 
     points        m, ground frame, at `reference_s`
-    own           by name how much more than itself a point expands about the dish's middle: `dish_share`, 0 elsewhere;
+    own           by name how much more than itself a point expands about the dish's middle; 0 off dish and arm, and
                   what is not in it stands on the ground
     dish_middle   (3,) m
     """

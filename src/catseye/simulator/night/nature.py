@@ -29,7 +29,7 @@ RADIATION_C = 0.5  # WMO-8 ch. 2: a naturally ventilated screen in sunshine and 
 INTERVAL_S = (10.0, 600.0)  # how often weather stations are usually read
 GAP_S, GAP_SLOTS, GAP_SLOT_S, GAP_CHANCE = 900.0, 10, 3600.0, 0.3  # a restarted logger: minutes, chosen
 STEEL_LAG_S = (1800.0, 5400.0)  # 15-25 mm of steel, air on both sides: c rho d / (2 h), h 10-15 W/m2/K
-DISH_SHARE = 0.2  # its backup structure is thinner than the box girders under it: chosen
+DISH_SHARE, ARM_SHARE = 0.2, 0.1  # dish and arm are thinner than the box girders under them: chosen
 
 
 @dataclass(frozen=True)
@@ -230,4 +230,5 @@ def _stations(draw: _Draw) -> StationNature:
 
 def _expansion(draw: _Draw) -> SteelExpansion:
     rng = draw.rng("site/steel")
-    return SteelExpansion(draw.level("site/steel"), _even(rng, *STEEL_LAG_S), _even(rng, -DISH_SHARE, DISH_SHARE))
+    lag, dish, arm = _even(rng, *STEEL_LAG_S), _even(rng, -DISH_SHARE, DISH_SHARE), _even(rng, -ARM_SHARE, ARM_SHARE)
+    return SteelExpansion(draw.level("site/steel"), lag, dish, arm)

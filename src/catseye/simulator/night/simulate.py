@@ -212,6 +212,8 @@ def _moving(
     if law is not None:
         units = [t.name for unit in site.telescope.triplets for t in unit.targets]
         own |= dict.fromkeys([*(t.name for t in site.telescope.dish), *units], law.dish_share)
+        on_arm = [t.name for t in site.telescope.structural if t.frame == "reflector"]
+        own |= dict.fromkeys([*FEED_ARM_RANGERS, *on_arm], law.arm_share)
     middle = np.array([*APERTURE_CENTRE, height_above_vertex(APERTURE_CENTRE)])
     return MovingPoints(site.points, air, law, 0.5 * (min(seconds) + max(seconds)), own, site.pose.dish(middle))
 

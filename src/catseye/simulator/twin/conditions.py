@@ -6,6 +6,7 @@ from catseye.errors import InputError
 from catseye.simulator.night.expansion import STEEL_PER_K
 from catseye.simulator.night.faults import EFFECTS, Planted
 
+SEA_LEVEL_K, LAPSE_K_PER_M, POLYTROPIC = 288.15, 0.0065, 5.25588  # K, K/m, g M / R L: [ICAO93]
 LIVING_EFFECTS = (
     "air_waves",  # of temperature, common to the site
     "bearing_tilt",  # of the azimuth bearing and track
@@ -50,6 +51,7 @@ STILL = LivingPlanted(ignore=(*EFFECTS, *LIVING_EFFECTS))  # nothing but geometr
 class LivingConditions:
     """The air at z = 0 over the pintle at the start, and how it lives. Magnitudes are chosen; nights are quiet.
 
+    elevation_m             above the sea, where `pressure_hpa` is meant; a site elsewhere has the standard air's there
     diurnal_c               half of the day's swing; warmest at 15 h local mean time
     gradient_c_per_m        at night and at noon; above the surface layer
     surface_layer_c         temperature gained on leaving the ground, at night and at noon
@@ -84,6 +86,7 @@ class LivingConditions:
     horizontal_c_per_100m: float = 0.05
     wander_c: float = 0.15
     pressure_hpa: float = 930.6
+    elevation_m: float = 806.42  # z = 0 of the Green Bank site
     pressure_walk_hpa: float = 0.2
     humidity_percent: float = 70.5
     dew_point_wander_c: float = 0.3
@@ -100,6 +103,19 @@ class LivingConditions:
     radiation_c: float = 0.25
     expansion_per_k: float = STEEL_PER_K
     dish_expansion: float = 0.2
+
+    def at(self, elevation_m: float) -> "LivingConditions":
+        """The same weather at another elevation above the sea, m: pressure as in the standard atmosphere.
+
+        Source: [ICAO93], the layer with a lapse of 6.5 K/km: p / p0 = (T / T0)^(g M / R L).
+
+        >>> round(LIVING_NIGHT.at(319.0).pressure_hpa, 1)
+        986.7
+        """
+        if elevation_m == self.elevation_m:
+            return self
+        ratio = (SEA_LEVEL_K - LAPSE_K_PER_M * elevation_m) / (SEA_LEVEL_K - LAPSE_K_PER_M * self.elevation_m)
+        return replace(self, pressure_hpa=self.pressure_hpa * ratio**POLYTROPIC, elevation_m=elevation_m)
 
 
 LIVING_NIGHT = LivingConditions()

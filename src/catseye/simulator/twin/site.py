@@ -79,7 +79,8 @@ class Twin:
         drawn: TwinDraws = {"streams": Streams(seed), "planted": Planted() if planted is None else planted}
         self._streams, self._planted = drawn["streams"], drawn["planted"]
         self._start_ns = round(start_mjd * PER_DAY)
-        self.air = LivingAir.of(site, conditions, start_mjd, **drawn)
+        here = conditions.at(site.site.site.elevation_of_z0_m)
+        self.air = LivingAir.of(site, here, start_mjd, **drawn)
         self.telescope = telescope(site, motion, start_mjd, air=self.air, **drawn)
         self.telescope.angles(np.zeros(1))  # a motion that cannot be is refused here
         self.scene = TwinPlaces(site, **drawn)

@@ -66,4 +66,22 @@ def test_u_of_the_noise_of_a_range_and_the_table_and_line_of_averages_by_hand():
     assert first["range_um"] == pytest.approx(first["allan_deviation_rad"] * 99.93e3 / (2 * np.pi), rel=1e-9)
     time, height = found.curve["fit"]
     assert height[0] == pytest.approx(-2.0, abs=0.01)  # 10 mrad
-    assert np.diff(height) == pytest.approx(-0.5 * np.diff(time))  # white noise falls by the square root
+    # [RILEY08] table 3 with the walk in steps: white^2/m + walk^2 (2 m^2 + 1)/(6 m)
+    m = 10**time / 0.001
+    flicker = found.value("flicker_mrad2")  # 2 h at one reading, 2 ln 2 h of many [RILEY08], within 2 % between
+    by_hand = 1e-6 * (found.value("white_mrad2") / m + found.value("walk_mrad2") * (2 * m**2 + 1) / (6 * m))
+    by_hand[0] += 2e-6 * flicker
+    by_hand[1:] += 2e-6 * np.log(2) * flicker
+    assert height == pytest.approx(0.5 * np.log10(by_hand), abs=1e-3)  # flicker is 1 % of the last: 2 % of that
+
+
+def test_the_line_of_averages_holds_the_walk_that_the_readings_show():
+    rng = np.random.default_rng(8)
+    walking = 0.012 * rng.standard_normal(8192) + np.cumsum(2e-4 * rng.standard_normal(8192))
+    found = measure_oscillator(readings(OscillatorSheet, KIND, numbers={"phase_rad": walking}, interval_s=0.001))
+    shown, line = 10 ** found.curve["readings"][1], 10 ** found.curve["fit"][1]
+    white = 0.012 / np.sqrt(10 ** found.curve["fit"][0] / 0.001)
+    assert shown[-1] > 3.0 * white[-1]  # where white noise alone would be far below the readings
+    for row, middle in zip(found.rows, line, strict=True):
+        _, _, _, low, high, *_ = row
+        assert 0.8 * low < middle < 1.25 * high  # the limits hold 19 of 20; averages of one series go together

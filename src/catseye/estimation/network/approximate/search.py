@@ -20,6 +20,8 @@ from catseye.estimation.network.unfolding.location import locate
 STRICT, LENIENT = 1e-3, 1e-7  # least over largest eigenvalue of a point's normal matrix: good geometry; any at all
 DECIDED = 4.0  # a second position must fit this many times worse, in squares ...
 BY_NOISE = 25.0  # ... and by more than five standard uncertainties
+TWO_FIT = " and two positions fit"
+MIRRORED = ", mirror images in the plane of those that see it: give it a rough place, or measure a zenith angle"
 BLOCK = 20_000  # ranges at a time, so that memory stays bounded
 
 
@@ -123,7 +125,7 @@ class PlacingSearch:
             return False
         apart = np.linalg.norm((x - x[0])[:, part], axis=1) > 0.01 * ties.size
         if np.any(apart & (cost < decided * cost[0] + BY_NOISE)):
-            self.why[p] = " and two positions fit"
+            self.why[p] = TWO_FIT
             return False
         self.xyz[p, part] = np.where(np.isfinite(self.xyz[p, part]), self.xyz[p, part], x[0, part])
         return True
@@ -189,6 +191,8 @@ class PlacingSearch:
             text += " only"
         held = [name for name, known in zip("xyz", np.isfinite(self.xyz[p]), strict=True) if known]
         text += f" ({', '.join(held)} found)" if held else ""
+        if p in self.unfolding and self.why.get(p) == TWO_FIT and np.all(self.rows.code[usable] == RANGE):
+            return text + TWO_FIT + MIRRORED  # and that is why no figure of all points helped
         return text + self.unfolding.get(p, self.why.get(p, ""))
 
 

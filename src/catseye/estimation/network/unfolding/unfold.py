@@ -24,8 +24,8 @@ each and as many ranges as unknowns; measure more pairs"
 IN_LINE = "not unfolded: the stations or the targets lie on one line, about which the others may turn; add some off it"
 PLANE_TOO_FEW = "not unfolded: {s} stations or {t} targets lie in one plane, where at least 6 are needed; add more, or \
 some off it"
-NO_FIT = "not unfolded: the best figure leaves {rms:.2g} m where {sigma:.2g} m is expected; a zero or scale of the \
-rangers is wrong, or some ranges are"
+NO_FIT = "not unfolded: the best figure leaves {rms:.2g} m where {sigma:.2g} m is expected: the ranges do not fit one \
+figure"
 LOOSE = "not unfolded: the ranges between {s} stations and {t} targets let the figure bend by a thirtieth of its size; \
 points in one plane may lie on one circle or other conic: add a station off it"
 AMBIGUOUS = "not unfolded: different figures fit {s} stations and {t} targets equally well; measure more pairs"

@@ -14,7 +14,8 @@ from catseye.constants import PPM
 from catseye.geometry.catenary import expanded
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings, Words
 from catseye.records.files.record import Record, Uncertainty, Within, broken_rule
-from catseye.reduction.calibrations.calibration import Calibration, Cell, CheckOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Cell
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.fit import (
     CalibrationFit,
     Effect,
@@ -24,6 +25,9 @@ from catseye.reduction.calibrations.fit import (
 )
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
+    Plausibility,
+    PlausibleSpan,
+    ReadingScatter,
     provenance,
     quantities,
     residuals_by_number,
@@ -233,6 +237,7 @@ class CommonParts(TypedDict):
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
     decisions: tuple[CheckOutcome, ...]
+    fit: CalibrationFit
     variance_factor: float
     degrees_of_freedom: int
     notes: tuple[str, ...]
@@ -251,6 +256,7 @@ def _common(readings: SheetReadings, fit: CalibrationFit, length: np.ndarray) ->
         "columns": (word, "reads_mm", "length_mm", "residual_um", fit.test, "state"),
         "rows": rows,
         "decisions": fit.decisions(),
+        "fit": fit,
         "variance_factor": fit.variance_factor,
         "degrees_of_freedom": round(fit.degrees_of_freedom),
         "notes": scatter_notes(fit, "µm", 1e-3),
@@ -258,6 +264,33 @@ def _common(readings: SheetReadings, fit: CalibrationFit, length: np.ndarray) ->
 
 
 BLOCKS_RECIPE = CalibrationKind(
-    "zero and scale of an instrument against gauge blocks", BLOCKS_LAYOUT, calibrate_against_blocks
+    "zero and scale of an instrument against gauge blocks",
+    BLOCKS_LAYOUT,
+    calibrate_against_blocks,
+    plausible=Plausibility(
+        scatter=ReadingScatter(
+            10.0, "µm", 1e-3, "a height gauge or comparator is read to 1 µm [PARKER04] section 2.2.2"
+        ),
+        sizes={
+            "zero_mm": PlausibleSpan(-1.0, 1.0, "an instrument is set to zero before it is calibrated"),
+            "scale_ppm": PlausibleSpan(-1e3, 1e3, "a steel scale off by 85 °C reads 1000 ppm wrong"),
+        },
+        columns={
+            "temperature_c": PlausibleSpan(10.0, 30.0, "blocks are true at 20 °C [ISO98], in a room where people work")
+        },
+    ),
 )
-SPACERS_RECIPE = CalibrationKind("lengths of spacers by a calibrated instrument", SPACERS_LAYOUT, calibrate_spacers)
+SPACERS_RECIPE = CalibrationKind(
+    "lengths of spacers by a calibrated instrument",
+    SPACERS_LAYOUT,
+    calibrate_spacers,
+    plausible=Plausibility(
+        scatter=ReadingScatter(
+            10.0, "µm", 1e-3, "a height gauge or comparator is read to 1 µm [PARKER04] section 2.2.2"
+        ),
+        sizes={"*_mm": PlausibleSpan(0.0, 2000.0, "a length, as long as a gauge reaches")},
+        columns={
+            "temperature_c": PlausibleSpan(10.0, 30.0, "lengths hold at 20 °C [ISO22], in a room where people work")
+        },
+    ),
+)

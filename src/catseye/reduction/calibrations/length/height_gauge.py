@@ -26,7 +26,15 @@ from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, Cell, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
 from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number, scatter_notes
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    Plausibility,
+    PlausibleSpan,
+    ReadingScatter,
+    provenance,
+    residuals_by_number,
+    scatter_notes,
+)
 from catseye.reduction.calibrations.length.gauge_blocks import Block
 
 KIND = "height-gauge"
@@ -254,6 +262,7 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, sought: list[str]
         columns=(*words, "height_mm", "residual_um", fit.test, "state"),
         rows=rows,
         decisions=fit.decisions(),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
@@ -270,5 +279,16 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, sought: list[str]
 
 
 RECIPE = CalibrationKind(
-    "offsets of the mirror from the tooling ball, by a height gauge", LAYOUT, calibrate_height_gauge
+    "offsets of the mirror from the tooling ball, by a height gauge",
+    LAYOUT,
+    calibrate_height_gauge,
+    plausible=Plausibility(
+        scatter=ReadingScatter(
+            20.0, "µm", 1e-3, "a height gauge on a surface plate repeats to some µm [PARKER04] 2.2.2"
+        ),
+        sizes={
+            "d[xz]_mm": PlausibleSpan(-100.0, 100.0, "what the sheet allows of an offset known beforehand", u=0.5),
+            "dy_mm": PlausibleSpan(50.0, 1000.0, "what the sheet allows of an offset known beforehand", u=0.5),
+        },
+    ),
 )

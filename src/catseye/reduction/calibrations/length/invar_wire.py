@@ -23,6 +23,9 @@ from catseye.reduction.calibrations.fit import (
 )
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
+    Plausibility,
+    PlausibleSpan,
+    ReadingScatter,
     provenance,
     quantities,
     residuals_by_number,
@@ -210,6 +213,7 @@ def _calibration(readings: SheetReadings, fit: CalibrationFit, distance: np.ndar
         columns=(*readings.numbers, "distance_mm", "residual_um", fit.test, "state"),
         rows=rows,
         decisions=fit.decisions(),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
@@ -226,4 +230,12 @@ def _calibration(readings: SheetReadings, fit: CalibrationFit, distance: np.ndar
     )
 
 
-RECIPE = CalibrationKind("distance by a hanging Invar wire, or the wire by a distance", LAYOUT, measure_with_wire)
+RECIPE = CalibrationKind(
+    "distance by a hanging Invar wire, or the wire by a distance",
+    LAYOUT,
+    measure_with_wire,
+    plausible=Plausibility(
+        scatter=ReadingScatter(100.0, "µm", 1e-3, "end scales of half millimetres are read to a fifth of one"),
+        columns={"temperature_c": PlausibleSpan(-30.0, 45.0, "air in which people stretch a wire")},
+    ),
+)

@@ -30,7 +30,14 @@ from catseye.records.files.record import Within
 from catseye.reduction.calibrations.calibration import Calibration, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
 from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    Plausibility,
+    PlausibleSpan,
+    ReadingScatter,
+    provenance,
+    scatter_notes,
+)
 
 KIND = "alignment"
 COUNTS, SPOT, PATH = Within(-1_000_000, 1_000_000), Within(-1000, 1000), Within(-10, 500)
@@ -191,6 +198,7 @@ def _calibration(readings: SheetReadings, solution: CurvedFit) -> Calibration:
                  "residual_q_mm", fit.test, "state"),
         rows=rows,
         decisions=fit.decisions(),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
@@ -248,5 +256,14 @@ def _circles(readings: SheetReadings, solution: CurvedFit) -> dict[str, tuple[np
 
 
 RECIPE = CalibrationKind(
-    "the laser beam against the azimuth axis, with its effect on range and pointing", LAYOUT, calibrate_alignment
+    "the laser beam against the azimuth axis, with its effect on range and pointing",
+    LAYOUT,
+    calibrate_alignment,
+    plausible=Plausibility(
+        scatter=ReadingScatter(0.1, "mm", 1.0, "the middle of a spot of some mm is read by eye to a tenth of one"),
+        sizes={
+            "beam_[xy]_mm": PlausibleSpan(-10.0, 10.0, "a beam further off leaves the mirror", u=1.0),
+            "beam_tilt_[xy]_rad": PlausibleSpan(-0.05, 0.05, "a beam 3 degrees askew misses its mount"),
+        },
+    ),
 )

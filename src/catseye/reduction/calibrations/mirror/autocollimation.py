@@ -23,10 +23,18 @@ from catseye.geometry.mirror.encoder import azimuth_angle, elevation_angle
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome, RecordValue
+from catseye.reduction.calibrations.calibration import Calibration, RecordValue
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
 from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    Plausibility,
+    PlausibleSpan,
+    ReadingScatter,
+    provenance,
+    scatter_notes,
+)
 
 KIND = "autocollimation"
 COUNTS = Within(-1_000_000, 1_000_000)
@@ -221,6 +229,7 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, flat: np.ndarray,
                  "residual_y_arcsec", fit.test, "state"),
         rows=rows,
         decisions=(_tilt_decision(solution, sheet.face_tilt_limit_arcsec), *fit.decisions()),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=_notes(solution, bool(flat.any())),
@@ -291,5 +300,16 @@ def _circles(
 
 
 RECIPE = CalibrationKind(
-    "mirror axes, encoder zeros and face tilt from an autocollimator", LAYOUT, calibrate_autocollimation
+    "mirror axes, encoder zeros and face tilt from an autocollimator",
+    LAYOUT,
+    calibrate_autocollimation,
+    plausible=Plausibility(
+        scatter=ReadingScatter(
+            5.0, "arcsec", ARCSECOND, "an autocollimator is read to a second or better [PARKER04] 2.4"
+        ),
+        sizes={
+            "beta?_rad": PlausibleSpan(-0.02, 0.02, "a mirror's axes within a degree of its mount's"),
+            "face_tilt_rad": PlausibleSpan(-0.01, 0.01, "a face half a degree off its shaft is mounted wrongly"),
+        },
+    ),
 )

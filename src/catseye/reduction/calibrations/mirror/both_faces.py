@@ -22,7 +22,15 @@ from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
 from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number, scatter_notes
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    Plausibility,
+    PlausibleSpan,
+    ReadingScatter,
+    provenance,
+    residuals_by_number,
+    scatter_notes,
+)
 
 KIND = "both-faces"
 DISTANCE = Within(0.1, 10_000)
@@ -185,6 +193,7 @@ def _calibration(
         columns=("line", "to", "pointing", "phi_deg", "distance_m", "residual_um", fit.test, "state"),
         rows=rows,
         decisions=fit.decisions(),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(*notes, *scatter_notes(fit, "µm", 1e-6)),
@@ -198,5 +207,13 @@ def _calibration(
 
 
 RECIPE = CalibrationKind(
-    "axis and mirror offset from distances in direct and prime pointing", LAYOUT, calibrate_both_faces
+    "axis and mirror offset from distances in direct and prime pointing",
+    LAYOUT,
+    calibrate_both_faces,
+    plausible=Plausibility(
+        scatter=ReadingScatter(
+            100.0, "µm", 1e-6, "a ranger repeats to a tenth of a millimetre or better, 0.4° of phase"
+        ),
+        sizes={"*_offset_mm": PlausibleSpan(-10.0, 10.0, "what a mirror's record may hold of an offset", u=1.0)},
+    ),
 )

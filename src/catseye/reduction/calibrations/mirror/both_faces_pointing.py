@@ -27,7 +27,15 @@ from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, RecordValue
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
 from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number, scatter_notes
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    Plausibility,
+    PlausibleSpan,
+    ReadingScatter,
+    provenance,
+    residuals_by_number,
+    scatter_notes,
+)
 from catseye.reduction.calibrations.mirror.both_faces import POINTINGS
 
 KIND = "both-faces-pointing"
@@ -246,6 +254,7 @@ def _calibration(readings: SheetReadings, solution: CurvedFit) -> Calibration:
                  "residual_elevation_counts", fit.test, "state"),
         rows=rows,
         decisions=fit.decisions(),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(*notes, *scatter_notes(fit, "counts", 1.0)),
@@ -259,5 +268,14 @@ def _calibration(readings: SheetReadings, solution: CurvedFit) -> Calibration:
 
 
 RECIPE = CalibrationKind(
-    "face tilt, beam tilt and encoder zeros from counts in both pointings", LAYOUT, calibrate_both_faces_pointing
+    "face tilt, beam tilt and encoder zeros from counts in both pointings",
+    LAYOUT,
+    calibrate_both_faces_pointing,
+    plausible=Plausibility(
+        scatter=ReadingScatter(
+            5.0, "counts", 1.0, "a search finds a target to some counts of 13 arcsec [PARKER04] 2.4"
+        ),
+        sizes={"*_tilt*_rad": PlausibleSpan(-0.05, 0.05, "a beam or face 3 degrees askew misses its mount")},
+        explained=0.99,
+    ),
 )

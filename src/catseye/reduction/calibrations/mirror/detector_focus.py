@@ -21,10 +21,20 @@ from catseye.constants import TWO_PI
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome, Quantity, RecordValue
+from catseye.reduction.calibrations.calibration import Calibration, Quantity, RecordValue
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
 from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes, student
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    Plausibility,
+    PlausibleSpan,
+    ReadingScatter,
+    provenance,
+    quantities,
+    scatter_notes,
+    student,
+)
 
 KIND = "detector-focus"
 PLACE, VOLTS = Within(-100, 100), Within(0, 20, above=True)
@@ -218,6 +228,7 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, model: Model, lon
         columns=("position_mm", "amplitude_volt", "residual_percent", fit.test, "state"),
         rows=rows,
         decisions=(_within_the_run(solution, place), *_symmetry(longer), *fit.decisions()),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
@@ -246,7 +257,7 @@ def _within_the_run(solution: CurvedFit, place: np.ndarray) -> CheckOutcome:
     text = (
         "amplitudes fall on both sides" if nearer > 0.0 else "the top lies outside of the readings: go on with the run"
     )
-    return CheckOutcome("best focus from the nearer end of the run, mm", nearer, 0.0, nearer > 0.0, text)
+    return CheckOutcome("best focus from the nearer end of the run, mm", nearer, 0.0, nearer > 0.0, text, least=True)
 
 
 def _symmetry(longer: CurvedFit | None) -> tuple[CheckOutcome, ...]:
@@ -260,5 +271,15 @@ def _symmetry(longer: CurvedFit | None) -> tuple[CheckOutcome, ...]:
 
 
 RECIPE = CalibrationKind(
-    "best focus and depth of the detector, with its effect on amplitude and range", LAYOUT, calibrate_detector_focus
+    "best focus and depth of the detector, with its effect on amplitude and range",
+    LAYOUT,
+    calibrate_detector_focus,
+    plausible=Plausibility(
+        scatter=ReadingScatter(
+            5.0, "%", 0.01, "an amplitude of many cycles repeats to a per cent [PARKER04] chapter 6"
+        ),
+        sizes={"depth_mm": PlausibleSpan(0.0, 100.0, "of a focus within the reach of the stage")},
+        explained=0.9,
+        varying={"position_mm": 0.0},
+    ),
 )

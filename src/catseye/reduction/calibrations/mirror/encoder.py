@@ -20,10 +20,18 @@ from catseye.geometry.mirror.encoder import COUNTS_PER_RADIAN, COUNTS_PER_TURN
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome, RecordValue
+from catseye.reduction.calibrations.calibration import Calibration, RecordValue
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
 from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    Plausibility,
+    PlausibleSpan,
+    ReadingScatter,
+    provenance,
+    scatter_notes,
+)
 
 KIND = "encoder"
 COUNTS = Within(-1_000_000, 1_000_000)
@@ -188,6 +196,7 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, psi: np.ndarray) 
         columns=("run", "psi_deg", "counts", "residual_counts", fit.test, "state"),
         rows=rows,
         decisions=(*_order_decisions(solution, n, sheet.level), *fit.decisions()),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
@@ -232,4 +241,13 @@ def _order_decisions(solution: CurvedFit, n: int, level: float) -> tuple[CheckOu
     return tuple(outcomes)
 
 
-RECIPE = CalibrationKind("an encoder's waves, once and twice a turn, from true angles", LAYOUT, calibrate_encoder)
+RECIPE = CalibrationKind(
+    "an encoder's waves, once and twice a turn, from true angles",
+    LAYOUT,
+    calibrate_encoder,
+    plausible=Plausibility(
+        scatter=ReadingScatter(1.0, "counts", 1.0, "a servo settles within a count [PARKER04] section 2.4"),
+        sizes={"*_counts": PlausibleSpan(-200.0, 200.0, "0.7 degrees: no disc is so far off its centre", u=20.0)},
+        varying={"angle_deg": 360.0},
+    ),
+)

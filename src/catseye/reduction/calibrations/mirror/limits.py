@@ -13,10 +13,18 @@ from catseye.geometry.mirror.encoder import COUNTS_PER_TURN, HALF_TURN
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome
+from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved
 from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes, student
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    Plausibility,
+    ReadingScatter,
+    provenance,
+    scatter_notes,
+    student,
+)
 
 KIND = "limits"
 COUNTS = Within(-1_000_000, 1_000_000)
@@ -115,7 +123,8 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, single: float) ->
         covariance=covariance,
         columns=("stop", "azimuth_counts", "residual_counts", fit.test, "state"),
         rows=rows,
-        decisions=(_reach(low_limit, high_limit), *fit.decisions()),
+        decisions=(_reach(low_limit, high_limit), _travel(solution), *fit.decisions()),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(*_unreached(low_limit, high_limit, sheet.na0), *scatter_notes(fit, "counts", 1.0)),
@@ -137,7 +146,16 @@ def _reach(low: int, high: int) -> CheckOutcome:
     travel = float(high - low)
     reached = "every direction is reached" if travel >= HALF_TURN else "some directions are not reached"
     text = f"{reached}, in the direct or the prime pointing"
-    return CheckOutcome("travel between the limits, counts", travel, HALF_TURN, travel >= HALF_TURN, text)
+    return CheckOutcome("travel between the limits, counts", travel, HALF_TURN, travel >= HALF_TURN, text, least=True)
+
+
+def _travel(solution: CurvedFit) -> CheckOutcome:
+    """Whether two stops of one axis can lie so far apart: a lever lets a pin by, once."""
+    travel, most = solution.value("high stop") - solution.value("low stop"), 1.5 * COUNTS_PER_TURN
+    text = "stops of one axis"
+    if travel > most:
+        text = f"the stops lie {travel / COUNTS_PER_TURN:.2f} turns apart: counts of another encoder, or doubled"
+    return CheckOutcome("stops apart, counts", travel, most, bool(travel <= most), text)
 
 
 def _unreached(low: int, high: int, na0: float | None) -> tuple[str, ...]:
@@ -150,4 +168,11 @@ def _unreached(low: int, high: int, na0: float | None) -> tuple[str, ...]:
     return (f"Theta from {first:.2f} to {last:.2f} degrees is not reached in the direct pointing, {size:.2f} degrees",)
 
 
-RECIPE = CalibrationKind("azimuth limits from touches of both mechanical stops", LAYOUT, calibrate_limits)
+RECIPE = CalibrationKind(
+    "azimuth limits from touches of both mechanical stops",
+    LAYOUT,
+    calibrate_limits,
+    plausible=Plausibility(
+        scatter=ReadingScatter(50.0, "counts", 1.0, "a stop gives way by less than a fifth of a degree"),
+    ),
+)

@@ -27,10 +27,17 @@ from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry
-from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome, RecordValue
+from catseye.reduction.calibrations.calibration import Calibration, RecordValue
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.curved import CurvedFit, ModelParameter, fit_curved, row_ends
 from catseye.reduction.calibrations.fit import FitOptions, ObservedScatter
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, residuals_by_number
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    Plausibility,
+    ReadingScatter,
+    provenance,
+    residuals_by_number,
+)
 from catseye.reduction.calibrations.mirror.both_faces import POINTINGS
 from catseye.reduction.site.stations import imperfections_of, station_covariance, station_of
 
@@ -300,6 +307,7 @@ def _calibration(
                  "residual_elevation_counts", fit.test, "state"),
         rows=rows,
         decisions=(compared.whole(sheet.level), *compared.single(sheet.level), *fit.decisions()),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=tuple(notes),
@@ -337,4 +345,8 @@ RECIPE = CalibrationKind(
     "a station's angles and zeros from targets found in the field, against the laboratory",
     LAYOUT,
     calibrate_search_results,
+    plausible=Plausibility(
+        scatter=ReadingScatter(20.0, "counts", 1.0, "a spiral search steps by some counts [PARKER04] section 2.4"),
+        explained=0.99,
+    ),
 )

@@ -13,15 +13,17 @@ import numpy as np
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, TWO_PI
 from catseye.records.files.readings import SheetReadings
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, Cell, CheckOutcome
-from catseye.reduction.calibrations.fit import (
-    CalibrationFit,
-    Effect,
-    FitOptions,
-    ObservedScatter,
-    fit_readings,
+from catseye.reduction.calibrations.calibration import Calibration, Cell
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
+from catseye.reduction.calibrations.fit import CalibrationFit, Effect, FitOptions, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    Plausibility,
+    ReadingScatter,
+    provenance,
+    quantities,
+    scatter_notes,
 )
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.monument.azimuth_sheet import KIND, LAYOUT, AzimuthSheet
 from catseye.reduction.calibrations.monument.directions import (
     AFTER,
@@ -300,8 +302,8 @@ def _closure_decisions(sights: DirectionSights, fit: CalibrationFit, effects: li
     """The closure of each set that visited the lab twice, against three of its u."""
     return [
         CheckOutcome(
-            f"closure of set {name}, arcsec",
-            closure / ARCSECOND,
+            f"closure of set {name}, size in arcsec",
+            abs(closure) / ARCSECOND,
             CLOSURE_FACTOR * u / ARCSECOND,
             bool(abs(closure) <= CLOSURE_FACTOR * u),
             "circle against the mount, lab after less before; limit three standard uncertainties",
@@ -334,6 +336,7 @@ def _calibration(sights: DirectionSights, fit: CalibrationFit, linear: Linearise
                  fit.test, "state"),
         rows=_rows(sights, fit, azimuth),
         decisions=(*_closure_decisions(sights, fit, linear.effects), *fit.decisions()),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
@@ -388,5 +391,10 @@ def _dms(angle: float) -> str:
     return f"{degrees}° {minutes:02d}' {seconds / 10:04.1f}\""
 
 
-RECIPE = CalibrationKind("azimuth of a Kelvin mount from directions to known points, stars and references", LAYOUT,
-              calibrate_azimuth)  # fmt: skip
+CIRCLE = ReadingScatter(10.0, "arcsec", ARCSECOND, "a theodolite reads to 2 arcsec, a star is timed to 1 s")
+RECIPE = CalibrationKind(
+    "azimuth of a Kelvin mount from directions to known points, stars and references",
+    LAYOUT,
+    calibrate_azimuth,
+    Plausibility(scatter=CIRCLE),
+)

@@ -21,7 +21,8 @@ from catseye.errors import ValidityError
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
 from catseye.records.files.refusal import refusal, shown
-from catseye.reduction.calibrations.calibration import Calibration, Cell, CheckOutcome, RecordValue
+from catseye.reduction.calibrations.calibration import Calibration, Cell, RecordValue
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.fit import (
     CalibrationFit,
     Effect,
@@ -29,7 +30,15 @@ from catseye.reduction.calibrations.fit import (
     ObservedScatter,
     fit_readings,
 )
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    Plausibility,
+    PlausibleSpan,
+    ReadingScatter,
+    provenance,
+    quantities,
+    scatter_notes,
+)
 
 KIND = "hydrostatic-level"
 CLOSURE_FACTOR = 3.0  # of its standard uncertainty, beyond which a loop is named
@@ -243,8 +252,8 @@ def _loops_decision(loops: list[tuple[str, float, float]]) -> CheckOutcome:
     if worst is None:
         return CheckOutcome("loops: misclosure, mm", float("nan"), float("nan"), None, "the run closes no loop")
     return CheckOutcome(
-        f"loops: misclosure of {len(loops)}, the worst, mm",
-        worst[1] / MILLIMETRE,
+        f"loops: misclosure of {len(loops)}, size of the worst, mm",
+        abs(worst[1]) / MILLIMETRE,
         CLOSURE_FACTOR * worst[2] / MILLIMETRE,
         bool(abs(worst[1]) <= CLOSURE_FACTOR * worst[2]),
         f"set-ups {worst[0]}; limit three standard uncertainties",
@@ -301,6 +310,7 @@ def _calibration(
                  fit.test, "state"),
         rows=_rows(readings, fit, density),
         decisions=(_loops_decision(loops), *fit.decisions()),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
@@ -326,5 +336,16 @@ def _calibration(
 
 
 RECIPE = CalibrationKind(
-    "heights of marks and the instrument's constant by a hydrostatic level", LAYOUT, calibrate_level
+    "heights of marks and the instrument's constant by a hydrostatic level",
+    LAYOUT,
+    calibrate_level,
+    plausible=Plausibility(
+        scatter=ReadingScatter(
+            50.0, "µm", 1e-3 * MILLIMETRE, "micrometers touch water to some µm; 0.1 mm is 1 Pa of air"
+        ),
+        sizes={
+            "height_*_mm": PlausibleSpan(-1e6, 1e6, "a height above any datum, by water that tells 0.05 mm", u=0.5),
+            "constant_mm": PlausibleSpan(-100.0, 100.0, "two vessels of one make"),
+        },
+    ),
 )

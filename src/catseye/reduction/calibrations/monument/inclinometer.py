@@ -24,20 +24,24 @@ from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.calibration import Calibration, Cell
-from catseye.reduction.calibrations.fit import (
-    CalibrationFit,
-    Effect,
-    FitOptions,
-    ObservedScatter,
-    fit_readings,
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
+from catseye.reduction.calibrations.fit import CalibrationFit, Effect, FitOptions, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    Plausibility,
+    PlausibleSpan,
+    ReadingScatter,
+    provenance,
+    quantities,
+    scatter_notes,
 )
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
 from catseye.reduction.calibrations.monument.frame_sheet import UAngle
 
 KIND = "inclinometer"
 REFERENCE_C = 20.0  # °C to which the zeros belong
 ROUNDS, ENOUGH = 20, 1e-10  # relative change of the parameters at which the search ends
 SQUARE = 0.5 * np.pi
+UNLIKE = 1.5  # ratio of the scales of two axes of one make, which differ by some per cent
 Scale = Annotated[float, Within(-1e5, 1e5)]
 
 
@@ -353,7 +357,8 @@ def _calibration(axes: _AxisReadings, fit: CalibrationFit) -> Calibration:
         columns=(*optional, "x_volt", "y_volt", "residual_x_mv", "residual_y_mv", f"x|{fit.test}", f"y|{fit.test}",
                  "state"),
         rows=rows,
-        decisions=fit.decisions(),
+        decisions=(*_alike(axes.full(fit.x)), *fit.decisions()),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(*_notes(axes), *scatter_notes(fit, "mV", 1e-3)),
@@ -370,6 +375,16 @@ def _calibration(axes: _AxisReadings, fit: CalibrationFit) -> Calibration:
     )  # fmt: skip
 
 
+def _alike(whole: np.ndarray) -> tuple[CheckOutcome, ...]:
+    """Scales of the two axes side by side: they are of one make."""
+    scale = np.abs(whole[2:4])
+    ratio = float(scale.max() / scale.min()) if scale.min() > 0.0 else float("inf")
+    text = "two axes of one make"
+    if ratio > UNLIKE:
+        text = f"the axes' scales are {whole[2]:.4g} and {whole[3]:.4g} V/rad: a tilt or a voltage of another size"
+    return (CheckOutcome("larger scale over the smaller", ratio, UNLIKE, bool(ratio <= UNLIKE), text),)
+
+
 def _notes(axes: _AxisReadings) -> tuple[str, ...]:
     if not axes.pier:
         return () if axes.sheet.table_tilt else (
@@ -381,5 +396,17 @@ def _notes(axes: _AxisReadings) -> tuple[str, ...]:
     )
 
 
-RECIPE = CalibrationKind("scales, zeros and axes of a dual-axis inclinometer on a tilt table or a pier", LAYOUT,
-              calibrate_inclinometer)  # fmt: skip
+RECIPE = CalibrationKind(
+    "scales, zeros and axes of a dual-axis inclinometer on a tilt table or a pier",
+    LAYOUT,
+    calibrate_inclinometer,
+    plausible=Plausibility(
+        scatter=ReadingScatter(5.0, "mV", 1e-3, "three seconds of arc at 400 V/rad [PARKER04] chapter 7"),
+        sizes={
+            "scale_?_volt_per_rad": PlausibleSpan(0.0, 1e5, "above zero where the axis' + end up reads more"),
+            "misalignment_?_arcsec": PlausibleSpan(-36e3, 36e3, "an axis within 10 degrees of the case's mark"),
+            "table_tilt_?_arcsec": PlausibleSpan(-36e3, 36e3, "a table within 10 degrees of level"),
+        },
+        columns={"temperature_c": PlausibleSpan(-30.0, 45.0, "air in which people read an inclinometer")},
+    ),
+)

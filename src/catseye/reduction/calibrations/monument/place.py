@@ -17,8 +17,9 @@ from catseye.geometry.frames.local_frame import LocalFrame, elevation_factor, gr
 from catseye.records.files.readings import TEXT, SheetLayout, SheetReadings
 from catseye.records.files.record import Elevation, Within
 from catseye.records.files.refusal import refusal, shown
-from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome, RecordValue
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities
+from catseye.reduction.calibrations.calibration import Calibration, RecordValue
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
+from catseye.reduction.calibrations.kind import CalibrationKind, Plausibility, provenance, quantities
 from catseye.reduction.calibrations.monument.frame_sheet import FrameSheet, frame_of
 
 KIND = "monument-place"
@@ -220,5 +221,8 @@ def _calibration(
 
 
 RECIPE = CalibrationKind(
-    "place of a fixed point from a survey adjustment, in all systems of its report", LAYOUT, measure_place
+    "place of a fixed point from a survey adjustment, in all systems of its report",
+    LAYOUT,
+    measure_place,
+    plausible=Plausibility(),
 )

@@ -28,7 +28,15 @@ from catseye.reduction.calibrations.fit import (
     ObservedScatter,
     fit_readings,
 )
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    Plausibility,
+    PlausibleSpan,
+    ReadingScatter,
+    provenance,
+    quantities,
+    scatter_notes,
+)
 from catseye.reduction.calibrations.monument.frame_sheet import MonumentSheet, UAngle, frame_of
 
 KIND = "plate-levels"
@@ -178,6 +186,7 @@ def _calibration(readings: SheetReadings, fit: CalibrationFit) -> Calibration:
                  "residual_arcsec", fit.test, "state"),
         rows=_rows(readings, fit),
         decisions=fit.decisions(),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
@@ -208,5 +217,14 @@ def _calibration(readings: SheetReadings, fit: CalibrationFit) -> Calibration:
 
 
 RECIPE = CalibrationKind(
-    "turns of a Kelvin mount about z^ and x^ by a level on a three-ball plate", LAYOUT, calibrate_plate
+    "turns of a Kelvin mount about z^ and x^ by a level on a three-ball plate",
+    LAYOUT,
+    calibrate_plate,
+    plausible=Plausibility(
+        scatter=ReadingScatter(
+            5.0, "arcsec", ARCSECOND, "a precision level has 2 to 4 arcsec a division [PARKER04] 2.2.1"
+        ),
+        sizes={"alpha?_rad": PlausibleSpan(-0.02, 0.02, "a mount within a degree of level", u=10.0 * ARCSECOND)},
+        varying={"orientation_deg": 180.0},
+    ),
 )

@@ -11,9 +11,18 @@ import numpy as np
 from catseye.constants import TWO_PI
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
-from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome
+from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.fit import CalibrationFit, FitOptions, ObservedScatter, fit_readings
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    Plausibility,
+    PlausibleSpan,
+    ReadingScatter,
+    provenance,
+    quantities,
+    scatter_notes,
+)
 from catseye.reduction.calibrations.ranging.leftover import leakage_effects
 from catseye.signal.systematics.amplitude import amplitude_by_coefficient
 
@@ -166,6 +175,7 @@ def _calibration(
         columns=("reading", "amplitude_volt", "ln_amplitude", "phase_mrad", "residual_mrad", fit.test, "state"),
         rows=rows,
         decisions=(_line_decision(longer), *fit.decisions()),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
@@ -192,5 +202,14 @@ def _calibration(
 
 
 RECIPE = CalibrationKind(
-    "coupling from amplitude to phase, one target at several attenuations", LAYOUT, calibrate_amplitude
+    "coupling from amplitude to phase, one target at several attenuations",
+    LAYOUT,
+    calibrate_amplitude,
+    plausible=Plausibility(
+        scatter=ReadingScatter(
+            0.2, "mrad", MILLIRADIAN, "1 mV of noise in a phasor of 5 V, the converter's full range"
+        ),
+        sizes={"amplitude_to_phase*_rad": PlausibleSpan(-0.1, 0.1, "what a mirror's record may hold of it")},
+        varying={"amplitude_target_volt": 0.0},
+    ),
 )

@@ -16,6 +16,7 @@ from catseye.optics.retroreflector import cats_eye, prism
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
 from catseye.reduction.calibrations.calibration import Calibration, Cell
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.fit import (
     CalibrationFit,
     Effect,
@@ -25,6 +26,8 @@ from catseye.reduction.calibrations.fit import (
 )
 from catseye.reduction.calibrations.kind import (
     CalibrationKind,
+    Plausibility,
+    ReadingScatter,
     provenance,
     quantities,
     residuals_by_number,
@@ -33,6 +36,7 @@ from catseye.reduction.calibrations.kind import (
 
 PRISM, BALL = "prism-constant", "ball-constant"
 PARTS = ("r1", "r2")
+OUT_OF_FOCUS = 0.15  # of the shell; index of phase for that of groups makes 0.03, least blur 0.02
 TEMPERATURE = Within(-40, 60)
 
 
@@ -119,7 +123,17 @@ def calibrate_ball(readings: SheetReadings, reject: bool = False) -> Calibration
         readings, fit, GlassConstants(keys, values, by_size, by_index), kind=BALL, what="Ball",
         record={"r1_mm": r1, "r2_mm": r2, "u_r_mm": float(np.sqrt(fit.covariance.diagonal().max())),
                 "pc_b_mm": values[2]},
+        decisions=(_in_focus(float(r1), float(r2), n),),
     )  # fmt: skip
+
+
+def _in_focus(r1: float, r2: float, n: float) -> CheckOutcome:
+    """Whether the shell lies about where the small ball focuses, without which nothing returns."""
+    off = abs(r2 * (n - 1.0) / r1 - 1.0)
+    text = "the shell lies near the small ball's focus"
+    if off > OUT_OF_FOCUS:
+        text = f"r2 is {r2 / r1:.3f} r1, a focus lies at {1.0 / (n - 1.0):.3f}: the words in the column part, or a size"
+    return CheckOutcome("shell off the focus, share of its radius", off, OUT_OF_FOCUS, bool(off <= OUT_OF_FOCUS), text)
 
 
 def _dimensions(
@@ -171,6 +185,7 @@ def _calibration(
     kind: str,
     what: str,
     record: dict[str, float],
+    decisions: tuple[CheckOutcome, ...] = (),
 ) -> Calibration:
     sheet, by_size, by_index = readings.sheet, constants.by_size, constants.by_index
     covariance = by_size @ fit.covariance @ by_size.T + sheet.u_index_ratio**2 * np.outer(by_index, by_index)
@@ -188,7 +203,8 @@ def _calibration(
         covariance=covariance,
         columns=(*readings.words, "size_at_20_c_mm", "residual_um", fit.test, "state"),
         rows=rows,
-        decisions=fit.decisions(),
+        decisions=(*decisions, *fit.decisions()),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
@@ -205,5 +221,19 @@ def _calibration(
     )
 
 
-PRISM_RECIPE = CalibrationKind("constants of a glass prism from its measured height", PRISM_LAYOUT, calibrate_prism)
-BALL_RECIPE = CalibrationKind("constants of a ball cat's-eye from its measured radii", BALL_LAYOUT, calibrate_ball)
+PRISM_RECIPE = CalibrationKind(
+    "constants of a glass prism from its measured height",
+    PRISM_LAYOUT,
+    calibrate_prism,
+    plausible=Plausibility(
+        scatter=ReadingScatter(50.0, "µm", 1e-3, "a micrometer or measuring machine repeats to some µm"),
+    ),
+)
+BALL_RECIPE = CalibrationKind(
+    "constants of a ball cat's-eye from its measured radii",
+    BALL_LAYOUT,
+    calibrate_ball,
+    plausible=Plausibility(
+        scatter=ReadingScatter(50.0, "µm", 1e-3, "a micrometer or measuring machine repeats to some µm"),
+    ),
+)

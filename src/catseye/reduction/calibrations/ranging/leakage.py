@@ -11,9 +11,17 @@ import numpy as np
 
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
-from catseye.reduction.calibrations.calibration import Calibration, Cell, CheckOutcome
-from catseye.reduction.calibrations.fit import CalibrationFit, FitOptions, ObservedScatter, fit_readings
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
+from catseye.reduction.calibrations.calibration import Calibration, Cell
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
+from catseye.reduction.calibrations.fit import SCATTER_LIMIT, CalibrationFit, FitOptions, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    Plausibility,
+    PlausibleSpan,
+    ReadingScatter,
+    provenance,
+    scatter_notes,
+)
 from catseye.reduction.calibrations.ranging.phasors import COLUMNS, MILLIVOLT, leakage_record, phasors, polar_quantities
 
 KIND = "leakage"
@@ -75,6 +83,31 @@ def _scatter(readings: SheetReadings, names: tuple[str, ...], sessions: int) -> 
     return ObservedScatter(claimed, unknown)
 
 
+def _quadratures_decision(fit: CalibrationFit, z: np.ndarray, names: tuple[str, ...]) -> CheckOutcome:
+    """Whether both quadratures scatter alike within sessions: a channel of other gain, or a column changed, does not.
+
+    Source: [FOERSTNER16] chapter 4 (Fisher's test of two variances), both sides, at the kind's share of the level.
+    """
+    from scipy.stats import f as fisher
+
+    on, name = fit.active[: len(z)], "quadratures: ratio of their scatters"
+    kept, groups = z[on], np.array(names)[on]
+    inner = kept - np.array([kept[groups == one].mean() for one in groups])
+    degrees = len(kept) - len(set(groups))
+    squares = np.array([np.sum(inner.real**2), np.sum(inner.imag**2)])
+    if degrees < 1 or not squares.all():
+        return CheckOutcome(name, float("nan"), float("nan"), None, "too few buffers in a session to compare them")
+    ratio, limit = float(squares.max() / squares.min()), float(fisher.isf(0.5 * SCATTER_LIMIT, degrees, degrees))
+    larger = ("the real part", "the imaginary part")[int(np.argmax(squares))]
+    text = "both quadratures scatter alike"
+    if ratio > limit:
+        text = (
+            f"{larger} scatters {np.sqrt(ratio):.2f} times as much as the other: gains out of balance, or a "
+            "column that is not in volts"
+        )
+    return CheckOutcome(name, float(np.sqrt(ratio)), float(np.sqrt(limit)), bool(ratio <= limit), text)
+
+
 def _sessions_decision(sheet: LeakageSheet, sessions: int) -> CheckOutcome:
     """Whether the sessions tell how the leakage differs from one to the next."""
     name = "sessions"
@@ -87,7 +120,7 @@ def _sessions_decision(sheet: LeakageSheet, sessions: int) -> CheckOutcome:
             "too few to tell how the leakage differs from one to the next: u_leakage_volt may be far too small; "
             "measure more, or state u_session_volt"
         )
-    return CheckOutcome(name, float(sessions), float(FEWEST_SESSIONS), enough, text)
+    return CheckOutcome(name, float(sessions), float(FEWEST_SESSIONS), enough, text, least=True)
 
 
 def _rows(
@@ -151,7 +184,12 @@ def _calibration(
             "state",
         ),
         rows=_rows(readings, fit, z, names),
-        decisions=(_sessions_decision(sheet, sessions), *fit.decisions()),
+        decisions=(
+            _sessions_decision(sheet, sessions),
+            _quadratures_decision(fit, z, names),
+            *fit.decisions(),
+        ),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(*notes, *scatter_notes(fit, "mV", MILLIVOLT)),
@@ -170,4 +208,12 @@ def _calibration(
     )
 
 
-RECIPE = CalibrationKind("leakage from buffers with the beam blocked", LAYOUT, calibrate_leakage)
+RECIPE = CalibrationKind(
+    "leakage from buffers with the beam blocked",
+    LAYOUT,
+    calibrate_leakage,
+    plausible=Plausibility(
+        scatter=ReadingScatter(5.0, "mV", MILLIVOLT, "a thousandth of a full return of 5 V"),
+        sizes={"leakage_amplitude_volt": PlausibleSpan(0.0, 0.5, "a tenth of a full return of 5 V", u=0.05)},
+    ),
+)

@@ -14,15 +14,24 @@ from catseye.constants import SPEED_OF_LIGHT, TWO_PI
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.records.files.refusal import refusal
-from catseye.reduction.calibrations.calibration import Calibration, Cell, CheckOutcome
-from catseye.reduction.calibrations.fit import CalibrationFit, FitOptions, ObservedScatter, fit_readings
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, scatter_notes
+from catseye.reduction.calibrations.calibration import Calibration, Cell
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
+from catseye.reduction.calibrations.fit import SCATTER_LIMIT, CalibrationFit, FitOptions, ObservedScatter, fit_readings
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    Plausibility,
+    PlausibleSpan,
+    ReadingScatter,
+    provenance,
+    scatter_notes,
+)
 from catseye.reduction.calibrations.ranging.phasors import COLUMNS, MILLIVOLT, leakage_record, phasors, polar_quantities
 from catseye.signal.systematics.leakage import circle_leakage
 
 KIND = "leakage-lit"
 SCATTER = "scatter of one quadrature"
 ROUNDS = 20
+FEWEST_OF_ELLIPSE = 10  # phasors; five terms are fitted, as many remain
 SHORTEST_ARC = 0.5 * np.pi  # rad; a shorter one does not tell the centre from the radius in the face of small biases
 
 
@@ -122,11 +131,54 @@ def _scatter(readings: SheetReadings, quadratures: int) -> ObservedScatter:
     return ObservedScatter(np.zeros((quadratures * m,) * 2), {SCATTER: np.eye(quadratures * m)})
 
 
+def _explained(fit: CalibrationFit, z: np.ndarray) -> float:
+    """Share of the phasors' variance about their mean that the turning light explains."""
+    on = fit.active[: len(z)]
+    total = float(np.sum(np.abs(z[on] - z[on].mean()) ** 2))
+    return 1.0 - float(np.sum(fit.residual[fit.active] ** 2)) / total if total > 0.0 else 0.0
+
+
 def _arc(arm: np.ndarray) -> float:
     """Angle of the circle that phasors cover, rad: a turn less the largest gap."""
     angle = np.sort(np.mod(np.angle(arm), TWO_PI))
     gaps = np.diff(np.append(angle, angle[0] + TWO_PI))
     return float(TWO_PI - gaps.max())
+
+
+def _balance(fit: CalibrationFit, z: np.ndarray, leakage: complex) -> CheckOutcome:
+    """Whether the phasors turn on a circle and not on an ellipse, as quadratures of unequal gain or angle make it.
+
+    An ellipse of half axes r (1 + e) and r (1 - e) stands r e cos 2(t - t_0) off its circle, t the angle about the
+    centre; the pair of terms is tested by Fisher's F.
+
+    Source: [FOERSTNER16] chapter 4 (test of a group of parameters), at the kind's share of the level.
+    """
+    from scipy.stats import f as fisher
+
+    name, m = "ellipse: half axes' difference over their sum", len(z)
+    on = fit.active[:m]
+    arm = (z - leakage)[on]
+    if len(arm) < FEWEST_OF_ELLIPSE:
+        return CheckOutcome(name, float("nan"), float("nan"), None, "too few phasors to tell a circle from an ellipse")
+    way = arm / np.abs(arm)
+    residual = fit.residual[:m][on]
+    off = np.real((residual + 1j * fit.residual[m:][on]) * np.conj(way)) if len(fit.residual) > m else residual
+    twice = np.column_stack([np.ones(len(arm)), way.real, way.imag, (way**2).real, (way**2).imag])
+    found = np.linalg.lstsq(twice, off, rcond=None)[0]
+    left, degrees = float(np.sum((off - twice @ found) ** 2)), len(arm) - twice.shape[1]
+    of_two = np.linalg.inv(twice.T @ twice)[3:, 3:]
+    squares = float(found[3:] @ np.linalg.solve(of_two, found[3:])) / 2.0
+    limit = float(fisher.isf(SCATTER_LIMIT, 2, degrees))
+    radius = float(np.mean(np.abs(arm)))
+    share = float(np.hypot(*found[3:])) / radius
+    most = share * np.sqrt(limit * max(left, 1e-300) / degrees / max(squares, 1e-300))
+    text = "the phasors lie on a circle"
+    if share > most:
+        text = (
+            f"the phasors lie on an ellipse of axes 1 : {(1.0 - share) / (1.0 + share):.4f}: the quadratures are "
+            "out of balance (gain, or angle between them)"
+        )
+    return CheckOutcome(name, share, float(most), bool(share <= most), text, grave=False)
 
 
 def _rows(
@@ -170,6 +222,7 @@ def _calibration(
         arc >= SHORTEST_ARC,
         f"the phasors cover {np.degrees(arc):.0f}° of the circle"
         + ("" if known else ", and its amplitude is taken to be constant"),
+        least=True,
     )
     return Calibration(
         kind=KIND,
@@ -179,7 +232,9 @@ def _calibration(
         covariance=polar,
         columns=("reading", "real_mv", "imaginary_mv", "residual_mv", f"largest |{fit.test}|", "state"),
         rows=_rows(readings, fit, z, statistic, known=known),
-        decisions=(covered, *fit.decisions()),
+        decisions=(covered, *fit.decisions(), _balance(fit, z, leakage)),
+        explained=_explained(fit, z),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
@@ -206,4 +261,14 @@ def _calibration(
     )
 
 
-RECIPE = CalibrationKind("leakage from a retroreflector moved along a rail", LAYOUT, calibrate_lit_leakage)
+RECIPE = CalibrationKind(
+    "leakage from a retroreflector moved along a rail",
+    LAYOUT,
+    calibrate_lit_leakage,
+    plausible=Plausibility(
+        scatter=ReadingScatter(5.0, "mV", MILLIVOLT, "a thousandth of a full return of 5 V"),
+        sizes={"leakage_amplitude_volt": PlausibleSpan(0.0, 0.5, "a tenth of a full return of 5 V", u=0.05)},
+        explained=0.99,
+        varying={"distance_m": 0.0},
+    ),
+)

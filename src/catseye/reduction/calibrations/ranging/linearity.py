@@ -13,15 +13,25 @@ from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.errors import EstimationError
 from catseye.estimation.quality.reliability import single_level
 from catseye.records.files.readings import SheetReadings
-from catseye.reduction.calibrations.calibration import Calibration, Cell, CheckOutcome, Quantity, RecordValue
-from catseye.reduction.calibrations.fit import CalibrationFit, Effect, FitOptions, fit_readings
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
+from catseye.reduction.calibrations.calibration import Calibration, Cell, Quantity, RecordValue
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
+from catseye.reduction.calibrations.fit import TESTS, CalibrationFit, Effect, FitOptions, fit_readings
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    Plausibility,
+    PlausibleSpan,
+    ReadingScatter,
+    provenance,
+    quantities,
+    scatter_notes,
+)
 from catseye.reduction.calibrations.ranging.cyclic import cyclic_effects
 from catseye.reduction.calibrations.ranging.rail import KIND, LAYOUT, LinearitySheet, Rail, rail_of
 from catseye.reduction.calibrations.ranging.spectrum import spectrum
 from catseye.signal.systematics.cyclic import cyclic_design, separable_orders
 
 ORDER_LEVEL = 0.05  # chance that any order is taken where there is none
+LINE_LEVEL = 0.05 / TESTS  # chance that noise alone is called a line
 
 
 def calibrate_linearity(readings: SheetReadings, reject: bool = False) -> Calibration:
@@ -137,7 +147,8 @@ def _chosen(
         statistic = (squares[k - 1] - squares[k]) / 2.0 / scale
         significant = bool(statistic > limit)
         highest = k if significant else highest
-        text = f"F test of its two terms at the level {single:.2g}: {'' if significant else 'not '}significant"
+        found = "significant" if significant else "not significant"
+        text = f"{found} by the F test of its two terms at the level {single:.2g}"
         outcomes.append(CheckOutcome(f"cyclic order {k}: F", float(statistic), limit, None, text))
     return kept[:highest], tuple(outcomes)
 
@@ -202,10 +213,11 @@ def _line_decision(period: np.ndarray, height: np.ndarray, chance: np.ndarray) -
     return CheckOutcome(
         "spectrum of residuals: chance of the highest line",
         float(chance[top]),
-        0.05,
-        bool(chance[top] >= 0.05),
+        LINE_LEVEL,
+        bool(chance[top] >= LINE_LEVEL),
         f"{height[top] / (1e-3 * MILLIMETRE):.2g} µm at a period of {period[top] * 1e3:.4g} mm, where the line is "
         "least likely",
+        least=True,
     )
 
 
@@ -276,6 +288,7 @@ def _calibration(
         ),
         rows=_rows(readings, rail, fit),
         decisions=(*decisions, _line_decision(period, height, chance)),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=_notes(fit, calibrated, count, reason, chosen=sheet.orders is None),
@@ -314,5 +327,15 @@ def _curve(rail: Rail, fit: CalibrationFit, orders: tuple[int, ...], at: np.ndar
 
 
 RECIPE = CalibrationKind(
-    "zero, scale and cyclic terms against an interferometer along a rail", LAYOUT, calibrate_linearity
+    "zero, scale and cyclic terms against an interferometer along a rail",
+    LAYOUT,
+    calibrate_linearity,
+    plausible=Plausibility(
+        scatter=ReadingScatter(50.0, "µm", 1e-3 * MILLIMETRE, "3 mrad of phase, half a wavelength of 0.1 m"),
+        sizes={
+            "zero_mm": PlausibleSpan(-20.0, 20.0, "a reference distance that was taken from the drawing"),
+            "scale_ppm": PlausibleSpan(-1e3, 1e3, "air left out makes 300 ppm, an oscillator of its own 100"),
+            "cyclic_*_mm": PlausibleSpan(-5.0, 5.0, "a leakage of a third of the return", u=0.5),
+        },
+    ),
 )

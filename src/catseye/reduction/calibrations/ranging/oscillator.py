@@ -10,9 +10,10 @@ import numpy as np
 from catseye.constants import TWO_PI
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
-from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome, Quantity
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance
-from catseye.signal.drift.allan import allan_deviation
+from catseye.reduction.calibrations.calibration import Calibration, Quantity
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
+from catseye.reduction.calibrations.kind import CalibrationKind, Plausibility, PlausibleSpan, provenance
+from catseye.signal.drift.allan import allan_deviation, expected_variance
 from catseye.signal.drift.noise import FEWEST, NoiseSpectrum, noise_spectrum
 
 KIND = "oscillator"
@@ -65,8 +66,8 @@ def measure_oscillator(readings: SheetReadings, reject: bool = False) -> Calibra
         for size, d, (low, high), kind in zip(allan.size, allan.deviation, interval, allan.kind, strict=True)
     )  # fmt: skip
     time = allan.size * sheet.interval_s
-    white = spectrum.white / np.sqrt(allan.size)
-    shown, line = allan.deviation > 0.0, np.full(len(time), spectrum.white > 0.0)  # what has a logarithm
+    fitted = np.sqrt(expected_variance(allan.size, white=spectrum.white, flicker=spectrum.flicker, walk=spectrum.walk))
+    shown, line = allan.deviation > 0.0, fitted > 0.0  # what has a logarithm
     return Calibration(
         kind=KIND,
         title=f"Oscillator test of {sheet.instrument}",
@@ -96,12 +97,13 @@ def measure_oscillator(readings: SheetReadings, reject: bool = False) -> Calibra
         ),
         curve={
             "readings": (np.log10(time[shown]), np.log10(allan.deviation[shown])),
-            "fit": (np.log10(time[line]), np.log10(white[line])),
+            "fit": (np.log10(time[line]), np.log10(fitted[line])),
         },
         axes=("averaging time (log10 of s)", "Allan deviation (log10 of rad)"),
         method="The spectrum of the unwrapped phases, a straight line taken out, is fitted with white, flicker and "
         "random-walk noise by the likelihood of its ordinates, spurs taken out one by one. Beside it the overlapping "
-        "Allan deviation of averages, with 95 % limits; the line in the figure is what white noise alone would do.",
+        "Allan deviation of averages, with 95 % limits; the line in the figure is what the three "
+        "noises together make of it; spurs and drift are not in it.",
         record={q.key: q.value for q in quantity},
     )
 
@@ -131,4 +133,11 @@ def _lines(spectrum: NoiseSpectrum) -> str:
     return "lines at " + ", ".join(f"{s.frequency_hz:.4g} Hz" for s in spectrum.spurs[:SHOWN])
 
 
-RECIPE = CalibrationKind("phase noise of the oscillator against averaging, with spurs", LAYOUT, measure_oscillator)
+RECIPE = CalibrationKind(
+    "phase noise of the oscillator against averaging, with spurs",
+    LAYOUT,
+    measure_oscillator,
+    plausible=Plausibility(
+        sizes={"white_mrad2": PlausibleSpan(0.0, 1e5, "a third of a radian in a cycle: its phase would be lost")},
+    ),
+)

@@ -13,7 +13,8 @@ import numpy as np
 from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.records.files.readings import SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
-from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Quantity
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.fit import (
     CalibrationFit,
     Effect,
@@ -21,7 +22,15 @@ from catseye.reduction.calibrations.fit import (
     ObservedScatter,
     fit_readings,
 )
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    Plausibility,
+    PlausibleSpan,
+    ReadingScatter,
+    provenance,
+    quantities,
+    scatter_notes,
+)
 from catseye.reduction.calibrations.ranging.air import WEATHER, AirSheet, group_air, half_wavelength, ranger_effects
 from catseye.reduction.calibrations.ranging.cyclic import cyclic_effects
 from catseye.reduction.calibrations.ranging.leftover import leakage_effects
@@ -177,7 +186,12 @@ def _calibration(
         covariance=covariance,
         columns=("distance_m", "cycles", "margin_mm", "d0_mm", "residual_um", fit.test, "state"),
         rows=rows,
-        decisions=(_cycles_decision(readings, margin, on), *fit.decisions()),
+        decisions=(
+            _cycles_decision(readings, margin, on),
+            _drawing_decision(sheet, calibrated[0]),
+            *fit.decisions(),
+        ),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
@@ -200,6 +214,18 @@ def _calibration(
     )
 
 
+def _drawing_decision(sheet: ReferenceDistanceSheet, d0: Quantity) -> CheckOutcome:
+    """The D0 found against that of the drawing: both uncertainties together, three of them."""
+    off, u = d0.value - sheet.d0_nominal_mm, float(np.hypot(d0.u, sheet.u_d0_nominal_mm))
+    return CheckOutcome(
+        "D0 less the drawing's, size in mm",
+        abs(off),
+        3.0 * u,
+        bool(abs(off) <= 3.0 * u),
+        f"{off:+.4g} mm from d0_nominal_mm; limit three standard uncertainties",
+    )
+
+
 def _cycles_decision(readings: SheetReadings, margin: np.ndarray, on: np.ndarray) -> CheckOutcome:
     """Is the whole number of cycles of every reading used safe? The margin against the doubt of the coarse length."""
     sheet = readings.sheet
@@ -216,7 +242,19 @@ def _cycles_decision(readings: SheetReadings, margin: np.ndarray, on: np.ndarray
         limit,
         worst >= limit,
         f"{readings.where[least]} decides; {SAFE:g} standard uncertainties of the coarse length must fit in",
+        least=True,
     )
 
 
-RECIPE = CalibrationKind("reference distance D0 from targets at known distances", LAYOUT, calibrate_reference_distance)
+RECIPE = CalibrationKind(
+    "reference distance D0 from targets at known distances",
+    LAYOUT,
+    calibrate_reference_distance,
+    plausible=Plausibility(
+        scatter=ReadingScatter(50.0, "µm", 1e-3 * MILLIMETRE, "3 mrad of phase, half a wavelength of 0.1 m"),
+        sizes={
+            "d0_mm": PlausibleSpan(50.0, 1000.0, "what the sheet allows of the drawing's value", u=1.0),
+            "scale_ppm": PlausibleSpan(-1e3, 1e3, "air left out makes 300 ppm, an oscillator of its own 100"),
+        },
+    ),
+)

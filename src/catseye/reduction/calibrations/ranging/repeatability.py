@@ -9,8 +9,9 @@ from catseye.estimation.quality.repeatability import Repeatability
 from catseye.estimation.quality.repeatability import repeatability as analysed
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
-from catseye.reduction.calibrations.calibration import Calibration, CheckOutcome
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities
+from catseye.reduction.calibrations.calibration import Calibration
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
+from catseye.reduction.calibrations.kind import CalibrationKind, Plausibility, PlausibleSpan, provenance, quantities
 
 KIND = "repeatability"
 MICROMETRE = 1e-3 * MILLIMETRE
@@ -115,4 +116,15 @@ def _deviations(analysis: Repeatability) -> tuple[np.ndarray, np.ndarray]:
     return values, covariance * np.outer(slope, slope)
 
 
-RECIPE = CalibrationKind("scatter of ranges within and between sets", LAYOUT, measure_repeatability)
+RECIPE = CalibrationKind(
+    "scatter of ranges within and between sets",
+    LAYOUT,
+    measure_repeatability,
+    plausible=Plausibility(
+        sizes={
+            "*_um": PlausibleSpan(
+                0.0, 1e3, "60 mrad of phase, half a wavelength of 0.1 m: twenty times a ranger's noise"
+            )
+        },
+    ),
+)

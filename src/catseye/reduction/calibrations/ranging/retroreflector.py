@@ -13,9 +13,18 @@ from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
 from catseye.records.files.readings import TEXT, TIME, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD, Name, Uncertainty, Within
 from catseye.records.files.refusal import refusal, shown
-from catseye.reduction.calibrations.calibration import Calibration, Cell, CheckOutcome
+from catseye.reduction.calibrations.calibration import Calibration, Cell
+from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.fit import CalibrationFit, FitOptions, ObservedScatter, fit_readings
-from catseye.reduction.calibrations.kind import CalibrationKind, provenance, quantities, scatter_notes
+from catseye.reduction.calibrations.kind import (
+    CalibrationKind,
+    Plausibility,
+    PlausibleSpan,
+    ReadingScatter,
+    provenance,
+    quantities,
+    scatter_notes,
+)
 from catseye.reduction.calibrations.ranging.cyclic import cyclic_effects
 
 KIND = "retroreflector"
@@ -169,6 +178,7 @@ def _seatings_decision(readings: SheetReadings, count: int) -> CheckOutcome:
         float(2 * (count + 1)),
         alternations >= 2 * (count + 1),
         "each retroreflector should be seated twice or more: a single one cannot show a bad seat",
+        least=True,
     )
 
 
@@ -200,6 +210,7 @@ def _calibration(readings: SheetReadings, fit: CalibrationFit, unknown: list[str
         columns=("hours", "position", "retroreflector", "range_m", "residual_um", fit.test, "state"),
         rows=_rows(readings, fit),
         decisions=(_seatings_decision(readings, count), *fit.decisions()),
+        fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=(
@@ -226,4 +237,14 @@ def _calibration(readings: SheetReadings, fit: CalibrationFit, unknown: list[str
     )
 
 
-RECIPE = CalibrationKind("range constants of retroreflectors against a known one", LAYOUT, calibrate_retroreflector)
+RECIPE = CalibrationKind(
+    "range constants of retroreflectors against a known one",
+    LAYOUT,
+    calibrate_retroreflector,
+    plausible=Plausibility(
+        scatter=ReadingScatter(50.0, "µm", 1e-3 * MILLIMETRE, "3 mrad of phase, half a wavelength of 0.1 m"),
+        sizes={
+            "pc_*mm": PlausibleSpan(-2000.0, 0.0, "glass makes a range longer: below zero [GOLDMAN00] eq. 3.10", u=1.0)
+        },
+    ),
+)

@@ -224,6 +224,11 @@ class AirField:
                 path.slopes[rows, s + 1 + i] = -own * by_sound
         return path
 
+    def refractivity_of(self, *weather: np.ndarray, wavelength_um: float | None = None) -> np.ndarray:
+        """Group refractivity at temperature °C, pressure hPa, humidity %, by the campaign's formula and light."""
+        light = self.wavelength_um if wavelength_um is None else wavelength_um
+        return np.asarray(group_refractivity(*weather, wavelength_um=light, model=self.model))
+
     @property
     def count(self) -> int:
         """Number p of all parameters."""

@@ -1,0 +1,222 @@
+"""Reasons for observations that contradict each other, each tried on a copy of the network before it is named.
+
+A reason is named only if the network with its cure adjusts inside the limits of its variance factor, and no other cure
+that changes as little does as well. The network itself stays as it is.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any, cast
+
+import numpy as np
+
+from catseye.errors import EstimationError
+from catseye.estimation.least_squares.adjustment import CONVERGED
+from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, label, points_of
+from catseye.estimation.observations.kinds import Distances, ObservationGroup
+from catseye.estimation.quality.reliability import TOO_LARGE, global_test
+from catseye.estimation.quality.robustness import MOST_INFLATION, SnoopingOptions, estimate_robustly, snoop
+
+# How a copy is adjusted: the network, and an inflation of its sigmas (none if None).
+Adjust = Callable[[ObservationNetwork, Sequence[np.ndarray] | None], NetworkSolution]
+
+LEVEL = 0.05  # of the limits of the variance factor, as reports print them
+EXCHANGE_FROM, EXCHANGE_GAIN = 1e3, 1e-2  # variance factor from which exchanged points are tried, and its fall if true
+EXCHANGE_ALL = 300  # points up to which all pairs are tried, and observations are searched one by one
+EXCHANGEABLE = 20  # points with the most observations, that are tried: 190 pairs
+SEARCHED = 60  # points up to which several wrong observations are searched for: some hundred adjustments
+SINGLES = 60  # observations with the largest residuals, that are left out one at a time
+MANY = 0.1  # of the observations: where more had to go, other weights would explain as well
+NAMED = 3  # observations in a sentence
+NEARER = 10.0  # times in squares: of several exchanges that fit, the one that leaves the points where they are given
+HALF_TURN = 0.01  # rad beside pi, within which an angle's error counts as half a turn
+TURNING = ("direction", "angle", "azimuth")  # kinds with a sense, clockwise or not
+MIRRORED = "the sense of the horizontal angles is mirrored: counted the other way the variance factor is {factor}"
+EXCHANGED = "with {first} and {second} exchanged the variance factor is {factor}"
+WITHOUT = "without {names} the variance factor is {factor}"
+OPPOSITE = "{names} is half a turn off: without it the variance factor is {factor}"
+
+
+@dataclass(frozen=True)
+class Cure:
+    """A reason in words, how many things it changes, and the variance factor with its cure."""
+
+    text: str
+    changes: int
+    factor: float
+
+
+@dataclass(frozen=True)
+class NetworkReason:
+    """The end of a status, "" for none, and whether it names a cause rather than a place."""
+
+    text: str
+    named: bool
+
+
+def reason(solution: NetworkSolution, adjust: Adjust) -> NetworkReason:
+    """The one reason whose cure fits, or else where most of the contradiction is.
+
+    solution   an answer that its observations contradict, or that did not converge
+    adjust     how copies of its network are adjusted, without tests
+    """
+    cures = [*_mirrored(solution, adjust), *_exchanged(solution, adjust)]
+    if not cures or solution.status != CONVERGED or _one_explains(solution):
+        cures += _without_one(solution, adjust)
+    cures = cures or list(_without_several(solution, adjust))
+    if cures:
+        least = min(cure.changes for cure in cures)
+        best = [cure for cure in cures if cure.changes == least]
+        if len(best) == 1:
+            return NetworkReason(f"; {best[0].text.replace('{factor}', f'{best[0].factor:.3g}')}", named=True)
+    return NetworkReason(_where(solution), named=False)
+
+
+def fits(solution: NetworkSolution) -> bool:
+    """Whether a solution converged, and no further off than the limits of its variance factor allow."""
+    degrees = solution.degrees_of_freedom
+    if solution.status != CONVERGED or not degrees > 0.5:
+        return False
+    return global_test(solution.variance_factor * degrees, degrees, LEVEL).outcome != TOO_LARGE
+
+
+def turned_round(network: ObservationNetwork) -> ObservationNetwork | None:
+    """The network with its horizontal angles counted the other way; None where it has none."""
+    groups, any_turned = [], False
+    for group in network.groups:
+        turning = np.isin(np.asarray(getattr(group, "kinds", np.zeros(len(group.observed)))), TURNING)
+        any_turned |= bool(turning.any())
+        groups.append(_signed(group, np.where(turning, -1.0, 1.0)) if turning.any() else group)
+    return replace(network, groups=tuple(groups)) if any_turned else None
+
+
+def _signed(group: ObservationGroup, sign: np.ndarray) -> ObservationGroup:
+    covariance = group.covariance
+    if covariance.ndim == 2:
+        covariance = covariance * np.outer(sign, sign)
+    return cast(ObservationGroup, replace(cast(Any, group), observed=sign * group.observed, covariance=covariance))
+
+
+def _mirrored(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure]:
+    turned = turned_round(solution.network)
+    if turned is not None:
+        trial = adjust(turned, None)
+        if fits(trial):
+            yield Cure(MIRRORED, 1, trial.variance_factor)
+
+
+def _exchanged(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure]:
+    """The exchange of two points whose coordinates refer to something, held or in the datum."""
+    network, names = solution.network, solution.network.points.names
+    if not solution.variance_factor > EXCHANGE_FROM or _one_explains(solution):
+        return
+    total, number = _by_point(solution)
+    likely = np.argsort(-number, kind="stable")[:EXCHANGEABLE]
+    if len(names) > EXCHANGE_ALL:  # only the worst fitting of them, for the trials take long
+        likely = likely[np.argsort(-total[likely] / np.maximum(number[likely], 1.0))][:6]
+    marked = (network.points.fixed | network.points.datum).any(axis=1)
+    trials = []
+    for i, j in combinations(sorted(int(k) for k in likely), 2):
+        if not (marked[i] or marked[j]) or np.any(network.points.absent[i] != network.points.absent[j]):
+            continue
+        xyz, order = network.points.xyz.copy(), [j, i]
+        xyz[[i, j]] = xyz[order]
+        trial = adjust(replace(network, points=replace(network.points, xyz=xyz)), None)
+        if trial.variance_factor < EXCHANGE_GAIN * solution.variance_factor and fits(trial):
+            trials.append((float(np.nansum((trial.x - xyz) ** 2)), i, j, trial.variance_factor))
+    trials.sort()  # a symmetric network fits after other exchanges too, but far from the given coordinates
+    if trials and (len(trials) == 1 or trials[1][0] > NEARER * trials[0][0]):
+        _, i, j, factor = trials[0]
+        yield Cure(EXCHANGED.replace("{first}", names[i]).replace("{second}", names[j]), 1, factor)
+
+
+def _without_one(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure]:
+    """Single observations without which the others agree, tried one by one from the largest residual on."""
+    network = solution.network
+    if len(network.points.names) > EXCHANGE_ALL:
+        return
+    size = [np.where(f.active, np.abs(f.residual) / f.sigma, 0.0) for f in solution.fits]
+    place = [(g, r) for g, part in enumerate(size) for r in range(len(part))]
+    for k in np.argsort(-np.concatenate([[], *size]), kind="stable")[:SINGLES]:
+        g, r = place[k]
+        inflation = [np.ones(len(part)) for part in size]
+        inflation[g][r] = np.inf
+        trial = _tried(network, inflation, adjust)
+        if trial is not None and fits(trial):
+            error, unit = abs(trial.fits[g].residual[r]), np.asarray(getattr(network.groups[g], "units", [""]))
+            opposite = unit[r % len(unit)] == "rad" and abs(error - np.pi) < HALF_TURN
+            text = (OPPOSITE if opposite else WITHOUT).replace("{names}", label(network, g, r))
+            yield Cure(text, 1, trial.variance_factor)
+
+
+def _without_several(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure]:
+    """The observations that data snooping from a robust start leaves out, in networks that are not too large."""
+    network = solution.network
+    if len(network.points.names) > SEARCHED:
+        return
+    sizes = [len(g.observed) for g in network.groups]
+
+    def solve(inflation: Sequence[np.ndarray]) -> Any:
+        return adjust(network, inflation).fits
+
+    try:
+        start = estimate_robustly(solve, sizes, places=targets_of_ranges(network))
+        options = SnoopingOptions(level=LEVEL)
+        found = snoop(solve, sizes, options=options, start=start.rejected, doubtful=start.undecided)
+    except EstimationError:  # what is left does not hold the network
+        return
+    out = [(g, int(r)) for g, part in enumerate(found.rejected) for r in np.flatnonzero(part)]
+    if not out or any(part.any() for part in found.undecided) or len(out) > max(2, MANY * sum(sizes)):
+        return
+    trial = _tried(network, [np.where(part, np.inf, 1.0) for part in found.rejected], adjust)
+    if trial is not None and fits(trial):
+        more = f" and {len(out) - NAMED} more" if len(out) > NAMED else ""
+        named = ", ".join(label(network, g, r) for g, r in out[:NAMED]) + more
+        yield Cure(WITHOUT.replace("{names}", named), len(out), trial.variance_factor)
+
+
+def _tried(network: ObservationNetwork, inflation: list[np.ndarray], adjust: Adjust) -> NetworkSolution | None:
+    """A trial; None where what is left does not hold the network."""
+    try:
+        return adjust(network, inflation)
+    except EstimationError:
+        return None
+
+
+def targets_of_ranges(network: ObservationNetwork) -> list[np.ndarray]:
+    """For the search at single points: the target of each range, -1 for other observations."""
+    return [points_of(g)[1] if isinstance(g, Distances) else np.full(len(g.observed), -1) for g in network.groups]
+
+
+def inflation_of(rejected: Sequence[np.ndarray], undecided: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Factors on sigmas, one (m,) array a group, that leave out the rejected and give the undecided next to nothing."""
+    return [np.where(r, np.inf, np.where(u, MOST_INFLATION, 1.0)) for r, u in zip(rejected, undecided, strict=True)]
+
+
+def _one_explains(solution: NetworkSolution) -> bool:
+    """Whether all but a hundredth of [pvv] is due to a single observation: without it [pvv] would fall by its w^2."""
+    largest = max(float(np.max(np.where(f.active, f.standardised**2, 0.0), initial=0.0)) for f in solution.fits)
+    squares = solution.variance_factor * solution.degrees_of_freedom
+    return solution.status == CONVERGED and squares - largest < EXCHANGE_GAIN * squares
+
+
+def _by_point(solution: NetworkSolution) -> tuple[np.ndarray, np.ndarray]:
+    """Sum of squared residuals in sigmas, and number, of the observations at each point (n,)."""
+    count = len(solution.network.points.names)
+    total, number = np.zeros(count), np.zeros(count)
+    for group, fit in zip(solution.network.groups, solution.fits, strict=True):
+        for end in points_of(group):
+            used = (end >= 0) & fit.active
+            total += np.bincount(end[used], (fit.residual[used] / fit.sigma[used]) ** 2, count)
+            number += np.bincount(end[used], minlength=count)
+    return total, number
+
+
+def _where(solution: NetworkSolution) -> str:
+    """The two points with most of the contradiction, if they stand out."""
+    total, number = _by_point(solution)
+    share = total / np.maximum(number, 1.0)
+    usual = np.median(share[number > 0]) if np.any(number > 0) else np.inf
+    names = [solution.network.points.names[i] for i in np.argsort(-share)[:2] if share[i] > 4.0 * usual]
+    return f"; most of it at {' and '.join(names)}" if names else ""

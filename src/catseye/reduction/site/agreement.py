@@ -1,0 +1,188 @@
+"""Two records of one thing, compared: barometers, hygrometers, a typed distance and the coordinates of its ends.
+
+Pure: numbers in, disagreements out. A disagreement accuses one of the two only where something decides between them:
+a pressure that, reduced to sea level by the standard air, weather has never reached.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from catseye.atmosphere.weather.barometer import carried_pressure
+from catseye.atmosphere.weather.humidity import relative_humidity_percent, vapour_pressure_hpa
+from catseye.constants import MILLIMETRE
+
+SURE = 5.0  # standard uncertainties of a difference beyond which two records disagree
+U_BAROMETER_HPA = 0.3  # chosen: an electronic barometer some years after its certificate
+U_HYGROMETER_PERCENT = 3.0  # chosen: a capacitive sensor in the open
+U_AIR_C, U_LAPSE_C_PER_M = 1.0, 0.02  # chosen: of the layer between two stations; a clear night's inversion
+U_WAVE_HPA = 0.5  # amplitude of pressure waves that cross a site, the largest usual: Stull (1988) chapter 12
+U_DEW_POINT_C = 1.0  # chosen: of the air at one station against another's, some 6.5 % of its vapour
+VAPOUR_PER_C = 0.065  # relative change of saturation pressure a degree, near 15 °C
+SEA_LEVEL_HPA = (870.0, 1085.0)  # lowest and highest pressure that weather made, at sea level: [WMOARC25]
+UNITS, NEAR = {"millimetres": 1e-3, "feet": 0.3048, "centimetres": 1e-2}, 0.01  # m; how near a ratio has to come
+STANDARD_C, STANDARD_LAPSE = 15.0, 0.0065  # °C at sea level, °C/m: [ICAO93]
+
+
+@dataclass(frozen=True, eq=False)
+class StationSeries:
+    """A weather station's readings.
+
+    elevation_m   above the sea, with u_elevation_m
+    mjd           (n,) UTC, rising
+    temperature_c, pressure_hpa, humidity_percent   (n,)
+    u_pressure_hpa, u_humidity_percent   of the sensors' offsets
+    """
+
+    name: str
+    elevation_m: float
+    mjd: np.ndarray
+    temperature_c: np.ndarray
+    pressure_hpa: np.ndarray
+    humidity_percent: np.ndarray
+    u_elevation_m: float = 1.0
+    u_pressure_hpa: float = U_BAROMETER_HPA
+    u_humidity_percent: float = U_HYGROMETER_PERCENT
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """Two records that cannot both be right.
+
+    what          "barometers" and so on
+    first, second   their names
+    difference, u   first less second, in the unit
+    unit          of both
+    accused       the one that is wrong; "" where nothing decides
+    reason        why that one, or what does not decide
+    """
+
+    what: str
+    first: str
+    second: str
+    difference: float
+    u: float
+    unit: str
+    accused: str
+    reason: str
+
+    @property
+    def text(self) -> str:
+        """The disagreement as a note.
+
+        >>> Disagreement("barometers", "WX1", "WX2", 86.04, 0.8, "hPa", "", "nothing decides").text
+        'the barometers of WX1 and WX2 disagree by 86 hPa (u 0.8 hPa): nothing decides'
+        """
+        size = f"{abs(self.difference):.3g} {self.unit} (u {self.u:.2g} {self.unit})"
+        return f"the {self.what} of {self.first} and {self.second} disagree by {size}: {self.reason}"
+
+
+def weather_disagreements(stations: Sequence[StationSeries]) -> tuple[Disagreement, ...]:
+    """Barometers and hygrometers of each two stations that cannot both be right, over the time that both cover."""
+    found = []
+    for first, second in combinations(stations, 2):
+        pair = _together(first, second)
+        if pair is not None:
+            found += [each for each in (_barometers(*pair), _hygrometers(*pair)) if each is not None]
+    return tuple(found)
+
+
+def distance_disagreement(
+    names: tuple[str, str], typed: float, u_typed: float, *, ends: np.ndarray, covariance: np.ndarray
+) -> Disagreement | None:
+    """A typed distance against the coordinates of its ends; None where both may be right.
+
+    names        of the ends
+    typed        m, with u_typed
+    ends         (2, 3) m
+    covariance   (6, 6) m², of both ends
+    """
+    span = np.asarray(ends[0], dtype=float) - np.asarray(ends[1], dtype=float)
+    length = float(np.linalg.norm(span))
+    along = np.concatenate([span, -span]) / length if length > 0.0 else np.zeros(6)
+    u = float(np.sqrt(u_typed**2 + along @ covariance @ along))
+    difference = typed - length
+    if not abs(difference) > SURE * u:
+        return None
+    reason = _factor(typed / length if length > 0.0 else np.inf)
+    return Disagreement(
+        "typed distance and coordinates",
+        *names,
+        difference / MILLIMETRE,
+        u / MILLIMETRE,
+        "mm",
+        accused="",
+        reason=reason,
+    )
+
+
+def _factor(ratio: float) -> str:
+    """What a ratio of two lengths looks like."""
+    for text, value in UNITS.items():
+        if min(abs(ratio / value - 1.0), abs(ratio * value - 1.0)) < NEAR:
+            return f"one looks like {text}, the other like metres"
+    return "nothing here says which is wrong"
+
+
+def _together(first: StationSeries, second: StationSeries) -> tuple[StationSeries, StationSeries] | None:
+    """Both at the times of the first that lie within the second's; None where there are none."""
+    inside = (first.mjd >= second.mjd.min()) & (first.mjd <= second.mjd.max())
+    if not inside.any():
+        return None
+    when = first.mjd[inside]
+    columns = ("temperature_c", "pressure_hpa", "humidity_percent")
+    own = {name: getattr(first, name)[inside] for name in columns}
+    other = {name: np.interp(when, second.mjd, getattr(second, name)) for name in columns}
+    return replace(first, mjd=when, **own), replace(second, mjd=when, **other)
+
+
+def _barometers(first: StationSeries, second: StationSeries) -> Disagreement | None:
+    """The first's pressure carried to the second's elevation, against what is read there."""
+    carried = carried_pressure(
+        first.pressure_hpa, first.temperature_c, first.elevation_m, z_to=second.elevation_m,
+        lapse_c_per_m=STANDARD_LAPSE,
+    )  # fmt: skip
+    u_rise = float(np.hypot(first.u_elevation_m, second.u_elevation_m))
+    spread = carried.standard_uncertainty_hpa(
+        first.u_pressure_hpa, u_temperature_c=U_AIR_C, u_lapse=U_LAPSE_C_PER_M, u_rise=u_rise
+    )
+    u = float(np.sqrt(np.mean(spread**2) + second.u_pressure_hpa**2 + U_WAVE_HPA**2))
+    difference = float(np.mean(carried.pressure_hpa - second.pressure_hpa))
+    if not abs(difference) > SURE * u:
+        return None
+    reduced = {each.name: _at_sea_level(each) for each in (first, second)}
+    beyond = [name for name, p in reduced.items() if not SEA_LEVEL_HPA[0] <= p <= SEA_LEVEL_HPA[1]]
+    if len(beyond) == 1:
+        reason = (
+            f"{beyond[0]}'s is wrong, or its elevation: reduced to sea level it is {reduced[beyond[0]]:.0f} hPa, where "
+            f"weather makes {SEA_LEVEL_HPA[0]:.0f} to {SEA_LEVEL_HPA[1]:.0f}"
+        )
+        return Disagreement("barometers", first.name, second.name, difference, u, "hPa", beyond[0], reason)
+    reason = "their heights and standard air do not say which of them is wrong"
+    return Disagreement("barometers", first.name, second.name, difference, u, "hPa", "", reason)
+
+
+def _at_sea_level(station: StationSeries) -> float:
+    """Mean pressure reduced to sea level by the standard atmosphere, hPa."""
+    here_c = STANDARD_C - STANDARD_LAPSE * station.elevation_m
+    mean = float(np.mean(station.pressure_hpa))
+    return float(carried_pressure(mean, here_c, station.elevation_m, z_to=0.0).pressure_hpa)
+
+
+def _hygrometers(first: StationSeries, second: StationSeries) -> Disagreement | None:
+    """The first's vapour, its share of the air held, as relative humidity in the second's air."""
+    vapour = vapour_pressure_hpa(first.temperature_c, first.pressure_hpa, first.humidity_percent)
+    # by the standard air's rise, not the barometers: they may be what is wrong
+    carried = carried_pressure(first.pressure_hpa, first.temperature_c, first.elevation_m, z_to=second.elevation_m)
+    there = vapour * carried.pressure_hpa / first.pressure_hpa
+    expected = relative_humidity_percent(there, second.temperature_c, carried.pressure_hpa)
+    gain = expected / np.maximum(first.humidity_percent, 1.0)
+    natural = VAPOUR_PER_C * U_DEW_POINT_C * np.maximum(expected, second.humidity_percent)
+    u = float(np.sqrt(np.mean((gain * first.u_humidity_percent) ** 2 + natural**2) + second.u_humidity_percent**2))
+    difference = float(np.mean(expected - second.humidity_percent))
+    if not abs(difference) > SURE * u:
+        return None
+    reason = "in one air both cannot be right, and nothing here says which is wrong"
+    return Disagreement("hygrometers", first.name, second.name, difference, u, "%", "", reason)

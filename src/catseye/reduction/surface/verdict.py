@@ -1,0 +1,100 @@
+"""Verdict of surfaces: where the prisms stand, what a dish can be, errors above the noise, what they rest on."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from catseye.constants import DEGREE, MILLIMETRE
+from catseye.reduction.site.posture import SURE, largest_correction
+from catseye.reduction.surface.actuators import Actuators
+from catseye.reduction.surface.change import Change
+from catseye.reduction.surface.lookup import Lookup
+from catseye.reduction.surface.placement import TRAVEL, DishPlacement
+from catseye.reduction.surface.shape import MeanSquare, SurfaceShape
+from catseye.verdict import Verdict
+
+LARGEST_FACTOR = 2.0  # variance factor of a look-up table's model beyond which its epochs disagree
+CLEAR = 2.0  # standard uncertainties by which a mean square stands out: 95 %
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceFindings:
+    """All that one call of `catseye surface` found: an epoch, a change, a look-up table; perhaps actuators.
+
+    placements   of each shape's prisms on the site's dish
+    """
+
+    shapes: tuple[SurfaceShape, ...]
+    change: Change | None = None
+    lookup: Lookup | None = None
+    actuators: Actuators | None = None
+    placements: tuple[DishPlacement, ...] = ()
+
+
+def surface_verdict(result: SurfaceFindings) -> Verdict:
+    """Prisms on the site's dish, errors above the noise, epochs that fit the look-up table, and what they rest on."""
+    sources = {shape.prisms.source: shape.prisms.verdict for shape in result.shapes}
+    return _own_verdict(result).resting_on(sources)
+
+
+def _own_verdict(result: SurfaceFindings) -> Verdict:
+    for shape, placement in zip(result.shapes, result.placements, strict=False):
+        if placement.doubt:
+            return Verdict("failed" if placement.cures else "doubtful", f"{shape.prisms.source}: {placement.doubt}")
+    for shape in result.shapes:
+        if doubt := _implausible(shape):
+            return Verdict("doubtful", f"{shape.prisms.source}: {doubt}")
+    if result.lookup is not None:
+        return _of_lookup(result)
+    noisy = [shape for shape in result.shapes if not stands_out(shape.square)]
+    if noisy:
+        return Verdict("doubtful", f"{noisy[0].prisms.source}: no error of the surface stands out from the noise")
+    prisms = ", ".join(str(len(shape.prisms.names)) for shape in result.shapes)
+    held = "" if "focal-length" in result.shapes[-1].fit.free else ", focal length held"
+    return Verdict("good", f"{prisms} prisms hold the paraboloid{held}, and its errors stand out from the noise")
+
+
+def _of_lookup(result: SurfaceFindings) -> Verdict:
+    assert result.lookup is not None
+    factors = [m.variance_factor for m in result.lookup.models if np.isfinite(m.variance_factor)]
+    if not factors:
+        return Verdict("doubtful", "as many terms as epochs: nothing checks the look-up table")
+    if max(factors) > LARGEST_FACTOR:
+        most = max(factors)
+        return Verdict("doubtful", f"epochs scatter about the look-up table with a variance factor up to {most:.1f}")
+    return Verdict("good", f"a look-up table of {len(result.shapes)} epochs, which scatter about it as they claim")
+
+
+def stands_out(square: MeanSquare) -> bool:
+    """Errors above the measurement's noise, with 95 %."""
+    return bool(square.own > CLEAR * square.u)
+
+
+def _implausible(shape: SurfaceShape) -> str:
+    """What of a fit no dish of the site can be; "" of a plausible one.
+
+    The surface lies within the actuators' travel t; so does a change of focal length, which moves the rim of radius R
+    by R² / 4f² of it; the dish stands where encoders say, to the largest correction of the pointing series.
+    """
+    fit, aperture = shape.fit, shape.aperture
+    worst = int(np.argmax(np.abs(fit.deviation)))
+    if not abs(fit.deviation[worst]) <= TRAVEL:
+        off = fit.deviation[worst] / MILLIMETRE
+        return f"{shape.prisms.names[worst]} is {off:+.0f} mm off the paraboloid, beyond {TRAVEL / MILLIMETRE:g} mm"
+    change = fit.focal_length - aperture.focal_length
+    most = TRAVEL * (2.0 * aperture.focal_length / aperture.radius) ** 2
+    if abs(change) > most + SURE * fit.u_focal_length:
+        return (
+            f"focal length {fit.focal_length:.3f} m, the site's is {aperture.focal_length:.3f} m (expected within "
+            f"{most:.2f} m): another dish?"
+        )
+    u = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    limit = largest_correction()
+    if np.any(np.abs(fit.rotation) > limit + SURE * u[3:]):
+        turn = np.linalg.norm(fit.rotation) / DEGREE
+        return f"the dish is turned by {turn:.3f} degrees against the posture (expected up to {limit / DEGREE:.3f})"
+    arm = float(np.linalg.norm(aperture.centre)) + aperture.radius
+    if np.any(np.abs(fit.translation) > limit * arm + SURE * u[:3]):
+        shift = np.linalg.norm(fit.translation)
+        return f"the vertex is {shift:.3f} m off its nominal place (expected up to {limit * arm:.2f} m)"
+    return ""

@@ -1,0 +1,35 @@
+"""Stations of a campaign that contradict each other: told in its notes, and no answer that rests on them is good."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from catseye.gateways.epoch.summary import verdict
+from catseye.reduction.epoch.epoch import reduce_epoch
+
+
+def with_offset(campaign, station, **offset):
+    weather = campaign.weather
+    own = np.array(weather.station) == station
+    changed = {name: getattr(weather, name) + np.where(own, value, 0.0) for name, value in offset.items()}
+    return dataclasses.replace(campaign, weather=dataclasses.replace(weather, **changed))
+
+
+def test_night_01s_stations_agree(few_01):
+    notes = reduce_epoch(few_01).notes
+    assert not any("disagree" in note for note in notes)
+
+
+@pytest.mark.parametrize(
+    ("offset", "said"),
+    [({"pressure_hpa": 86.0}, "barometers"), ({"humidity_percent": -45.0}, "hygrometers")],
+)
+def test_stations_that_disagree_are_told_and_neither_thermometer_alone_is_blamed(few_01, offset, said):
+    reduction = reduce_epoch(with_offset(few_01, "WX2", **offset))
+    (note,) = [n for n in reduction.notes if "disagree" in n]
+    assert said in note
+    assert "WX1" in note
+    assert "WX2" in note
+    assert verdict(reduction).word != "good"
+    assert note in reduction.coordinates.doubts
