@@ -131,7 +131,7 @@ def compare(
     """
     _check_alike(first, second)
     common, alike = paired_names(first, second)
-    held = DatumConnection.of(first, second, datum, options.rounding, alike)
+    held = DatumConnection.of(first, second, datum, options.rounding)
     names = _names(common, points, held)
     model = EpochModel.of(first, second, names, held)
     factor, homogeneity = _factor(first, second)

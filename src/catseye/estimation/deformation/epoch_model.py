@@ -81,14 +81,9 @@ class DatumConnection:
 
     @classmethod
     def of(
-        cls,
-        first: NetworkSolution,
-        second: NetworkSolution,
-        datum: str | None,
-        rounding: float,
-        alike: Sequence[tuple[str, str]] = (),
+        cls, first: NetworkSolution, second: NetworkSolution, datum: str | None, rounding: float
     ) -> "DatumConnection":
-        """Of two adjusted epochs; arguments as of `compare`, and pairs of names that differ only by case."""
+        """Of two adjusted epochs; arguments as of `compare`."""
         if datum is not None and datum not in DATUMS:
             raise EstimationError(f"datum {datum!r} is none of {', '.join(DATUMS)}")
         floats = [_floating(s) for s in (first, second)]
@@ -162,13 +157,6 @@ def _refuse_foreign(
                 raise EstimationError(STRANGE.format(which=which, names=held, alike=alike))
             text = PARTLY if which == "second" and carried else FOREIGN
             raise EstimationError(text.format(which=which, names=held, apart=max(known)))
-
-
-def _alike(alike: Sequence[tuple[str, str]], strange: dict[tuple[str, int], float]) -> str:
-    """Of these points those whose name stands in the other epoch in other case, in words."""
-    held = {name for name, _ in strange}
-    pairs = [f"{a} and {b}" for a, b in alike if held & {a, b}]
-    return f" (names that differ only by upper and lower case: {listed(pairs)})" if pairs else ""
 
 
 def _least_datum(kinds: np.ndarray) -> str:
