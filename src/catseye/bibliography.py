@@ -56,6 +56,8 @@ SOURCES: dict[str, Source] = {
             "figure 1.1 (REFRACT.EQ) sets the wet bulb tp = t after the psychrometer's equations, which then see "
             "saturated air",
             "4.3 prints gamma_w = 1.004 for water vapour, about 1.33 is right: humid air 0.5 m/s faster at 20 °C, 50 %",
+            "figure 4.1 (SOUND.EQ) takes the power 1/2 of 4.3's bracket, -1/2 is right (4.8): 0.39 m/s too slow at 4.8",
+            "figure 2.5 (CAL.EQ): ArcTan without 2.19, a whole turn, 100 000 counts, off between -pi and -pi/2",
             "5.1.3 says the detected signal is mixed with 1500.000 MHz; 5.1.1, + IF, is right",
             "5.2: clipping on top shifts a single edge, not the average of both edges that the Clark-Hess meter takes",
             "5.8 takes quadrature for the extreme: arcsin(r), not arctan(r); 7.9 um more at 10:1, 8 pm at 1000:1",
@@ -74,6 +76,8 @@ SOURCES: dict[str, Source] = {
         "on the telescope (`reduction.triplet.use`, `reduction.triplet.ties`, `geometry.antenna.triplet_mount`)",
         errata=(
             "3.19 prints (delta1 + delta2)/2 inside the root; (delta1 + delta2)/Delta is right",
+            "3.19a, leaves D_12^2 (delta1 + delta2) / 16 Delta^2 out: 15 um at 18 m",
+            "two equations are numbered 3.8, two 3.16, two 3.20",
             "3.11a, 3.15b and the second 3.16 write (1 - sgn)/2, a half at equal phases; 3.13a and 3.16a give none",
             "3.12 bounds a sum of phases in rad by 1: 1/2pi is missing, the bound is one cycle, 6.28 rad",
             "3.13 and 3.16 slip by a half wavelength where range and D_TOPPL straddle a boundary: round to the nearest",
