@@ -84,16 +84,16 @@ def test_every_common_point_has_a_displacement_a_covariance_and_a_test(seed, kin
     assert all(found.deformation.moved[i] for i in far), found.deformation.status
 
 
-@draws(900)
+@draws(450)
 def test_what_did_not_move_is_called_moved_at_the_level(runs):
-    """All kinds and datums alike; beside far moves the rest is left alone as often, for the search tests it once more."""
+    """All kinds and datums alike; beside one that moved the rest is left alone as often: it is tested once more."""
     alarms, beside, still, more = 0, 0, 0, 0
     for seed in range(runs):
         moved = seed % 2
         case = drawn(seed, KINDS[seed % 5], DATUMS[seed // 5 % 3], WHOLE, moved)
         if case is None:
             continue
-        scene, epochs, which, _ = case
+        _, epochs, which, _ = case
         called = compare(*epochs).deformation.moved
         if moved:
             more, beside = more + 1, beside + bool(np.delete(called, which).any())
