@@ -8,8 +8,8 @@ from scipy import stats
 
 from catseye.estimation.deformation import comparison
 from catseye.estimation.deformation.comparison import compare
-from comparison_scene import DATUMS, FLOATING, KINDS, Scene, by_numpy
 from draws import draws, examples
+from laws.comparison_scene import DATUMS, FLOATING, KINDS, Scene, by_numpy
 
 seeds = st.integers(0, 2**32 - 1)
 WHOLE = (False, False)
