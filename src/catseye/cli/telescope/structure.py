@@ -31,7 +31,8 @@ def _pivot(text: str | None) -> str | None:
 
 
 @app.command(
-    epilog="\b\nExample: catseye structure night-01 night-02 night-03 --points 'ZEG*' --predict 45 --out feed-arm\n"
+    epilog="\b\nExample: catseye night night-15 --elevation-deg 15; catseye reduce night-15 --out at-15;\n"
+    "         likewise 30, 45, 60, 75, 85; catseye structure at-* --points 'DP*' --predict 50 --out dish\n"
     "         catseye structure --epochs epochs.csv --points 'ZEG*' --harmonics 2 --hysteresis --out feed-arm\n"
     "         catseye structure --vibration night.db --points ZEG41040L --out shaking"
 )
