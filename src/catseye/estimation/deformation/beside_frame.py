@@ -11,6 +11,7 @@ from catseye.estimation.deformation.common_points import far_points, listed
 from catseye.estimation.deformation.congruence import (
     DATUMS,
     HELD,
+    KNOWN,
     UNSEEN,
     CongruenceTest,
     Differences,
@@ -18,6 +19,7 @@ from catseye.estimation.deformation.congruence import (
     seen_motions,
 )
 from catseye.estimation.deformation.deformation import Deformation, moved_points
+from catseye.estimation.deformation.deletion import DeletionSearch
 from catseye.estimation.deformation.epoch_model import EpochModel
 from catseye.estimation.network.model import NetworkSolution
 from catseye.estimation.shapes.rigid_body import motion_columns, turned_covariance
@@ -26,12 +28,19 @@ TOO_MANY = "{n} points of the frame are too many for one joint test (limit {limi
 
 
 def frame_points(
-    first: NetworkSolution, second: NetworkSolution, model: EpochModel, frame: Sequence[str] | None, *, limit: int
+    first: NetworkSolution,
+    second: NetworkSolution,
+    model: EpochModel,
+    frame: Sequence[str] | None,
+    *,
+    datum: str,
+    limit: int,
 ) -> np.ndarray:
     """Rows of the points that the others are compared with.
 
-    frame   those named; None: those that define both datums, where these are no more than the limit, else as many of
-            them as that, evenly chosen, else of all points
+    frame   those named; None: those that define both datums, as many as the limit, evenly chosen; or of all points,
+            where these only just hold the datum, such as a few coordinates that are held as a mere convention
+    datum   what the datums may differ by
     limit   points of one joint test
 
     Raises EstimationError for a stranger, and for more than the limit.
@@ -46,10 +55,27 @@ def frame_points(
             raise EstimationError(f"{listed(strange)} of the frame: not among the points compared")
         chosen = np.isin(model.names, list(frame))
     chosen[model.carried // 3] = True
-    inside = np.flatnonzero(chosen if chosen.any() else np.ones(len(chosen), dtype=bool))
-    if len(inside) > limit and frame is not None:
-        raise EstimationError(TOO_MANY.format(n=len(inside), limit=limit))
-    return inside[np.unique(np.linspace(0, len(inside) - 1, min(limit, len(inside))).astype(int))]
+    inside = np.flatnonzero(chosen)
+    if frame is not None:
+        if len(inside) > limit:
+            raise EstimationError(TOO_MANY.format(n=len(inside), limit=limit))
+        return inside
+    inside = _evenly(inside, limit)
+    return inside if len(inside) and _checked(model, inside, datum) else _evenly(np.arange(len(chosen)), limit)
+
+
+def _evenly(rows: np.ndarray, most: int) -> np.ndarray:
+    """Rows, as many of them as that, evenly chosen."""
+    return rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int))]
+
+
+def _checked(model: EpochModel, inside: np.ndarray, datum: str) -> bool:
+    """True if nothing floats beside these points, since they are held, or the rest shows which one of them moved."""
+    between = differences(model.epochs(inside), datum, np.ones(len(inside), dtype=bool))
+    if not between.used.any():
+        return not between.motions.shape[1]
+    search = DeletionSearch(between, KNOWN)
+    return search.degrees > 0 and all(search.spares([i]) for i, rows in enumerate(search.rows) if len(rows))
 
 
 @dataclass(frozen=True, eq=False)

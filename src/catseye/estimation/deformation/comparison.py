@@ -144,7 +144,7 @@ def compare(
         "variance_factor": factor,
     }
     if frame is not None or len(names) > LARGEST:
-        inside = frame_points(first, second, model, frame, limit=LARGEST)
+        inside = frame_points(first, second, model, frame, datum=held.datum, limit=LARGEST)
         deformation, (difference, covariance) = beside_frame(model, inside, tested)
     else:
         inside = np.zeros(0, dtype=int)

@@ -1,6 +1,6 @@
 """Two epochs of a network of any dimension and datum, some of whose points moved; and the answer by plain numpy."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -158,7 +158,3 @@ def by_numpy(scene, epochs, bare, own):
     q = q.reshape(n, 3, n, 3)
     rank_lost = int((~keep).sum())
     return d.reshape(n, 3), q[np.arange(n), :, np.arange(n)], rank_lost
-
-
-def changed(scene, **changes):
-    return replace(scene, **changes)
