@@ -5,7 +5,7 @@ import pytest
 
 import catseye
 from catseye.api.network import adjust, plan
-from network_scene import DATUMS, DIMENSIONS, least_squares, scene
+from laws.network_scene import DATUMS, DIMENSIONS, least_squares, scene
 
 SEEDS = range(2)
 MICROMETRE = 1e-6  # where the last step of two Gauss-Newtons may differ, below a thousandth of u
