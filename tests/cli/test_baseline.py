@@ -96,8 +96,8 @@ def test_quiet_is_quiet(catseye):
     ("arguments", "status", "said"),
     [
         (["missing.csv"], 1, "missing.csv"),
-        ([HEIGHTS], 1, "is not known"),
-        ([TS30, "--heights", TS30], 1, "is not known"),
+        ([HEIGHTS], 1, "are not known"),
+        ([TS30, "--heights", TS30], 1, "are not known"),
         ([TS30, "--against", HEIGHTS], 1, "TOML"),
         ([TS30, "--wavelength-um", "10.6"], 1, "wavelength 10.6 um is outside"),
         ([TS30, "--reference-index", "286.338"], 1, "index of air 286.338"),

@@ -13,7 +13,7 @@ from catseye.cli.live.options import PORT_BASE
 from catseye.cli.vocabularies import one_of
 from catseye.coordinator.modes import Mode
 from catseye.errors import EstimationError
-from catseye.estimation.network import adjustment
+from catseye.estimation.network import datum
 from catseye.estimation.quality.robustness import WEIGHTS
 from catseye.estimation.shapes import paraboloid, pose
 from catseye.gateways.calibrations.field_report_fields import FORMS
@@ -42,7 +42,7 @@ SOURCES = {
     "REFLECTORS": ACCEPTANCE,
     "CALIBRATION_KINDS": kinds.KINDS,
     "REPORT_KINDS": FORMS,
-    "DATUMS": adjustment.DATUMS,
+    "DATUMS": datum.DATUMS,
     "NETWORK_WEIGHTS": [name for name in WEIGHTS if name != "geman_mcclure"],  # whose constant is our own choice
     "POSE_GROUPS": pose_recipe.GROUPS,
     "POSE_FRAMES": pose_recipe.FRAMES,

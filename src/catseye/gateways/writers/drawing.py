@@ -107,6 +107,8 @@ def picture_file(text: Svg, path: Path, option: str, *, mark: str) -> bytes:
     from matplotlib.backends.backend_pdf import FigureCanvasPdf
 
     suffix, stream = path.suffix.lower(), io.BytesIO()
+    if path.is_dir():
+        raise InputError(f"{option} {path}: is a directory (expected the name of a file)")
     if suffix not in PICTURES:
         raise InputError(f"{option} {path}: no figure is written as {suffix or 'nothing'!r} (expected {PICTURES_TEXT})")
     if suffix == ".svg":

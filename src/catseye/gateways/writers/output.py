@@ -163,7 +163,7 @@ def whole_file(path: Path, option: str, mark: str) -> Iterator[list[str]]:
 def refuse_suffix(path: Path, option: str) -> None:
     """InputError for the name of a page that says another format than HTML."""
     suffix = path.suffix.lower()
-    if suffix not in PAGES:
+    if suffix not in PAGES and not path.is_dir():
         hint = "; a browser prints a page as PDF" if suffix == ".pdf" else ""
         raise InputError(f"{option} {path}: a page is HTML (expected a name that ends in .html{hint})")
 

@@ -36,7 +36,7 @@ class PlausibleSpan:
         >>> round(PlausibleSpan(-3.0, 3.0, "").most_u, 3)
         1.732
         """
-        return (self.high - self.low) / np.sqrt(12.0) if self.u is None else self.u
+        return float((self.high - self.low) / np.sqrt(12.0)) if self.u is None else self.u
 
 
 @dataclass(frozen=True)

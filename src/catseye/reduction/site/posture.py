@@ -69,7 +69,7 @@ def largest_correction() -> float:
     Source: [GBTPM01].
 
     >>> round(largest_correction() / DEGREE, 3)
-    0.083
+    0.082
     """
     a, e = np.meshgrid(np.arange(0.0, 360.0, 5.0) * DEGREE, np.arange(5.0, 90.5, 1.0) * DEGREE)
     return float(np.linalg.norm(published().correction(a, e), axis=-1).max())

@@ -13,7 +13,7 @@ from catseye.reduction.calibrations.ranging.leftover import leakage_effects
 from catseye.reduction.calibrations.ranging.reference_distance import LAYOUT, calibrate_reference_distance
 
 D0 = 0.180685
-FORMULA = float(MODELS["rueger1990"].uncertainty(11.7323))  # of the index itself, at 20 °C, 933 hPa, 50 %
+FORMULA = float(MODELS["rueger1990"].uncertainty(20.0, 933.0, 11.7323))  # of the index itself, at 20 °C, 933 hPa, 50 %
 BASE = {**WEATHER, "d0_nominal_mm": 185.0, "u_d0_nominal_mm": 1.0, "u_distance_common_mm": 0.0, "u_distance_ppm": 0.0}
 PLACES = np.concatenate([3.0 + 0.0111 * np.arange(9), np.linspace(5.0, 60.0, 9)])
 
