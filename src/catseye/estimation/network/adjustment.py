@@ -104,7 +104,11 @@ def adjust_network(
             forced=engine is not None,
         )
         if solution is not None:
-            return replace(solution, status=diagnosed(solution, _trial)) if diagnose else solution
+            return (
+                replace(solution, status=diagnosed(solution, _trial if inflation is None else None))
+                if diagnose
+                else solution
+            )
     problem = _Problem.of(network, start)
     if problem.missing:
         return problem.unanswered(NOT_PLACED.format(points=_listed(problem.missing)))
@@ -114,7 +118,7 @@ def adjust_network(
     if diagnose and solution.answered:
         if start is None and contradicted(solution):
             solution = _from_observations(solution, active, (inflation, alone), solver)
-        return replace(solution, status=diagnosed(solution, _trial))
+        return replace(solution, status=diagnosed(solution, _trial if inflation is None else None))
     return solution
 
 

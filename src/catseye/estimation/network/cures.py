@@ -55,12 +55,14 @@ class NetworkReason:
     named: bool
 
 
-def reason(solution: NetworkSolution, adjust: Adjust) -> NetworkReason:
+def reason(solution: NetworkSolution, adjust: Adjust | None) -> NetworkReason:
     """The one reason whose cure fits, or else where most of the contradiction is.
 
     solution   an answer that its observations contradict, or that did not converge
-    adjust     how copies of its network are adjusted, without tests
+    adjust     how copies of its network are adjusted, without tests; None: nothing is tried
     """
+    if adjust is None:
+        return NetworkReason(_where(solution), named=False)
     cures = [*_mirrored(solution, adjust), *_exchanged(solution, adjust)]
     if not cures or solution.status != CONVERGED or _one_explains(solution):
         cures += _without_one(solution, adjust)

@@ -135,11 +135,11 @@ def _tests(solution: NetworkSolution) -> list[np.ndarray]:
     return [np.where(f.active & (f.redundancy > 1e-6), np.abs(f.standardised), 0.0) for f in solution.fits]
 
 
-def diagnosed(solution: NetworkSolution, adjust: Adjust) -> str:
+def diagnosed(solution: NetworkSolution, adjust: Adjust | None) -> str:
     """The status of a solution, which says more where it did not converge or its observations contradict grossly.
 
     solution   with an answer, converged or not
-    adjust     how copies of the network are tried, see `cures.reason`
+    adjust     how copies of the network are tried, see `cures.reason`; None where weights are tried already
     """
     if not solution.degrees_of_freedom > 0.5:
         return solution.status
