@@ -340,7 +340,7 @@ def _whole(value: Any, name: str) -> Any:
 
 
 def _wanted(unit: In) -> str:
-    """What an argument expects, in words."""
+    """Words for the values that an argument expects."""
     if unit.unit == "mjd":
         return "a Modified Julian Day, or astropy's Time"
     if unit.unit == "":

@@ -89,7 +89,7 @@ def temperature_c(speed, pressure_hpa, vapour_pressure_hpa):
 
 
 def departure(temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm=450.0):
-    """How far the notes' speed of sound lies from that of `real_gas`, and that one's standard uncertainty, m/s.
+    """Standard uncertainty of the notes' speed of sound, m/s: its distance from `real_gas`, and that one's own.
 
     Arguments as of `speed`, and carbon dioxide, ppm, which the notes' air lacks.
 

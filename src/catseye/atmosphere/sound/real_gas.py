@@ -206,7 +206,7 @@ def _powers(ratio, terms):
 
 
 def departure(temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm=450.0):
-    """What the third virial coefficients left out may come to, and the uncertainty of the rest, m/s.
+    """Standard uncertainty, m/s: the third virial coefficients that are left out, and the rest.
 
     Arguments as of `speed`.
 

@@ -228,7 +228,7 @@ class Differences:
         return self.d + moved, s @ self.q @ s.T
 
     def plain(self, stable: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """As `seen_from`; nan where the stable points do not hold the datum, and in what is not compared."""
+        """Movements like `seen_from`; nan where stable points do not hold the datum, and where nothing is compared."""
         n = len(self.d)
         d, q = self.seen_from(stable) if self.holds(stable) else (np.full(n, np.nan), np.full((n, n), np.nan))
         seen = self.used | self.held

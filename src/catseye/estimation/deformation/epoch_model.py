@@ -62,7 +62,7 @@ def _floating(solution: NetworkSolution) -> Floating:
 
 @dataclass(frozen=True, eq=False)
 class DatumConnection:
-    """How the two datums are connected.
+    """Connection of the two datums.
 
     datum       what they may differ by
     same        names of points with coordinates held in both epochs, more of them than the datum needs

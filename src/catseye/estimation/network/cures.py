@@ -76,7 +76,7 @@ def reason(solution: NetworkSolution, adjust: Adjust | None) -> NetworkReason:
 
 
 def fits(solution: NetworkSolution) -> bool:
-    """Whether a solution converged, and no further off than the limits of its variance factor allow."""
+    """True for a solution that converged within the limits of its variance factor."""
     degrees = solution.degrees_of_freedom
     if solution.status != CONVERGED or not degrees > 0.5:
         return False
@@ -197,7 +197,7 @@ def inflation_of(rejected: Sequence[np.ndarray], undecided: Sequence[np.ndarray]
 
 
 def _one_explains(solution: NetworkSolution) -> bool:
-    """Whether all but a hundredth of [pvv] is due to a single observation: without it [pvv] would fall by its w^2."""
+    """True if a single observation makes all but a hundredth of [pvv], which would fall by its w^2 without it."""
     largest = max(float(np.max(np.where(f.active, f.standardised**2, 0.0), initial=0.0)) for f in solution.fits)
     squares = solution.variance_factor * solution.degrees_of_freedom
     return solution.status == CONVERGED and squares - largest < EXCHANGE_GAIN * squares

@@ -118,7 +118,7 @@ def _advice(network: ObservationNetwork, solution: LeastSquaresSolution, point: 
 
 
 def contradicted(solution: NetworkSolution) -> bool:
-    """Whether a solution did not converge or its observations contradict each other grossly.
+    """True for a solution that did not converge, or whose observations contradict each other grossly.
 
     Grossly: the a-priori chi-square test fails at one in a million and either the variance factor exceeds 9, which
     wrong weights hardly explain, or a test statistic exceeds 10. Smaller contradictions are the suspects' business.

@@ -179,7 +179,7 @@ class NetworkSolution:
 
     @cached_property
     def answered(self) -> bool:
-        """Whether every coordinate of the network has a covariance."""
+        """True if every coordinate of the network has a covariance."""
         points = self.network.points
         known = np.isfinite(self.covariance) | points.absent[:, :, None] | points.absent[:, None, :]
         return bool(known.all())
@@ -204,7 +204,7 @@ def points_of(group: ObservationGroup) -> tuple[np.ndarray, ...]:
 
 
 def label(network: ObservationNetwork, group: int, row: int) -> str:
-    """What an observation is called: its kind, its points, and its place in the file."""
+    """Name of an observation: its kind, its points, and its place in the file."""
     kind = getattr(network.groups[group], "kind", network.groups[group].name).replace("_", " ")
     ends = [network.points.names[int(end[row])] for end in points_of(network.groups[group]) if end[row] >= 0]
     where = network.places[group][row] if network.places and network.places[group] else ""

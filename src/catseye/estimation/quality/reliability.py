@@ -295,7 +295,7 @@ def global_test(pvv: float, degrees_of_freedom: float, level: float = 0.05) -> G
 
 
 def too_good(pvv: float, degrees_of_freedom: float) -> bool:
-    """Whether chance makes [pvv] as small as this less often than once in ten thousand.
+    """True for a [pvv] that chance makes so small less often than once in ten thousand.
 
     >>> too_good(1e-5, 10.0), too_good(2.0, 10.0)
     (True, False)

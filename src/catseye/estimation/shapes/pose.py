@@ -254,7 +254,7 @@ def _kept(problem: _Problem, method: str, limit: float) -> tuple[np.ndarray, np.
 
 
 def _one_left_out(problem: _Problem, why: str) -> tuple[np.ndarray, np.ndarray]:
-    """As `_kept`, where weights fail: the one point without which the others move as one.
+    """The one point without which the others move as one, sought like `_kept` where weights fail.
 
     Each is left out of a copy in turn. Raises EstimationError where none or more than one does, with their chances.
     """
