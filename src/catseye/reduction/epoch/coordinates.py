@@ -15,7 +15,7 @@ from catseye.records.night.campaign import ObservedSite
 from catseye.reduction.epoch.common_errors import considered
 from catseye.reduction.epoch.cycles import Resolved, resolve_cycles, without_shots
 from catseye.reduction.epoch.head import head_unknowns
-from catseye.reduction.epoch.notes import cycle_notes, doubts_of, loss_notes, record_notes, sound_notes
+from catseye.reduction.epoch.notes import cycle_notes, doubts_of, loss_notes, record_notes, sound_notes, wrong_records
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.range_shots import RangeShots, ranges_of
 from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases, Progress
@@ -177,6 +177,7 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCo
     every = {n: estimate(int(k)) for k, n in lasting}
     sound = {line.name: every[line.name] for line in network.field.lines}
     air = {n: value for n, value in every.items() if n not in sound}
+    wrong = wrong_records(network, solution, air)
     leakage_at = {n: layout.columns(Parameter(ParameterKind.LEAKAGE, n), 2) for n in network.rangers}
     used_paths = ranges.refractivity[ranges.used]
     return AdjustedCoordinates(
@@ -202,7 +203,7 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCo
         status=solution.status,
         fits=solution.fits,
         notes=(
-            *record_notes(network, solution, air, count),
+            *record_notes(network, solution, wrong, count),
             *sound_notes(network, solution, ranges, sound),
             *loss_notes(ranges),
             *resolved.notes,
@@ -211,6 +212,6 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCo
         unresolved=resolved.rejected,
         sound=sound,
         strength=network.strength,
-        doubts=doubts_of(network, solution, air),
+        doubts=doubts_of(network, solution, wrong),
         refuted=tuple(refuted_priors(settled)),
     )

@@ -132,10 +132,14 @@ def disagreements(network: CampaignNetwork) -> list[str]:
 
 
 def record_notes(
-    network: CampaignNetwork, solution: LeastSquaresSolution, air: dict[str, tuple[float, float]], count: dict[str, int]
+    network: CampaignNetwork, solution: LeastSquaresSolution, contradicted: list[str], count: dict[str, int]
 ) -> list[str]:
-    """What the adjustment noticed about the records, one line each; `count` are the used shots at each point."""
-    notes = wrong_records(network, solution, air)
+    """Notes on the records, one line each.
+
+    contradicted   as `wrong_records` gave them
+    count          used shots at each point
+    """
+    notes = list(contradicted)
     notes += network.allowance.texts
     left_out = max((states.neglected for states in network.states.values()), default=0.0)
     if left_out > WEAK:
@@ -159,11 +163,9 @@ def record_notes(
     return notes
 
 
-def doubts_of(
-    network: CampaignNetwork, solution: LeastSquaresSolution, air_offsets: dict[str, tuple[float, float]]
-) -> tuple[str, ...]:
+def doubts_of(network: CampaignNetwork, solution: LeastSquaresSolution, wrong: list[str]) -> tuple[str, ...]:
     """Reasons that the answer is not good: wrong records, allowances, thermometers at the end of their priors."""
-    doubts = [*wrong_records(network, solution, air_offsets), *network.allowance.texts]
+    doubts = [*wrong, *network.allowance.texts]
     air = network.field
     sigmas = network.allowance.sigmas(air)
     for station, column, sigma in zip(air.stations, network.layout.air, sigmas, strict=False):
