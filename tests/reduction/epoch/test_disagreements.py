@@ -33,3 +33,13 @@ def test_stations_that_disagree_are_told_and_neither_thermometer_alone_is_blamed
     assert "WX2" in note
     assert verdict(reduction).word != "good"
     assert note in reduction.coordinates.doubts
+
+
+def test_a_certificate_a_metre_off_is_told_beside_the_typed_places_of_its_ends(few_01):
+    first, *others = few_01.benchmarks
+    longer = first.model_copy(update={"certified_distance_mm": first.certified_distance_mm + 1000.0})
+    reduction = reduce_epoch(dataclasses.replace(few_01, benchmarks=(longer, *others)))
+    (note,) = [n for n in reduction.notes if "disagree" in n]
+    assert "typed distance and coordinates" in note
+    assert first.target in note
+    assert verdict(reduction).word != "good"

@@ -20,7 +20,7 @@ from catseye.reduction.epoch.unknowns import (
     ZEROS,
     CampaignNetwork,
 )
-from catseye.reduction.site.agreement import StationSeries, weather_disagreements
+from catseye.reduction.site.agreement import StationSeries, distance_disagreement, weather_disagreements
 
 
 def cycle_notes(ranges: RangeShots) -> list[str]:
@@ -121,14 +121,27 @@ def wrong_records(
 
 
 def disagreements(network: CampaignNetwork) -> list[str]:
-    """Barometers and hygrometers of the stations that cannot both be right."""
+    """Records of one thing that cannot both be right: barometers, hygrometers, certified distances and typed places."""
     weather = network.campaign.weather
     names, series = np.array(weather.station), []
     for station in network.campaign.site.weather_station:
         own = names == station.name
         readings = weather.mjd_utc[own], weather.temperature_c[own], weather.pressure_hpa[own]
         series.append(StationSeries(station.name, station.elevation_m, *readings, weather.humidity_percent[own]))
-    return [each.text for each in weather_disagreements([s for s in series if len(s.mjd)])]
+    found = list(weather_disagreements([s for s in series if len(s.mjd)]))
+    for mark in network.campaign.benchmarks:
+        ends = [network.places[name] for name in (mark.ranger, mark.target) if name in network.places]
+        if len(ends) == 2:
+            u = np.repeat([end.u_typed(network.settings.u_position) for end in ends], 3)
+            apart = distance_disagreement(
+                (mark.ranger, mark.target),
+                mark.certified_distance_mm * MILLIMETRE,
+                mark.u_mm * MILLIMETRE,
+                ends=np.array([end.start for end in ends]),
+                covariance=np.diag(u**2),
+            )
+            found += [] if apart is None else [apart]
+    return [each.text for each in found]
 
 
 def record_notes(
