@@ -43,3 +43,11 @@ def test_a_certificate_a_metre_off_is_told_beside_the_typed_places_of_its_ends(f
     assert "typed distance and coordinates" in note
     assert first.target in note
     assert verdict(reduction).word != "good"
+
+
+def test_humidity_typed_as_a_fraction_is_doubtful_with_both_readings(few_01):
+    weather = dataclasses.replace(few_01.weather, humidity_percent=0.01 * few_01.weather.humidity_percent)
+    reduction = reduce_epoch(dataclasses.replace(few_01, weather=weather))
+    notes = [n for n in reduction.notes if "as a fraction it would be" in n]
+    assert [n.split(": ")[1] for n in notes] == ["WX1", "WX2"]
+    assert verdict(reduction).word != "good"

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from catseye.atmosphere.weather.humidity import fraction_words, likely_fraction
 from catseye.constants import MILLIMETRE
 from catseye.estimation.least_squares.adjustment import (
     LeastSquaresSolution,
@@ -121,7 +122,7 @@ def wrong_records(
 
 
 def disagreements(network: CampaignNetwork) -> list[str]:
-    """Records of one thing that cannot both be right: barometers, hygrometers, certified distances and typed places."""
+    """Records that cannot be right: humidity typed as a fraction, stations or distances that contradict each other."""
     weather = network.campaign.weather
     names, series = np.array(weather.station), []
     for station in network.campaign.site.weather_station:
@@ -141,7 +142,12 @@ def disagreements(network: CampaignNetwork) -> list[str]:
                 covariance=np.diag(u**2),
             )
             found += [] if apart is None else [apart]
-    return [each.text for each in found]
+    fractions = [
+        f"weather.csv: {s.name}: {fraction_words(s.humidity_percent)}"
+        for s in series
+        if likely_fraction(s.humidity_percent)
+    ]
+    return [*fractions, *(each.text for each in found)]
 
 
 def record_notes(
