@@ -227,11 +227,12 @@ def _of_air(network: CampaignNetwork, parts: list[ShotParts], sights: list[_Sigh
 
 
 def _per_percent(network: CampaignNetwork, s: _Sight, z: np.ndarray) -> np.ndarray:
-    """(m,) of the refractivity at heights z by % of humidity, downwards: fog is no wetter."""
+    """(m,) of the refractivity at heights z by % of humidity: downwards, as fog is no wetter, but not below 0."""
     air = network.field
     above = z - air.heights.mean()
     dry = (s.temperature + s.gradient * above, s.pressure - LAPSE_HPA_PER_M * above)
-    return air.refractivity_of(*dry, s.humidity) - air.refractivity_of(*dry, s.humidity - 1.0)
+    step = np.where(s.humidity > 1.0, -1.0, 1.0)
+    return (air.refractivity_of(*dry, s.humidity + step) - air.refractivity_of(*dry, s.humidity)) / step
 
 
 def _smooth(ends: np.ndarray) -> np.ndarray:
