@@ -115,3 +115,12 @@ def test_constants_are_as_uncertain_as_their_dimensions(night_01):
     by_height = prism_mm(prism.height_mm + prism.u_height_mm) - prism_mm(prism.height_mm)
     assert places[prism.target].u_constant == pytest.approx(abs(by_height) * 1e-3, rel=1e-6)
     assert places["ZEG41040L"].u_constant == 0.0
+
+
+def test_cubes_at_the_elevation_bearings_ride_on_the_alidade_though_typed_in_the_grounds_frame(night_01):
+    bodies = {name: place.body for name, place in places_of(night_01).items() if place.kind == "hollow"}
+    assert {bodies[n] for n in ("ZAG731P", "ZAG731D")} == {"alidade"}
+    assert {bodies[b.target] for b in night_01.benchmarks} == {""}
+    mast = night_01.targets["ZAG731P"].model_copy(update={"name": "MAST", "position_mm": (90e3, 70e3, 46.9e3)})
+    beside = dataclasses.replace(night_01, targets={**night_01.targets, "MAST": mast})
+    assert places_of(beside)["MAST"].body == ""

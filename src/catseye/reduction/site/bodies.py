@@ -8,6 +8,7 @@ from catseye.constants import MILLIMETRE
 from catseye.records.site.folder import SiteFolder
 
 ABOVE_THE_DISH = 5.0  # m over the paraboloid: what is higher is on the arm
+ABOVE_THE_GROUND = 10.0  # m over the highest monument: what is higher stands on no pillar
 
 
 def bodies_of(site: SiteFolder, frames: Mapping[str, str]) -> dict[str, str]:
@@ -32,6 +33,21 @@ def bodies_of(site: SiteFolder, frames: Mapping[str, str]) -> dict[str, str]:
         elif triplet.frame == "alidade":
             bodies |= dict.fromkeys(triplet.targets, "alidade")
     return bodies
+
+
+def high_of_ground(site: SiteFolder) -> dict[str, str]:
+    """Point: "alidade", of single targets whose places are typed in the ground's frame and that cannot stand there.
+
+    They are higher than any pillar and nearer the pintle bearing than half of the monuments' ring: cubes at the
+    elevation bearings, 47 m up. At one posture they are the alidade's, and its steel moves them.
+    """
+    if not site.monuments:
+        return {}
+    stands = np.array([(m.x_mm, m.y_mm, m.z_mm) for m in site.monuments.values()]) * MILLIMETRE
+    least = np.max(stands[:, 2]) + ABOVE_THE_GROUND
+    most = 0.5 * np.median(np.hypot(stands[:, 0], stands[:, 1]))
+    places = {n: np.array(t.position_mm) * MILLIMETRE for n, t in site.targets.items() if t.frame == "ground"}
+    return {n: "alidade" for n, (x, y, z) in places.items() if z > least and np.hypot(x, y) < most}
 
 
 def lasting_names(site: SiteFolder) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from catseye.optics.retroreflector import cats_eye, prism
 from catseye.records.site.folder import SiteFolder
 from catseye.records.site.target import TargetRow
 from catseye.records.site.triplet import TripletRecord
-from catseye.reduction.site.bodies import bodies_of
+from catseye.reduction.site.bodies import bodies_of, high_of_ground
 
 MISTYPED_MM = 0.02  # ten times what rounding and the dimensions' uncertainty explain
 
@@ -105,6 +105,7 @@ def places_of(campaign: SiteFolder) -> dict[str, RangedPoint]:
         for point in _triplet(triplet, to_ground[triplet.frame], n):
             places[point.name] = point
     bodies = bodies_of(campaign, {target.name: target.frame for target in campaign.targets.values()})
+    bodies |= high_of_ground(campaign)
     return {name: replace(place, body=bodies.get(name, "")) for name, place in places.items()}
 
 
