@@ -115,12 +115,25 @@ def test_people_are_told_first_what_is_of_more_than_one_shot():
     passages = dict(summary(book, TwinWords(60635.125), None, seconds=60.0, rangers=18, told=3))
     assert passages["Noticed"].startswith("VER was not answered; ZY101 A: blocked (5 times)")
     assert "3 by 18 rangers in 60 s, all acknowledged; 1 blocked, 1 reflected" in passages["Shots"]
-    assert "In 1 of 1 epochs" in passages["Truth"]
+    assert "1 epochs, 1 held against the truth: 1 as claimed" in passages["Truth"]
     assert "none was kept" in passages["Journal"]
     assert (
         "none was solved"
         in dict(summary(LiveBook(), TwinWords(60635.125), None, seconds=1.0, rangers=1, told=0))["Epochs"]
     )
+
+
+def test_the_verdict_and_the_lines_below_it_count_epochs_alike():
+    """Below its band an epoch is nearer the truth than it claims: good, and not "within its band"."""
+    book, _ = filled(chi2=0.4)
+    words = {"seconds": 60.0, "rangers": 18, "told": 3}
+    passages = dict(summary(book, TwinWords(60635.125), None, **words))
+    assert "1 better than claimed" in passages["Truth"]
+    assert "as claimed" not in passages["Truth"]
+    assert simulation_object(book, TwinWords(60635.125), None, **words)["verdict"]["word"] == "good"
+    beyond, _ = filled(chi2=3.0)
+    assert "1 worse than claimed" in dict(summary(beyond, TwinWords(60635.125), None, **words))["Truth"]
+    assert simulation_object(beyond, TwinWords(60635.125), None, **words)["verdict"]["word"] == "doubtful"
 
 
 def test_a_shot_counts_once_whatever_its_epochs_say_of_it():

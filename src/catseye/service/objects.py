@@ -1,6 +1,7 @@
 """What a simulation came to: one JSON object for programs, a few lines for people."""
 
 import math
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
@@ -14,6 +15,7 @@ from catseye.service.comparison import EpochComparison
 from catseye.service.world import TwinWords
 
 TOLD = 5  # troubles that people are told of: first those that are of more than single shots
+CLAIMS = ("as claimed", "better than claimed", "worse than claimed")  # an epoch's chi² in, below, above its band
 OFFSETS = (
     ("cross_elevation_arcsec", "beam azimuth × cos E", ARCSECOND, "″"),
     ("elevation_arcsec", "beam elevation", ARCSECOND, "″"),
@@ -112,12 +114,17 @@ def epoch_object(row: dict[str, Any], compared: EpochComparison | None) -> dict[
 def epoch_line(compared: EpochComparison) -> str:
     """An epoch beside the truth, in one line."""
     low, high = compared.band
-    claim = "as claimed" if compared.fits else ("better than claimed" if compared.chi2 < low else "worse than claimed")
     return (
         f"epoch {compared.number}: {compared.points} points, off by {compared.rms_mm:.3f} mm rms "
         f"({compared.worst} {compared.worst_mm:.2f} mm), claimed u {compared.mean_u_mm:.3f} mm, "
-        f"chi² {compared.chi2:.2f} a coordinate (99 % within {low:.2f} to {high:.2f}): {claim}"
+        f"chi² {compared.chi2:.2f} a coordinate (99 % within {low:.2f} to {high:.2f}): {_claim(compared)}"
     )
+
+
+def _claim(compared: EpochComparison) -> str:
+    if compared.fits:
+        return CLAIMS[0]
+    return CLAIMS[1] if compared.chi2 < compared.band[0] else CLAIMS[2]
 
 
 def beam_lines(compared: EpochComparison) -> Iterator[str]:
@@ -156,12 +163,13 @@ def summary(
     compared = list(book.comparisons.values())
     if compared:
         last = compared[-1]
-        inside = sum(each.fits for each in compared)
+        by_claim = Counter(_claim(each) for each in compared)
+        claims = ", ".join(f"{by_claim[claim]} {claim}" for claim in CLAIMS if by_claim[claim])
         passages.append(
             (
                 "Truth",
-                f"{len(book.epochs)} epochs. The last, {epoch_line(last)}. In {inside} of {len(compared)} epochs "
-                "chi² is within its band.",
+                f"{len(book.epochs)} epochs, {len(compared)} held against the truth: {claims}. "
+                f"The last, {epoch_line(last)}.",
             )
         )
         lines = list(beam_lines(last))
