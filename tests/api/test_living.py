@@ -1,5 +1,8 @@
 """A journal and a simulated site from Python."""
 
+import dataclasses
+from datetime import date
+
 import pytest
 
 import catseye
@@ -20,6 +23,16 @@ def test_what_is_no_journal_is_refused(tmp_path):
         catseye.replay(tmp_path / "nothing.db")
     with pytest.raises(InputError, match="minutes = 0"):
         catseye.simulate(minutes=0.0)
+
+
+def test_a_site_whose_certificate_has_ended_measures_and_is_told():
+    site = catseye.load("gbt")
+    old = site.mirrors["ZP101"].model_copy(update={"valid_until": date(2001, 1, 1)})
+    site = dataclasses.replace(site, mirrors={**site.mirrors, "ZP101": old})
+    told = catseye.simulate(site, minutes=0.02, drop=[name for name in site.rangers if name != "ZY101"]).to_object()
+    [ended] = [each for each in told["troubles"] if each["kind"] == "certificate-expired"]
+    assert (ended["who"], ended["count"]) == ("records", 1)
+    assert "ZP101 ended on 2001-01-01" in ended["text"]
 
 
 @pytest.mark.slow

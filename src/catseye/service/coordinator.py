@@ -23,7 +23,7 @@ from catseye.coordinator.journal.entries import Run
 from catseye.coordinator.journal.writer import Journal, JournalSettings
 from catseye.coordinator.link.settings import Address
 from catseye.coordinator.modes import Mode
-from catseye.coordinator.parts import Clock, Environment
+from catseye.coordinator.parts import Clock, Environment, ticks_now
 from catseye.coordinator.plan.round import RoundPlanner, RoundSettings
 from catseye.coordinator.visibility.surroundings import KeepClear
 from catseye.coordinator.ziy import Coordinator, CoordinatorParts
@@ -33,11 +33,13 @@ from catseye.ranger.door import Door
 from catseye.ranger.network import ConnectionMaker
 from catseye.ranger.server import LOOPBACK
 from catseye.records.files.reading import read_record
-from catseye.records.night.live import Severity
+from catseye.records.files.record import Certificate
+from catseye.records.night.live import TICKS_PER_DAY, Severity
 from catseye.records.site.folder import SiteFolder
 from catseye.records.site.interlock import Interlocks
 from catseye.records.site.keep_out import KeepOut
 from catseye.records.site.solids import Solids
+from catseye.records.site.validity import expired, expired_of_site
 from catseye.reduction.live.live import Live, LiveSettings
 from catseye.service.settings import settings_object
 from catseye.service.solver import SolverProcess
@@ -191,6 +193,10 @@ class LiveCoordinator:
             mode=orders.mode,
             commands=initialising_commands(site),
         )
+        files = {orders.keep_out: keep_clear.keep_out, orders.interlocks: locks, orders.solids: solids}
+        self._certificates: dict[str, Certificate] = {
+            str(file): record for file, record in files.items() if file is not None and record is not None
+        }
         for name in orders.drop:
             self.ziy.firing.dropped.add(name)
             self.ziy.links[name].wanted = "hold"
@@ -228,6 +234,13 @@ class LiveCoordinator:
         """The head of the journal's chain; None without a journal."""
         return self._journal.head
 
+    def _tell_expired(self) -> None:
+        """Certificates that are not valid today: measured with all the same, and told."""
+        mjd = ticks_now(self.ziy.clock) / TICKS_PER_DAY
+        log = EventLog("records", self.ziy.clock, self.ziy.tell)
+        for text in (*expired_of_site(self.site, mjd), *expired(self._certificates, mjd)):
+            log.tell("certificate-expired", text, "warning", always=True)
+
     async def _watch_disk(self, journal: Journal) -> None:
         """Foretell when the journal's disk is full; until cancelled."""
         watch = DiskWatch(EventLog("journal", self.ziy.clock, self.ziy.tell), journal.hold)
@@ -256,6 +269,7 @@ class LiveCoordinator:
         try:
             await self.server.start()
             started()
+            self._tell_expired()
             if isinstance(self._journal, Journal):
                 watching = asyncio.ensure_future(self._watch_disk(self._journal))
             if self._solver is not None:  # beside the loop, while the mirrors go to their first targets

@@ -303,3 +303,12 @@ def test_the_loops_noise_moves_both_directions_at_once(catseye, tmp_path, codes)
     assert u_loop > 5e-7
     # the correlation is as the reduction makes it but for the stretch's start: the noise's estimate differs a little
     assert parts["time"] == pytest.approx(np.hypot(clean["parts_c"]["time"], per_second * u_loop), rel=0.05)
+
+
+def test_a_sheet_that_ended_before_the_shots_is_doubtful(catseye, tmp_path):
+    (tmp_path / "night.csv").write_bytes((EXAMPLE / "night.csv").read_bytes())
+    (tmp_path / "night.toml").write_text("valid_until = 2003-09-01\n" + (EXAMPLE / "night.toml").read_text())
+    now, ended = (answer(catseye, place / "night.csv")["verdict"] for place in (EXAMPLE, tmp_path))
+    assert now["word"] == "good"
+    assert ended["word"] == "doubtful"
+    assert "ended on 2003-09-01" in ended["why"]

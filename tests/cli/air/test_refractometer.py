@@ -139,3 +139,13 @@ def test_help_has_an_example(catseye):
     status, said, _ = catseye("--help")
     assert status == 0
     assert "examples/refractometer/path-a.csv" in said
+
+
+@pytest.mark.parametrize(("until", "word"), [("2003-09-06", "doubtful"), ("2003-09-07", "good")])
+def test_a_path_whose_certificate_ended_before_the_readings_is_doubtful(catseye, tmp_path, until, word):
+    (tmp_path / "path-a.csv").write_bytes(EXAMPLE.read_bytes())
+    (tmp_path / "path-a.toml").write_text(f"valid_until = {until}\n" + EXAMPLE.with_suffix(".toml").read_text())
+    _, said, _ = catseye(tmp_path / "path-a.csv", "--json")
+    verdict = json.loads(said)["verdict"]
+    assert verdict["word"] == word
+    assert ("ended on 2003-09-06" in verdict["why"]) == (word == "doubtful")

@@ -8,6 +8,7 @@ import numpy as np
 from catseye.constants import PPM
 from catseye.gateways.writers.verdict import Verdict
 from catseye.gateways.writers.written import csv_text
+from catseye.records.site.validity import expired
 
 if TYPE_CHECKING:
     from catseye.reduction.air.acoustic_recording import AcousticPath
@@ -51,7 +52,16 @@ def mean(path: "AcousticPath") -> Mean:
 
 
 def acoustic_verdict(paths: Sequence["AcousticPath"]) -> Verdict:
-    """Whether every path has a temperature, and most of its shots had a part in it."""
+    """Paths that have a temperature, how many shots had a part in it, and the sheets' validity."""
+    ended = [
+        text
+        for path in paths
+        for text in expired({f"{path.sheet.ranger} to {path.sheet.target}": path.sheet}, float(path.shots.mjd[-1]))
+    ]
+    return _own_verdict(paths).hearing(ended)
+
+
+def _own_verdict(paths: Sequence["AcousticPath"]) -> Verdict:
     lost = [path for path in paths if not path.used.any()]
     if lost and len(lost) == len(paths):
         return Verdict("failed", "no shot of any path could be used")

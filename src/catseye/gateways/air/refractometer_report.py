@@ -17,6 +17,7 @@ from catseye.gateways.writers.page import card, page, paragraph, picture, sectio
 from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.verdict import Verdict, verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
+from catseye.records.site.validity import expired
 from catseye.reduction.air.group_index import phase_slope
 from catseye.reduction.air.refractometer_calibration import STATUS
 from catseye.signal.cycles.whole import CycleStatus
@@ -32,7 +33,12 @@ SERIES = ("mjd_utc", "section", "phase_rad", "group_refractivity_ppm", "u_group_
 
 
 def refractometer_verdict(calibration: "PathCalibration") -> Verdict:
-    """Whether phases and weather scatter as claimed, and the phase follows the index as it must."""
+    """Scatter of phases and weather as claimed, the phase's slope with the index, and the sheet's validity."""
+    readings = calibration.readings
+    return _own_verdict(calibration).hearing(expired({"the path": readings.sheet}, readings.mjd_utc[-1]))
+
+
+def _own_verdict(calibration: "PathCalibration") -> Verdict:
     if not calibration.slope.agrees:
         ratio = calibration.slope.ratio
         return Verdict("doubtful", f"the phase follows the weather's index {ratio:.3f} times, not once")

@@ -24,7 +24,10 @@ def expired(certificates: Mapping[str, Certificate], mjd: float) -> tuple[str, .
     )
 
 
-def expired_of_site(site: SiteFolder) -> tuple[str, ...]:
-    """Expired certificates of a site's record, monuments, mirrors and triplets at its campaign's start."""
+def expired_of_site(site: SiteFolder, mjd: float | None = None) -> tuple[str, ...]:
+    """Expired certificates of a site's record, monuments, mirrors and triplets.
+
+    mjd   UTC of the data; None: its campaign's start
+    """
     held: dict[str, Certificate] = {"site.toml": site.site, **site.monuments, **site.mirrors, **site.triplets}
-    return expired(held, site.site.campaign.start_mjd_utc)
+    return expired(held, site.site.campaign.start_mjd_utc if mjd is None else mjd)
