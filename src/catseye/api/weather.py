@@ -230,21 +230,16 @@ def sound(
     343.577
     """
     from catseye.atmosphere.sound.speed import sound as state_of
-    from catseye.atmosphere.weather.humidity import fraction_words, likely_fraction
     from catseye.gateways.air.objects import stated_inputs
     from catseye.gateways.air.sound_objects import sound_verdict
-    from catseye.gateways.writers.verdict import Verdict
 
     state = state_of(temperature_c, pressure_hpa, humidity_percent, model=model, co2_ppm=co2_ppm)
     u = state.combined_uncertainty(u_temperature_c, u_pressure_hpa, u_humidity_percent, u_co2_ppm)
     stated = stated_inputs(
         temperature=u_temperature_c, pressure=u_pressure_hpa, humidity=u_humidity_percent, carbon_dioxide=u_co2_ppm
     )
-    judged = sound_verdict(state, u, stated)
-    if likely_fraction(humidity_percent):
-        judged = Verdict("doubtful", fraction_words(humidity_percent))
     return SoundResult(
-        judged,
+        sound_verdict(state, humidity_percent, u, stated),
         temperature_c,
         pressure_hpa,
         humidity_percent,

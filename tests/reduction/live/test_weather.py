@@ -154,3 +154,13 @@ def test_readings_are_kept_for_two_hours():
     kept = watch.believed(ticks(4 * 3600.0))
     assert len(kept) == 121
     assert np.all(np.diff([w.ticks for w in kept]) > 0)
+
+
+def test_a_station_that_says_fractions_of_one_is_told_with_both_readings():
+    watch = StationWatch(("WX1", "WX2"))
+    for t in STEPS:
+        assert watch.add(read("WX1", t, humidity=0.62)) == ""
+        assert watch.add(read("WX2", t, humidity=61.0)) == ""
+    [note] = watch.notes()
+    assert note.startswith("WX1: a humidity of 0.62 %")
+    assert "62 %" in note

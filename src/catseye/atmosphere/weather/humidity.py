@@ -428,16 +428,34 @@ LEAST_RESOLVED = (
 def likely_fraction(humidity_percent) -> bool:
     """True where every relative humidity is above 0 and at most 1 %: more likely a fraction of 1 than percent.
 
-    humidity_percent   relative humidity, %
+    humidity_percent   relative humidity, %; NaN where none was read
 
     >>> likely_fraction(0.5), likely_fraction(0.0), likely_fraction([0.5, 40.0])
     (True, False, False)
     """
-    values = np.asarray(humidity_percent, float)
+    values = _read(humidity_percent)
     return bool(values.size and np.all((values > 0.0) & (values <= LEAST_RESOLVED)))
 
 
 def fraction_words(humidity_percent) -> str:
     """Both readings of a humidity that is likely a fraction."""
-    first = float(np.ravel(np.asarray(humidity_percent, float))[0])
+    first = float(_read(humidity_percent)[0])
     return f"a humidity of {first:g} % is below what hygrometers resolve; as a fraction it would be {100.0 * first:g} %"
+
+
+def _read(humidity_percent) -> np.ndarray:
+    values = np.ravel(np.asarray(humidity_percent, float))
+    return values[np.isfinite(values)]
+
+
+def humidity_doubts(humidity_percent) -> tuple[str, ...]:
+    """Both readings of humidities that are likely fractions of 1; empty where they are percent.
+
+    humidity_percent   relative humidity, %
+
+    >>> humidity_doubts([0.41, 0.43])
+    ('a humidity of 0.41 % is below what hygrometers resolve; as a fraction it would be 41 %',)
+    >>> humidity_doubts([41.0, 43.0])
+    ()
+    """
+    return (fraction_words(humidity_percent),) if likely_fraction(humidity_percent) else ()

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from catseye.atmosphere.weather.humidity import humidity_doubts
 from catseye.constants import PPM
 from catseye.gateways.writers.verdict import Verdict
 from catseye.gateways.writers.written import csv_text
@@ -53,12 +54,11 @@ def mean(path: "AcousticPath") -> Mean:
 
 def acoustic_verdict(paths: Sequence["AcousticPath"]) -> Verdict:
     """Paths that have a temperature, how many shots had a part in it, and the sheets' validity."""
-    ended = [
-        text
-        for path in paths
-        for text in expired({f"{path.sheet.ranger} to {path.sheet.target}": path.sheet}, float(path.shots.mjd[-1]))
-    ]
-    return _own_verdict(paths).hearing(ended)
+    doubts: list[str] = []
+    for path in paths:
+        doubts += expired({f"{path.sheet.ranger} to {path.sheet.target}": path.sheet}, float(path.shots.mjd[-1]))
+        doubts += humidity_doubts(path.shots.weather[2])
+    return _own_verdict(paths).hearing(doubts)
 
 
 def _own_verdict(paths: Sequence["AcousticPath"]) -> Verdict:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from catseye.atmosphere.weather.humidity import fraction_words, likely_fraction
+from catseye.atmosphere.weather.humidity import humidity_doubts
 from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.verdict import Verdict
 
@@ -47,11 +47,10 @@ def air_verdict(air: "AirState", u: Any, stated: Sequence[str] | None = None) ->
     u        standard uncertainty of the group index, as told
     stated   inputs whose uncertainty it has, of `stated_inputs`; None: all if it is more than the formula's
     """
-    if likely_fraction(air.humidity_percent):
-        return Verdict("doubtful", fraction_words(air.humidity_percent))
     if stated is None:
         stated = WEATHER if np.any(np.asarray(u) > np.asarray(air.standard_uncertainty) * (1.0 + 1e-12)) else ()
-    return Verdict("good", f"within the limits of {air.model}; {uncertainty_words(stated)}")
+    verdict = Verdict("good", f"within the limits of {air.model}; {uncertainty_words(stated)}")
+    return verdict.hearing(humidity_doubts(air.humidity_percent))
 
 
 def air_object(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from catseye.atmosphere.weather.humidity import humidity_doubts
 from catseye.constants import PPM, TWO_PI
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
@@ -35,7 +36,8 @@ SERIES = ("mjd_utc", "section", "phase_rad", "group_refractivity_ppm", "u_group_
 def refractometer_verdict(calibration: "PathCalibration") -> Verdict:
     """Scatter of phases and weather as claimed, the phase's slope with the index, and the sheet's validity."""
     readings = calibration.readings
-    return _own_verdict(calibration).hearing(expired({"the path": readings.sheet}, readings.mjd_utc[-1]))
+    doubts = expired({"the path": readings.sheet}, readings.mjd_utc[-1]) + humidity_doubts(readings.humidity_percent)
+    return _own_verdict(calibration).hearing(doubts)
 
 
 def _own_verdict(calibration: "PathCalibration") -> Verdict:

@@ -8,6 +8,7 @@ import numpy as np
 from catseye.atmosphere.sound import parker2004 as sound_parker2004
 from catseye.atmosphere.sound.dispersion import dispersion
 from catseye.atmosphere.sound.speed import MODELS, Sound, sound
+from catseye.atmosphere.weather.humidity import humidity_doubts
 from catseye.errors import ValidityError
 from catseye.gateways.air.objects import WEATHER as SENSED
 from catseye.gateways.air.objects import spread, uncertainty_words
@@ -32,7 +33,7 @@ def sound_object(
         del slopes["co2_ppm"]
     t, p, h = weather
     return {
-        "verdict": sound_verdict(state, u, stated).to_object(),
+        "verdict": sound_verdict(state, h, u, stated).to_object(),
         "model": state.model,
         "temperature_c": t,
         "pressure_hpa": p,
@@ -67,15 +68,16 @@ def gamma_water_cost(state: Sound, weather: Weather) -> dict[str, Any]:
     }
 
 
-def sound_verdict(state: Sound, u: Any, stated: Sequence[str] | None = None) -> Verdict:
-    """Good within the formula's limits, which were checked; what its uncertainty stands for.
+def sound_verdict(state: Sound, humidity_percent: Any, u: Any, stated: Sequence[str] | None = None) -> Verdict:
+    """Good within the formula's limits, which were checked, and with a humidity in percent; what its u stands for.
 
     u        standard uncertainty of the speed, m/s, as told
     stated   inputs whose uncertainty it has, of `stated_inputs`; None: all if it is more than the formula's
     """
     if stated is None:
         stated = SENSED if np.any(np.asarray(u) > np.asarray(state.standard_uncertainty) * (1.0 + 1e-12)) else ()
-    return Verdict("good", f"within the limits of {state.model}; {uncertainty_words(stated)}")
+    verdict = Verdict("good", f"within the limits of {state.model}; {uncertainty_words(stated)}")
+    return verdict.hearing(humidity_doubts(humidity_percent))
 
 
 def sound_passages(answer: dict[str, Any]) -> list[Passage]:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from catseye.atmosphere.weather.humidity import humidity_doubts
 from catseye.constants import MILLIMETRE, PPM
 from catseye.estimation.baseline.iso17123 import FullTest
 from catseye.gateways.writers.passage import Passage
@@ -42,7 +43,11 @@ def spans(calibration: "BaselineCalibration") -> list[Span]:
 
 
 def baseline_verdict(calibration: "BaselineCalibration") -> Verdict:
-    """Whether the tests of ISO 17123-4 and of the shots bear the calibration out."""
+    """Tests of ISO 17123-4 and of the shots, and what speaks against the weather."""
+    return _own_verdict(calibration).hearing(humidity_doubts(calibration.observations.humidity_percent))
+
+
+def _own_verdict(calibration: "BaselineCalibration") -> Verdict:
     failed = [d.name for d in calibration.decisions if d.passed is False]
     if failed:
         return Verdict("failed", f"tests failed: {'; '.join(failed)}")

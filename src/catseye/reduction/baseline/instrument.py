@@ -10,6 +10,7 @@ from typing import TypedDict
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from catseye.atmosphere.weather.humidity import humidity_doubts
 from catseye.constants import MILLIMETRE, PPM
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.baseline.adjustment import CEILING, BaselineSolution
@@ -99,7 +100,7 @@ def _calibrated(
     settings: BaselineSettings,
     progress: Progress | None,
 ) -> BaselineCalibration:
-    notes: list[str] = []
+    notes = list(humidity_doubts(shots.humidity_percent))
     names = _ordered(shots, heights, against)
     shots = _renumbered(shots, names)
     height, u_height, reference = _heights(shots, heights, against, settings, notes)

@@ -12,6 +12,7 @@ from itertools import islice, pairwise
 
 import numpy as np
 
+from catseye.atmosphere.weather.humidity import LEAST_RESOLVED, humidity_doubts
 from catseye.errors import CatseyeError
 from catseye.records.files.readings import TIME, SheetReadings
 from catseye.reduction.calibrations.calibration import Calibration
@@ -58,6 +59,7 @@ def judged(kind: CalibrationKind, readings: SheetReadings, calibration: Calibrat
 def _outcomes(limits: Plausibility, readings: SheetReadings, calibration: Calibration) -> list[CheckOutcome]:
     return [
         *_columns(limits, readings),
+        *_humidity(readings),
         *_scatter(limits, calibration),
         *_explained(limits, calibration),
         *_sizes(limits, calibration),
@@ -93,6 +95,14 @@ def _columns(limits: Plausibility, readings: SheetReadings) -> Iterator[CheckOut
                 f"column {name} holds {worst:g}, expected {span.low:g} to {span.high:g}: {span.reason}",
                 least=low, grave=False,
             )  # fmt: skip
+
+
+def _humidity(readings: SheetReadings) -> Iterator[CheckOutcome]:
+    """A humidity that is likely a fraction of 1, of the sheet or its column."""
+    values = readings.numbers.get("humidity_percent", getattr(readings.sheet, "humidity_percent", None))
+    for text in humidity_doubts(values) if values is not None else ():
+        largest = float(np.max(values))
+        yield CheckOutcome("humidity_percent: largest", largest, LEAST_RESOLVED, False, text, least=True, grave=False)
 
 
 def _scatter(limits: Plausibility, calibration: Calibration) -> Iterator[CheckOutcome]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from catseye.atmosphere.weather.humidity import fraction_words, likely_fraction
+from catseye.atmosphere.weather.humidity import humidity_doubts
 from catseye.constants import MILLIMETRE
 from catseye.estimation.least_squares.adjustment import (
     LeastSquaresSolution,
@@ -142,11 +142,7 @@ def disagreements(network: CampaignNetwork) -> list[str]:
                 covariance=np.diag(u**2),
             )
             found += [] if apart is None else [apart]
-    fractions = [
-        f"weather.csv: {s.name}: {fraction_words(s.humidity_percent)}"
-        for s in series
-        if likely_fraction(s.humidity_percent)
-    ]
+    fractions = [f"weather.csv: {s.name}: {text}" for s in series for text in humidity_doubts(s.humidity_percent)]
     return [*fractions, *(each.text for each in found)]
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from catseye.atmosphere.weather.humidity import humidity_doubts
 from catseye.constants import SECONDS_PER_DAY
 from catseye.records.night.live import TICKS_PER_DAY, LiveWeather
 
@@ -70,7 +71,13 @@ class StationWatch:
 
     def notes(self) -> tuple[str, ...]:
         """What is wrong with stations now."""
-        return tuple(s.doubt for s in self._stations.values() if s.doubted_since is not None)
+        jumped = [s.doubt for s in self._stations.values() if s.doubted_since is not None]
+        humid = [
+            f"{name}: {text}"
+            for name, s in self._stations.items()
+            for text in humidity_doubts([read.humidity_percent for read in s.good])
+        ]
+        return (*jumped, *humid)
 
     def _jump(self, read: LiveWeather, station: _Station) -> str:
         own = _median(station)
