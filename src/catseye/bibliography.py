@@ -81,6 +81,8 @@ SOURCES: dict[str, Source] = {
             "3.11a, 3.15b and the second 3.16 write (1 - sgn)/2, a half at equal phases; 3.13a and 3.16a give none",
             "3.12 bounds a sum of phases in rad by 1: 1/2pi is missing, the bound is one cycle, 6.28 rad",
             "3.13 and 3.16 slip by a half wavelength where range and D_TOPPL straddle a boundary: round to the nearest",
+            "1.3 has prisms 38.10 mm high, 3.4 some 38.4: 0.20 mm of H_rp, 0.26 mm of P_c; sheets have their own",
+            "3.25 takes arcsin of leg over leg, arctan is right: 2.7 urad, 9 nm of H_corr, before a prism at 18 m",
             "3.23 with D_TOPPL good to 2 mm gives incidences to some mrad, and none where D_0 exceeds D_1",
             "3.4's table: H_rp is 25.146 mm for a 38.4 mm prism, not 25.2; P_c of the ball -173.715 mm, not -173.6",
             "A, third case: the law of cosines, not Pythagoras; the bound holds while h is below D_12/2",

@@ -67,7 +67,7 @@ def memo_numbers(r: TripletReadings, cycles: TripletCycles, lengths: TripletLeng
     cycles    ours, right
     lengths   ours, exact
 
-    Source: [GOLDMAN00] eqs. 3.13, 3.16, 3.19b, 3.20, 3.23, 3.25, 3.28, 3.29.
+    Source: [GOLDMAN00] eqs. 3.13, 3.16, 3.19b, 3.20, 3.23, 3.25 (arctan were right; D_0 is a leg), 3.28, 3.29.
     """
     half, half_fp = half_wavelengths(r)
     zero, zero_fp = r.phi_zrg + r.phi_cal, r.phi_zrg_fp + r.phi_cal_fp
