@@ -8,7 +8,9 @@ import pytest
 
 from catseye.records.night.live import TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
 from catseye.records.site.folder import REFERENCE
+from catseye.reduction.epoch.allowance import Allowance
 from catseye.reduction.epoch.epoch import reduce_epoch
+from catseye.reduction.epoch.self_check import LENGTH
 from catseye.reduction.epoch.telescope_motion import TelescopeKnots
 from catseye.reduction.live.live import Live, LiveSettings
 from catseye.simulator.twin.conditions import STILL
@@ -213,6 +215,22 @@ def test_strangers_are_named_and_break_nothing(settled):
     assert "ZY999" in said.text
     feed.into(live)
     assert live.solve(night.ticks(3)) is not None
+
+
+def test_an_epoch_is_judged_as_a_campaign_and_what_is_allowed_for_is_told_and_covered(settled, monkeypatch):
+    """An error of 0.3 mm that shots of one length share, as the self-check would find it."""
+    night, live, feed = settled
+    feed.into(live)
+    plain = copy.deepcopy(live).solve(night.ticks(3))
+    found = Allowance(families={LENGTH: 0.3}, texts=("the ranges err in common by length",))
+    monkeypatch.setattr("catseye.reduction.epoch.self_check.FEWEST", 4)  # a round of six rangers has few shots
+    monkeypatch.setattr("catseye.reduction.live.epoch.allowed", lambda settled: found)
+    covered = live.solve(night.ticks(3))
+    assert "the ranges err in common by length" in covered.notes
+    assert "the ranges err in common by length" not in plain.notes
+    variance = np.diag(covered.covariance) / np.diag(plain.covariance).clip(1e-14)
+    assert np.median(variance) > 1.001  # shots and what was carried know most of it
+    assert np.max(variance) > 1.02
 
 
 def test_without_its_samples_a_shot_counts_with_what_the_ranger_made_of_it(settled):

@@ -5,7 +5,7 @@ the telescope had carried them, and what earlier epochs know takes the place of 
 """
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,13 +20,14 @@ from catseye.records.night.shot import ShotColumns
 from catseye.records.night.weather import Weather
 from catseye.records.site.folder import SiteFolder
 from catseye.records.site.triplet import TripletRecord
+from catseye.reduction.epoch.allowance import Allowance
 from catseye.reduction.epoch.coordinates import AdjustedCoordinates, coordinates_of
 from catseye.reduction.epoch.cycles import Resolved, resolve_cycles, without_shots
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import Phases, follow_electronics
 from catseye.reduction.epoch.reason import Reason
 from catseye.reduction.epoch.settings import ReductionSettings
-from catseye.reduction.epoch.settling import settle_network
+from catseye.reduction.epoch.settling import SettledNetwork, allowed, settle_network
 from catseye.reduction.epoch.unknowns import CampaignNetwork, build_network
 from catseye.reduction.live.shots import PhasedShot
 from catseye.reduction.live.state import Carried, from_ground, to_ground, with_unseen
@@ -136,13 +137,25 @@ def solve_epoch(
         resolved = resolve_cycles(build_network(observed, phases, electronics, settings=settings, motion=motion))
         electronics = without_shots(electronics, set(resolved.rejected))
     known = () if carried is None else carried.points()
-    network = build_network(observed, phases, electronics, settings=settings, motion=motion, also=lasting, known=known)
+
+    def network_with(allowance: Allowance) -> CampaignNetwork:
+        built = build_network(
+            observed,
+            phases,
+            electronics,
+            settings=settings,
+            motion=motion,
+            also=lasting,
+            known=known,
+            allowance=allowance,
+        )
+        return built if carried is None else _with_carried(built, carried, frames_at(built, motion))
+
+    network = network_with(Allowance())
     if not network.rangers:
         raise InputError("no shot of this epoch can be used (expected a phase, a reference and a place for one)")
-    frames = frames_at(network, motion)
-    if carried is not None:
-        network = _with_carried(network, carried, frames)
-    settled = settle_network(network, resolved.starts, keep=SETTLED, predicted=carried is not None)
+    settled = _judged(network, network_with, resolved.starts, predicted=carried is not None)
+    network, frames = settled.network, frames_at(settled.network, motion)
     solution, coordinates = settled.solution, coordinates_of(settled, resolved=resolved)
     reasons |= resolved.rejected
     layout = network.layout
@@ -158,6 +171,26 @@ def solve_epoch(
         elevation=float(motion.track.at(motion.epoch)[1]),
     )
     return Epoch(tuple(rows), coordinates, seen if carried is None else with_unseen(carried, seen), reasons)
+
+
+def _judged(
+    network: CampaignNetwork,
+    network_with: Callable[[Allowance], CampaignNetwork],
+    starts: Mapping[str, np.ndarray],
+    *,
+    predicted: bool,
+) -> SettledNetwork:
+    """The adjustment, its explanations judged; once more where something has to be allowed for.
+
+    Once: what a second adjustment would ask for, the next epoch asks for again. Doubts of the stations are told and not
+    taken in: an epoch hardly knows a gradient, and what was carried on knows their offsets from hours.
+    """
+    settled = settle_network(network, starts, keep=SETTLED, predicted=predicted)
+    allowance = replace(allowed(settled), thermometers={}, profile=0.0)
+    if allowance.same(settled.network.allowance):
+        return settled._replace(network=replace(settled.network, allowance=allowance))
+    network = network_with(allowance).with_strength(settled.network.strength)
+    return settle_network(network, starts, keep=SETTLED, predicted=predicted)
 
 
 def frames_at(network: CampaignNetwork, motion: CarriedMotion) -> dict[str, Transform]:
