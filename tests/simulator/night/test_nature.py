@@ -13,10 +13,12 @@ from catseye.simulator.night.batches import in_batches
 from catseye.simulator.night.expansion import SteelExpansion
 from catseye.simulator.night.faults import Faults, Planted, Streams
 from catseye.simulator.night.fields import AirWave, Front, HorizontalGradient, PressureWave, Turbulence
+from catseye.simulator.night.head import neighbouring_residuals
 from catseye.simulator.night.lag import lagged
 from catseye.simulator.night.natural_air import NaturalAir
 from catseye.simulator.night.nature import CALM, Nature
 from catseye.simulator.night.posture import posture
+from catseye.simulator.night.schedule import REFERENCE
 from catseye.simulator.night.simulate import SimulatedTelescope, simulate_night
 from catseye.simulator.night.stations import ReadingGap, StationNature
 from catseye.simulator.night.structure import structure
@@ -86,6 +88,7 @@ def test_each_effect_stays_below_its_largest_reaches_near_it_and_is_sometimes_ab
         "Sun": (0.5, [v for n in drawn for v in n.stations.radiation_c.values() if v]),
         "steel": (1.0, [n.expansion.share for n in drawn if n.expansion]),
         "batches": (1.0, [n.batch_heights for n in drawn if n.batch_heights]),
+        "neighbours": (1.0, [n.neighbours for n in drawn if n.neighbours]),
     }
     for name, (largest, values) in sizes.items():
         assert 0.95 * largest < max(values) <= largest, name  # of 150 even draws one lies in the last twentieth
@@ -293,6 +296,17 @@ def test_each_shot_sees_points_where_they_are_at_its_time(calm):
     assert 0.1e-3 < np.abs(changed).max() < 1.5e-3
 
 
+def test_what_the_alidade_carries_moves_with_its_own_share_and_the_alidade_does_not():
+    """A tenth more of 47 m of steel: dish and arm move alike, away from the pintle bearing."""
+    shares = [small(Nature(expansion=SteelExpansion(1.0, 3600.0, alidade_share=share))) for share in (0.0, 0.1)]
+    plain, more = (night.truth.moving for night in shares)
+    late = np.array([plain.reference_s + 1800.0])
+    expected = 0.1 * float(plain.scale(late)[0]) * plain.dish_middle
+    for name in ("ZY114", "DP020", "TR03-L"):
+        np.testing.assert_allclose((more.at([name], late) - plain.at([name], late))[0], expected, atol=1e-12)
+    assert np.array_equal(plain.at(["ZAG731D"], late), more.at(["ZAG731D"], late))
+
+
 def test_the_dish_expands_by_its_own_share_about_its_middle():
     shares = {share: small(Nature(expansion=SteelExpansion(1.0, 3600.0, share))) for share in (0.0, 0.2)}
     plain, more = shares[0.0].truth.moving, shares[0.2].truth.moving
@@ -357,6 +371,23 @@ def test_a_night_takes_its_batches_from_its_nature(calm):
     assert changed == {"DP", "TR"}
 
 
+def test_lines_to_near_ends_share_their_air():
+    """Over 2000 draws: variance 1, and share exp(-3 m / 5 m) between ends 3 m apart; two per cent by chance."""
+    rng, ends = np.random.default_rng(8), np.array([[0.0, 0.0, 50.0], [3.0, 0.0, 50.0], [60.0, 0.0, 50.0]])
+    own = (dict(zip("abc", rng.normal(size=3), strict=True)) for _ in range(2000))
+    drawn = [list(neighbouring_residuals(each, ends, rng=rng, share=0.7).values()) for each in own]
+    covariance = np.cov(np.array(drawn).T)
+    np.testing.assert_allclose(np.diag(covariance), 1.0, atol=0.1)
+    np.testing.assert_allclose(covariance[0, 1:], [0.7 * np.exp(-0.6), 0.0], atol=0.08)
+
+
+def test_a_night_takes_its_neighbours_from_its_nature():
+    plain, made = (small(nature, planted=Planted()) for nature in (Nature(batch_heights=1e-9), Nature(neighbours=1.0)))
+    changed = {s.target for s, a, b in zip(made.shots, made.frames, plain.frames, strict=True) if np.any(a != b)}
+    assert REFERENCE not in changed
+    assert len(changed) > 0.9 * len({s.target for s in made.shots})  # a blocked shot has no line
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
@@ -373,6 +404,7 @@ def test_a_night_takes_its_batches_from_its_nature(calm):
         (lambda: ReadingGap("WX1", 100.0, 50.0), "end_s - start_s of a gap of WX1 = -50"),
         (lambda: SteelExpansion(lag_s=0.0), "lag_s of the steel = 0"),
         (lambda: Nature(batch_heights=-1.0), "batch_heights = -1"),
+        (lambda: Nature(neighbours=1.5), "neighbours = 1.5"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(make, message):

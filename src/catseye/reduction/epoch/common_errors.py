@@ -37,6 +37,7 @@ from catseye.reduction.epoch.unknowns import (
 STEEL_PER_K = 12e-6
 U_WAVELENGTH_UM = 1e-3  # of each head: site.toml gives one for all, 0.780, to its last digit
 OF_BENCH = np.sqrt(0.5)  # of the u of a D0: half of its variance is the bench's, which calibrated them all
+OF_NEIGHBOURS = np.sqrt(0.5)  # of a line's residual: half of its variance is its neighbours', too; no record says
 BATCH = 100  # prisms of one melt and one polishing, by serial order
 ALIKE_M = 5.0  # lines of one ranger share their air where their ends are so near: the outer scale close to a dish
 NODES = 12  # of a path
@@ -217,7 +218,7 @@ def _of_air(network: CampaignNetwork, parts: list[ShotParts], sights: list[_Sigh
             for more in (0.0, U_WAVELENGTH_UM)
         )
         yield CommonError(f"wavelength of {part.name}", {part.name: part.distance * (redder - now)})
-    ppm = path_ppm(network)
+    ppm = OF_NEIGHBOURS * path_ppm(network)
     if ppm > 0.0:
         for part, s in zip(parts, sights, strict=True):
             for i, shape in enumerate(_smooth(s.b).T):

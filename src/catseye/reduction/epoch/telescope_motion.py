@@ -36,7 +36,7 @@ PARTS = (
     "up",
 )
 UNITS = (PPM, PPM, PPM, *(MICRORADIAN,) * 3, *(MILLIMETRE,) * 5)  # bends at the rim
-WALK = (3.0, 1.0, 0.5, 0.25, 0.25, 0.25, 0.02, 0.02, 0.05, 0.05, 0.05)  # a root hour: 0.25 K of steel; 0.05", 20 um
+WALK = (3.0, 1.0, 0.5, 0.25, 0.25, 0.25, 0.02, 0.02, 0.02, 0.02, 0.02)  # a root hour: 0.25 K of steel; 0.05", 20 um
 ALIKE = ((0,), (1,), (2,), (3,), (4, 5), (6, 7), (8, 9), (10,))  # parts of one strength: no direction is another
 LEAST_WALK, MOST_WALK = 0.02, 30.0  # factors on these
 

@@ -77,6 +77,11 @@ class TrueAir:
     conditions: AirConditions
     stratification: float = 1.0  # factor on every change with height
 
+    @property
+    def neighbours(self) -> float:
+        """Share of the variance of a line's residual that it has in common with the lines beside it."""
+        return 0.0
+
     def temperature_c(self, z, seconds):
         c = self.conditions
         height = np.asarray(z, dtype=float)

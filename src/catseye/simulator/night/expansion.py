@@ -21,18 +21,22 @@ class SteelExpansion:
     lag_s        time constant of the steel behind the air
     dish_share   by which the dish expands about its own middle on top, as a share of the telescope's expansion
     arm_share    by which the feed arm expands away from the dish's middle on top, likewise
+    alidade_share   by which the alidade, thicker than what it carries, expands on top: dish and arm move away from the
+                 pintle bearing as the dish's middle does
     """
 
     share: float = 1.0
     lag_s: float = 3600.0
     dish_share: float = 0.0
     arm_share: float = 0.0
+    alidade_share: float = 0.0
 
     def __post_init__(self):
         require("share of the steel's expansion", self.share, -10.0, 10.0)
         require("lag_s of the steel", self.lag_s, 60.0, 86_400.0)
         require("dish_share of the expansion", self.dish_share, -1.0, 1.0)
         require("arm_share of the expansion", self.arm_share, -1.0, 1.0)
+        require("alidade_share of the expansion", self.alidade_share, -1.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +47,7 @@ class MovingPoints:
     own           by name how much more than itself a point expands about the dish's middle; 0 off dish and arm, and
                   what is not in it stands on the ground
     dish_middle   (3,) m
+    carried       names of what the alidade carries: dish and arm
     """
 
     points: Mapping[str, np.ndarray]
@@ -51,6 +56,7 @@ class MovingPoints:
     reference_s: float = 0.0
     own: Mapping[str, float] = field(default_factory=dict)
     dish_middle: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    carried: frozenset[str] = frozenset()
 
     def scale(self, seconds):
         """Expansion of the telescope since `reference_s`, at times (k,): 1e-6 is a micrometre a metre."""
@@ -68,4 +74,5 @@ class MovingPoints:
         scale = self.scale(seconds)[:, None]
         rides = np.array([name in self.own for name in names])[:, None]
         own = np.array([self.own.get(name, 0.0) for name in names])[:, None]
-        return rest + rides * scale * (rest + own * (rest - self.dish_middle))
+        lifted = self.law.alidade_share * np.array([name in self.carried for name in names])[:, None]
+        return rest + rides * scale * (rest + own * (rest - self.dish_middle) + lifted * self.dish_middle)

@@ -1,5 +1,6 @@
 """What a head records: the phase of each return, and the samples of its converter."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ MODULATION_HZ = 1.5e9
 RADIANS_PER_METRE = 2.0 * TWO_PI * MODULATION_HZ / SPEED_OF_LIGHT  # of one-way optical path
 VOLT_PER_CODE = 10.0 / 32768.0
 SAMPLES_PER_CYCLE, CYCLES = 64, 128
+NEIGHBOUR_M = 5.0  # outer scale of eddies that stay: as far as a dish's backing structure and panels warm the air
 DRIFT_RAD_PER_ROOT_HOUR = 0.010
 HARMONICS = np.array([0.0020, 0.0003])  # second and third, of the amplitude, their phases any from shot to shot
 REFERENCE_VOLT = 6.5
@@ -86,6 +88,20 @@ def foreign_return(amplitude: float, draws) -> tuple[complex, complex]:
     return amplitude, amplitude * share * np.exp(1j * sign * np.radians(40.0 + 100.0 * where))
 
 
+def neighbouring_residuals(
+    own: Mapping[str, float], ends: np.ndarray, *, rng: np.random.Generator, share: float
+) -> dict[str, float]:
+    """Residuals of one ranger's lines, a share of their variance in common as exp(-r / 5 m) between their ends.
+
+    own    target: residual in its standard deviation, each by itself
+    ends   (n, 3) m, of the targets
+    """
+    alike = np.exp(-np.linalg.norm(ends[:, None] - ends, axis=2) / NEIGHBOUR_M)
+    common = np.linalg.cholesky(alike + 1e-9 * np.eye(len(ends))) @ rng.normal(size=len(ends))
+    alone = np.array(list(own.values()))
+    return dict(zip(own, (np.sqrt(1.0 - share) * alone + np.sqrt(share) * common).tolist(), strict=True))
+
+
 def returns_of_ranger(
     head: TrueHead,
     shots: list[ScheduledShot],
@@ -102,6 +118,11 @@ def returns_of_ranger(
     phase_e = electronic_phase(head, seconds, streams, planted=planted)
     rng = streams(f"returns/{head.ranger}")
     paths = {name: streams(f"air/{head.ranger}/{name}").normal() for name in targets}
+    if air.neighbours > 0.0:
+        own = {name: paths[name] for name in sorted({s.target for s in shots} & targets.keys())}
+        ends = np.array([points.points[name] for name in own])
+        rng_of_lines = streams(f"air/{head.ranger}/neighbours")
+        paths |= neighbouring_residuals(own, ends, rng=rng_of_lines, share=air.neighbours)
     fluctuation = np.array([paths.get(s.target, 0.0) for s in shots]) * air.conditions.index_fluctuation_ppm * PPM
     flicker = 1.0 + planted.gain("scintillation") * 0.022 * rng.normal(size=len(shots))
     fate, foreign = rng.uniform(size=len(shots)), rng.uniform(size=(len(shots), 4))

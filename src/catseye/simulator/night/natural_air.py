@@ -20,6 +20,10 @@ class NaturalAir(TrueAir):
 
     nature: Nature = CALM
 
+    @property
+    def neighbours(self) -> float:
+        return self.nature.neighbours
+
     def weather_at(self, points, seconds):
         """As of `TrueAir`. What warms the air does not wet it: the same vapour is a lower relative humidity."""
         smooth_c, pressure_hpa, humidity_percent = TrueAir(self.conditions, self.stratification).weather_at(

@@ -29,7 +29,7 @@ RADIATION_C = 0.5  # WMO-8 ch. 2: a naturally ventilated screen in sunshine and 
 INTERVAL_S = (10.0, 600.0)  # how often weather stations are usually read
 GAP_S, GAP_SLOTS, GAP_SLOT_S, GAP_CHANCE = 900.0, 10, 3600.0, 0.3  # a restarted logger: minutes, chosen
 STEEL_LAG_S = (1800.0, 5400.0)  # 15-25 mm of steel, air on both sides: c rho d / (2 h), h 10-15 W/m2/K
-DISH_SHARE, ARM_SHARE = 0.2, 0.1  # dish and arm are thinner than the box girders under them: chosen
+DISH_SHARE, ARM_SHARE, ALIDADE_SHARE = 0.2, 0.1, 0.1  # dish and arm are thinner than the box girders under them: chosen
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,7 @@ class Nature:
 
     wind_m_s        towards the east and the north; airs the thermometers
     batch_heights   error that the glass heights of a batch of prisms have in common, one sigma, in the sheet's u_height
+    neighbours      share of the variance of a line's residual that it has in common with the lines beside it, 0 to 1
 
     >>> Nature(waves=(AirWave(amplitude_c=0.3, period_s=2100.0),)).calm
     False
@@ -52,10 +53,12 @@ class Nature:
     stations: StationNature = field(default_factory=StationNature)
     expansion: SteelExpansion | None = None
     batch_heights: float = 0.0
+    neighbours: float = 0.0
 
     def __post_init__(self):
         require("wind_m_s", float(np.hypot(*self.wind_m_s)), 0.0, 60.0)
         require("batch_heights", self.batch_heights, 0.0, 100.0)
+        require("neighbours", self.neighbours, 0.0, 1.0)
 
     @staticmethod
     def drawn(seed: int, strength: float = 1.0, *, night: int = 0) -> "Nature":
@@ -135,6 +138,7 @@ def _drawn(draw: _Draw) -> Nature:
         stations=_stations(draw),
         expansion=expansion if expansion.share else None,
         batch_heights=draw.level("site/batches"),
+        neighbours=min(draw.level("nature/neighbours"), 1.0),
     )
 
 
@@ -231,4 +235,4 @@ def _stations(draw: _Draw) -> StationNature:
 def _expansion(draw: _Draw) -> SteelExpansion:
     rng = draw.rng("site/steel")
     lag, dish, arm = _even(rng, *STEEL_LAG_S), _even(rng, -DISH_SHARE, DISH_SHARE), _even(rng, -ARM_SHARE, ARM_SHARE)
-    return SteelExpansion(draw.level("site/steel"), lag, dish, arm)
+    return SteelExpansion(draw.level("site/steel"), lag, dish, arm, _even(rng, -ALIDADE_SHARE, ALIDADE_SHARE))

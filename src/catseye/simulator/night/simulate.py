@@ -209,13 +209,13 @@ def _moving(
     """The points while the telescope expands: what was drawn holds half-way from the first shot to the last."""
     seconds = [shot.seconds for shots in plan.values() for shot in shots]
     own = dict.fromkeys(site.telescope.targets, 0.0)
+    on_dish = [t.name for t in (*site.telescope.dish, *(t for unit in site.telescope.triplets for t in unit.targets))]
+    on_arm = [*FEED_ARM_RANGERS, *(t.name for t in site.telescope.structural if t.frame == "reflector")]
     if law is not None:
-        units = [t.name for unit in site.telescope.triplets for t in unit.targets]
-        own |= dict.fromkeys([*(t.name for t in site.telescope.dish), *units], law.dish_share)
-        on_arm = [t.name for t in site.telescope.structural if t.frame == "reflector"]
-        own |= dict.fromkeys([*FEED_ARM_RANGERS, *on_arm], law.arm_share)
-    middle = np.array([*APERTURE_CENTRE, height_above_vertex(APERTURE_CENTRE)])
-    return MovingPoints(site.points, air, law, 0.5 * (min(seconds) + max(seconds)), own, site.pose.dish(middle))
+        own |= dict.fromkeys(on_dish, law.dish_share) | dict.fromkeys(on_arm, law.arm_share)
+    centre, carried = np.array([*APERTURE_CENTRE, height_above_vertex(APERTURE_CENTRE)]), frozenset(on_dish + on_arm)
+    half_way = 0.5 * (min(seconds) + max(seconds))
+    return MovingPoints(site.points, air, law, half_way, own, site.pose.dish(centre), carried)
 
 
 def benchmark_targets(marks: list[TrueBenchmark], streams: Streams, planted: Planted) -> list[TrueTarget]:

@@ -54,6 +54,10 @@ class WarmLine:
     def conditions(self) -> AirConditions:
         return self.air.conditions
 
+    @property
+    def neighbours(self) -> float:
+        return self.air.neighbours
+
     def index_at(self, points, seconds):
         """Group index at the ends of lines, where no plume is."""
         return self.air.index_at(points, seconds)
