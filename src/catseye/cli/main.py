@@ -4,6 +4,8 @@ import os
 import signal
 import sys
 
+LIVING = ("zy", "ziy", "simulate", "serve")  # which end in an order of their own
+
 
 def run() -> None:
     """`catseye`: exits with 0 done, 1 could not, 2 wrong usage, 130 on Ctrl-C, 143 when terminated."""
@@ -11,6 +13,10 @@ def run() -> None:
         signal.signal(number, lambda caught, frame: os._exit(128 + caught))
     from catseye.gateways.writers.interruption import ignore_signals, leave_on_signals
 
+    if sys.argv[1:2] and sys.argv[1] not in LIVING and not sys.argv[1].startswith("-") and hasattr(os, "fork"):
+        from catseye.cli.supervisor import work_in_child
+
+        work_in_child()
     leave_on_signals()
     from catseye.cli.terminal import finish
 

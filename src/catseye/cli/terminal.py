@@ -37,6 +37,13 @@ def attempt(command: Callable[[], None]) -> int:
     except CatseyeError as problem:
         complain(str(problem))
         return 1
+    except (MemoryError, ImportError) as problem:
+        from catseye.cli.memory import lacks_memory, out_of_memory
+
+        if not lacks_memory(problem):
+            raise
+        complain(out_of_memory(problem))
+        return 1
     except OSError as problem:
         complain(f"{problem.filename or 'input or output'}: {problem.strerror or problem}")
         return 1

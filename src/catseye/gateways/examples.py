@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 from catseye.errors import InputError
-from catseye.gateways.writers.interruption import deferred, undone_when_interrupted
+from catseye.gateways.writers.interruption import Unfinished, deferred, undone_when_interrupted
 from catseye.records.files.refusal import shown
 
 SHORT = {"night-01": "night-01", "gbt": "sites/gbt"}  # names that a user may type without the folder
@@ -96,7 +96,7 @@ def copy_example(name: str, directory: Path) -> int:
     if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
         raise InputError(f"{directory}: is there and not empty (expected a new or an empty folder)")
     fresh = directory.resolve().parent / f".catseye-{secrets.token_hex(6)}"
-    with undone_when_interrupted(lambda: shutil.rmtree(fresh, ignore_errors=True)):
+    with undone_when_interrupted(Unfinished(str(fresh))):
         try:
             shutil.copytree(root, fresh, ignore=shutil.ignore_patterns(*SKIPPED))
             with deferred():

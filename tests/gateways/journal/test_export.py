@@ -430,6 +430,45 @@ def test_what_live_did_not_believe_goes_along(tmp_path):
     assert "named in doubts.csv as not believed by the epochs: 1 of the shots" in done.notes
 
 
+def test_how_far_the_telescope_shook_goes_along(tmp_path):
+    """A row an epoch and body, as the epoch believed it; what no epoch of the span says is not there."""
+    entries = campaign_entries()
+    for k, mm in ((2, 0.25), (4, 0.375), (6, 0.5)):
+        answer = {"number": k, "ticks": START + SECOND * k, "jitter_mm": {"arm": mm, "dish": 0.03125}}
+        entries.append(EpochSolution(START + SECOND * k + 9, answer))
+    entries.append(EpochSolution(START + SECOND * 400, {"ticks": START + SECOND * 400, "jitter_mm": {"arm": 9.0}}))
+    done, campaign = exported(tmp_path, entries)
+    lines = (tmp_path / "out" / "jitter.csv").read_text().splitlines()
+    assert lines[0] == "mjd_utc,body,u_mm"
+    told = [(stamp(START + SECOND * k), mm) for k, mm in ((2, 0.25), (4, 0.375), (6, 0.5))]
+    assert lines[1:] == [line for t, mm in told for line in (f"{t},arm,{mm}", f"{t},dish,0.03125")]
+    assert campaign.jitter.mm(float(stamp(START + SECOND * 3)))["arm"] == pytest.approx(0.3125, abs=1e-6)
+    assert not [note for note in done.notes if "shook" in note]
+
+
+def test_a_journal_whose_epochs_do_not_say_it_has_the_setting_of_the_run(tmp_path):
+    run = replace(scene_run(), settings={"live": {"jitter_mm": {"arm": 0.2, "alidade": 0.03}}})
+    with Journal.open(tmp_path / "j.db", run=run, clock=ManualClock(START / 1e8)) as journal:
+        for entry in campaign_entries():
+            journal.append(entry)
+    with JournalReader(tmp_path / "j.db") as reader:
+        done = export_campaign(reader, tmp_path / "out", run=1)
+    first = stamp(START + SECOND)
+    assert (tmp_path / "out" / "jitter.csv").read_text().splitlines()[1:] == [
+        f"{first},alidade,0.03",
+        f"{first},arm,0.2",
+    ]
+    assert [note for note in done.notes if "jitter.csv has the run's setting" in note]
+    assert read_campaign(tmp_path / "out").jitter.mm(START / 1e8)["arm"] == 0.2
+
+
+def test_a_jitter_that_a_campaign_cannot_hold_is_refused(tmp_path):
+    said = EpochSolution(START + SECOND * 2, {"ticks": START + SECOND * 2, "jitter_mm": {"arm": 400.0}})
+    with pytest.raises(InputError, match="run 1: jitter_mm of an epoch is invalid"):
+        exported(tmp_path, [*campaign_entries(), said])
+    assert not (tmp_path / "out").exists()
+
+
 def test_where_no_station_was_believed_the_readings_go_as_they_are(tmp_path):
     entries = [full_shot(k) for k in range(1, 9)]
     entries += [LiveWeather("WX1", START + SECOND * k, 10.0, 930.1, 70.0) for k in (-2700, -2690, -2680)]

@@ -2,13 +2,13 @@
 
 What a campaign cannot hold is left out and told: shots without samples, taken in another way than site.toml says, not
 later than the ranger's last, without weather; readings with a silent sensor. What the live reduction did not believe
-goes along in doubts.csv. The directory is read before it appears.
+goes along in doubts.csv, how far the telescope's bodies shook in jitter.csv. The directory is read before it appears.
 """
 
 import csv
 import io
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import ValidationError
 
-from catseye.constants import DEGREE
+from catseye.constants import DEGREE, SECONDS_PER_DAY
 from catseye.coordinator.journal.check import ChainReport
 from catseye.coordinator.journal.entries import AnsweredShot
 from catseye.coordinator.journal.reader import JournalReader
@@ -27,6 +27,7 @@ from catseye.gateways.writers.output import whole_directory
 from catseye.gateways.writers.written import origin
 from catseye.records.night.campaign import LONGEST_CAMPAIGN, WEATHER_MARGIN, read_campaign
 from catseye.records.night.doubt import DOUBTS, DoubtRow, believed_samples
+from catseye.records.night.jitter import JITTER, LARGEST_MM, JitterRow
 from catseye.records.night.live import TICKS_PER_DAY, LivePosture, LiveWeather
 from catseye.records.night.shot import ShotRow
 from catseye.records.night.weather import WeatherSample
@@ -37,6 +38,7 @@ from catseye.verdict import Verdict
 
 STEADY = 0.01 * DEGREE  # rad that the telescope may move before it is told
 MARGIN = round(WEATHER_MARGIN * TICKS_PER_DAY)  # ticks
+JITTER_MARGIN = round(60.0 / SECONDS_PER_DAY * TICKS_PER_DAY)  # ticks, of an epoch behind its last shot
 MOST_TOLD = 3  # examples of each reason
 LIES = (ShotStatus.REFLECTED, ShotStatus.BAD_REFERENCE)  # what a night's own samples may not show again
 
@@ -121,6 +123,7 @@ def export_campaign(
         raise InputError(f"journal {reader.place}: run {run} has no shot that a campaign can hold: {reasons}")
     notes, wrong = left.notes(), list[str]()
     doubts = _doubts(reader, run, chosen, readings, why, notes, wrong)
+    shaken = _shaken(reader, run, (chosen[0].ticks, chosen[-1].ticks), notes)
     site = _as_it_stood(reader, run, site, chosen, readings, notes, wrong)
     verdict = export_verdict(chain, len(chosen) + len(readings), wrong)
     with whole_directory(out, Path(reader.place)) as directory:
@@ -131,8 +134,9 @@ def export_campaign(
             (directory / name).mkdir(exist_ok=True)
         (directory / "weather.csv").write_text(_weather_csv(readings), encoding="utf-8", newline="")
         (directory / "shots.csv").write_text(_shots_csv(chosen, notes), encoding="utf-8", newline="")
-        if doubts:
-            (directory / DOUBTS).write_text(_doubts_csv(doubts), encoding="utf-8", newline="")
+        for name, model, rows in ((DOUBTS, DoubtRow, doubts), (JITTER, JitterRow, shaken)):
+            if rows:
+                (directory / name).write_text(_table(model, rows), encoding="utf-8", newline="")
         _write_frames(reader, run, chosen, directory / "frames.npy")
         read_campaign(directory)
         provenance = origin(datetime.now(UTC), stored.hashes)
@@ -212,12 +216,40 @@ def _doubts(
     return made + shots
 
 
-def _doubts_csv(doubts: list[DoubtRow]) -> str:
+def _shaken(reader: JournalReader, run: int, span: tuple[int, int], notes: list[str]) -> list[JitterRow]:
+    """Jitter of the telescope's bodies as each epoch from first to last shot believed it.
+
+    A journal of an older version does not say that: what was set for the run.
+    """
+    found: dict[tuple[int, str], float] = {}
+    for _, solution in reader.solutions(run):
+        ticks = solution.answer.get("ticks", solution.ticks)
+        if span[0] <= ticks <= span[1] + JITTER_MARGIN:
+            found |= {(ticks, body): mm for body, mm in (solution.answer.get("jitter_mm") or {}).items()}
+    if not found:
+        live = reader.run(run).settings.get("live")
+        usual = live.get("jitter_mm") if isinstance(live, Mapping) else None
+        found = {(span[0], str(body)): mm for body, mm in (usual or {}).items()}
+        if found:
+            notes.append(f"the journal's epochs do not say how far the telescope shook: {JITTER} has the run's setting")
+    try:
+        return [
+            JitterRow(mjd_utc=float(stamp(ticks)), body=body, u_mm=float(mm))
+            for (ticks, body), mm in sorted(found.items())
+        ]
+    except ValidationError as problem:
+        raise InputError(
+            f"journal {reader.place}: run {run}: jitter_mm of an epoch is invalid (expected 0 to {LARGEST_MM:g} mm of "
+            "arm, dish and alidade)"
+        ) from problem
+
+
+def _table(model: type[DoubtRow | JitterRow], rows: Sequence[DoubtRow | JitterRow]) -> str:
     text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(DoubtRow.model_fields)
-    for each in doubts:
-        writer.writerow((each.what, each.name, f"{each.mjd_utc:.8f}", each.why))
+    writer = csv.DictWriter(text, tuple(model.model_fields), lineterminator="\n")
+    writer.writeheader()
+    for each in rows:
+        writer.writerow(each.model_dump() | {"mjd_utc": f"{each.mjd_utc:.8f}"})
     return text.getvalue()
 
 

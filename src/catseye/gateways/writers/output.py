@@ -3,14 +3,13 @@
 import json
 import os
 import secrets
-import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from catseye.errors import InputError
-from catseye.gateways.writers.interruption import deferred, undone_when_interrupted
+from catseye.gateways.writers.interruption import Unfinished, deferred, undone_when_interrupted
 
 PROVENANCE = "provenance.json"
 PAGES = (".html", ".htm")
@@ -96,13 +95,7 @@ def whole_directory(out: Path, *read: Path) -> Iterator[Path]:
     where = refuse_output(out, *read)
     fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
     old = where.parent / f".catseye-{secrets.token_hex(6)}"
-
-    def undo() -> None:
-        if old.exists() and not where.exists():  # between the renames: the old tree is all there is
-            os.rename(old, where)
-        shutil.rmtree(fresh, ignore_errors=True)
-        shutil.rmtree(old, ignore_errors=True)
-
+    undo = Unfinished(str(fresh), str(where), str(old))
     with undone_when_interrupted(undo):
         try:
             fresh.mkdir()
@@ -142,7 +135,7 @@ def whole_file(path: Path, option: str, mark: str) -> Iterator[list[str]]:
     where = path.resolve()
     fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
     pieces: list[str] = []
-    with undone_when_interrupted(lambda: fresh.unlink(missing_ok=True)):
+    with undone_when_interrupted(Unfinished(str(fresh))):
         try:
             if where.is_dir():
                 raise InputError(f"{option} {path}: is a directory (expected the name of a file)")
@@ -180,7 +173,7 @@ def write_whole(path: Path, content: bytes, *, option: str, ours: Callable[[byte
     """
     where = path.resolve()
     fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
-    with undone_when_interrupted(lambda: fresh.unlink(missing_ok=True)):
+    with undone_when_interrupted(Unfinished(str(fresh))):
         try:
             if where.is_dir():
                 raise InputError(f"{option} {path}: is a directory (expected the name of a file)")
