@@ -11,20 +11,23 @@ import select
 import signal
 import sys
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from typing import NoReturn
 
-from catseye.gateways.writers.interruption import LONGEST_DEFERRAL, UnfinishedWork, tell_supervisor
+from catseye.gateways.writers.interruption import LONGEST_DEFERRAL, UnfinishedWork, leave_on_signals, tell_supervisor
 
 GRACE = LONGEST_DEFERRAL + 0.5  # s that the child has to leave by itself: the contract allows five
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 HEARD = (*SIGNALS, signal.SIGCHLD)
 PDEATHSIG = 1  # PR_SET_PDEATHSIG of prctl(2)
-WORDS = {signal.SIGINT: "interrupted by Ctrl-C", signal.SIGTERM: "terminated"}
 
 
-def work_in_child() -> None:
-    """Return in a child that does the work; the parent never returns. Where none can be made, return as we are."""
+def work_in_child(stopped: Callable[[int], None]) -> None:
+    """Return in a child that does the work; the parent never returns. Where none can be made, return as we are.
+
+    stopped   says that a signal ended the program, and leaves
+    """
     reports, ours = os.pipe()
     signal.pthread_sigmask(signal.SIG_BLOCK, HEARD)  # until both know what to do
     try:
@@ -35,11 +38,12 @@ def work_in_child() -> None:
         os.close(ours)
     if child > 0:
         os.close(ours)
-        _watch(child, reports)
+        _watch(child, reports, stopped)
     if child == 0:
         os.close(reports)
         tell_supervisor(ours)
         _end_with(parent)
+    leave_on_signals()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, HEARD)
 
 
@@ -53,7 +57,7 @@ def _end_with(parent: int) -> None:
             os._exit(128 + signal.SIGTERM)
 
 
-def _watch(child: int, reports: int) -> NoReturn:
+def _watch(child: int, reports: int, stopped: Callable[[int], None]) -> NoReturn:
     """Until the child has ended, then leave as it did."""
     work, woken = UnfinishedWork(), _woken_by_signals()
     os.set_blocking(reports, False)
@@ -72,7 +76,15 @@ def _watch(child: int, reports: int) -> NoReturn:
         ended, status, usage = os.wait4(child, os.WNOHANG)
         if not _hear(work, reports):  # it is about to end, which a signal will say
             open_ = [woken]
-    _leave(work, asked, status, usage.ru_maxrss * 1024)
+    killed = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
+    if killed:
+        work.undo()
+    if asked and (killed or os.WEXITSTATUS(status) == 128 + asked):
+        stopped(asked)
+    if killed and killed not in SIGNALS:
+        _complain_of(signal.Signals(killed).name, usage.ru_maxrss * 1024)
+        os._exit(1)
+    os._exit(128 + killed if killed else os.WEXITSTATUS(status))
 
 
 def _hear(work: UnfinishedWork, reports: int) -> bool:
@@ -96,24 +108,8 @@ def _woken_by_signals() -> int:
     return ours
 
 
-def _leave(work: UnfinishedWork, asked: int, status: int, memory: int) -> NoReturn:
-    """Say in one line why the work was not done, where the child could not; leave with the right status."""
-    killed = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
-    code = os.WEXITSTATUS(status) if os.WIFEXITED(status) else 128 + killed
-    if killed:
-        work.undo()
-    if asked and (killed or code == 128 + asked):
-        code = 128 + asked
-        _complain(f"{WORDS[signal.Signals(asked)]}; nothing half-written is left")
-    elif killed and killed not in SIGNALS:
-        from catseye.cli.memory import memory_of_a_killed
+def _complain_of(name: str, memory: int) -> None:
+    from catseye.cli.memory import memory_of_a_killed
+    from catseye.cli.terminal import complain
 
-        code = 1
-        _complain(memory_of_a_killed(signal.Signals(killed).name, memory))
-    os._exit(code)
-
-
-def _complain(text: str) -> None:
-    with suppress(OSError):
-        clear = b"\r\x1b[K" if os.isatty(2) else b""  # of a progress line
-        os.write(2, clear + f"catseye: {text}\n".encode())
+    complain(memory_of_a_killed(name, memory))
