@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from threadpoolctl import threadpool_limits
-
+from catseye.processors import one_thread
 from catseye.records.night.campaign import REFERENCE, Campaign
 from catseye.records.site.validity import expired_of_site
 from catseye.reduction.epoch.coordinates import AdjustedCoordinates, adjust_coordinates
@@ -55,7 +54,7 @@ def reduce_epoch(
     """
     settings = settings or ReductionSettings()
     phases = measure_phases(campaign, settings, progress)
-    with threadpool_limits(limits=1, user_api="blas"):  # spinning pools make small matrices many times slower
+    with one_thread():
         electronics, wrong = follow_electronics(campaign, phases, settings.dense_shots)
         coordinates = adjust_coordinates(campaign, phases, electronics, settings=settings, progress=progress)
         surface, missing = fit_surface(campaign, coordinates)
