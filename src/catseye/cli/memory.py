@@ -38,6 +38,8 @@ def memory_of_a_killed(name: str, peak: int) -> str:
     name   of the signal
     peak   bytes that it had at most
     """
+    if name == "SIGBUS":
+        return "ended by SIGBUS: a file that was read was cut off, or its disk is full; nothing half-written is left"
     return (
         f"ended by {name} with {peak / GIB:.1f} GiB in use{_limit()}: most likely out of memory, more than that is "
         f"needed ({ADVICE}); nothing half-written is left"

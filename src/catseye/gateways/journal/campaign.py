@@ -419,11 +419,18 @@ def _weather_csv(readings: list[LiveWeather]) -> str:
 
 
 def _write_frames(reader: JournalReader, run: int, chosen: list[ExportedShot], path: Path) -> None:
-    """A row a shot, as long as the longest, zeros behind the shorter ones; one buffer in memory at a time."""
+    """A row a shot, as long as the longest, zeros behind the shorter ones; one buffer in memory at a time.
+
+    Written, not mapped: where the disk is full, a mapped file ends the process.
+    """
     width = max(shot.cycles * shot.samples_per_cycle for shot in chosen)
     rows = {shot.seq: row for row, shot in enumerate(chosen)}
-    frames = np.lib.format.open_memmap(path, mode="w+", dtype="<i2", shape=(len(chosen), width))
-    for seq, entry in reader.shots(run):
-        if seq in rows and entry.shot.samples is not None:
-            frames[rows[seq], : len(entry.shot.samples)] = entry.shot.samples
-    frames.flush()
+    with path.open("wb") as file:
+        header = {"descr": "<i2", "fortran_order": False, "shape": (len(chosen), width)}
+        np.lib.format.write_array_header_1_0(file, header)
+        first = file.tell()
+        file.truncate(first + 2 * width * len(chosen))
+        for seq, entry in reader.shots(run):
+            if seq in rows and entry.shot.samples is not None:
+                file.seek(first + 2 * width * rows[seq])
+                file.write(np.asarray(entry.shot.samples, "<i2").tobytes())

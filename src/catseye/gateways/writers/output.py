@@ -109,6 +109,34 @@ def whole_directory(out: Path, *read: Path) -> Iterator[Path]:
             undo()
 
 
+@contextmanager
+def new_directory(directory: Path) -> Iterator[Path]:
+    """A directory to write into, which becomes a new one, or takes an empty one's place, when the block ends well.
+
+    Raises InputError where it holds something or something cannot be written, with the file's name in it.
+    """
+    where = directory.resolve()
+    if where.exists() and (not where.is_dir() or any(where.iterdir())):
+        raise InputError(f"{directory}: exists and is not an empty directory (expected a new or an empty one)")
+    fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
+    undo = Unfinished(str(fresh))
+    with undone_when_interrupted(undo):
+        try:
+            where.parent.mkdir(parents=True, exist_ok=True)
+            fresh.mkdir()
+            yield fresh
+            with deferred():
+                if where.exists():
+                    where.rmdir()
+                os.rename(fresh, where)
+        except OSError as problem:
+            file = Path(problem.filename or fresh)
+            inside = file.relative_to(fresh) if file.is_relative_to(fresh) else Path()
+            raise InputError(f"{directory / inside}: cannot be written: {problem.strerror or problem}") from problem
+        finally:
+            undo()
+
+
 def _replace(where: Path, fresh: Path, old: Path) -> None:
     """Two renames: the old tree aside, the new one in its place; when the second fails the first is taken back."""
     if not where.exists():
