@@ -20,7 +20,6 @@ from typing import NamedTuple
 
 LONGEST_DEFERRAL = 3.0  # s: the contract allows five until the process is gone
 
-_undo: list[Callable[[], None]] = []
 _deferrals = 0
 _pending = 0
 _supervisor: int | None = None  # descriptor that the supervisor reads
@@ -47,6 +46,9 @@ class Unfinished(NamedTuple):
             else:
                 with suppress(FileNotFoundError):
                     os.unlink(path)
+
+
+_undo: list[Callable[[], None] | Unfinished] = []
 
 
 class UnfinishedWork:
@@ -92,7 +94,7 @@ def ignore_signals() -> None:
 
 
 @contextmanager
-def undone_when_interrupted(undo: Callable[[], None]) -> Iterator[None]:
+def undone_when_interrupted(undo: Callable[[], None] | Unfinished) -> Iterator[None]:
     """Calls `undo` when the process is interrupted inside; it must not raise for what is not there."""
     _undo.append(undo)
     _say(undo, begun=True)
@@ -103,7 +105,7 @@ def undone_when_interrupted(undo: Callable[[], None]) -> Iterator[None]:
         _say(undo, begun=False)
 
 
-def _say(undo: Callable[[], None], *, begun: bool) -> None:
+def _say(undo: Callable[[], None] | Unfinished, *, begun: bool) -> None:
     if _supervisor is not None and isinstance(undo, Unfinished):
         with suppress(OSError):  # it is gone: this process hears of that by a signal
             os.write(_supervisor, json.dumps([begun, *undo]).encode() + b"\n")
