@@ -35,7 +35,8 @@ class JitterTable:
 
     def mm(self, mjd_utc: ArrayLike) -> dict[str, NDArray[np.float64]]:
         """Jitter of each body that is named, mm, at times (m,)."""
-        return {body: np.interp(mjd_utc, times, u) for body, (times, u) in self.bodies.items()}
+        at = np.asarray(mjd_utc, dtype=float)
+        return {body: np.asarray(np.interp(at, times, u)) for body, (times, u) in self.bodies.items()}
 
 
 def jitter_table(rows: Sequence[JitterRow]) -> JitterTable | None:

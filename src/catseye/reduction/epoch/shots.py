@@ -14,6 +14,7 @@ from catseye.reduction.epoch.head import HeadCorrections, head_corrections
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import ElectronicsPhase
 from catseye.reduction.epoch.self_check import unit_of
+from catseye.reduction.epoch.telescope_track import buffer_middles
 from catseye.reduction.epoch.unknowns import CampaignNetwork, path_ppm
 from catseye.reduction.site.motion import shaken
 from catseye.signal.cycles.whole import fraction, unwrapped_length, whole_cycles
@@ -104,7 +105,7 @@ class _Sights:
         b = x[target[:, None] + np.arange(3)]
         turns = None
         if network.motion is not None:
-            times = network.campaign.shots.mjd_utc[network.electronics[name].shots]
+            times = buffer_middles(network.campaign, network.electronics[name].shots)
             turns = *network.motion.carried((name,) * m, times), *network.motion.carried(targets, times)
             a, b = (np.einsum("mij,mj->mi", r, p) + s for p, r, s in ((a, *turns[:2]), (b, *turns[2:])))
         towards = a - b
@@ -201,12 +202,10 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
 
 
 def _jitter(network: CampaignNetwork, name: str, targets: tuple[str, ...]) -> np.ndarray:
-    """Variance (m,), m^2, of the distances by the telescope's shaking, as the epoch or the campaign's table has it."""
-    if network.motion is not None:
-        return network.motion.jitter(name, targets)
+    """Variance (m,), m^2, of the distances by the telescope's shaking, as the campaign's table or the epoch has it."""
     table = network.campaign.jitter
     if table is None:
-        return np.zeros(len(targets))
+        return np.zeros(len(targets)) if network.motion is None else network.motion.jitter(name, targets)
     times = network.campaign.shots.mjd_utc[network.electronics[name].shots]
     return shaken(network.places[name].body, [network.places[t].body for t in targets], table.mm(times))
 

@@ -48,6 +48,13 @@ class PostureTrack:
             del self._ticks[:first]
             self._filled = 0
 
+    @classmethod
+    def of(cls, reads: Sequence[LivePosture]) -> "PostureTrack":
+        """All of some readings, in order of time, to which nothing is added."""
+        track = cls()
+        track._ticks, track._reads = [read.ticks for read in reads], {read.ticks: read for read in reads}
+        return track
+
     def between(self, first: float, last: float) -> "PostureTrack":
         """The readings of now that matter from MJD to MJD, to which nothing is added: those within, and a gap more."""
         gap = LONGEST_GAP / SECONDS_PER_DAY
