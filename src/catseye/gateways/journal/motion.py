@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -59,7 +60,7 @@ class JournalledMotion:
         }
         return cls(reader, run, [found[ticks] for ticks in sorted(found)])
 
-    @property
+    @cached_property
     def moved(self) -> float:
         """The largest change of an angle, rad."""
         return self._moved(self.postures)
@@ -90,7 +91,7 @@ class JournalledMotion:
         notes += [wrong] * bool(wrong)
         return ToldMotion(middle, tuple(_row(read) for read in near), self._jitter(span, climbed, notes), wrong)
 
-    @property
+    @cached_property
     def _ticks(self) -> NDArray[np.int64]:
         return np.array([read.ticks for read in self.postures], dtype=np.int64)
 
@@ -123,7 +124,9 @@ class JournalledMotion:
         bent = {body: mm * climbed / math.sqrt(12.0) for body, mm in bending.items()}  # evenly through the climb
         try:
             return tuple(
-                JitterRow(mjd_utc=float(stamp(ticks)), body=body, u_mm=math.hypot(mm, bent.get(body, 0.0)))
+                JitterRow.model_validate(
+                    {"mjd_utc": float(stamp(ticks)), "body": body, "u_mm": math.hypot(mm, bent.get(body, 0.0))}
+                )
                 for (ticks, body), mm in sorted(found.items())
             )
         except (ValidationError, TypeError) as problem:
