@@ -1,9 +1,11 @@
 """Progress is for terminals, complaints are one line."""
 
 import io
+import threading
 
 import pytest
 
+from catseye.cli import terminal
 from catseye.cli.terminal import ProgressLine, attempt, complain, wrapped
 from catseye.errors import InputError
 
@@ -24,6 +26,38 @@ def test_progress_is_one_line_that_is_wiped_at_the_end(monkeypatch):
     assert "adjustment 0/6" in stream.getvalue()
     assert "\n" not in stream.getvalue()
     assert stream.getvalue().endswith("\r\x1b[K")
+
+
+class Listener(io.StringIO):
+    """A stream that says when a text has come."""
+
+    def __init__(self, wanted, terminal):
+        super().__init__()
+        self.wanted, self.terminal, self.heard = wanted, terminal, threading.Event()
+
+    def isatty(self):
+        return self.terminal
+
+    def write(self, text):
+        count = super().write(text)
+        if self.wanted in self.getvalue():
+            self.heard.set()
+        return count
+
+
+@pytest.mark.parametrize(("shown", "wanted"), [(True, "report.html 5/6, for "), (False, "report.html 5 of 6, for ")])
+def test_a_step_that_says_nothing_is_named_again_with_its_time(monkeypatch, shown, wanted):
+    """The page is the longest step, and one call: whoever waits reads what for and how long already."""
+    stream = Listener(wanted, shown)
+    monkeypatch.setattr("sys.stderr", stream)
+    monkeypatch.setattr("sys.argv", ["catseye"])
+    for name, seconds in (("BEAT", 0.001), ("SURE", 0.01), ("FIRST_LINE", 0.02), ("BETWEEN_LINES", 0.02)):
+        monkeypatch.setattr(terminal, name, seconds)
+    progress = ProgressLine(quiet=False)
+    progress("writing report.html", 5, 6)
+    assert stream.heard.wait(20.0)
+    progress.clear()
+    assert not [thread for thread in threading.enumerate() if thread.name == "catseye-progress"]  # none to say more
 
 
 @pytest.mark.parametrize(("stream", "quiet"), [(io.StringIO(), False), (Terminal(), True)])

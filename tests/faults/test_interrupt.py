@@ -19,6 +19,10 @@ from repository import ROOT
 NIGHT = ROOT / "examples" / "night-01"
 RUN = "from catseye.cli.main import run; run()"
 STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
+SAID = {  # one line; nothing where the work was done just before
+    signal.SIGINT: b"catseye: interrupted by Ctrl-C; nothing half-written is left\n",
+    signal.SIGTERM: b"catseye: terminated; nothing half-written is left\n",
+}
 SOON = 5.0  # s, the contract's
 TERM_BIT = 1 << (signal.SIGTERM - 1)  # Python leaves SIGTERM alone, so that catching it shows that we are in charge
 
@@ -76,7 +80,7 @@ def test_at_some_moment_after_the_start(tmp_path, moment, number):
     with suppress(subprocess.TimeoutExpired):
         process.wait(timeout=moment)
     status, said = interrupt(process, number)
-    assert said == b""
+    assert said == (SAID[number] if status else b"")
     assert_clean(out, status, number)
 
 
@@ -155,3 +159,98 @@ def test_they_cannot_hold_it_up_for_ever():
     )
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, timeout=SOON)
     assert (done.returncode, done.stderr) == (143, b"")
+
+
+FACTOR = """
+import sys
+import catseye.cli.main
+sys.argv = ["catseye", "reduce"]
+def work():
+    import numpy as np
+    from pathlib import Path
+    from scipy.linalg import lapack
+    from catseye.gateways.writers.output import whole_directory
+    matrix = np.asfortranarray(np.ones((4000, 4000)) + 4000 * np.eye(4000))
+    with whole_directory(Path(OUT)) as directory:
+        (directory / "half.csv").write_text("x")
+        print("begun", flush=True)
+        while True:  # no bytecode for seconds, were the matrix larger: LAPACK holds the interpreter
+            lapack.dpotrf(matrix)
+catseye.cli.main._main = work
+"""
+HELD = "import signal; signal.pthread_sigmask(signal.SIG_BLOCK, (2, 15))\n"  # in the child no handler ever runs
+
+
+def held(out, code):
+    """A run that is inside a factorisation, and no handler of which is ever called: as LAPACK lets none be."""
+    text = FACTOR.replace("OUT", repr(str(out))).replace("        print", f"        {code}        print")
+    process = subprocess.Popen(
+        [sys.executable, "-c", text + "catseye.cli.main.run()"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        preexec_fn=ends_with_us(),
+    )
+    assert process.stdout.readline() == b"begun\n"
+    return process
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_within_a_call_that_runs_no_handler(tmp_path, number):
+    """The supervisor ends what cannot hear, and removes what it had half-made."""
+    out = tmp_path / "work" / "out"
+    out.mkdir(parents=True)
+    (out / "provenance.json").write_text(json.dumps({"format": FORMAT, "outputs": {"ranges.csv": ""}}))
+    (out / "ranges.csv").write_text("shot\n1\n")
+    process = held(out, HELD)
+    assert len(list(out.parent.iterdir())) == 2
+    assert interrupt(process, number) == (STATUS[number], SAID[number])
+    assert [path.name for path in out.parent.iterdir()] == ["out"]
+    assert (out / "ranges.csv").read_text() == "shot\n1\n"
+
+
+def test_a_run_that_the_system_kills_says_so_in_one_line(tmp_path):
+    """As it does where memory is out: what is killed cannot say or remove anything itself."""
+    process = held(tmp_path / "out", "import os, threading; threading.Timer(0.2, os.kill, (os.getpid(), 9)).start()\n")
+    _, said = process.communicate(timeout=4 * SOON)
+    assert process.returncode == 1
+    assert said.startswith(b"catseye: ended by SIGKILL with ")
+    assert b"most likely out of memory" in said
+    assert said.count(b"\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_nobody_works_on_when_the_supervisor_is_killed(tmp_path):
+    process = held(tmp_path / "out", "import os; os.write(2, b'%d\\n' % os.getpid())\n")
+    worker = int(process.stderr.readline())
+    process.kill()
+    process.communicate(timeout=SOON)
+    until = time.monotonic() + SOON
+    while Path(f"/proc/{worker}").exists() and time.monotonic() < until:
+        time.sleep(0.01)
+    assert not Path(f"/proc/{worker}").exists()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_directory_between_its_two_renames_is_taken_back(tmp_path):
+    """What the supervisor heard: begun, and ended where it is done; said in pieces as a pipe may cut them."""
+    from catseye.gateways.writers.interruption import Unfinished, UnfinishedWork
+
+    place = {name: tmp_path / name for name in ("fresh", "where", "old", "file", "done")}
+    for name in ("fresh", "old", "done"):
+        place[name].mkdir()
+    place["file"].write_text("half")
+    told = [
+        [True, *map(str, (place["fresh"], place["where"], place["old"]))],
+        [True, str(place["file"]), "", ""],
+        [True, str(place["done"]), "", ""],
+        [False, str(place["done"]), "", ""],
+    ]
+    text = b"".join(json.dumps(line).encode() + b"\n" for line in told)
+    work = UnfinishedWork()
+    for k in range(0, len(text), 7):
+        work.hear(text[k : k + 7])
+    work.undo()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["done", "where"]
+    work.undo()  # what is not there is no failure
+    assert Unfinished(str(tmp_path / "none"))() is None

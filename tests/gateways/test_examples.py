@@ -84,6 +84,19 @@ def test_every_listed_example_is_there_and_can_be_copied(tmp_path):
         examples.copy_example("", tmp_path / "mine")
 
 
+def test_a_disk_that_is_full_is_named_by_its_first_file_and_nothing_is_left(tmp_path):
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, before[1]))  # of the night only its samples are larger
+        with pytest.raises(InputError, match=r"^[^\n]+/mine/frames\.npy: cannot be written: File too large$"):
+            examples.copy_example("night-01", tmp_path / "mine")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not list(tmp_path.iterdir())
+
+
 def test_examples_that_were_not_installed_are_refused_in_one_line(monkeypatch, tmp_path):
     package = tmp_path / "lib" / "catseye"
     monkeypatch.setattr(examples, "__file__", str(package / "gateways" / "examples.py"))

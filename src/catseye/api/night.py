@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from catseye.records.night.campaign import Campaign
     from catseye.reduction.budget.explanation import Explanation
     from catseye.reduction.epoch.epoch import Reduction
+    from catseye.simulator.night.night import Night
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -309,33 +310,41 @@ def night(
     seed           of every draw: the same night each time
     dish_prisms    0 to 9999; the telescope has 2209
     azimuth_deg, elevation_deg   of the telescope
-    interval_s     between two shots of a ranger, s
+    interval_s     between two shots of a ranger, s: above a buffer's 0.128, and short enough that all fit in a day
     again          how often each ranger of the feed arm shoots each prism once more; 0.43 makes some 20 000 shots
     nature         strength, 0 to 10, of waves, fronts, turbulence and gradients in the air, of thermometers that lag
                    and of a telescope that expands: at 1 up to nature's own, drawn from the seed; 0: smooth air that
                    drifts evenly, a rigid telescope
 
-    Raises InputError where the directory holds something and ValidityError for numbers beyond these.
+    Raises InputError where the directory holds something or cannot be written, and ValidityError for numbers beyond
+    these.
     """
-    from dataclasses import asdict
-
-    from catseye.errors import ValidityError
-    from catseye.gateways.writers.objects import json_page
+    from catseye.gateways.writers.output import new_directory
     from catseye.simulator.night.nature import Nature
     from catseye.simulator.night.schedule import Schedule
-    from catseye.simulator.night.sheets import write_night
+    from catseye.simulator.night.sheets import named, write_files
     from catseye.simulator.night.simulate import SimulatedTelescope, simulate_night
 
-    for name, value in (("interval_s", interval_s), ("again", again)):
-        if not 0.0 <= value <= 1000.0 or (name == "interval_s" and value == 0.0):
-            raise ValidityError(f"{name} = {value:g} (expected above 0 to 1000, 0 for again)")
-    made = simulate_night(
-        seed,
-        telescope=SimulatedTelescope(azimuth_deg, elevation_deg, dish_prisms),
-        schedule=Schedule(interval_s=interval_s, again=again),
-        nature=Nature.drawn(seed, nature),
-    )
-    where = write_night(made, Path(directory))
+    with new_directory(Path(directory)) as fresh:
+        made = simulate_night(
+            seed,
+            telescope=SimulatedTelescope(azimuth_deg, elevation_deg, dish_prisms),
+            schedule=Schedule(interval_s=interval_s, again=again),
+            nature=Nature.drawn(seed, nature),
+        )
+        write_files(made, fresh)
+        page = _truth_page(made, seed, nature)
+        with named(fresh / "truth.json") as path:
+            path.write_text(page, encoding="utf-8")
+    return Path(directory)
+
+
+def _truth_page(made: "Night", seed: int, nature: float) -> str:
+    """What a reduction of a simulated night is held against, as JSON."""
+    from dataclasses import asdict
+
+    from catseye.gateways.writers.objects import json_page
+
     truth = made.truth
     page = {
         "what": "the truth behind a simulated night: metres in the ground frame, status of each shot",
@@ -345,5 +354,4 @@ def night(
         "surface_deviations": None if truth.paraboloid is None else truth.paraboloid.deviations,
         "shots": truth.shot_status,
     }
-    (where / "truth.json").write_text(json_page(page), encoding="utf-8")
-    return where
+    return json_page(page)

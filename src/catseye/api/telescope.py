@@ -14,6 +14,7 @@ from catseye.api.result import Progress, Result, quantities
 from catseye.api.units import In, with_units
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import EstimationError, InputError
+from catseye.processors import free_threads
 
 if TYPE_CHECKING:
     from astropy.table import QTable
@@ -174,7 +175,8 @@ def pose(
         "pivot": None if pivot is None else np.array(pivot, dtype=float),
         "robust": robust,
     }
-    found = _posed(later, before, at_posture(records, *later.posture), chosen, pointing, tilt_arcsec)
+    with free_threads():
+        found = _posed(later, before, at_posture(records, *later.posture), chosen, pointing, tilt_arcsec)
     fit = found.pose.pose
     hashes = {**later.hashes, **({} if before is None else before.hashes), **records.hashes}
     read = [place_of(each, output=True) for each in (epoch, earlier) if isinstance(each, str | os.PathLike)]

@@ -93,6 +93,27 @@ AirModel = Annotated[
     typer.Option("--air-model", metavar=AIR_MODELS, callback=one_of(AIR_MODELS), help="Formula for the index of air."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object for programs.")]
+
+
+def _with_threads(context: typer.Context, count: int | None) -> int | None:
+    """Have so many threads until the command ends."""
+    if count is not None:
+        from catseye.processors import at_most
+
+        context.with_resource(at_most(count))
+    return count
+
+
+Threads = Annotated[
+    int | None,
+    typer.Option(
+        "--threads",
+        metavar="N",
+        min=1,
+        callback=_with_threads,
+        help="Threads of linear algebra; without, OPENBLAS_NUM_THREADS, or as many as there are free cores.",
+    ),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress, no text.")]
 
 
@@ -122,6 +143,7 @@ def reduce(
         ),
     ] = None,
     air_model: AirModel = ReductionSettings.air_model,
+    threads: Threads = None,
     json: Json = False,
     quiet: Quiet = False,
     strict: Strict = False,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.commands import Json, Quiet, Threads, app
 from catseye.cli.option_groups import grouped
 from catseye.cli.results import Strict, judge, tell
 from catseye.cli.terminal import ProgressLine, say
@@ -127,6 +127,7 @@ def adjust(  # noqa: PLR0913 - its options are its command line
         ),
     ] = None,
     out: Out = None,
+    threads: Threads = None,
     json: Json = False,
     quiet: Quiet = False,
     strict: Strict = False,
@@ -268,6 +269,7 @@ def plan(  # noqa: PLR0913 - its options are its command line
     on_paper: _OnPaper,
     claim: _Claim,
     out: Out = None,
+    threads: Threads = None,
     json: Json = False,
     quiet: Quiet = False,
     strict: Strict = False,

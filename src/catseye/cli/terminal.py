@@ -3,6 +3,7 @@
 import os
 import sys
 import textwrap
+import threading
 import time
 import warnings
 from collections.abc import Callable
@@ -14,6 +15,7 @@ from catseye.errors import CatseyeError
 WIDTH = 100  # columns; longer lines are hard to read
 INTERVAL = 0.1  # s between two refreshes of the progress line
 FIRST_LINE, BETWEEN_LINES = 10.0, 10.0  # s until progress is told where stderr is no terminal, and between its lines
+BEAT = 1.0  # s between two looks at a step that is silent
 SURE = 2.0  # s of a step before an end is foretold
 
 
@@ -36,6 +38,13 @@ def attempt(command: Callable[[], None]) -> int:
         return leaving.code if isinstance(leaving.code, int) else 0
     except CatseyeError as problem:
         complain(str(problem))
+        return 1
+    except (MemoryError, ImportError) as problem:
+        from catseye.cli.memory import lacks_memory, out_of_memory
+
+        if not lacks_memory(problem):
+            raise
+        complain(out_of_memory(problem))
         return 1
     except OSError as problem:
         complain(f"{problem.filename or 'input or output'}: {problem.strerror or problem}")
@@ -77,7 +86,8 @@ class ProgressLine:
     """What is being done, on stderr, with an estimate of the end.
 
     On a terminal one line that changes; elsewhere plain lines, few and only of long work, and none at all with
-    `--json`, whose reader expects stderr empty unless something is wrong.
+    `--json`, whose reader expects stderr empty unless something is wrong. A step that says nothing for long, as the
+    page of a report, is named again with how long it has taken.
     """
 
     def __init__(self, quiet: bool) -> None:
@@ -87,12 +97,42 @@ class ProgressLine:
         self._last = ""
         self._start = self._next = time.monotonic()
         self._next_line = self._start + FIRST_LINE
+        self._since, self._counts = self._start, (0, 0)
+        self._lock, self._over = threading.Lock(), threading.Event()
+        self._beat: threading.Thread | None = None
 
     def __call__(self, what: str, done: int, total: int) -> None:
-        now = time.monotonic()
-        if what.partition(" ")[0] != self._last.partition(" ")[0]:
-            self._start = now  # of this step: files that are written one by one are one
-        changed, self._last = what != self._last, what
+        with self._lock:
+            now = time.monotonic()
+            if what.partition(" ")[0] != self._last.partition(" ")[0]:
+                self._start = now  # of this step: files that are written one by one are one
+            if (changed := what != self._last) or (done, total) != self._counts:
+                self._since = now
+            self._last, self._counts = what, (done, total)
+            self._tell(now, changed)
+        if self._beat is None and (self._shown or self._plain):
+            self._over.clear()
+            self._beat = threading.Thread(target=self._repeat, name="catseye-progress", daemon=True)
+            self._beat.start()
+
+    def clear(self) -> None:
+        """Wipe the line; nothing more is said until there is more progress."""
+        if self._beat is not None:
+            self._over.set()
+            self._beat.join()
+            self._beat = None
+        if self._shown:
+            self._write("\r\x1b[K")
+
+    def _repeat(self) -> None:
+        """Say a step again that is silent, each second on a terminal, in its turn elsewhere."""
+        while not self._over.wait(BEAT):
+            with self._lock:
+                if (now := time.monotonic()) - self._since >= SURE:
+                    self._tell(now, False)
+
+    def _tell(self, now: float, changed: bool) -> None:
+        what, (done, total) = self._last, self._counts
         if self._shown and (changed or now >= self._next):
             self._next = now + INTERVAL
             bar = "█" * (20 * done // total if total else done % 21)  # without a known end it fills again and again
@@ -101,13 +141,11 @@ class ProgressLine:
             self._next_line = now + BETWEEN_LINES
             self._write(f"{what} {done}{f' of {total}' if total else ''}{self._left(now, done, total)}\n")
 
-    def clear(self) -> None:
-        if self._shown:
-            self._write("\r\x1b[K")
-
     def _left(self, now: float, done: int, total: int) -> str:
-        """How long the step has taken and may still take, once that can be told."""
-        passed = now - self._start
+        """How long the step has taken and may still take; of one that is silent, how long it has been."""
+        passed, silent = now - self._start, now - self._since
+        if silent >= SURE:
+            return f", for {duration(silent)}"
         if not 0 < done < total or passed < SURE:
             return ""
         return f", {duration(passed)}, some {duration(passed * (total - done) / done)} left"

@@ -1,12 +1,10 @@
 """What comes with catseye under examples/: found by name, listed, and copied out."""
 
-import os
-import secrets
 import shutil
 from pathlib import Path
 
 from catseye.errors import InputError
-from catseye.gateways.writers.interruption import deferred, undone_when_interrupted
+from catseye.gateways.writers.output import new_directory
 from catseye.records.files.refusal import shown
 
 SHORT = {"night-01": "night-01", "gbt": "sites/gbt"}  # names that a user may type without the folder
@@ -95,16 +93,15 @@ def copy_example(name: str, directory: Path) -> int:
     root = example(name) if name else examples_directory()
     if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
         raise InputError(f"{directory}: is there and not empty (expected a new or an empty folder)")
-    fresh = directory.resolve().parent / f".catseye-{secrets.token_hex(6)}"
-    with undone_when_interrupted(lambda: shutil.rmtree(fresh, ignore_errors=True)):
-        try:
-            shutil.copytree(root, fresh, ignore=shutil.ignore_patterns(*SKIPPED))
-            with deferred():
-                if directory.exists():
-                    directory.rmdir()
-                os.rename(fresh, directory)
-        except OSError as problem:
-            raise InputError(f"{directory}: cannot be written: {problem.strerror or problem}") from problem
-        finally:
-            shutil.rmtree(fresh, ignore_errors=True)
+    with new_directory(directory) as fresh:
+
+        def copied(source: str, target: str) -> None:
+            try:
+                shutil.copy2(source, target)
+            except OSError as problem:  # of which copytree would make a list
+                place = directory / Path(target).relative_to(fresh)
+                raise InputError(f"{place}: cannot be written: {problem.strerror or problem}") from problem
+
+        ignored = shutil.ignore_patterns(*SKIPPED)
+        shutil.copytree(root, fresh, ignore=ignored, copy_function=copied, dirs_exist_ok=True)
     return sum(path.is_file() for path in directory.rglob("*"))

@@ -319,7 +319,7 @@ def exported(tmp_path, entries, **more):
     return done, read_campaign(tmp_path / "out")
 
 
-def test_an_export_of_a_telescope_that_moved_is_doubtful_and_so_is_what_is_read_from_it(tmp_path):
+def test_an_export_of_a_telescope_that_jumped_is_doubtful_and_so_is_what_is_read_from_it(tmp_path):
     done, campaign = exported(tmp_path, campaign_entries())
     assert done.verdict.word == "good"
     assert campaign.verdict == done.verdict
@@ -430,6 +430,45 @@ def test_what_live_did_not_believe_goes_along(tmp_path):
     assert "named in doubts.csv as not believed by the epochs: 1 of the shots" in done.notes
 
 
+def test_how_far_the_telescope_shook_goes_along(tmp_path):
+    """A row an epoch and body, as the epoch believed it; what no epoch of the span says is not there."""
+    entries = campaign_entries()
+    for k, mm in ((2, 0.25), (4, 0.375), (6, 0.5)):
+        answer = {"number": k, "ticks": START + SECOND * k, "jitter_mm": {"arm": mm, "dish": 0.03125}}
+        entries.append(EpochSolution(START + SECOND * k + 9, answer))
+    entries.append(EpochSolution(START + SECOND * 400, {"ticks": START + SECOND * 400, "jitter_mm": {"arm": 9.0}}))
+    done, campaign = exported(tmp_path, entries)
+    lines = (tmp_path / "out" / "jitter.csv").read_text().splitlines()
+    assert lines[0] == "mjd_utc,body,u_mm"
+    told = [(stamp(START + SECOND * k), mm) for k, mm in ((2, 0.25), (4, 0.375), (6, 0.5))]
+    assert lines[1:] == [line for t, mm in told for line in (f"{t},arm,{mm}", f"{t},dish,0.03125")]
+    assert campaign.jitter.mm(float(stamp(START + SECOND * 3)))["arm"] == pytest.approx(0.3125, abs=1e-6)
+    assert not [note for note in done.notes if "shook" in note]
+
+
+def test_a_journal_whose_epochs_do_not_say_it_has_the_setting_of_the_run(tmp_path):
+    run = replace(scene_run(), settings={"live": {"jitter_mm": {"arm": 0.2, "alidade": 0.03}}})
+    with Journal.open(tmp_path / "j.db", run=run, clock=ManualClock(START / 1e8)) as journal:
+        for entry in campaign_entries():
+            journal.append(entry)
+    with JournalReader(tmp_path / "j.db") as reader:
+        done = export_campaign(reader, tmp_path / "out", run=1)
+    first = stamp(START + SECOND)
+    assert (tmp_path / "out" / "jitter.csv").read_text().splitlines()[1:] == [
+        f"{first},alidade,0.03",
+        f"{first},arm,0.2",
+    ]
+    assert [note for note in done.notes if "jitter.csv has the run's setting" in note]
+    assert read_campaign(tmp_path / "out").jitter.mm(START / 1e8)["arm"] == 0.2
+
+
+def test_a_jitter_that_a_campaign_cannot_hold_is_refused(tmp_path):
+    said = EpochSolution(START + SECOND * 2, {"ticks": START + SECOND * 2, "jitter_mm": {"arm": 400.0}})
+    with pytest.raises(InputError, match="run 1: jitter_mm of an epoch is invalid"):
+        exported(tmp_path, [*campaign_entries(), said])
+    assert not (tmp_path / "out").exists()
+
+
 def test_where_no_station_was_believed_the_readings_go_as_they_are(tmp_path):
     entries = [full_shot(k) for k in range(1, 9)]
     entries += [LiveWeather("WX1", START + SECOND * k, 10.0, 930.1, 70.0) for k in (-2700, -2690, -2680)]
@@ -459,11 +498,39 @@ def test_a_campaign_that_could_not_be_read_does_not_appear(tmp_path):
 
 
 def test_a_telescope_that_moved_is_told(tmp_path):
-    moved = [LivePosture(START + SECOND * k, 1.0 + 0.01 * k, 0.5) for k in (1, 2, 5)]
+    """Its middle is the posture of site.toml, its readings are postures.csv: encoders' angles and rates in degrees."""
+    moved = [LivePosture(START + SECOND * k, 1.0 + 0.01 * k, 0.5 + 0.001 * k, 0.01, 0.001) for k in (1, 2, 5)]
     still = [e for e in campaign_entries() if not isinstance(e, LivePosture)]
     done, campaign = exported(tmp_path, [*still, *moved])
     assert done.notes[0].startswith("the telescope moved by 2.292 deg")  # 0.04 rad
-    assert campaign.site.campaign.azimuth_deg == pytest.approx(np.degrees(1.02))
+    assert campaign.site.campaign.azimuth_deg == pytest.approx(np.degrees(1.03))
+    assert campaign.site.campaign.elevation_deg == pytest.approx(np.degrees(0.503))
+    assert done.verdict.word == "good"
+    told = {
+        "mjd_utc": lambda read: stamp(read.ticks),
+        "azimuth_deg": lambda read: read.azimuth,
+        "elevation_deg": lambda read: read.elevation,
+        "azimuth_rate_deg_s": lambda read: read.azimuth_rate,
+        "elevation_rate_deg_s": lambda read: read.elevation_rate,
+    }
+    assert_columns((tmp_path / "out" / "postures.csv").read_text(), told, moved)
+    assert [(r.ticks, r.azimuth) for r in campaign.postures] == [(r.ticks, pytest.approx(r.azimuth)) for r in moved]
+    assert campaign.jitter is None
+
+
+def test_shots_without_a_posture_of_a_telescope_that_moved_are_left_out(tmp_path):
+    """The third is 2.5 s from both readings; how far the arm bent while it climbed is in its jitter."""
+    moved = [LivePosture(START + SECOND * k, 1.0 + 0.01 * k, 0.5 + 0.002 * k, 0.01, 0.002) for k in (0, 5)]
+    entries = [full_shot(k, ticks=START + SECOND * k) for k in (1, 2, 4, 5)]
+    entries.append(full_shot(3, ticks=START + SECOND * 5 // 2))
+    entries.sort(key=lambda shot: shot.ticks)
+    entries += [LiveWeather("WX1", START + SECOND * k, 10.0, 930.1, 70.0) for k in range(6)]
+    entries.append(EpochSolution(START + SECOND * 3, {"ticks": START + SECOND * 3, "jitter_mm": {"arm": 0.3}}))
+    done, campaign = exported(tmp_path, [*entries, *moved])
+    assert done.left_out == {"a shot without a posture within 2 s": 1}
+    assert campaign.shots.shot.tolist() == [1, 2, 4, 5]
+    climbed = np.degrees(0.0)  # of two readings one lies between the first shot and the last
+    assert campaign.jitter.mm(START / 1e8)["arm"] == pytest.approx(np.hypot(0.3, 0.2 * climbed / np.sqrt(12.0)))
 
 
 def test_what_a_campaign_cannot_hold_is_told_and_left_out(tmp_path):

@@ -72,6 +72,7 @@ def export(
                     "journal that checks: take its backup, or --damaged to leave out what does not)"
                 )
             if to == "campaign":
+                progress("writing the campaign", 0, 1)
                 written = export_campaign(reader, out, run=number, span=span, chain=chain)
                 counts, notes = {"shots": written.shots, "weather": written.readings}, written.notes
                 verdict = written.verdict

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, cast
 
 import typer
 
-from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.commands import Json, Quiet, Threads, app
 from catseye.cli.live.replay import RunName, run_of
 from catseye.cli.networks import Out
 from catseye.cli.results import Strict, judge
@@ -103,6 +103,7 @@ def structure(  # noqa: PLR0913 - its options are its command line
         typer.Option("--less", metavar="RANGER:TARGET", help="Vibration: taken off each other series of its ranger."),
     ] = None,
     out: Out = None,
+    threads: Threads = None,
     json: Json = False,
     quiet: Quiet = False,
     strict: Strict = False,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.commands import Json, Quiet, Threads, app
 from catseye.cli.option_groups import grouped
 from catseye.cli.results import Strict, tell
 from catseye.cli.terminal import ProgressLine
@@ -149,6 +149,7 @@ def surface(  # noqa: PLR0913 - its options are its command line
         Path | None,
         typer.Option("--out", metavar="DIR", help="Directory to write: new, empty, or an earlier output of catseye."),
     ] = None,
+    threads: Threads = None,
     json: Json = False,
     quiet: Quiet = False,
     strict: Strict = False,

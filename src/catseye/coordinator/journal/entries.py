@@ -85,6 +85,7 @@ class StoredAnswer(TypedDict, total=False):
     zeros: dict[str, list[float]]
     pose: dict[str, Json] | None
     notes: list[str]
+    jitter_mm: dict[str, float]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,6 @@ S = C - B' V^-1 B, its covariance Z = S^-1, and with W = V^-1 B the blocks' V^-1
 Source: elimination of parameters by blocks, [FOERSTNER16] chapter 15 (bundle adjustment).
 """
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -20,6 +19,7 @@ from threadpoolctl import threadpool_limits
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.covariance import LARGEST_MATRIX
 from catseye.estimation.least_squares.rows import ActiveRows
+from catseye.processors import threads
 
 WIDE = 1000  # parameters of the border from which one more core is worth waking
 SAME = 2e-6  # relative change of a row up to which an earlier elimination serves; tests take differences of such
@@ -259,10 +259,10 @@ class Eliminated:
 
 
 def _on_cores(size: int, work: Callable):
-    """A factorisation on all cores where it is large: bound pools make small ones quick, and large ones slow."""
+    """A factorisation on all free cores where it is large: bound pools make small ones quick, and large ones slow."""
     if size < WIDE:
         return work()
-    with threadpool_limits(limits=len(os.sched_getaffinity(0)), user_api="blas"):
+    with threadpool_limits(limits=threads(), user_api="blas"):
         return work()
 
 

@@ -2,13 +2,14 @@
 
 What a campaign cannot hold is left out and told: shots without samples, taken in another way than site.toml says, not
 later than the ranger's last, without weather; readings with a silent sensor. What the live reduction did not believe
-goes along in doubts.csv. The directory is read before it appears.
+goes along in doubts.csv, how far the telescope's bodies shook in jitter.csv, and in postures.csv where it was, if it
+moved. The directory is read before it appears.
 """
 
 import csv
 import io
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -23,11 +24,14 @@ from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
 from catseye.gateways.journal.chain import chain_object, export_verdict
 from catseye.gateways.journal.export import seal, stamp
+from catseye.gateways.journal.motion import JournalledMotion, ToldMotion
 from catseye.gateways.writers.output import whole_directory
 from catseye.gateways.writers.written import origin
 from catseye.records.night.campaign import LONGEST_CAMPAIGN, WEATHER_MARGIN, read_campaign
 from catseye.records.night.doubt import DOUBTS, DoubtRow, believed_samples
-from catseye.records.night.live import TICKS_PER_DAY, LivePosture, LiveWeather
+from catseye.records.night.jitter import JITTER, JitterRow
+from catseye.records.night.live import TICKS_PER_DAY, LiveWeather
+from catseye.records.night.postures import POSTURES, PostureRow
 from catseye.records.night.shot import ShotRow
 from catseye.records.night.weather import WeatherSample
 from catseye.records.site.folder import REFERENCE, SiteFolder, site_files
@@ -35,7 +39,6 @@ from catseye.reduction.epoch.reason import ShotStatus, status_of
 from catseye.reduction.live.weather import StationWatch
 from catseye.verdict import Verdict
 
-STEADY = 0.01 * DEGREE  # rad that the telescope may move before it is told
 MARGIN = round(WEATHER_MARGIN * TICKS_PER_DAY)  # ticks
 MOST_TOLD = 3  # examples of each reason
 LIES = (ShotStatus.REFLECTED, ShotStatus.BAD_REFERENCE)  # what a night's own samples may not show again
@@ -115,13 +118,16 @@ def export_campaign(
     readings, why = _readings(reader, run, span, site, left)
     if not readings:
         raise InputError(f"journal {reader.place}: run {run} has no whole weather reading in the span (expected one)")
-    chosen = _chosen(reader, run, span, site, left, sorted(reading.ticks for reading in readings))
+    motion = JournalledMotion.of(reader, run, span)
+    chosen = _chosen(reader, run, span, site, left, sorted(reading.ticks for reading in readings), motion)
     if not chosen:
         reasons = "; ".join(left.notes()) or "no shots in the span"
         raise InputError(f"journal {reader.place}: run {run} has no shot that a campaign can hold: {reasons}")
     notes, wrong = left.notes(), list[str]()
     doubts = _doubts(reader, run, chosen, readings, why, notes, wrong)
-    site = _as_it_stood(reader, run, site, chosen, readings, notes, wrong)
+    stood = motion.during((chosen[0].ticks, chosen[-1].ticks), notes)
+    wrong += [stood.wrong] * bool(stood.wrong)
+    site = _as_it_stood(site, chosen, readings, stood, notes, wrong)
     verdict = export_verdict(chain, len(chosen) + len(readings), wrong)
     with whole_directory(out, Path(reader.place)) as directory:
         for path, text in site_files(site).items():
@@ -131,8 +137,9 @@ def export_campaign(
             (directory / name).mkdir(exist_ok=True)
         (directory / "weather.csv").write_text(_weather_csv(readings), encoding="utf-8", newline="")
         (directory / "shots.csv").write_text(_shots_csv(chosen, notes), encoding="utf-8", newline="")
-        if doubts:
-            (directory / DOUBTS).write_text(_doubts_csv(doubts), encoding="utf-8", newline="")
+        for name, rows in ((DOUBTS, doubts), (JITTER, stood.jitter), (POSTURES, stood.postures)):
+            if rows:
+                (directory / name).write_text(_table(rows), encoding="utf-8", newline="")
         _write_frames(reader, run, chosen, directory / "frames.npy")
         read_campaign(directory)
         provenance = origin(datetime.now(UTC), stored.hashes)
@@ -212,12 +219,12 @@ def _doubts(
     return made + shots
 
 
-def _doubts_csv(doubts: list[DoubtRow]) -> str:
+def _table(rows: Sequence[DoubtRow | JitterRow | PostureRow]) -> str:
     text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(DoubtRow.model_fields)
-    for each in doubts:
-        writer.writerow((each.what, each.name, f"{each.mjd_utc:.8f}", each.why))
+    writer = csv.DictWriter(text, tuple(type(rows[0]).model_fields), lineterminator="\n")
+    writer.writeheader()
+    for each in rows:
+        writer.writerow(each.model_dump() | {"mjd_utc": f"{each.mjd_utc:.8f}"})
     return text.getvalue()
 
 
@@ -249,9 +256,10 @@ def _chosen(
     site: SiteFolder,
     left: LeftOut,
     weather: list[int],
+    motion: JournalledMotion,
 ) -> list[ExportedShot]:
     """The shots that a campaign holds, in order of time."""
-    refusal = _refusals(site, weather)
+    refusal = _refusals(site, weather, motion)
     chosen: list[ExportedShot] = []
     for seq, entry in reader.shots(run):
         shot = entry.shot
@@ -277,7 +285,7 @@ def _chosen(
     return kept
 
 
-def _refusals(site: SiteFolder, weather: list[int]) -> Callable[[AnsweredShot], str]:
+def _refusals(site: SiteFolder, weather: list[int], motion: JournalledMotion) -> Callable[[AnsweredShot], str]:
     """What says why a campaign of a site cannot hold a shot; "" where it can."""
     rangers, targets = set(site.rangers), set(site.target_names) | {REFERENCE}
     ranging, adc = site.site.ranging, site.site.adc
@@ -295,6 +303,8 @@ def _refusals(site: SiteFolder, weather: list[int]) -> Callable[[AnsweredShot], 
             return "a shot with another if_hz or volts a code than site.toml's"
         if not weather[0] - MARGIN <= shot.ticks <= weather[-1] + MARGIN:
             return "a shot without weather within 1 h"
+        if motion.lacks(shot.ticks):
+            return "a shot without a posture within 2 s"
         try:
             _row(1, shot.ticks, shot.ranger, shot.target, shot.cycles, shot.samples_per_cycle, 0)
         except ValidationError:
@@ -305,33 +315,18 @@ def _refusals(site: SiteFolder, weather: list[int]) -> Callable[[AnsweredShot], 
 
 
 def _as_it_stood(
-    reader: JournalReader,
-    run: int,
     site: SiteFolder,
     chosen: list[ExportedShot],
     readings: list[LiveWeather],
+    told: ToldMotion,
     notes: list[str],
     wrong: list[str],
 ) -> SiteFolder:
     """The site with the campaign's start and posture, and the stations that spoke; `wrong` as for `_doubts`."""
-    start, end = chosen[0].ticks, chosen[-1].ticks
-    named: dict[str, object] = {"start_mjd_utc": start / TICKS_PER_DAY}
-    postures = [
-        (entry.azimuth, entry.elevation)
-        for _, entry in reader.events(run, kinds=["postures"])
-        if isinstance(entry, LivePosture) and start <= entry.ticks <= end
-    ]
-    if postures:
-        azimuth, elevation = np.unwrap([s[0] for s in postures]), np.array([s[1] for s in postures])
-        middle = np.median(azimuth), np.median(elevation)
-        named |= {"azimuth_deg": float(middle[0] / DEGREE % 360.0), "elevation_deg": float(middle[1] / DEGREE)}
-        moved = max(np.ptp(azimuth), np.ptp(elevation))
-        if moved > STEADY:
-            wrong.append(
-                f"the telescope moved by {moved / DEGREE:.3f} deg: a campaign has one posture, the median's "
-                "(choose a span in which it stood still)"
-            )
-            notes.append(wrong[-1])
+    named: dict[str, object] = {"start_mjd_utc": chosen[0].ticks / TICKS_PER_DAY}
+    if told.posture is not None:
+        azimuth, elevation = told.posture
+        named |= {"azimuth_deg": azimuth / DEGREE % 360.0, "elevation_deg": elevation / DEGREE}
     else:
         wrong.append("no posture was journalled in the span: azimuth and elevation are site.toml's")
         notes.append(wrong[-1])
@@ -387,11 +382,18 @@ def _weather_csv(readings: list[LiveWeather]) -> str:
 
 
 def _write_frames(reader: JournalReader, run: int, chosen: list[ExportedShot], path: Path) -> None:
-    """A row a shot, as long as the longest, zeros behind the shorter ones; one buffer in memory at a time."""
+    """A row a shot, as long as the longest, zeros behind the shorter ones; one buffer in memory at a time.
+
+    Written, not mapped: where the disk is full, a mapped file ends the process.
+    """
     width = max(shot.cycles * shot.samples_per_cycle for shot in chosen)
     rows = {shot.seq: row for row, shot in enumerate(chosen)}
-    frames = np.lib.format.open_memmap(path, mode="w+", dtype="<i2", shape=(len(chosen), width))
-    for seq, entry in reader.shots(run):
-        if seq in rows and entry.shot.samples is not None:
-            frames[rows[seq], : len(entry.shot.samples)] = entry.shot.samples
-    frames.flush()
+    with path.open("wb") as file:
+        header = {"descr": "<i2", "fortran_order": False, "shape": (len(chosen), width)}
+        np.lib.format.write_array_header_1_0(file, header)
+        first = file.tell()
+        file.truncate(first + 2 * width * len(chosen))
+        for seq, entry in reader.shots(run):
+            if seq in rows and entry.shot.samples is not None:
+                file.seek(first + 2 * width * rows[seq])
+                file.write(np.asarray(entry.shot.samples, "<i2").tobytes())

@@ -3,14 +3,13 @@
 import json
 import os
 import secrets
-import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from catseye.errors import InputError
-from catseye.gateways.writers.interruption import deferred, undone_when_interrupted
+from catseye.gateways.writers.interruption import Unfinished, deferred, undone_when_interrupted
 
 PROVENANCE = "provenance.json"
 PAGES = (".html", ".htm")
@@ -96,13 +95,7 @@ def whole_directory(out: Path, *read: Path) -> Iterator[Path]:
     where = refuse_output(out, *read)
     fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
     old = where.parent / f".catseye-{secrets.token_hex(6)}"
-
-    def undo() -> None:
-        if old.exists() and not where.exists():  # between the renames: the old tree is all there is
-            os.rename(old, where)
-        shutil.rmtree(fresh, ignore_errors=True)
-        shutil.rmtree(old, ignore_errors=True)
-
+    undo = Unfinished(str(fresh), str(where), str(old))
     with undone_when_interrupted(undo):
         try:
             fresh.mkdir()
@@ -112,6 +105,34 @@ def whole_directory(out: Path, *read: Path) -> Iterator[Path]:
                 _replace(where, fresh, old)
         except OSError as problem:
             raise InputError(f"--out {out}: cannot be written: {problem.strerror or problem}") from problem
+        finally:
+            undo()
+
+
+@contextmanager
+def new_directory(directory: Path) -> Iterator[Path]:
+    """A directory to write into, which becomes a new one, or takes an empty one's place, when the block ends well.
+
+    Raises InputError where it holds something or something cannot be written, with the file's name in it.
+    """
+    where = directory.resolve()
+    if where.exists() and (not where.is_dir() or any(where.iterdir())):
+        raise InputError(f"{directory}: exists and is not an empty directory (expected a new or an empty one)")
+    fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
+    undo = Unfinished(str(fresh))
+    with undone_when_interrupted(undo):
+        try:
+            where.parent.mkdir(parents=True, exist_ok=True)
+            fresh.mkdir()
+            yield fresh
+            with deferred():
+                if where.exists():
+                    where.rmdir()
+                os.rename(fresh, where)
+        except OSError as problem:
+            file = Path(problem.filename or fresh)
+            inside = file.relative_to(fresh) if file.is_relative_to(fresh) else Path()
+            raise InputError(f"{directory / inside}: cannot be written: {problem.strerror or problem}") from problem
         finally:
             undo()
 
@@ -142,7 +163,7 @@ def whole_file(path: Path, option: str, mark: str) -> Iterator[list[str]]:
     where = path.resolve()
     fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
     pieces: list[str] = []
-    with undone_when_interrupted(lambda: fresh.unlink(missing_ok=True)):
+    with undone_when_interrupted(Unfinished(str(fresh))):
         try:
             if where.is_dir():
                 raise InputError(f"{option} {path}: is a directory (expected the name of a file)")
@@ -180,7 +201,7 @@ def write_whole(path: Path, content: bytes, *, option: str, ours: Callable[[byte
     """
     where = path.resolve()
     fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
-    with undone_when_interrupted(lambda: fresh.unlink(missing_ok=True)):
+    with undone_when_interrupted(Unfinished(str(fresh))):
         try:
             if where.is_dir():
                 raise InputError(f"{option} {path}: is a directory (expected the name of a file)")

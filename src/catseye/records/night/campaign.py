@@ -12,7 +12,10 @@ from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import in_row, refusal, shown
 from catseye.records.files.verdicts import verdict_of_export
 from catseye.records.night.doubt import DOUBTS, DoubtRow, believed_samples, refuse_doubts
+from catseye.records.night.jitter import JITTER, JitterRow, JitterTable, jitter_table
+from catseye.records.night.live import LivePosture
 from catseye.records.night.path_temperature import PathTemperature, PathTemperatureTable, path_temperature_columns
+from catseye.records.night.postures import POSTURES, PostureRow, postures_of
 from catseye.records.night.shot import ShotColumns, ShotRow, read_buffers, refuse_shots, shot_columns
 from catseye.records.night.weather import Weather, WeatherSample, weather_columns
 from catseye.records.site.folder import (
@@ -35,7 +38,8 @@ PATH_TEMPERATURES = "path_temperatures.csv"  # optional
 class ObservedSite(SiteFolder):
     """A site with its shots and its weather, all that ranges and coordinates need once phases are known.
 
-    `path_temperatures` is None where no line's temperature was measured by sound. `weather` and the site's stations are
+    `path_temperatures` is None where no line's temperature was measured by sound, `jitter` where nothing is known to
+    shake; `postures` where the telescope moved. `weather` and the site's stations are
     what was believed, `doubted` the shots that were not, by their ids, with why; `doubt_notes` tell of the weather.
     `verdict` is that of the export that wrote the campaign; None of others.
     """
@@ -43,6 +47,8 @@ class ObservedSite(SiteFolder):
     weather: Weather
     shots: ShotColumns
     path_temperatures: PathTemperatureTable | None = None
+    jitter: JitterTable | None = None
+    postures: tuple[LivePosture, ...] = ()
     doubted: Mapping[int, str] = field(default_factory=dict)
     doubt_notes: tuple[str, ...] = ()
     verdict: Verdict | None = None
@@ -75,6 +81,8 @@ def read_campaign(directory: Path | str) -> Campaign:
     lines = folder.table(PATH_TEMPERATURES, PathTemperature) if sounded else []
     judged = os.path.lexists(folder.directory / DOUBTS)
     doubts = folder.table(DOUBTS, DoubtRow) if judged else []
+    shaken = os.path.lexists(folder.directory / JITTER)
+    moved = os.path.lexists(folder.directory / POSTURES)
 
     campaign = Campaign(
         **records.named(folder),
@@ -82,6 +90,8 @@ def read_campaign(directory: Path | str) -> Campaign:
         shots=shot_columns(shots),
         frames=buffers,
         path_temperatures=path_temperature_columns(lines) if lines else None,
+        jitter=jitter_table(folder.table(JITTER, JitterRow)) if shaken else None,
+        postures=postures_of(folder.table(POSTURES, PostureRow), shots) if moved else (),
         verdict=verdict_of_export(folder),
     )
     refuse_unjoined(campaign, records)

@@ -30,6 +30,7 @@ from catseye.reduction.epoch.settling import (
     settle_network,
 )
 from catseye.reduction.epoch.strengths import ProcessStrength
+from catseye.reduction.epoch.telescope_track import motion_of
 from catseye.reduction.epoch.unknowns import (
     UNJUDGED,
     build_network,
@@ -127,10 +128,12 @@ def adjust_coordinates(
     Source: [PARKER04] eq. 5.18 and 5.19 for the range, in optical metres: N c/2f - phase c/(4 pi f) =
     n_path D - n (Pc + dPc + D0 + zero); [GOLDMAN00] eq. B.1 for dPc. The priors are the records' uncertainties.
     """
-    network = build_network(campaign, phases, electronics, settings=settings)
+    motion = motion_of(campaign)
+    network = build_network(campaign, phases, electronics, settings=settings, motion=motion)
     resolved = resolve_cycles(network, progress)
     if resolved.rejected:
-        network = build_network(campaign, phases, without_shots(electronics, set(resolved.rejected)), settings=settings)
+        left = without_shots(electronics, set(resolved.rejected))
+        network = build_network(campaign, phases, left, settings=settings, motion=motion)
     if not network.rangers:
         why = next(iter(resolved.rejected.values()), "no shot on any target has a usable phase and reference")
         raise InputError(f"shots.csv: {why}; nothing to adjust")
@@ -141,7 +144,7 @@ def adjust_coordinates(
         if allowance.same(before):
             break
         network = build_network(
-            campaign, phases, settled.network.electronics, settings=settings, allowance=allowance
+            campaign, phases, settled.network.electronics, settings=settings, motion=motion, allowance=allowance
         ).with_strength(settled.network.strength)
         starts = {name: settled.solution.x[network.layout.columns(name)] for name in network.places}
         settled = settle_network(network, starts, progress, active=selection_of(settled, network))

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from threadpoolctl import threadpool_limits
-
+from catseye.processors import one_thread
 from catseye.records.night.campaign import REFERENCE, Campaign
 from catseye.records.site.validity import expired_of_site
 from catseye.reduction.epoch.coordinates import AdjustedCoordinates, adjust_coordinates
@@ -19,6 +18,7 @@ from catseye.reduction.epoch.ranges import (
 from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.surface import DishFit, fit_surface
+from catseye.reduction.epoch.telescope_track import as_in_the_middle
 from catseye.reduction.site.places import sheet_notes
 
 
@@ -45,7 +45,7 @@ class Reduction:
 def reduce_epoch(
     campaign: Campaign, settings: ReductionSettings | None = None, progress: Progress | None = None
 ) -> Reduction:
-    """Coordinates, pose and surface of one campaign during which nothing moved.
+    """Coordinates, pose and surface of one campaign during which nothing moved, or the telescope as its postures say.
 
     campaign   as `read_campaign` gives it
     settings   assumptions beyond the records (default: those of the layout)
@@ -53,9 +53,9 @@ def reduce_epoch(
 
     Raises InputError where nothing can be adjusted and EstimationError where the adjustment finds no answer.
     """
-    settings = settings or ReductionSettings()
+    settings, campaign = settings or ReductionSettings(), as_in_the_middle(campaign)
     phases = measure_phases(campaign, settings, progress)
-    with threadpool_limits(limits=1, user_api="blas"):  # spinning pools make small matrices many times slower
+    with one_thread():
         electronics, wrong = follow_electronics(campaign, phases, settings.dense_shots)
         coordinates = adjust_coordinates(campaign, phases, electronics, settings=settings, progress=progress)
         surface, missing = fit_surface(campaign, coordinates)

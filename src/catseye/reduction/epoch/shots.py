@@ -14,7 +14,9 @@ from catseye.reduction.epoch.head import HeadCorrections, head_corrections
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import ElectronicsPhase
 from catseye.reduction.epoch.self_check import unit_of
+from catseye.reduction.epoch.telescope_track import buffer_middles
 from catseye.reduction.epoch.unknowns import CampaignNetwork, path_ppm
+from catseye.reduction.site.motion import shaken
 from catseye.signal.cycles.whole import fraction, unwrapped_length, whole_cycles
 
 ShotGroup = Distances | MovingDistances
@@ -103,7 +105,7 @@ class _Sights:
         b = x[target[:, None] + np.arange(3)]
         turns = None
         if network.motion is not None:
-            times = network.campaign.shots.mjd_utc[network.electronics[name].shots]
+            times = buffer_middles(network.campaign, network.electronics[name].shots)
             turns = *network.motion.carried((name,) * m, times), *network.motion.carried(targets, times)
             a, b = (np.einsum("mij,mj->mi", r, p) + s for p, r, s in ((a, *turns[:2]), (b, *turns[2:])))
         towards = a - b
@@ -159,7 +161,7 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
     cycles, margin = whole_cycles(coarse, phase, half)
     observed = unwrapped_length(cycles, phase, half)
     per_radian = -half / TWO_PI
-    jitter = np.zeros(len(n)) if network.motion is None else n**2 * network.motion.jitter(name, targets)
+    jitter = n**2 * _jitter(network, name, targets)
     shared = _shared(network, name, targets, distance=distance, per_radian=per_radian)
     covariance, variance = _covariance(network, name, targets, distance, per_radian)
     parts = ShotParts(
@@ -197,6 +199,15 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
         name, observed, covariance, origin, target, *sights.turns, n, offset, nuisance=nuisance, coefficient=coefficient
     )
     return moving, parts
+
+
+def _jitter(network: CampaignNetwork, name: str, targets: tuple[str, ...]) -> np.ndarray:
+    """Variance (m,), m^2, of the distances by the telescope's shaking, as the campaign's table or the epoch has it."""
+    table = network.campaign.jitter
+    if table is None:
+        return np.zeros(len(targets)) if network.motion is None else network.motion.jitter(name, targets)
+    times = network.campaign.shots.mjd_utc[network.electronics[name].shots]
+    return shaken(network.places[name].body, [network.places[t].body for t in targets], table.mm(times))
 
 
 def _leakage_slope(per_radian: float, lit: np.ndarray, cube: np.ndarray) -> np.ndarray:

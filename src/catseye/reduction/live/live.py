@@ -94,6 +94,7 @@ class EpochAnswer:
     zeros         ranger: m, and u
     pose          of dish and feed since the reference epoch
     notes         for people
+    jitter_mm     body: how far its points were at a shot from their mean, as the epoch believed
     """
 
     number: int
@@ -113,6 +114,7 @@ class EpochAnswer:
     zeros: dict[str, tuple[float, float]]
     pose: LivePose | None
     notes: tuple[str, ...]
+    jitter_mm: Mapping[str, float] = field(default_factory=dict)
 
     def point(self, name: str) -> tuple[Array, Array]:
         """(3,) m and its covariance (3, 3).
@@ -372,6 +374,7 @@ class Live:
             coordinates.zeros,
             pose,
             (*coordinates.notes, *self.stations.notes()),
+            motion.jitter_mm,
         )
 
     def _unready(self, weather: Sequence[LiveWeather]) -> str:

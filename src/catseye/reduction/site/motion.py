@@ -6,7 +6,7 @@ its rate of change an uncertainty of the carried state.
 
 import math
 from bisect import bisect_right, insort
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -47,6 +47,13 @@ class PostureTrack:
                 del self._reads[gone]
             del self._ticks[:first]
             self._filled = 0
+
+    @classmethod
+    def of(cls, reads: Sequence[LivePosture]) -> "PostureTrack":
+        """All of some readings, in order of time, to which nothing is added."""
+        track = cls()
+        track._ticks, track._reads = [read.ticks for read in reads], {read.ticks: read for read in reads}
+        return track
 
     def between(self, first: float, last: float) -> "PostureTrack":
         """The readings of now that matter from MJD to MJD, to which nothing is added: those within, and a gap more."""
@@ -206,6 +213,20 @@ def frames_of(site: SiteFolder) -> dict[str, str]:
     }
 
 
+def shaken(body: str, others: Sequence[str], jitter_mm: Mapping[str, ArrayLike]) -> Array:
+    """Variance (m,), m^2, of ranges between a point of one body and one of each other by what shakes.
+
+    jitter_mm   of each body, () or (m,); none of the ground's ""
+
+    Points of one body shake together: their ranges do not change.
+    """
+    far = np.array(others, dtype=str)
+    near_mm, far_mm = np.broadcast_to(jitter_mm.get(body, 0.0), len(far)), np.zeros(len(far))
+    for other, mm in jitter_mm.items():
+        far_mm = np.where(far == other, mm, far_mm)
+    return np.asarray(np.where(far == body, 0.0, np.hypot(near_mm, far_mm) * MILLIMETRE) ** 2)
+
+
 @dataclass(frozen=True, eq=False)
 class CarriedMotion:
     """How the telescope carries points from an epoch to other instants.
@@ -229,10 +250,7 @@ class CarriedMotion:
 
     def jitter(self, ranger: str, targets: tuple[str, ...]) -> Array:
         """Variance (m,), m^2, of ranges to targets by what shakes; none where both ends shake together."""
-        own = self.bodies.get(ranger, "")
-        pairs = [(own, self.bodies.get(target, "")) for target in targets]
-        u = [0.0 if a == b else np.hypot(self.jitter_mm.get(a, 0.0), self.jitter_mm.get(b, 0.0)) for a, b in pairs]
-        return (np.array(u) * MILLIMETRE) ** 2
+        return shaken(self.bodies.get(ranger, ""), [self.bodies.get(target, "") for target in targets], self.jitter_mm)
 
     def distances(self, a: str, b: str, places: Mapping[str, Array], mjd: Array) -> Array:
         """(m,) m between two points of given places (3,), each in its own frame, at times (m,)."""

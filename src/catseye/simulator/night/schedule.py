@@ -1,16 +1,20 @@
 """Who shoots what and when, in the manner of night-01."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.constants import DEGREE
+from catseye.constants import DEGREE, SECONDS_PER_DAY
+from catseye.errors import ValidityError
+from catseye.records.night.campaign import LONGEST_CAMPAIGN
 from catseye.simulator.night.faults import Faults, Streams
 from catseye.simulator.night.posture import TruePosture
 from catseye.simulator.night.structure import Structure, unit
 from catseye.simulator.night.world import FEED_ARM_RANGERS, GROUND_RANGERS, TrueBenchmark, TrueMonument
 
 REFERENCE = "ZRG"
+BUFFER_S = 0.128  # s that a shot takes: 128 cycles of 1 kHz
 
 
 @dataclass(frozen=True)
@@ -18,7 +22,7 @@ class Schedule:
     """Rhythm of the campaign.
 
     interval_s        between shots of a ranger
-    jitter_s          each shot comes early or late by up to this
+    jitter_s          each shot comes early or late by up to this, and never before the last one's buffer is full
     reference_every   shots between two reference shots
     span_s            the ground rangers start anywhere that lets them end within it
     ball_rangers      ground rangers that shoot one ball, at most
@@ -38,6 +42,14 @@ class Schedule:
     ground_repeats: int = 2
     certified_repeats: int = 4
     neighbour_repeats: int = 2
+
+    def __post_init__(self) -> None:
+        if not BUFFER_S < self.interval_s <= 1000.0:
+            raise ValidityError(
+                f"interval_s = {self.interval_s:g} (expected above {BUFFER_S} s, a shot's buffer, to 1000)"
+            )
+        if not 0.0 <= self.again <= 1000.0:
+            raise ValidityError(f"again = {self.again:g} (expected 0 to 1000)")
 
 
 @dataclass(frozen=True)
@@ -105,8 +117,13 @@ def with_references(targets: list[str], every: int) -> list[str]:
 
 
 def plan_shots(rule: Schedule, shot_lists: dict[str, list[str]], streams: Streams) -> dict[str, list[ScheduledShot]]:
-    """Shots of every ranger in its own time."""
+    """Shots of every ranger in its own time.
+
+    Raises ValidityError: more shots than a campaign's day has room for.
+    """
     plan = {}
+    needs: list[tuple[float, int]] = []
+    jitter = min(rule.jitter_s, 0.5 * (rule.interval_s - BUFFER_S))
     for ranger, targets in shot_lists.items():
         rng = streams(f"schedule/{ranger}")
         order = [str(t) for t in rng.permutation(targets)] if targets else []
@@ -114,6 +131,24 @@ def plan_shots(rule: Schedule, shot_lists: dict[str, list[str]], streams: Stream
         on_ground = ranger in GROUND_RANGERS
         room = rule.span_s - rule.interval_s * len(names)
         start = rng.uniform(40.0, max(room, 60.0) if on_ground else 0.3 * rule.span_s)
-        times = start + rule.interval_s * np.arange(len(names)) + rng.uniform(-rule.jitter_s, rule.jitter_s, len(names))
+        times = start + rule.interval_s * np.arange(len(names)) + rng.uniform(-jitter, jitter, len(names))
+        needs.append((start, len(names)))
         plan[ranger] = [ScheduledShot(float(t), ranger, name) for t, name in zip(times, names, strict=True)]
+    _refuse_long(rule, needs)
     return plan
+
+
+def _refuse_long(rule: Schedule, needs: Sequence[tuple[float, int]]) -> None:
+    """ValidityError where shots end later than a campaign may.
+
+    needs   start, s, and number of shots of each ranger
+    """
+    longest = LONGEST_CAMPAIGN * SECONDS_PER_DAY
+    fits = min(((longest - start) / count for start, count in needs), default=rule.interval_s)
+    if rule.interval_s > fits:
+        most = max(count for _, count in needs)
+        raise ValidityError(
+            f"interval_s = {rule.interval_s:g}: {most} shots of a ranger take {rule.interval_s * most / 3600.0:.1f} h, "
+            f"a campaign holds {longest / 3600.0:g} h (expected at most {np.floor(100.0 * fits) / 100.0:g} s, or fewer "
+            "prisms, or a smaller again)"
+        )

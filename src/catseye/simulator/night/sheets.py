@@ -2,6 +2,8 @@
 
 import csv
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -167,7 +169,7 @@ def feed_arm_sheet(feed_arm: dict[str, TrueTarget], aim_point_mm) -> str:
 
 
 def write_table(path: Path, header: str, rows) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with named(path), path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header.split(","))
         writer.writerows(rows)
@@ -184,21 +186,37 @@ def write_night(night: Night, directory: str | Path) -> Path:
     partial = directory.with_name(directory.name + ".partial")
     partial.mkdir(parents=True)
     try:
-        _write_files(night, partial)
+        write_files(night, partial)
         partial.replace(directory)
     finally:
         shutil.rmtree(partial, ignore_errors=True)
     return directory
 
 
-def _write_files(night: Night, directory: Path) -> None:
-    """Write every file of the campaign into an existing, empty directory."""
+def write_files(night: Night, directory: Path) -> None:
+    """Write every file of the campaign into an existing, empty directory.
+
+    Raises OSError with the file's name: no room, no permission.
+    """
     for folder in ("monuments", "mirrors", "triplets"):
         (directory / folder).mkdir()
     for name, text in _texts(night).items():
-        (directory / name).write_text(text, encoding="utf-8")
+        with named(directory / name) as path:
+            path.write_text(text, encoding="utf-8")
     _write_tables(night, directory)
-    np.save(directory / "frames.npy", night.frames)
+    with named(directory / "frames.npy") as path, path.open("wb") as file:
+        np.lib.format.write_array_header_1_0(file, np.lib.format.header_data_from_array_1_0(night.frames))
+        file.write(np.ascontiguousarray(night.frames).data.cast("B"))  # numpy's own writing loses the system's reason
+
+
+@contextmanager
+def named(path: Path) -> Iterator[Path]:
+    """Let an OSError inside say which file it is of: one of a write knows no name."""
+    try:
+        yield path
+    except OSError as problem:
+        problem.filename = problem.filename or str(path)
+        raise
 
 
 def _texts(night: Night) -> dict[str, str]:

@@ -1,0 +1,161 @@
+"""Motion of the telescope as a journal has it, for a campaign: where it stood or how it moved, how far it shook."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from catseye.constants import DEGREE, SECONDS_PER_DAY
+from catseye.coordinator.journal.reader import JournalReader
+from catseye.errors import InputError
+from catseye.gateways.journal.export import stamp
+from catseye.records.night.jitter import JITTER, LARGEST_MM, JitterRow
+from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
+from catseye.records.night.postures import NEAREST, POSTURES, PostureRow
+from catseye.reduction.live.live import LiveSettings
+from catseye.reduction.site.motion import PostureTrack
+
+FASTEST = 1.0 * DEGREE  # rad/s: the GBT slews at 0.67 in azimuth
+STEADY = 0.01 * DEGREE  # rad that the telescope may move before it is told
+MARGIN = round(NEAREST * TICKS_PER_DAY)  # ticks from a shot to a posture
+EPOCH_MARGIN = round(60.0 / SECONDS_PER_DAY * TICKS_PER_DAY)  # ticks, of an epoch behind its last shot
+
+
+@dataclass(frozen=True)
+class ToldMotion:
+    """What a campaign is told.
+
+    posture    azimuth and elevation, rad, of its middle; None where nobody said
+    wrong      why its postures cannot be believed, in words; "" where they can
+    postures   rows, of a telescope that moved
+    jitter     rows
+    """
+
+    posture: tuple[float, float] | None
+    postures: tuple[PostureRow, ...]
+    jitter: tuple[JitterRow, ...]
+    wrong: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class JournalledMotion:
+    """The postures of a run, in order of time, each instant once, and the reader that knows its epochs."""
+
+    reader: JournalReader
+    run: int
+    postures: list[LivePosture]
+
+    @classmethod
+    def of(cls, reader: JournalReader, run: int, span: tuple[int, int] | None) -> "JournalledMotion":
+        """Of a run, within a span of ticks and two seconds more."""
+        found = {
+            entry.ticks: entry
+            for _, entry in reader.events(run, kinds=["postures"])
+            if isinstance(entry, LivePosture) and (span is None or span[0] - MARGIN <= entry.ticks < span[1] + MARGIN)
+        }
+        return cls(reader, run, [found[ticks] for ticks in sorted(found)])
+
+    @cached_property
+    def moved(self) -> float:
+        """The largest change of an angle, rad."""
+        return self._moved(self.postures)
+
+    def lacks(self, ticks: int) -> bool:
+        """Whether nobody knows where a telescope that moved was at an instant."""
+        if self.moved <= STEADY:
+            return False
+        times = self._ticks
+        at = int(np.searchsorted(times, ticks))
+        return bool(np.min(np.abs(times[max(at - 1, 0) : at + 1] - ticks)) > MARGIN)
+
+    def during(self, span: tuple[int, int], notes: list[str]) -> ToldMotion:
+        """From the first shot to the last, ticks; notes tell of what moved."""
+        within = [read for read in self.postures if span[0] <= read.ticks <= span[1]]
+        if not within:
+            return ToldMotion(None, (), self._jitter(span, 0.0, notes))
+        moved = self._moved(within)
+        if moved <= STEADY:
+            azimuth, elevation = np.unwrap([r.azimuth for r in within]), [r.elevation for r in within]
+            stood = float(np.median(azimuth)), float(np.median(elevation))
+            return ToldMotion(stood, (), self._jitter(span, 0.0, notes))
+        notes.append(f"the telescope moved by {moved / DEGREE:.3f} deg: {POSTURES} says how")
+        near = [read for read in self.postures if span[0] - MARGIN <= read.ticks <= span[1] + MARGIN]
+        middle = PostureTrack.of(near).angles(0.5 * (span[0] + span[1]) / TICKS_PER_DAY)
+        climbed = float(np.ptp([read.elevation for read in within])) / DEGREE
+        wrong = _jump(near)
+        notes += [wrong] * bool(wrong)
+        return ToldMotion(middle, tuple(_row(read) for read in near), self._jitter(span, climbed, notes), wrong)
+
+    @cached_property
+    def _ticks(self) -> NDArray[np.int64]:
+        return np.array([read.ticks for read in self.postures], dtype=np.int64)
+
+    @staticmethod
+    def _moved(reads: list[LivePosture]) -> float:
+        if not reads:
+            return 0.0
+        return max(float(np.ptp(np.unwrap([r.azimuth for r in reads]))), float(np.ptp([r.elevation for r in reads])))
+
+    def _jitter(self, span: tuple[int, int], climbed: float, notes: list[str]) -> tuple[JitterRow, ...]:
+        """Jitter of the bodies as each epoch of a span believed it, and how they bent while the telescope climbed, deg.
+
+        A journal of an older version does not say the first: what was set for the run.
+        """
+        found: dict[tuple[int, str], float] = {}
+        for _, solution in self.reader.solutions(self.run):
+            ticks = solution.answer.get("ticks", solution.ticks)
+            if span[0] <= ticks <= span[1] + EPOCH_MARGIN:
+                found |= {(ticks, body): mm for body, mm in (solution.answer.get("jitter_mm") or {}).items()}
+        live = self.reader.run(self.run).settings.get("live")
+        settings = live if isinstance(live, Mapping) else {}
+        if not found:
+            usual = settings.get("jitter_mm")
+            found = {(span[0], str(body)): mm for body, mm in (usual if isinstance(usual, Mapping) else {}).items()}
+            if found:
+                notes.append(
+                    f"the journal's epochs do not say how far the telescope shook: {JITTER} has the run's setting"
+                )
+        bending = settings.get("bending_mm_per_degree", LiveSettings().bending_mm_per_degree)
+        bent = {body: mm * climbed / math.sqrt(12.0) for body, mm in bending.items()}  # evenly through the climb
+        try:
+            return tuple(
+                JitterRow.model_validate(
+                    {"mjd_utc": float(stamp(ticks)), "body": body, "u_mm": math.hypot(mm, bent.get(body, 0.0))}
+                )
+                for (ticks, body), mm in sorted(found.items())
+            )
+        except (ValidationError, TypeError) as problem:
+            raise InputError(
+                f"journal {self.reader.place}: run {self.run}: jitter_mm of an epoch is invalid (expected 0 to "
+                f"{LARGEST_MM:g} mm of arm, dish and alidade)"
+            ) from problem
+
+
+def _jump(reads: list[LivePosture]) -> str:
+    """Where two readings are further apart than a telescope moves meanwhile; "" of none."""
+    for before, after in pairwise(reads):
+        seconds = (after.ticks - before.ticks) * TICK_SECONDS
+        turned = abs((after.azimuth - before.azimuth + math.pi) % (2.0 * math.pi) - math.pi)
+        apart = max(turned, abs(after.elevation - before.elevation))
+        if apart > STEADY + FASTEST * seconds:
+            jumped = f"the telescope moved by {apart / DEGREE:.3f} deg in {seconds:.3f} s"
+            return f"{jumped}, says the posture at {stamp(after.ticks)}: postures cannot be believed"
+    return ""
+
+
+def _row(read: LivePosture) -> PostureRow:
+    azimuth, elevation, *rates = (
+        value / DEGREE for value in (read.azimuth, read.elevation, read.azimuth_rate, read.elevation_rate)
+    )
+    return PostureRow(
+        mjd_utc=float(stamp(read.ticks)),
+        azimuth_deg=azimuth,
+        elevation_deg=elevation,
+        azimuth_rate_deg_s=rates[0],
+        elevation_rate_deg_s=rates[1],
+    )

@@ -1,0 +1,54 @@
+"""A campaign during which the telescope moved rigidly, as its postures say; its points are those of its middle."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from catseye.constants import DEGREE, SECONDS_PER_DAY
+from catseye.records.night.campaign import Campaign, ObservedSite
+from catseye.reduction.epoch.unknowns import middle_of
+from catseye.reduction.site.motion import CarriedMotion, PostureTrack, frames_of
+from catseye.reduction.site.places import RangedPoint
+
+
+def motion_of(campaign: ObservedSite) -> CarriedMotion | None:
+    """How the telescope carried its points from the campaign's middle to each shot; None of one that stood still."""
+    if not campaign.postures:
+        return None
+    track = PostureTrack.of(campaign.postures)
+    return CarriedMotion(campaign, track, frames_of(campaign), middle_of(campaign.shots.mjd_utc))
+
+
+def as_in_the_middle(campaign: Campaign) -> Campaign:
+    """The campaign at the posture of its middle, for which its points hold; itself where the telescope stood still."""
+    motion = motion_of(campaign)
+    if motion is None:
+        return campaign
+    azimuth, elevation = motion.track.at(motion.epoch)
+    posture = {"azimuth_deg": float(azimuth) / DEGREE % 360.0, "elevation_deg": float(elevation) / DEGREE}
+    stands = campaign.site.campaign.model_copy(update=posture)
+    return replace(campaign, site=campaign.site.model_copy(update={"campaign": stands}))
+
+
+def buffer_middles(campaign: ObservedSite, rows: np.ndarray) -> np.ndarray:
+    """MJD of the middles of some shots' buffers, where a moving target is; of an epoch the times are those already."""
+    shots = campaign.shots
+    if not campaign.postures:
+        return np.asarray(shots.mjd_utc[rows])
+    half = 0.5 * shots.cycles[rows] / campaign.site.ranging.if_hz
+    return np.asarray(shots.mjd_utc[rows] + half / SECONDS_PER_DAY)
+
+
+def carried_ends(
+    campaign: ObservedSite, row: int, ends: tuple[np.ndarray, np.ndarray], place: RangedPoint
+) -> tuple[tuple[np.ndarray, np.ndarray], RangedPoint]:
+    """Scan point and target of one shot, and the target's face, from the campaign's middle to that shot."""
+    motion = motion_of(campaign)
+    if motion is None:
+        return ends, place
+    names = campaign.shots.ranger[row], campaign.shots.target[row]
+    turn, shift = motion.carried(names, buffer_middles(campaign, np.array([row, row])))
+    a, b = (turn[k] @ end + shift[k] for k, end in enumerate(ends))
+    if place.normal is not None:
+        place = replace(place, normal=turn[1] @ place.normal)
+    return (a, b), place
