@@ -17,8 +17,8 @@ import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import InputError
-from catseye.estimation.shapes.pose import PlaceCovariances, Pose, fit_pose
-from catseye.estimation.shapes.rigid_body import turned_covariance
+from catseye.estimation.shapes.place_covariances import PlaceCovariances, turn_in_place
+from catseye.estimation.shapes.pose import Pose, fit_pose
 from catseye.geometry.antenna.frames import ground_from_alidade
 from catseye.geometry.frames.frame import Transform
 from catseye.records.network.solved_points import SolvedPoints
@@ -189,19 +189,19 @@ def _posture_of(epoch: SolvedPoints, site: SiteFolder, carrier: str) -> SiteFold
 
 
 def _into(to_from: Transform, x: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    turn = to_from.rotation
-    return to_from.points(x), turned_covariance(turned_covariance(q, turn, columns=True), turn, columns=False)
+    """Places and their covariance in another frame; the covariance is written over."""
+    return to_from.points(x), turn_in_place(q, to_from.rotation)
 
 
 def _design(
     names: Sequence[str], known: dict[str, RangedPoint], site: SiteFolder, to_from: Transform
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Design places (n, 3) and covariance (3n, 3n), independent from point to point, in the frame `to_from.to`."""
+    """Design places (n, 3) and covariances (n, 3, 3), independent from point to point, in the frame `to_from.to`."""
     settings = ReductionSettings()
     focal = site.site.paraboloid.focal_length_mm * MILLIMETRE
     on_dish = {n for n, t in site.targets.items() if t.type == "prism" and t.frame == "reflector"}
     inside = nominal_frame(site)
-    x, q = np.zeros((len(names), 3)), np.zeros((3 * len(names), 3 * len(names)))
+    x, q = np.zeros((len(names), 3)), np.zeros((len(names), 3, 3))
     for k, name in enumerate(names):
         place = known[name]
         u = place.u_typed(settings.u_position) if place.typed else settings.u_position
@@ -214,5 +214,5 @@ def _design(
             where = inside.points(foot)
             spread = spread + (U_SURFACE**2 - u**2) * np.outer(along, along)
         x[k] = to_from.points(where)
-        q[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = to_from.rotation @ spread @ to_from.rotation.T
+        q[k] = to_from.rotation @ spread @ to_from.rotation.T
     return x, q
