@@ -25,7 +25,6 @@ def written(tmp_path_factory):
     directory = tmp_path_factory.mktemp("many")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(objects_module, "MOST_INSIDE", 100)
-        patch.setattr(files_module, "MOST_INSIDE", 100)
         patch.setattr(files_module, "AT_ONCE", 37)
         write_reduction(reduction_of_example(), directory)
     return directory

@@ -185,7 +185,7 @@ class _Problem:
 
 def _kept(problem: _Problem, method: str) -> tuple[np.ndarray, np.ndarray]:
     """(n,) bool which points stay, and (n,) the largest |w| of each, nothing being left out for being unchecked."""
-    sigma = np.sqrt(np.diag(problem.known.difference(np.eye(3))))
+    sigma = np.sqrt(np.diag(problem.known.difference(len(problem.names), np.eye(3))))
 
     def solve(inflation: Sequence[np.ndarray]) -> list[GroupFit]:
         (factor,) = inflation

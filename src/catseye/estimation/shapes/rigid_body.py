@@ -26,7 +26,8 @@ POINTS = {"rigid": 3, "similarity": 3, "affine": 4}
 ITERATIONS = 50
 STEP = 1e-12  # of the size of the set: below it rounding rules
 FLAT = 1e-9  # of the size of the set: points no further off a line or plane do not hold a turn about it
-NEAR = 1e-4  # of the step before: a factor that leaves more of it is of another place; so near are weights known
+NEAR = 1e-2  # of the step before: a factor that leaves more of it is of another place; so near are weights known
+HELD = 1e8  # condition of a start's normal equations of unit diagonal: beyond it their step is not held
 WEAK_TURN = 0.1  # rad: beyond it a turn is no longer small, and its covariance only an indication
 
 
@@ -254,6 +255,7 @@ def adjusted_motion(
     else:
         matrix, mirrored = closed_form(x, y, with_scale=kind == "similarity")
     translation = np.mean(y - pivot - (x - pivot) @ matrix.T, axis=0)
+    matrix, translation = _by_own_blocks(kind, x - pivot, y - pivot, known, matrix, translation)
     adjusted, weighted, taken, used = x, np.zeros(x.size), 0, 0
     before = step = np.inf
     model = None
@@ -264,7 +266,7 @@ def adjusted_motion(
         if model is None or (used > 1 and step > NEAR * before):
             model, used = None, 0  # its memory goes first
             model = FactoredModel.of(
-                columns, known.difference(matrix, extra), parameters=_names(kind), rows=called, overwrite=True
+                columns, known.difference(len(x), matrix, extra), parameters=_names(kind), rows=called, overwrite=True
             )
         used += 1
         left = misclosure - known.difference_times(matrix, weighted[:, None], extra)[:, 0]
@@ -294,6 +296,29 @@ def adjusted_motion(
         status=status,
     )
     return motion, linear
+
+
+def _by_own_blocks(
+    kind: str, x: np.ndarray, y: np.ndarray, known: PlaceCovariances, matrix: np.ndarray, translation: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """A start nearer to the end: one step in which each point counts by its own covariance, as if independent.
+
+    x, y   (n, 3) m, from the pivot
+
+    Matrix and translation come back as they were where a point's own covariance is singular or the step is not held.
+    """
+    columns = _columns(kind, x, matrix).reshape(len(x), 3, -1)
+    try:
+        pulled = np.einsum("kia,kij->akj", columns, np.linalg.inv(known.blocks(len(x), matrix)))
+        size = np.sqrt(np.einsum("akj,kja->a", pulled, columns))
+        normal = np.einsum("akj,kjb->ab", pulled, columns) / np.outer(size, size)
+        if not np.linalg.cond(normal) < HELD:
+            return matrix, translation
+        left = y - translation - x @ matrix.T
+        step = np.linalg.solve(normal, np.einsum("akj,kj->a", pulled, left) / size) / size
+    except np.linalg.LinAlgError:
+        return matrix, translation
+    return _stepped(kind, matrix, step[3:]), translation + step[:3]
 
 
 def _names(kind: str) -> list[str]:

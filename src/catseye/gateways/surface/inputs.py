@@ -10,6 +10,7 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError
+from catseye.estimation.least_squares.covariance import Dense, JointPoints
 from catseye.geometry.antenna.frames import ground_from_reflector
 from catseye.geometry.frames.frame import Transform
 from catseye.records.files.columns import TextColumns, columns_of
@@ -70,12 +71,12 @@ def prisms_of(reduction: Reduction) -> Prisms:
     name = campaign.site.campaign.name
     if surface is None:
         raise InputError(f"{name}: the reduction found no dish (expected a night that saw its prisms)")
-    rows = [coordinates.index(each) for each in surface.names]
+    rows = coordinates.rows(surface.names)
     posture = campaign.site.campaign
     nominal = _frame(campaign, posture.azimuth_deg, posture.elevation_deg)
     azimuth, elevation = posture.azimuth_deg, posture.elevation_deg
-    block = coordinates.block(surface.names)
-    return Prisms(surface.names, coordinates.x[rows], block, nominal, name, elevation, azimuth)
+    joint = coordinates.joint.of_points(rows)
+    return Prisms(surface.names, coordinates.x[rows], joint, nominal, name, elevation, azimuth)
 
 
 def _frame(site: SiteFolder, azimuth_deg: float, elevation_deg: float) -> Transform:
@@ -111,9 +112,9 @@ def _reduced(
         names = tuple(surface["deviations"])
         points = np.array([[answer["points"][name][axis] for axis in AXES] for name in names], dtype=float)
         at = {label: row for row, label in enumerate(answer["covariance_order"])}
-        rows = [at[f"{name} {axis}"] for name in names for axis in AXES]
-        whole = stored_covariance(answer, folder.directory, len(at))
-        covariance = np.array(np.asarray(whole)[np.ix_(rows, rows)], dtype=float)
+        columns = np.array([[at[f"{name} {axis}"] for axis in AXES] for name in names])
+        whole = np.asarray(stored_covariance(answer, folder.directory, len(at)))
+        covariance = JointPoints(Dense(whole), columns)
         posture = pose["nominal_posture"]
         azimuth, elevation = float(posture["azimuth_deg"]), float(posture["elevation_deg"])
         focal = float(surface["focal_length"])
@@ -121,7 +122,7 @@ def _reduced(
         raise refusal(
             f"{source}/coordinates.json", f"is not a reduction's: {problem!r} (expected what catseye reduce writes)"
         ) from problem
-    if not (np.isfinite(points).all() and np.isfinite(covariance).all()):
+    if not (np.isfinite(points).all() and np.isfinite(covariance.u).all()):
         raise refusal(f"{source}/coordinates.json", "holds a coordinate or covariance that is no number")
     designed = site.site.paraboloid.focal_length_mm * MILLIMETRE
     if abs(focal - designed) > HELD_F:

@@ -17,7 +17,8 @@ import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import InputError
-from catseye.estimation.shapes.place_covariances import PlaceCovariances, turn_in_place
+from catseye.estimation.least_squares.covariance import JointPoints
+from catseye.estimation.shapes.place_covariances import Known, PlaceCovariances, TurnedPoints, turn_in_place
 from catseye.estimation.shapes.pose import Pose, fit_pose
 from catseye.geometry.antenna.frames import ground_from_alidade
 from catseye.geometry.frames.frame import Transform
@@ -145,12 +146,12 @@ def pose_of_group(
         raise InputError(f"{len(have)} points of {group or 'the list'} are in both (expected {FEWEST} or more)")
     carrier = CARRIES[group] if group is not None else "ground"
     there = frame_transform(carrier, site).inverse()
-    second, q_second = _into(there, later.places(have), later.block(have))
+    second, q_second = _into(there, later, have)
     if earlier is None:
         first, q_first = _design(have, known, site, there)
     else:
         before = frame_transform(carrier, _posture_of(earlier, site, carrier)).inverse()
-        first, q_first = _into(before, earlier.places(have), earlier.block(have))
+        first, q_first = _into(before, earlier, have)
     pose = fit_pose(
         have, first, second, frame=carrier, covariance=PlaceCovariances(first=q_first, second=q_second), robust=robust
     )
@@ -188,9 +189,12 @@ def _posture_of(epoch: SolvedPoints, site: SiteFolder, carrier: str) -> SiteFold
     return at_posture(site, *epoch.posture)
 
 
-def _into(to_from: Transform, x: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places and their covariance in another frame; the covariance is written over."""
-    return to_from.points(x), turn_in_place(q, to_from.rotation)
+def _into(to_from: Transform, epoch: SolvedPoints, names: Sequence[str]) -> tuple[np.ndarray, Known]:
+    """Places (n, 3) of an epoch's points in another frame, and their covariance."""
+    x = to_from.points(epoch.places(names))
+    if isinstance(epoch.covariance, JointPoints):
+        return x, TurnedPoints(epoch.covariance.of_points(epoch.rows(names)), to_from.rotation)
+    return x, turn_in_place(epoch.block(names), to_from.rotation)
 
 
 def _design(
