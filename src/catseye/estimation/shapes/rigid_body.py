@@ -27,7 +27,7 @@ ITERATIONS = 50
 STEP = 1e-12  # of the size of the set: below it rounding rules
 FLAT = 1e-9  # of the size of the set: points no further off a line or plane do not hold a turn about it
 NEAR = 1e-2  # of the step before: a factor that leaves more of it is of another place; so near are weights known
-HELD = 1e8  # condition of a start's normal equations of unit diagonal: beyond it their step is not held
+HELD = 1e-4  # of a column's length: what must be left of it beside those before it, for a start to take the step
 WEAK_TURN = 0.1  # rad: beyond it a turn is no longer small, and its covariance only an indication
 
 
@@ -307,17 +307,17 @@ def _by_own_blocks(
 
     Matrix and translation come back as they were where a point's own covariance is singular or the step is not held.
     """
-    columns = _columns(kind, x, matrix).reshape(len(x), 3, -1)
     try:
-        pulled = np.einsum("kia,kij->akj", columns, np.linalg.inv(known.blocks(len(x), matrix)))
-        size = np.sqrt(np.einsum("akj,kja->a", pulled, columns))
-        normal = np.einsum("akj,kjb->ab", pulled, columns) / np.outer(size, size)
-        if not np.linalg.cond(normal) < HELD:
-            return matrix, translation
-        left = y - translation - x @ matrix.T
-        step = np.linalg.solve(normal, np.einsum("akj,kj->a", pulled, left) / size) / size
+        half = np.linalg.inv(np.linalg.cholesky(known.blocks(len(x), matrix)))
     except np.linalg.LinAlgError:
         return matrix, translation
+    rows = (half @ _columns(kind, x, matrix).reshape(len(x), 3, -1)).reshape(x.size, -1)
+    left = (half @ (y - translation - x @ matrix.T)[:, :, None]).ravel()
+    size = np.linalg.norm(rows, axis=0)
+    base, triangle = np.linalg.qr(rows / size)
+    if np.abs(np.diag(triangle)).min() < HELD:
+        return matrix, translation
+    step = np.linalg.solve(triangle, base.T @ left) / size
     return _stepped(kind, matrix, step[3:]), translation + step[:3]
 
 
