@@ -19,12 +19,13 @@ AT_ONCE = 500  # rows that are read together
 
 def part_of(matrix: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """(k, m) doubles of some rows and columns; of a mapped file no more than this part comes into memory at once."""
-    part, base = np.empty((len(rows), len(columns))), matrix
-    while base is not None and not isinstance(base, mmap.mmap):
-        base = getattr(base, "base", None)
+    part = np.empty((len(rows), len(columns)))
+    base: Any = matrix
+    while isinstance(base, np.ndarray):
+        base = base.base
     for k in range(0, len(rows), AT_ONCE):
         part[k : k + AT_ONCE] = matrix[rows[k : k + AT_ONCE]][:, columns]
-        if base is not None:
+        if isinstance(base, mmap.mmap):
             base.madvise(mmap.MADV_DONTNEED)
     return part
 
