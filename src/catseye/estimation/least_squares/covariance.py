@@ -291,12 +291,16 @@ class JointPoints:
 
     def matrix(self) -> np.ndarray:
         """(3p, 3p), x y z point by point; EstimationError where that is too large."""
+        self.check_size()
+        return self.block(np.arange(len(self.columns)))
+
+    def check_size(self) -> None:
+        """Raise EstimationError where the matrix would be too large."""
         if self.columns.size > LARGEST_MATRIX:
             raise EstimationError(
                 f"the full covariance of {len(self.columns)} points takes {8e-9 * self.columns.size**2:.0f} GB "
                 f"(limit {LARGEST_MATRIX // 3} points); ask for the blocks of single points"
             )
-        return self.block(np.arange(len(self.columns)))
 
     def block(self, rows: np.ndarray) -> np.ndarray:
         """(3k, 3k) of some points."""

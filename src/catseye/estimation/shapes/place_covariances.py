@@ -57,6 +57,7 @@ class PlaceCovariances:
         known: list[Any] = []
         for name, each in given.items():
             if isinstance(each, TurnedPoints):
+                each.points.check_size()
                 known.append(replace(each, points=each.points.held()))
                 continue
             q = None if each is None else np.asarray(each, dtype=float)

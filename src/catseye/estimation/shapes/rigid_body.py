@@ -277,6 +277,7 @@ def adjusted_motion(
         adjusted = x + known.pull(at, weighted).reshape(-1, 3)
         translation = translation + change[:3]
         matrix = _stepped(kind, at, change[3:])
+    assert model is not None
     gain, spread_of = model.refined(columns, lambda a: known.difference_times(at, a, extra))
     status = NOT_CONVERGED.format(step=step, iterations=taken)
     if step < smallest:
