@@ -320,7 +320,7 @@ class JointPoints:
         return self.q.solve(right)[own]
 
     def of_points(self, rows: np.ndarray) -> "JointPoints":
-        """The same of some points."""
+        """The joint covariance of some of the points."""
         return JointPoints(self.q, self.columns[rows])
 
     def between(self, some: np.ndarray, others: np.ndarray) -> np.ndarray:

@@ -29,7 +29,7 @@ class Reaching:
 
     @staticmethod
     def of(rows: csr_array) -> "Reaching":
-        """Sparse rows, taken apart."""
+        """Sparse rows taken apart by what many share."""
         count, size = np.bincount(rows.indices, minlength=rows.shape[1]), rows.shape[0]
         many = count > SHARED * size
         shared, own = np.flatnonzero(many), ~many[rows.indices]
@@ -38,7 +38,7 @@ class Reaching:
         return Reaching(shared, rows[:, shared].toarray(), rest)
 
     def part(self, low: int, high: int) -> "Reaching":
-        """Some of the rows."""
+        """Rows from one to before another."""
         return Reaching(self.shared, self.dense[low:high], self.rest[low:high])
 
     def times(self, z: np.ndarray) -> np.ndarray:

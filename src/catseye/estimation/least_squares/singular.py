@@ -124,7 +124,7 @@ class FactoredModel:
 
     @cached_property
     def weight(self) -> np.ndarray:
-        """(m, m) P, dense."""
+        """(m, m) P, the whole matrix."""
         if self.factor is None:
             return np.zeros((len(self.sigma),) * 2)
         inverse = np.tril(lapack.dpotri(self.factor, lower=1)[0])
@@ -175,7 +175,7 @@ class LinearEstimate:
 
     @property
     def weight_diagonal(self) -> np.ndarray:
-        """(m,) P_ii."""
+        """(m,) the diagonal of P alone."""
         return self.model.weight_diagonal
 
 
