@@ -69,7 +69,8 @@ def report(reduction: Reduction, when: datetime, progress: Progress | None = Non
 
 def pictures(reduction: Reduction, progress: Progress | None = None) -> dict[str, str]:
     """The figures of the page, as SVG text."""
-    made, texts = figures(reduction), {}
+    made = figures(reduction)
+    texts: dict[str, str] = {}
     for done, (name, figure) in enumerate(made.items()):
         if progress is not None:
             progress(f"page: figure {name.replace('_', ' ')}", done, len(made) + 1)

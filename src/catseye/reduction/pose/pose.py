@@ -147,6 +147,7 @@ def pose_of_group(
     carrier = CARRIES[group] if group is not None else "ground"
     there = frame_transform(carrier, site).inverse()
     second, q_second = _into(there, later, have)
+    q_first: Known
     if earlier is None:
         first, q_first = _design(have, known, site, there)
     else:
@@ -155,7 +156,7 @@ def pose_of_group(
     pose = fit_pose(
         have, first, second, frame=carrier, covariance=PlaceCovariances(first=q_first, second=q_second), robust=robust
     )
-    kept = np.array([n in set(pose.names) for n in have])
+    kept = np.isin(have, pose.names)
     to_frame = frame_transform(frame, site).inverse() @ frame_transform(carrier, site)
     shown = pose if to_frame.to == to_frame.from_ else pose.in_frame(to_frame)
     wanted = pivot if pivot is not None else default_pivot(group or "", frame, site)
