@@ -1,6 +1,8 @@
 """What the main job costs, beside what a user would pick instead; ratios of one run, medians of rounds.
 
-python benchmarks/bench_reduce.py
+python benchmarks/bench_reduce.py           all of it
+python benchmarks/bench_reduce.py --files   what commands take of the whole dish, files and page with them
+python benchmarks/bench_reduce.py --next    the same of 5000 prisms and 100 000 shots: an hour, and memory
 """
 
 import json
@@ -225,11 +227,57 @@ def one_step(campaign, reduction) -> dict[str, float]:
     return {"step": ours, "splu": time.perf_counter() - before}
 
 
+WHOLE, NEXT = (2209, 0.43), (5000, 2.15)  # prisms, and how often each is shot again: 20 000 and 100 000 shots
+
+
+def used(arguments: list[str]) -> tuple[float, float, float, str]:
+    """Processor time (s), wall time (s) and peak memory (GB) of a command of its own, and why it failed, if so."""
+    begun = time.perf_counter()
+    with tempfile.TemporaryFile("w+") as said:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "catseye", *arguments], stdout=subprocess.DEVNULL, stderr=said,
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        )  # fmt: skip
+        _, status, usage = os.wait4(process.pid, 0)
+        said.seek(0)
+        lines = said.read().strip().splitlines()
+    wall, code = time.perf_counter() - begun, os.waitstatus_to_exitcode(status)
+    why = "" if code == 0 else f"exit status {code}: {lines[-1] if lines else 'killed'}"
+    return usage.ru_utime + usage.ru_stime, wall, usage.ru_maxrss / 1e6, why
+
+
+def files_and_page(prisms: int, again: float) -> None:
+    """What a user types of a whole dish: the answer alone, with every file and the page, then pose and surface."""
+    from catseye.api.night import night
+
+    with tempfile.TemporaryDirectory() as directory:
+        place, out = Path(directory) / "night", Path(directory) / "out"
+        night(place, dish_prisms=prisms, again=again, nature=0.0)
+        shots = len(read_campaign(place).shots.shot)
+        sys.stdout.write(f"Commands of {prisms} prisms, {shots} shots      processor       wall     memory\n")
+        used(["reduce", str(EXAMPLE), "--json"])  # kernels compiled
+        rows = {
+            "reduce --json": ["reduce", str(place), "--json"],
+            "reduce --out: files and page": ["reduce", str(place), "--out", str(out)],
+            "pose --group dish": ["pose", str(out), "--site", str(place), "--group", "dish", "--json"],
+            "surface": ["surface", str(out), "--site", str(place), "--json"],
+        }
+        for name, arguments in rows.items():
+            processor, wall, memory, why = used(arguments)
+            sys.stdout.write(f"  {name:<40} {processor:8.1f} s {wall:8.1f} s {memory:7.2f} GB  {why}\n")
+            sys.stdout.flush()
+        sys.stdout.write("\n")
+
+
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--one"]:
         one_night(int(sys.argv[2]), Path(sys.argv[3]))
+        sys.exit()
+    if sys.argv[1:2] in (["--files"], ["--next"]):
+        files_and_page(*(WHOLE if sys.argv[1] == "--files" else NEXT))
         sys.exit()
     detection()
     adjustment()
     whole()
     whole_dish()
+    files_and_page(*WHOLE)

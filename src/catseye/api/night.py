@@ -77,12 +77,12 @@ class NightResult(Result):
 
     def tables(self) -> "dict[str, QTable]":
         """`points`: a row a point; `ranges`: a row a shot that was adjusted; `surface`: a row a prism of the dish."""
-        from catseye.gateways.epoch.tables import kind_of
+        from catseye.gateways.epoch.tables import kinds_of
 
         own = self.reduction.coordinates.joint.blocks
         points = {
             "point": (self.names, ""),
-            "kind": ([kind_of(self.reduction, name) for name in self.names], ""),
+            "kind": (list(kinds_of(self.reduction).values()), ""),
             **{axis: (self.x[:, k], "m") for k, axis in enumerate("xyz")},
             **{f"u_{axis}": (self.u[:, k] / MILLIMETRE, "mm") for k, axis in enumerate("xyz")},
             "covariance": (own / MILLIMETRE**2, "mm2"),
@@ -146,7 +146,6 @@ def reduce(
     >>> night.x.shape, night.verdict.word
     ((130, 3), 'good')
     """
-    from catseye.gateways.epoch.objects import reduction_object
     from catseye.gateways.epoch.summary import verdict
     from catseye.reduction.epoch.epoch import reduce_epoch
     from catseye.reduction.epoch.settings import ReductionSettings
@@ -163,7 +162,7 @@ def reduce(
         coordinates.degrees_of_freedom,
         {shot: str(reason) for shot, reason in reduction.rejected.items()},
         coordinates.refractivity_ppm,
-        reduction_object(reduction)["pose"],
+        None if reduction.surface is None else reduction.surface.pose(),
         reduction.notes,
         reduction,
     )

@@ -117,7 +117,7 @@ class PoseResult(Result):
         """As `catseye pose --out`."""
         from catseye.gateways.pose.files import write_pose
 
-        write_pose(self.found, directory, self.hashes, settings=self.settings)
+        write_pose(self.found, directory, self.hashes, settings=self.settings, progress=progress)
 
     def inputs(self) -> dict[str, str]:
         """SHA-256 of each file read."""

@@ -237,7 +237,11 @@ def test_joint_points_are_the_same_from_either_covariance(both):
     np.testing.assert_allclose(bordered.matrix(), dense.matrix(), atol=2e-6 * size**2)
     rows = np.array([7, 30, 2])
     np.testing.assert_allclose(bordered.block(rows), dense.block(rows), atol=2e-6 * size**2)
-    np.testing.assert_allclose(bordered.across(rows), dense.across(rows), atol=2e-6 * size**2)
+    every = np.arange(len(columns))
+    np.testing.assert_allclose(bordered.between(every, rows), dense.between(every, rows), atol=2e-6 * size**2)
+    np.testing.assert_allclose(bordered.held().matrix(), bordered.matrix(), rtol=0, atol=1e-14 * size**2)
+    some = np.random.default_rng(5).standard_normal((columns.size, 2))
+    np.testing.assert_allclose(bordered.times(some), bordered.matrix() @ some, rtol=0, atol=1e-12 * size**2)
     up = np.random.default_rng(4).standard_normal((3, 3))
     np.testing.assert_allclose(bordered.along(rows, up), dense.along(rows, up), atol=2e-5 * size**2)
     np.testing.assert_allclose(

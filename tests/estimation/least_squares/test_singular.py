@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import catseye.estimation.least_squares.singular as module
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.singular import best_linear_estimate
 
@@ -59,3 +60,25 @@ def test_what_floats_or_is_known_too_well_is_named():
     q = np.array([[1.0, 0, 0], [0, 1, 2], [0, 2, 1]])
     with pytest.raises(EstimationError, match="the covariance is none"):
         best_linear_estimate(np.zeros((3, 0)), np.zeros(3), q, parameters=[], **names)
+
+
+@pytest.mark.parametrize("rows", [4, 11, 40])
+@pytest.mark.parametrize("null", [0, 2])
+def test_the_weights_diagonal_is_the_dense_matrix_one_panel_after_the_other(rows, null, monkeypatch):
+    """Of a full covariance, and of one that does not know two of the design's combinations."""
+    monkeypatch.setattr(module, "PANEL", 7)
+    rng = np.random.default_rng(rows)
+    design = rng.normal(size=(rows, 3))
+    root = rng.normal(size=(rows, rows + 2))
+    if null:  # nothing along two columns of the design
+        base = np.linalg.qr(design[:, :null])[0]
+        root = root - base @ (base.T @ root)
+    found = best_linear_estimate(
+        design, rng.normal(size=rows), root @ root.T, parameters=list("abc"), rows=[str(k) for k in range(rows)]
+    )
+    np.testing.assert_allclose(found.weight_diagonal, np.diag(found.weight), rtol=1e-9, atol=1e-12)
+    q = root @ root.T
+    np.testing.assert_allclose(found.redundancy, np.diag(q @ found.weight), atol=1e-8)
+    rest = np.linalg.svd(design)[0][:, 3:]  # what the design leaves over
+    own = rest @ np.linalg.inv(rest.T @ q @ rest) @ rest.T
+    np.testing.assert_allclose(found.weight, own, rtol=1e-7, atol=1e-7 * np.abs(own).max())

@@ -101,6 +101,10 @@ def test_every_part_of_the_joint_covariance(ranging_network, targets_too):
     weights = random_array(shape=(5, len(full)), density=0.2, rng=np.random.default_rng(4), format="csr")
     np.testing.assert_allclose(ranging.q.solve(weights.toarray().T), full @ weights.T, rtol=0, atol=size * len(full))
     np.testing.assert_allclose(ranging.q.carried(weights), weights @ full @ weights.T, rtol=0, atol=size * len(full))
+    others = random_array(shape=(3, len(full)), density=0.2, rng=np.random.default_rng(5), format="csr")
+    for q in (ranging.q, dense.q):
+        found = q.carried(weights, others)
+        np.testing.assert_allclose(found, weights @ full @ others.T, rtol=0, atol=size * len(full))
     names = ["T003", "S02", "T011"]
     np.testing.assert_allclose(ranging.block(names), dense.block(names), rtol=0, atol=size)
     columns = network.groups[0].columns

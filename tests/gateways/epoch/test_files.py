@@ -1,6 +1,7 @@
 """The files of a reduction of many points: the covariance beside, figures without labels, notes in one line."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import catseye.gateways.epoch.figures as figures_module
 import catseye.gateways.epoch.files as files_module
 import catseye.gateways.epoch.objects as objects_module
 from catseye.errors import InputError
+from catseye.estimation.least_squares.covariance import JointPoints
 from catseye.gateways.epoch.figures import figures
 from catseye.gateways.epoch.files import write_reduction
 from catseye.gateways.writers.drawing import svg
@@ -25,7 +27,6 @@ def written(tmp_path_factory):
     directory = tmp_path_factory.mktemp("many")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(objects_module, "MOST_INSIDE", 100)
-        patch.setattr(files_module, "MOST_INSIDE", 100)
         patch.setattr(files_module, "AT_ONCE", 37)
         write_reduction(reduction_of_example(), directory)
     return directory
@@ -119,3 +120,56 @@ def test_figures_of_many_points_are_maps_of_pixels_without_labels(monkeypatch):
     assert "<image" in svg(drawn["plan"])
     assert "<image" in svg(drawn["residuals"])
     assert len(svg(drawn["plan"])) < 300_000
+
+
+class Asked:
+    """A covariance that is not at hand: whole matrices that are asked of it are counted."""
+
+    def __init__(self, inner):
+        self.inner, self.large = inner, []
+
+    def __getattr__(self, name):
+        return getattr(self.inner, name)
+
+    def _counted(self, name, *given):
+        answer = getattr(self.inner, name)(*given)
+        self.large.append(answer.size)
+        return answer
+
+    def within(self, columns):
+        return self._counted("within", columns)
+
+    def across(self, columns):
+        return self._counted("across", columns)
+
+    def carried(self, *given):
+        return self._counted("carried", *given)
+
+
+def test_the_points_rows_are_multiplied_out_once(tmp_path, monkeypatch):
+    """For the matrix in its file, the page's three fits of the dish and its pose."""
+    whole = reduction_of_example()
+    points = whole.coordinates.joint
+    asked = Asked(points.q)
+    coordinates = replace(whole.coordinates, joint=JointPoints(asked, points.columns))
+    monkeypatch.setattr(objects_module, "MOST_INSIDE", 100)
+    told = []
+    write_reduction(replace(whole, coordinates=coordinates), tmp_path, lambda *each: told.append(each))
+    assert sum(asked.large) == points.columns.size**2
+    said = [what for what, _, _ in told]
+    page = said.index("writing report.html")
+    assert said[page + 1 : page + 4] == ["page: figure plan", "page: figure elevation", "page: figure feed arm"]
+    assert said[-2] == "page: the dish by each command"
+    assert all(done <= of for _, done, of in told)
+
+
+def test_the_page_says_where_the_matrix_is_and_what_is_drawn_as_dots(written, tmp_path, monkeypatch):
+    page = (written / "report.html").read_text()
+    assert "the full matrix in covariance.fits" in page
+    assert "Every point with the outline of its 1σ ellipsoid" in page
+    monkeypatch.setattr(figures_module, "CROWD", 20)
+    write_reduction(reduction_of_example(), tmp_path)
+    page = (tmp_path / "report.html").read_text()
+    assert "the full matrix in coordinates.json" in page
+    assert "Prisms of the dish as dots, too many for ellipsoids; every other point with the outline" in page
+    assert "Every point with" not in page

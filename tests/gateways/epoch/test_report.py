@@ -46,7 +46,7 @@ def drawn(reduction):
 @pytest.fixture
 def drawn_already(monkeypatch, drawn):
     """The figures' part of the report, which takes most of its time, from the shelf."""
-    monkeypatch.setattr("catseye.gateways.epoch.report.pictures", lambda reduction: drawn)
+    monkeypatch.setattr("catseye.gateways.epoch.report.pictures", lambda *_: drawn)
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from catseye.constants import SPEED_OF_LIGHT, TWO_PI
-from catseye.gateways.epoch.tables import kind_of, ranges_csv
+from catseye.gateways.epoch.tables import kinds_of, ranges_csv
 from column_scene import assert_columns
 
 
@@ -141,7 +141,7 @@ def test_every_column_of_the_coordinates_has_the_unit_of_its_name(written, reduc
 
     told = {
         "point": lambda i: found.points[i],
-        "kind": lambda i: kind_of(reduction, found.points[i]),
+        "kind": lambda i: kinds_of(reduction)[found.points[i]],
         **{f"{'xyz'[a]}_m": lambda i, a=a: found.x[i, a] for a in range(3)},
         **{f"u_{'xyz'[a]}_mm": lambda i, a=a: q(i, a, a) ** 0.5 for a in range(3)},
         **{f"cov_{'xyz'[a]}{'xyz'[b]}_mm2": lambda i, a=a, b=b: q(i, a, b) for a, b in ((0, 1), (0, 2), (1, 2))},

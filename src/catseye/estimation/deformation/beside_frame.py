@@ -22,7 +22,8 @@ from catseye.estimation.deformation.deformation import Deformation, moved_points
 from catseye.estimation.deformation.deletion import DeletionSearch
 from catseye.estimation.deformation.epoch_model import EpochModel
 from catseye.estimation.network.model import NetworkSolution
-from catseye.estimation.shapes.rigid_body import motion_columns, turned_covariance
+from catseye.estimation.shapes.place_covariances import turned_covariance
+from catseye.estimation.shapes.rigid_body import motion_columns
 
 TOO_MANY = "{n} points of the frame are too many for one joint test (limit {limit}); name fewer (frame=)"
 

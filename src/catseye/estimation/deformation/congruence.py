@@ -15,7 +15,8 @@ from catseye.errors import EstimationError
 from catseye.estimation.least_squares.singular import LinearEstimate, best_linear_estimate
 from catseye.estimation.network.datum import to_datum
 from catseye.estimation.shapes.motions import MOTIONS
-from catseye.estimation.shapes.rigid_body import motion_columns, turned_covariance
+from catseye.estimation.shapes.place_covariances import turned_covariance
+from catseye.estimation.shapes.rigid_body import motion_columns
 
 DATUMS: dict[str, tuple[int, ...]] = {
     "absolute": (),

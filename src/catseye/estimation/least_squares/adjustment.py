@@ -230,8 +230,8 @@ class _Nothing:
     def solve(self, b: np.ndarray) -> np.ndarray:
         return np.full(b.shape, self.value)
 
-    def carried(self, matrix: sparray) -> np.ndarray:
-        return np.full((matrix.shape[0],) * 2, self.value)
+    def carried(self, matrix: sparray, others: sparray | None = None) -> np.ndarray:
+        return np.full((matrix.shape[0], (matrix if others is None else others).shape[0]), self.value)
 
     def diagonal(self) -> np.ndarray:
         return np.full(self.size, self.value)

@@ -386,19 +386,23 @@ class BorderedCovariance:
         unit[columns, np.arange(len(columns))] = 1.0
         return self.solve(unit)
 
-    def carried(self, matrix: sparray) -> np.ndarray:
-        """(k, k) covariance of k combinations of parameters, the rows of a sparse matrix (k, n)."""
+    def carried(self, matrix: sparray, others: sparray | None = None) -> np.ndarray:
+        """(k, k) covariance of k combinations of parameters, the rows of a sparse matrix (k, n); or (k, m) with m."""
+        from catseye.estimation.least_squares.reaching import Reaching
+
         e, b = self.eliminated, self.eliminated.blocks
-        rows = csr_array(matrix * self.eliminated.scale)
-        inner, outer = rows[:, b.inner], rows[:, b.outer]
-        reach, z = csr_array(outer - inner @ e.reach), e.inverse()
-        met = np.unique(reach.indices)
-        if 4 * len(met) < len(z):
-            reach, z = reach[:, met], z[np.ix_(met, met)]
-        answer = np.asarray(reach @ (reach @ z).T + (inner @ e.inside @ inner.T).toarray())
+        both = []
+        for each in (matrix,) if others is None else (matrix, others):
+            rows = csr_array(each * e.scale)
+            inner = rows[:, b.inner]
+            both.append((inner, Reaching.of(csr_array(rows[:, b.outer] - inner @ e.reach))))
+        (inner, reach), (inner_also, reach_also) = both[0], both[-1]
+        answer = reach.carried(e.inverse(), None if others is None else reach_also)
+        own = csr_array(inner @ e.inside @ inner_also.T).tocoo()  # has each entry once
+        answer[own.coords] += own.data
         if self.reach is not None:
             moved = matrix @ self.reach
-            answer -= moved @ self.middle @ moved.T
+            answer -= moved @ self.middle @ (moved if others is None else others @ self.reach).T
         return answer
 
     def within(self, columns: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from scipy.sparse import csr_array, sparray
 from catseye.errors import EstimationError
 
 LARGEST_MATRIX = 12_000  # parameters: a full matrix of more takes over a gigabyte
-SOLVED = 100  # points whose block is solved for at once, where the factor's pattern does not hold it
+SOLVED = 100  # points whose block is solved for at once, where the factor's pattern does not hold it; or looked at
 
 
 class Covariance(Protocol):
@@ -44,8 +44,8 @@ class Covariance(Protocol):
         """The covariance times b, (n,) or (n, k)."""
         ...
 
-    def carried(self, matrix: sparray) -> np.ndarray:
-        """(k, k) covariance of k combinations of parameters, the rows of a sparse matrix (k, n)."""
+    def carried(self, matrix: sparray, others: sparray | None = None) -> np.ndarray:
+        """(k, k) covariance of k combinations of parameters, the rows of a sparse matrix (k, n); or (k, m) with m."""
         ...
 
 
@@ -84,8 +84,8 @@ class Dense:
     def solve(self, b: np.ndarray) -> np.ndarray:
         return np.asarray(self.full @ b)
 
-    def carried(self, matrix: sparray) -> np.ndarray:
-        return np.asarray(matrix @ (matrix @ self.full).T)
+    def carried(self, matrix: sparray, others: sparray | None = None) -> np.ndarray:
+        return np.asarray(matrix @ ((matrix if others is None else others) @ self.full).T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,8 +134,8 @@ class Sparse:
         result[moving] = inside[at] * self.scale[at][:, None]
         return result
 
-    def carried(self, matrix: sparray) -> np.ndarray:
-        return np.asarray(matrix @ self.solve(matrix.T.toarray()))
+    def carried(self, matrix: sparray, others: sparray | None = None) -> np.ndarray:
+        return np.asarray(matrix @ self.solve((matrix if others is None else others).T.toarray()))
 
     def across(self, columns: np.ndarray) -> np.ndarray:
         unit = np.zeros((self.size, len(columns)))
@@ -218,8 +218,8 @@ class Transformed:
         at, ab = self.t.T @ b, self.b.T @ b
         return np.asarray(self.inner.solve(b) - self.t @ (ab - self.c @ at) - self.b @ at)
 
-    def carried(self, matrix: sparray) -> np.ndarray:
-        return np.asarray(matrix @ self.solve(matrix.T.toarray()))
+    def carried(self, matrix: sparray, others: sparray | None = None) -> np.ndarray:
+        return np.asarray(matrix @ self.solve((matrix if others is None else others).T.toarray()))
 
     def diagonal(self) -> np.ndarray:
         low_rank = 2.0 * np.sum(self.t * self.b, axis=1) - np.einsum("nd,de,ne->n", self.t, self.c, self.t)
@@ -244,7 +244,7 @@ class Widened:
         return self.inner.across(columns) + self.reach @ self.reach[columns].T
 
     def within(self, columns: np.ndarray) -> np.ndarray:
-        return self.inner.within(columns) + self.reach[columns] @ self.reach[columns].T
+        return _widened(self.inner.within(columns), self.reach[columns], self.reach[columns])
 
     def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
         part = np.where((columns < 0)[..., None], 0.0, self.reach[columns])
@@ -258,9 +258,10 @@ class Widened:
     def solve(self, b: np.ndarray) -> np.ndarray:
         return np.asarray(self.inner.solve(b) + self.reach @ (self.reach.T @ b))
 
-    def carried(self, matrix: sparray) -> np.ndarray:
+    def carried(self, matrix: sparray, others: sparray | None = None) -> np.ndarray:
         moved = np.asarray(matrix @ self.reach)
-        return self.inner.carried(matrix) + moved @ moved.T
+        also = moved if others is None else np.asarray(others @ self.reach)
+        return _widened(self.inner.carried(matrix, others), moved, also)
 
     def diagonal(self) -> np.ndarray:
         return self.inner.diagonal() + np.sum(self.reach**2, axis=1)
@@ -290,20 +291,49 @@ class JointPoints:
 
     def matrix(self) -> np.ndarray:
         """(3p, 3p), x y z point by point; EstimationError where that is too large."""
+        self.check_size()
+        return self.block(np.arange(len(self.columns)))
+
+    def check_size(self) -> None:
+        """Raise EstimationError where the matrix would be too large."""
         if self.columns.size > LARGEST_MATRIX:
             raise EstimationError(
                 f"the full covariance of {len(self.columns)} points takes {8e-9 * self.columns.size**2:.0f} GB "
                 f"(limit {LARGEST_MATRIX // 3} points); ask for the blocks of single points"
             )
-        return self.block(np.arange(len(self.columns)))
 
     def block(self, rows: np.ndarray) -> np.ndarray:
         """(3k, 3k) of some points."""
         return self.q.within(self.columns[rows].ravel())
 
-    def across(self, rows: np.ndarray) -> np.ndarray:
-        """(3p, 3k) of all points with some."""
-        return self.q.across(self.columns[rows].ravel())[self.columns.ravel()]
+    def held(self) -> "JointPoints":
+        """The same with all its matrix at hand, for who asks for much of it; itself where that would be too large."""
+        if isinstance(self.q, Dense) or self.columns.size > LARGEST_MATRIX:
+            return self
+        return JointPoints(Dense(self.matrix()), np.arange(self.columns.size).reshape(-1, 3))
+
+    def times(self, a: np.ndarray) -> np.ndarray:
+        """(3p, k) the points' covariance times a (3p, k)."""
+        own = self.columns.ravel()
+        right = np.zeros((len(self.q.diagonal()), a.shape[1]))
+        right[own] = a
+        return self.q.solve(right)[own]
+
+    def of_points(self, rows: np.ndarray) -> "JointPoints":
+        """The joint covariance of some of the points."""
+        return JointPoints(self.q, self.columns[rows])
+
+    def between(self, some: np.ndarray, others: np.ndarray) -> np.ndarray:
+        """(3k, 3m) of some points with others."""
+        if isinstance(self.q, Dense):
+            return self.q.full[np.ix_(self.columns[some].ravel(), self.columns[others].ravel())]
+        return self.q.carried(self._picked(some), self._picked(others))
+
+    def _picked(self, some: np.ndarray) -> csr_array:
+        """(3k, n) that takes some points' coordinates out of all parameters."""
+        k = 3 * len(some)
+        at = (np.arange(k), self.columns[some].ravel())
+        return csr_array((np.ones(k), at), shape=(k, len(self.q.diagonal())))
 
     @cached_property
     def blocks(self) -> np.ndarray:
@@ -319,7 +349,21 @@ class JointPoints:
         """(k, k) of some points' components along directions (k, 3)."""
         k = len(rows)
         if isinstance(self.q, Dense):
-            blocks = self.block(rows).reshape(k, 3, k, 3)
-            return np.asarray(np.einsum("ki,kimj,mj->km", directions, blocks, directions, optimize=True))
+            parts = (slice(low, low + SOLVED) for low in range(0, k, SOLVED))
+            return np.concatenate([_combined(self.between(rows[part], rows), directions, part) for part in parts])
         at = (np.repeat(np.arange(k), 3), self.columns[rows].ravel())
         return self.q.carried(csr_array((np.ravel(directions), at), shape=(k, len(self.q.diagonal()))))
+
+
+def _widened(q: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """q + a b', without another matrix of its size; a q that nobody else has is written over."""
+    total = q if q.flags.owndata and q.flags.writeable else q.copy()
+    for k in range(0, len(total), SOLVED):
+        total[k : k + SOLVED] += a[k : k + SOLVED] @ b.T
+    return total
+
+
+def _combined(q: np.ndarray, directions: np.ndarray, part: slice) -> np.ndarray:
+    """(c, k) of some points' components with all, from their rows (3c, 3k)."""
+    seen = np.einsum("rmj,mj->rm", q.reshape(len(q), -1, 3), directions)
+    return np.asarray(np.einsum("ci,cim->cm", directions[part], seen.reshape(-1, 3, len(directions))))

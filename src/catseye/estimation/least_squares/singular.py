@@ -2,13 +2,16 @@
 
 What is estimated takes the null space in: only the part of the values that no parameter explains is weighted, by the
 inverse of its own covariance. So the sum of squares and its degrees of freedom do not depend on any datum.
+
+A covariance is factorised once; what is asked of it later is solved for by triangles.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from scipy.linalg import lapack
+from scipy.linalg import blas, lapack
 
 from catseye.errors import EstimationError
 
@@ -16,6 +19,125 @@ NO_COVARIANCE = "the covariance is none: scaled to unit variances its smallest e
 FLOATING = 1e-10  # of the largest singular value of a design with unit columns
 SINGULAR = 1e-11  # of the weighted part's condition: beyond it a covariance claims to know something exactly
 NEGATIVE = 1e-9  # of the number of rows: an eigenvalue below minus that is no rounding (scaled to unit variances)
+REFINED = 1e-10  # of two standard uncertainties' product: a covariance is refined until it changes by less,
+REFINEMENTS = 10  # or as often, where rounding keeps it from that
+PANEL = 512  # columns of an inverse that are solved for together: some MB, and products as quick as any
+
+
+@dataclass(frozen=True, eq=False)
+class FactoredModel:
+    """Values = design @ parameters + errors of covariance Q, factorised once; Q may be singular.
+
+    With U an orthonormal base of the design and N one of the rest: P = N (N'QN)^-1 N', computed without N from the
+    projected covariance, and gain U'(1 - QP). All is scaled to unit variances.
+
+    sigma    (m,) units of the rows
+    base     (m, p) U
+    back     (p, p) from that base to the parameters
+    level    by which F = (1 - UU')Q(1 - UU') + level UU' holds the base
+    factor   (m, m) F's lower triangle of Cholesky, in Fortran's order; what is above it is nothing. None where m = p
+    gain     (p, m) of scaled values in terms of U
+    spread   (p, p) covariance of the base's parameters
+    """
+
+    sigma: np.ndarray
+    base: np.ndarray
+    back: np.ndarray
+    level: float
+    factor: np.ndarray | None
+    gain: np.ndarray
+    spread: np.ndarray
+
+    @staticmethod
+    def of(
+        design: np.ndarray,
+        covariance: np.ndarray,
+        *,
+        parameters: Sequence[str],
+        rows: Sequence[str],
+        overwrite: bool = False,
+    ) -> "FactoredModel":
+        """The model factorised; arguments and errors as of `best_linear_estimate`.
+
+        overwrite   the factor takes the covariance's place, where this is in rows; else the place of a copy
+        """
+        m, p = design.shape
+        sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        if sigma.any():
+            sigma = np.where(sigma > 0.0, sigma, sigma[sigma > 0.0].min(initial=np.inf))
+        else:
+            sigma = np.ones(m)
+        scaled = design / sigma[:, None]
+        length = np.linalg.norm(scaled, axis=0)
+        if np.any(length == 0.0):
+            raise EstimationError(_floating([name for name, one in zip(parameters, length, strict=True) if one == 0.0]))
+        u, s, vt = np.linalg.svd(scaled / length, full_matrices=False) if p else (scaled, length, np.eye(0))
+        if p and (m < p or s[-1] < FLOATING * s[0]):
+            part = np.sum(vt[s < FLOATING * s[0]] ** 2, axis=0) if m >= p else np.ones(p)
+            raise EstimationError(_floating([parameters[int(i)] for i in np.flatnonzero(part > 1e-3 * part.max())]))
+        qu = (covariance @ (u / sigma[:, None])) / sigma[:, None]
+        level, factor, gain = 1.0, None, u.T
+        if m > p:
+            level, factor = _factor_beside(covariance, sigma, u, qu, rows=rows, overwrite=overwrite)
+            gain = gain - (_solved(factor, qu) - u @ (u.T @ qu) / level).T
+        spread = gain @ qu  # gain Q gain', as gain Q = gain Q U U'
+        if p and (least := float(np.linalg.eigvalsh(0.5 * (spread + spread.T))[0])) < -NEGATIVE * m:
+            raise EstimationError(NO_COVARIANCE.format(value=least))
+        return FactoredModel(sigma, u, vt.T / s / length[:, None], level, factor, gain, spread)
+
+    def solve(self, values: np.ndarray, closure: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Weighted residuals l (m,) or (m, k) and parameters x (p,) or (p, k): Q l + design x = values, design' l = c.
+
+        closure   c, (p,) or (p, k); zero without, which is least squares
+        """
+        unit = self.sigma if values.ndim == 1 else self.sigma[:, None]
+        scaled = values / unit
+        weighted = np.zeros_like(scaled)
+        if self.factor is not None:
+            weighted = _solved(self.factor, scaled) - self.base @ (self.base.T @ scaled) / self.level
+        along = self.gain @ scaled
+        if closure is not None:
+            bend = self.back.T @ closure
+            weighted, along = weighted + self.gain.T @ bend, along - self.spread @ bend
+        return weighted / unit, self.back @ along
+
+    def refined(self, design: np.ndarray, times: Callable[[np.ndarray], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Gain (p, m) and covariance (p, p) of a model that is nearly the one factorised.
+
+        design   (m, p) of the other
+        times    its covariance times (m, p)
+        """
+        unit = np.eye(design.shape[1])
+        weighted, along = self.solve(np.zeros(design.shape), unit)
+        for _ in range(REFINEMENTS):
+            more, change = self.solve(-times(weighted) - design @ along, unit - design.T @ weighted)
+            weighted, along = weighted + more, along + change
+            u = np.sqrt(np.abs(np.diag(along)))
+            if np.all(np.abs(change) <= REFINED * np.outer(u, u)):
+                break
+        return weighted.T, -0.5 * (along + along.T)
+
+    @property
+    def parameter_gain(self) -> np.ndarray:
+        """(p, m): parameters = gain @ values."""
+        return np.asarray(self.back @ self.gain / self.sigma)
+
+    @cached_property
+    def weight(self) -> np.ndarray:
+        """(m, m) P, the whole matrix."""
+        if self.factor is None:
+            return np.zeros((len(self.sigma),) * 2)
+        inverse = np.tril(lapack.dpotri(self.factor, lower=1)[0])
+        whole = inverse + np.tril(inverse, -1).T - (self.base @ self.base.T) / self.level
+        return np.asarray(whole / self.sigma[:, None] / self.sigma)
+
+    @cached_property
+    def weight_diagonal(self) -> np.ndarray:
+        """(m,) P_ii, at half the price of `weight` and without its memory."""
+        if self.factor is None:
+            return np.zeros(len(self.sigma))
+        own = _inverse_diagonal(self.factor) - np.sum(self.base**2, axis=1) / self.level
+        return np.asarray(own / self.sigma**2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,20 +147,36 @@ class LinearEstimate:
     estimate            (p,)
     covariance          (p, p)
     gain                (p, m): estimate = gain @ values
-    weight              (m, m) P: P values is the weighted residual, (P_ii)^-1 the covariance of values i foretold by
-                        all others
     weighted_residual   (m,) P values
     pvv                 values' P values
     degrees_of_freedom  m - p
+    design              (m, p)
+    model               what it was solved with
     """
 
     estimate: np.ndarray
     covariance: np.ndarray
     gain: np.ndarray
-    weight: np.ndarray
     weighted_residual: np.ndarray
     pvv: float
     degrees_of_freedom: int
+    design: np.ndarray
+    model: FactoredModel
+
+    @property
+    def redundancy(self) -> np.ndarray:
+        """(m,) share of each row in the degrees of freedom: (QP)_ii = (1 - design gain)_ii."""
+        return np.asarray(1.0 - np.sum(self.design * self.gain.T, axis=1))
+
+    @property
+    def weight(self) -> np.ndarray:
+        """(m, m) P: P values is the weighted residual, (P_ii)^-1 the covariance of values i foretold by all others."""
+        return self.model.weight
+
+    @property
+    def weight_diagonal(self) -> np.ndarray:
+        """(m,) the diagonal of P alone."""
+        return self.model.weight_diagonal
 
 
 def best_linear_estimate(
@@ -57,9 +195,7 @@ def best_linear_estimate(
     parameters   p names, and
     rows         m names, for errors
 
-    With U an orthonormal base of the design and N one of the rest: P = N (N'QN)^-1 N', computed without N from the
-    projected covariance, and estimate U'(1 - QP) values. All is first scaled to unit variances. Raises EstimationError
-    if parameters float, or if the covariance leaves a combination of rows exactly known.
+    Raises EstimationError if parameters float, or if the covariance leaves a combination of rows exactly known.
 
     Source: [RAO73] section 4i (unified least squares).
 
@@ -67,36 +203,18 @@ def best_linear_estimate(
     >>> best_linear_estimate(np.ones((2, 1)), np.array([3.0, 5.0]), q, parameters=["mean"], rows=["a", "b"]).estimate
     array([4.])
     """
-    m, p = design.shape
-    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    sigma = np.where(sigma > 0.0, sigma, sigma[sigma > 0.0].min(initial=np.inf)) if sigma.any() else np.ones(m)
-    q = covariance / sigma[:, None] / sigma
-    scaled = design / sigma[:, None]
-    length = np.linalg.norm(scaled, axis=0)
-    if np.any(length == 0.0):
-        raise EstimationError(_floating([name for name, one in zip(parameters, length, strict=True) if one == 0.0]))
-    u, s, vt = np.linalg.svd(scaled / length, full_matrices=False) if p else (scaled, length, np.eye(0))
-    if p and (m < p or s[-1] < FLOATING * s[0]):
-        part = np.sum(vt[s < FLOATING * s[0]] ** 2, axis=0) if m >= p else np.ones(p)
-        raise EstimationError(_floating([parameters[int(i)] for i in np.flatnonzero(part > 1e-3 * part.max())]))
-    qu = q @ u
-    rest = q - u @ qu.T - qu @ u.T + u @ (u.T @ qu) @ u.T
-    weight = _inverse_beside(rest, u, rows) if m > p else np.zeros((m, m))
-    gain = u.T - qu.T @ weight
-    spread = gain @ q @ gain.T
-    if p and np.linalg.eigvalsh(spread)[0] < -NEGATIVE * m:
-        raise EstimationError(NO_COVARIANCE.format(value=float(np.linalg.eigvalsh(q)[0])))
-    back = vt.T / s / length[:, None]  # from the base U to the parameters
-    gain, weight = back @ gain / sigma, weight / sigma[:, None] / sigma
-    residual = weight @ values
+    model = FactoredModel.of(design, covariance, parameters=parameters, rows=rows)
+    residual, estimate = model.solve(values)
+    gain = model.parameter_gain
     return LinearEstimate(
-        estimate=gain @ values,
-        covariance=back @ spread @ back.T,
+        estimate=estimate,
+        covariance=gain @ covariance @ gain.T,
         gain=gain,
-        weight=weight,
         weighted_residual=residual,
         pvv=float(values @ residual),
-        degrees_of_freedom=m - p,
+        degrees_of_freedom=design.shape[0] - design.shape[1],
+        design=design,
+        model=model,
     )
 
 
@@ -104,15 +222,26 @@ def _floating(names: Sequence[str]) -> str:
     return f"not held by these points: {', '.join(names)}; add points, or fit fewer parameters"
 
 
-def _inverse_beside(rest: np.ndarray, u: np.ndarray, rows: Sequence[str]) -> np.ndarray:
-    """Inverse of a matrix on the complement of the orthonormal columns u, which span its null space."""
+def _factor_beside(
+    covariance: np.ndarray, sigma: np.ndarray, u: np.ndarray, qu: np.ndarray, *, rows: Sequence[str], overwrite: bool
+) -> tuple[float, np.ndarray]:
+    """Level and Cholesky's factor of (1 - UU')Q(1 - UU') + level UU', Q scaled and U orthonormal columns."""
     m, p = u.shape
-    level = np.trace(rest) / (m - p)
-    filled = rest + level * (u @ u.T)
-    factor, failed = lapack.dpotrf(filled, lower=1)
-    condition = 0.0 if failed else lapack.dpocon(factor, np.abs(filled).sum(axis=0).max(), uplo="L")[0]
+    q = np.divide(covariance, sigma[:, None], out=covariance if overwrite else np.empty((m, m)))
+    q /= sigma
+    uqu = u.T @ qu
+    level = float(np.trace(q) - np.trace(uqu)) / (m - p)
+    half = np.asfortranarray(qu - 0.5 * u @ (uqu + level * np.eye(p)))
+    base, filled = np.asfortranarray(u), q.T
+    for a, b in ((half, base), (base, half)):
+        filled = blas.dgemm(-1.0, a, b, beta=1.0, c=filled, trans_b=1, overwrite_c=1)
+    norm = max(float(np.abs(filled[:, k : k + PANEL]).sum(axis=0).max()) for k in range(0, m, PANEL))
+    variances = np.diag(filled).copy()
+    factor, failed = lapack.dpotrf(filled, lower=1, clean=0, overwrite_a=1)
+    condition = 0.0 if failed else lapack.dpocon(factor, norm, uplo="L")[0]
     if condition < SINGULAR:
-        values, vectors = np.linalg.eigh(filled)
+        above = np.triu(factor, 1)  # is still the matrix
+        values, vectors = np.linalg.eigh(above + above.T + np.diag(variances))
         if values[0] < -NEGATIVE * m:
             raise EstimationError(NO_COVARIANCE.format(value=values[0]))
         part = np.sum(vectors[:, values < 10.0 * SINGULAR * values[-1]] ** 2, axis=1)
@@ -121,5 +250,25 @@ def _inverse_beside(rest: np.ndarray, u: np.ndarray, rows: Sequence[str]) -> np.
             f"the covariance claims to know a combination of {', '.join(named)} exactly, and no motion that is left "
             "free explains it; free more of the datum, or give held points their covariance"
         )
-    inverse = np.tril(lapack.dpotri(factor, lower=1)[0])
-    return inverse + np.tril(inverse, -1).T - (u @ u.T) / level
+    return level, factor
+
+
+def _solved(factor: np.ndarray, right: np.ndarray) -> np.ndarray:
+    return np.asarray(lapack.dpotrs(factor, right, lower=1)[0].reshape(right.shape))
+
+
+def _inverse_diagonal(factor: np.ndarray) -> np.ndarray:
+    """Diagonal of (L L')^-1: the squares of L^-1's columns, a panel at a time."""
+    m = len(factor)
+    result = np.empty(m)
+    for first in range(0, m, PANEL):
+        wide = min(PANEL, m - first)
+        columns = np.zeros((m - first, wide))
+        columns[:wide] = np.eye(wide)
+        for low in range(first, m, PANEL):
+            high, at = min(low + PANEL, m), low - first
+            part = columns[at : high - first]
+            part -= factor[low:high, first:low] @ columns[:at]
+            part[:] = lapack.dtrtrs(factor[low:high, low:high], part, lower=1)[0]
+        result[first : first + wide] = np.sum(columns**2, axis=0)
+    return result

@@ -72,11 +72,10 @@ class RangingCovariance:
         met = np.flatnonzero(np.any(b.reshape(len(b), -1) != 0.0, axis=1))
         return np.asarray(self.across(met) @ b[met])
 
-    def carried(self, matrix: sparray) -> np.ndarray:
-        by_column = csc_array(matrix)
-        met = np.flatnonzero(np.diff(by_column.indptr))
-        slopes = by_column[:, met]
-        return np.asarray(slopes @ (slopes @ self.within(met)).T)
+    def carried(self, matrix: sparray, others: sparray | None = None) -> np.ndarray:
+        both = [csc_array(each) for each in ((matrix,) if others is None else (matrix, others))]
+        met = np.flatnonzero(sum(np.diff(each.indptr) for each in both))
+        return np.asarray(both[0][:, met] @ (both[-1][:, met] @ self.within(met)).T)
 
     def blocks(self, first: np.ndarray) -> np.ndarray:
         result = np.empty((len(self.station), 3, 3))

@@ -8,20 +8,21 @@ on its own against the others can be found (robust start) or named (single tests
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from catseye.errors import EstimationError, FrameError
 from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit
-from catseye.estimation.least_squares.singular import LinearEstimate, best_linear_estimate
+from catseye.estimation.least_squares.singular import LinearEstimate
 from catseye.estimation.quality.robustness import RobustOptions, estimate_robustly
+from catseye.estimation.shapes.place_covariances import PlaceCovariances, turned_covariance
 from catseye.estimation.shapes.rigid_body import (
     CONVERGED,
     POINTS,
     Transformation,
-    fit_transformation,
+    adjusted_motion,
     motion_columns,
-    turned_covariance,
 )
 from catseye.geometry.frames.frame import Transform
 
@@ -39,18 +40,23 @@ class Pose:
     motion        the fit: pivot, translation, matrix, covariance (6, 6), residuals, status
     names         n, of the points that count, in the order of the residuals
     gain          (6, 3n): small changes of second less first, turned with the motion, to changes of the six numbers
-    w             (n,) largest |w| of a point's three coordinates; nan where nothing checks it
     p             chance of such a sum of squares or a larger one, if the group is rigid; nan without redundancy
     left_out      name: its largest |w| against all that count
+    linear        the estimate at the end, for `w`, which costs as much as the fit and is computed when asked for
     """
 
     frame: str
     motion: Transformation
     names: tuple[str, ...]
     gain: np.ndarray
-    w: np.ndarray
     p: float
     left_out: dict[str, float]
+    linear: LinearEstimate
+
+    @cached_property
+    def w(self) -> np.ndarray:
+        """(n,) largest |w| of a point's three coordinates; nan where nothing checks it."""
+        return _largest_w(self.linear)
 
     @property
     def pivot(self) -> np.ndarray:
@@ -109,20 +115,6 @@ class Pose:
         return self.motion.apply(x) - x, columns @ self.covariance @ columns.T
 
 
-@dataclass(frozen=True, eq=False)
-class PlaceCovariances:
-    """How well the n places of a group are known in two epochs.
-
-    first    (3n, 3n) m^2, may be singular; None: exact, as a design
-    second   likewise; one of the two at least
-    cross    (3n, 3n) m^2, of the first (rows) with the second (columns), if any
-    """
-
-    first: np.ndarray | None = None
-    second: np.ndarray | None = None
-    cross: np.ndarray | None = None
-
-
 def fit_pose(
     names: Sequence[str],
     first: np.ndarray,
@@ -132,7 +124,6 @@ def fit_pose(
     covariance: PlaceCovariances,
     pivot: np.ndarray | None = None,
     robust: str | None = None,
-    limit: float = LIMIT,
 ) -> Pose:
     """The rigid motion that takes a group's first places to its second, weighted, with full covariance.
 
@@ -142,8 +133,8 @@ def fit_pose(
     covariance      of the places
     pivot           (3,) m, about which the rotation is told; the points' mean if None
     robust          None keeps every point; one of METHODS leaves out points that moved on their own: an L1 start, then
-                    that method's weights, by `quality.robustness.estimate_robustly`; what it rejects goes whole
-    limit           |w| of a coordinate beyond which `robust` rejects
+                    that method's weights, by `quality.robustness.estimate_robustly`; what it rejects, |w| of a
+                    coordinate beyond LIMIT, goes whole
 
     After a robust start the points that stay count fully, so the covariance is that of plain least squares with them;
     that they were chosen is not in it. Raises EstimationError as `fit_transformation`.
@@ -154,92 +145,55 @@ def fit_pose(
     if robust is not None and robust not in METHODS:
         raise EstimationError(f"robust method {robust!r} is none of {', '.join(METHODS)}")
     x, y = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
-    size = (3 * len(called), 3 * len(called))
-    zero = np.zeros(size)
-    known = covariance.first, covariance.second, covariance.cross
-    given = [zero if q is None else np.asarray(q, dtype=float) for q in known]
-    if any(q.shape != size for q in given):
-        shapes = ", ".join(str(q.shape) for q in given)
-        raise EstimationError(f"covariances of {len(called)} points have shapes {shapes} (expected {size})")
     where = x.mean(axis=0) if pivot is None else np.asarray(pivot, dtype=float)
-    problem = _Problem(called, x, y, given[0], given[1], given[2], where)
+    problem = _Problem(called, x, y, covariance.checked(len(called)), where)
     keep, statistic = np.ones(len(called), dtype=bool), np.zeros(len(called))
     if robust is not None and len(called) > POINTS["rigid"]:
-        keep, statistic = _kept(problem, robust, limit)
+        keep, statistic = _kept(problem, robust)
     chosen = problem.of(keep)
-    motion = chosen.fit()
-    linear = chosen.linear(motion)
+    motion, linear = chosen.fit()
     return Pose(
         frame=frame,
         motion=motion,
         names=chosen.names,
         gain=linear.gain,
-        w=_largest_w(linear),
         p=_chance(motion),
+        linear=linear,
         left_out={name: float(w) for name, w, k in zip(called, statistic, keep, strict=True) if not k},
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """Points of two epochs with their covariances; `fit` and `linear` solve for the motion."""
+    """Points of two epochs with their covariances; `fit` solves for the motion."""
 
     names: tuple[str, ...]
     x: np.ndarray
     y: np.ndarray
-    qx: np.ndarray
-    qy: np.ndarray
-    cross: np.ndarray
+    known: PlaceCovariances
     pivot: np.ndarray
 
     def of(self, keep: np.ndarray) -> "_Problem":
         """The same with some points (n,) bool only."""
-        rows = np.flatnonzero(np.repeat(keep, 3))
-        at = np.ix_(rows, rows)
         names = tuple(n for n, k in zip(self.names, keep, strict=True) if k)
-        return replace(
-            self, names=names, x=self.x[keep], y=self.y[keep], qx=self.qx[at], qy=self.qy[at], cross=self.cross[at]
-        )
+        return replace(self, names=names, x=self.x[keep], y=self.y[keep], known=self.known.of(keep))
 
-    def fit(self, extra: np.ndarray | None = None) -> Transformation:
-        """The motion; `extra` (3n,) m^2 adds to the variances of the second epoch."""
-        return fit_transformation(
-            self.x,
-            self.y,
-            covariance_first=self.qx,
-            covariance_second=self.qy if extra is None else self.qy + np.diag(extra),
-            cross=self.cross,
-            pivot=self.pivot,
-            names=self.names,
-        )
-
-    def spread(self, matrix: np.ndarray) -> np.ndarray:
-        """Covariance (3n, 3n) of second less turned first."""
-        shared = turned_covariance(self.cross, matrix, columns=False)
-        both = turned_covariance(turned_covariance(self.qx, matrix, columns=True), matrix, columns=False)
-        return np.asarray(self.qy + both - shared - shared.T)
-
-    def linear(self, motion: Transformation, extra: np.ndarray | None = None) -> LinearEstimate:
-        """The linear estimate at the motion's end, for its gain and weights."""
-        spread = self.spread(motion.matrix)
-        if extra is not None:
-            spread = spread + np.diag(extra)
-        columns = motion_columns((self.x - self.pivot) @ motion.matrix.T, np.zeros(3))[:, :6]
-        rows = [f"{name} {axis}" for name in self.names for axis in "xyz"]
-        return best_linear_estimate(columns, motion.residual.ravel(), spread, parameters=COMPONENTS, rows=rows)
+    def fit(self, extra: np.ndarray | None = None) -> tuple[Transformation, LinearEstimate]:
+        """The motion and its linear estimate; `extra` (3n,) m^2 adds to the variances of the second epoch."""
+        return adjusted_motion(self.x, self.y, self.known, pivot=self.pivot, names=self.names, extra=extra)
 
 
-def _kept(problem: _Problem, method: str, limit: float) -> tuple[np.ndarray, np.ndarray]:
+def _kept(problem: _Problem, method: str) -> tuple[np.ndarray, np.ndarray]:
     """(n,) bool which points stay, and (n,) the largest |w| of each, nothing being left out for being unchecked."""
-    sigma = np.sqrt(np.diag(problem.spread(np.eye(3))))
+    sigma = np.sqrt(np.diag(problem.known.difference(len(problem.names), np.eye(3))))
 
     def solve(inflation: Sequence[np.ndarray]) -> list[GroupFit]:
         (factor,) = inflation
         extra = (np.square(factor) - 1.0) * sigma**2
-        motion = problem.fit(extra)
-        return [_fit(problem.linear(motion, extra), motion, problem.spread(motion.matrix), sigma)]
+        motion, linear = problem.fit(extra)
+        return [_fit(linear, motion, sigma)]
 
-    estimate = estimate_robustly(solve, [len(sigma)], options=RobustOptions(method=method, start="l1", limit=limit))
+    estimate = estimate_robustly(solve, [len(sigma)], options=RobustOptions(method=method, start="l1", limit=LIMIT))
     if estimate.status != CONVERGED:
         return _one_left_out(problem, f"robust weights ({method}) did not settle")
     statistic = np.abs(np.nan_to_num(estimate.statistic[0])).reshape(-1, 3).max(axis=1)
@@ -247,7 +201,9 @@ def _kept(problem: _Problem, method: str, limit: float) -> tuple[np.ndarray, np.
     if (left := int(keep.sum())) < POINTS["rigid"]:
         text = f"robust weights ({method}) would leave {left} of {len(keep)} points (expected 3 or more)"
         return _one_left_out(problem, text)
-    if left <= POINTS["rigid"] + 1 and _chance(problem.of(keep).fit()) < RIGID:  # few points: weights found a wrong one
+    if (
+        left <= POINTS["rigid"] + 1 and _chance(problem.of(keep).fit()[0]) < RIGID
+    ):  # few points: weights found a wrong one
         with suppress(EstimationError):  # else the weights' answer, whose chance says what it is worth
             return _one_left_out(problem, f"what robust weights ({method}) leave does not move as one")
     return keep, statistic
@@ -259,10 +215,10 @@ def _one_left_out(problem: _Problem, why: str) -> tuple[np.ndarray, np.ndarray]:
     Each is left out of a copy in turn. Raises EstimationError where none or more than one does, with their chances.
     """
     everyone = np.arange(len(problem.names))
-    chance = np.array([_chance(problem.of(everyone != k).fit()) for k in everyone])
+    chance = np.array([_chance(problem.of(everyone != k).fit()[0]) for k in everyone])
     good = np.flatnonzero(chance >= RIGID)
     if len(good) == 1:
-        return everyone != good[0], np.nan_to_num(_largest_w(problem.linear(problem.fit())))
+        return everyone != good[0], np.nan_to_num(_largest_w(problem.fit()[1]))
     if len(good):
         named = " or ".join(f"{problem.names[k]} (p {chance[k]:.2g})" for k in good)
         text = f"without {named} the others move as one, and nothing says which of them moved"
@@ -275,12 +231,12 @@ def _one_left_out(problem: _Problem, why: str) -> tuple[np.ndarray, np.ndarray]:
     raise EstimationError(f"{why}; {text}; fit without robust and look at the residuals, or take other points")
 
 
-def _fit(linear: LinearEstimate, motion: Transformation, spread: np.ndarray, sigma: np.ndarray) -> GroupFit:
+def _fit(linear: LinearEstimate, motion: Transformation, sigma: np.ndarray) -> GroupFit:
     """One group of 3n rows for `estimate_robustly`; its own weight undone is the estimator's business.
 
     The error in row i alone that explains the residuals best is (P v)_i / P_ii, of variance 1 / P_ii.
     """
-    weight = np.diag(linear.weight)
+    weight = linear.weight_diagonal
     with np.errstate(divide="ignore", invalid="ignore"):
         estimated = np.where(weight > 0.0, linear.weighted_residual / weight, 0.0)
         u = np.where(weight > 0.0, 1.0 / np.sqrt(weight), np.inf)
@@ -289,7 +245,7 @@ def _fit(linear: LinearEstimate, motion: Transformation, spread: np.ndarray, sig
         active=np.ones(len(sigma), dtype=bool),
         residual=motion.residual.ravel(),
         sigma=sigma,
-        redundancy=np.einsum("ij,ji->i", spread, linear.weight),
+        redundancy=linear.redundancy,
         standardised=estimated / u,
         estimated_error=estimated,
         detectable_error=NONCENTRALITY * u,
@@ -299,7 +255,7 @@ def _fit(linear: LinearEstimate, motion: Transformation, spread: np.ndarray, sig
 
 def _largest_w(linear: LinearEstimate) -> np.ndarray:
     """(n,) largest |w| of each point's coordinates: w_i = (P v)_i / sqrt(P_ii), Baarda's test with correlations."""
-    weight = np.diag(linear.weight)
+    weight = linear.weight_diagonal
     with np.errstate(divide="ignore", invalid="ignore"):
         w = np.where(weight > 0.0, np.abs(linear.weighted_residual) / np.sqrt(weight), np.nan)
     by_point = w.reshape(-1, 3)

@@ -3,6 +3,8 @@
 Both covariances may be singular, as those of free networks are. What is estimated takes their null space in: only the
 part of the misclosures that no motion explains is weighted, by the inverse of its own covariance. So the sum of squares
 and its degrees of freedom do not depend on the datum of either set; the parameters do, and their covariance says so.
+
+The covariance is factorised at the start and again only where the search has turned so far that steps shrink slowly.
 """
 
 from collections.abc import Sequence
@@ -11,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.singular import best_linear_estimate
+from catseye.estimation.least_squares.singular import FactoredModel, LinearEstimate
 from catseye.estimation.shapes.motions import motions
+from catseye.estimation.shapes.place_covariances import PlaceCovariances
 
 CONVERGED = "converged"
 NOT_CONVERGED = "not converged: the last step moved a point by {step:.2g} m after {iterations} iterations"
@@ -23,6 +26,8 @@ POINTS = {"rigid": 3, "similarity": 3, "affine": 4}
 ITERATIONS = 50
 STEP = 1e-12  # of the size of the set: below it rounding rules
 FLAT = 1e-9  # of the size of the set: points no further off a line or plane do not hold a turn about it
+NEAR = 1e-2  # of the step before: a factor that leaves more of it is of another place; so near are weights known
+HELD = 1e-4  # of a column's length: what must be left of it beside those before it, for a start to take the step
 WEAK_TURN = 0.1  # rad: beyond it a turn is no longer small, and its covariance only an indication
 
 
@@ -216,8 +221,32 @@ def fit_transformation(
 
     Source: [KABSCH76], [UMEYAMA91] (start); [POPE72] (derivatives at adjusted observations); [RAO73] section 4i.
     """
+    known = PlaceCovariances(covariance_first, covariance_second, cross)
+    if covariance_first is None and covariance_second is None:
+        known = PlaceCovariances(second=np.tile(np.eye(3), (len(first), 1, 1)))
+    return adjusted_motion(first, second, known, kind=kind, pivot=pivot, names=names)[0]
+
+
+def adjusted_motion(
+    first: np.ndarray,
+    second: np.ndarray,
+    covariance: PlaceCovariances,
+    *,
+    kind: str = "rigid",
+    pivot: np.ndarray | None = None,
+    names: Sequence[str] | None = None,
+    extra: np.ndarray | None = None,
+) -> tuple[Transformation, LinearEstimate]:
+    """`fit_transformation`, with the linear estimate at its end: gain, weighted residuals, weights.
+
+    extra   (3n,) m^2, more variance of the second set
+
+    Each step solves the linear model for what is left of the conditions at its place, misclosure = spread times
+    weighted residuals and columns' weighted residuals = 0, so that a factor of a place nearby leads to the same end.
+    The weights P of the estimate are of the last factor, by NEAR of themselves; everything else is of the end.
+    """
     x, y, called = _checked(first, second, kind, names)
-    qx, qy, c = _covariances(covariance_first, covariance_second, cross, len(x))
+    known = covariance.checked(len(x))
     pivot = x.mean(axis=0) if pivot is None else np.asarray(pivot, dtype=float)
     smallest = STEP * max(float(np.abs(x - pivot).max()), float(np.abs(y - pivot).max()))
     if kind == "affine":
@@ -226,33 +255,71 @@ def fit_transformation(
     else:
         matrix, mirrored = closed_form(x, y, with_scale=kind == "similarity")
     translation = np.mean(y - pivot - (x - pivot) @ matrix.T, axis=0)
-    adjusted, step, taken = x, np.inf, 0
+    matrix, translation = _by_own_blocks(kind, x - pivot, y - pivot, known, matrix, translation)
+    adjusted, weighted, taken, used = x, np.zeros(x.size), 0, 0
+    before = step = np.inf
+    model = None
     while step >= smallest and taken < ITERATIONS:
         taken += 1
         misclosure = (y - pivot - translation - (x - pivot) @ matrix.T).ravel()
         columns = _columns(kind, adjusted - pivot, matrix)
-        spread = _of_misclosure(qx, qy, c, matrix)
-        fit = best_linear_estimate(columns, misclosure, spread, parameters=_names(kind), rows=called)
-        step = float(np.abs(columns @ fit.estimate).max())
-        pull = turned_covariance(qx, matrix, columns=True) - c  # Q_x L' - C
-        adjusted = x + (pull @ fit.weighted_residual).reshape(-1, 3)
-        translation = translation + fit.estimate[:3]
-        matrix = _stepped(kind, matrix, fit.estimate[3:])
+        if model is None or (used > 1 and step > NEAR * before):
+            model, used = None, 0  # its memory goes first
+            model = FactoredModel.of(
+                columns, known.difference(len(x), matrix, extra), parameters=_names(kind), rows=called, overwrite=True
+            )
+        used += 1
+        left = misclosure - known.difference_times(matrix, weighted[:, None], extra)[:, 0]
+        more, change = model.solve(left, -columns.T @ weighted)
+        weighted = weighted + more
+        before, step = step, float(np.abs(columns @ change).max())
+        at = matrix
+        adjusted = x + known.pull(at, weighted).reshape(-1, 3)
+        translation = translation + change[:3]
+        matrix = _stepped(kind, at, change[3:])
+    assert model is not None
+    gain, spread_of = model.refined(columns, lambda a: known.difference_times(at, a, extra))
     status = NOT_CONVERGED.format(step=step, iterations=taken)
     if step < smallest:
-        status = _status(kind, fit.covariance, mirrored or np.linalg.det(matrix) < 0.0)
-    return Transformation(
+        status = _status(kind, spread_of, mirrored or np.linalg.det(matrix) < 0.0)
+    free = x.size - columns.shape[1]
+    linear = LinearEstimate(change, spread_of, gain, weighted, float(misclosure @ weighted), free, columns, model)
+    motion = Transformation(
         kind=kind,
         pivot=pivot,
         translation=translation,
         matrix=matrix,
-        covariance=fit.covariance,
+        covariance=spread_of,
         residual=misclosure.reshape(-1, 3),
-        pvv=fit.pvv,
-        degrees_of_freedom=fit.degrees_of_freedom,
+        pvv=linear.pvv,
+        degrees_of_freedom=free,
         iterations=taken,
         status=status,
     )
+    return motion, linear
+
+
+def _by_own_blocks(
+    kind: str, x: np.ndarray, y: np.ndarray, known: PlaceCovariances, matrix: np.ndarray, translation: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """A start nearer to the end: one step in which each point counts by its own covariance, as if independent.
+
+    x, y   (n, 3) m, from the pivot
+
+    Matrix and translation come back as they were where a point's own covariance is singular or the step is not held.
+    """
+    try:
+        half = np.linalg.inv(np.linalg.cholesky(known.blocks(len(x), matrix)))
+    except np.linalg.LinAlgError:
+        return matrix, translation
+    rows = (half @ _columns(kind, x, matrix).reshape(len(x), 3, -1)).reshape(x.size, -1)
+    left = (half @ (y - translation - x @ matrix.T)[:, :, None]).ravel()
+    size = np.linalg.norm(rows, axis=0)
+    base, triangle = np.linalg.qr(rows / size)
+    if np.abs(np.diag(triangle)).min() < HELD:
+        return matrix, translation
+    step = np.linalg.solve(triangle, base.T @ left) / size
+    return _stepped(kind, matrix, step[3:]), translation + step[:3]
 
 
 def _names(kind: str) -> list[str]:
@@ -269,21 +336,6 @@ def _stepped(kind: str, matrix: np.ndarray, step: np.ndarray) -> np.ndarray:
 
     turned = Rotation.from_rotvec(step[:3]).as_matrix() @ matrix
     return turned * (1.0 + step[3] / np.cbrt(np.linalg.det(matrix))) if kind == "similarity" else turned
-
-
-def turned_covariance(q: np.ndarray, matrix: np.ndarray, *, columns: bool) -> np.ndarray:
-    """q L' (columns) or L q (rows) for a covariance q (3n, 3m), L the matrix (3, 3) repeated along the diagonal."""
-    if columns:
-        return (q.reshape(len(q), -1, 3) @ matrix.T).reshape(q.shape)
-    return (matrix @ q.reshape(-1, 3, q.shape[1])).reshape(q.shape)
-
-
-def _of_misclosure(qx: np.ndarray, qy: np.ndarray, c: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Covariance of the misclosure y - L x."""
-    shared = turned_covariance(c, matrix, columns=False)
-    return (
-        qy + turned_covariance(turned_covariance(qx, matrix, columns=True), matrix, columns=False) - shared - shared.T
-    )
 
 
 def _status(kind: str, covariance: np.ndarray, mirrored: bool) -> str:
@@ -326,19 +378,3 @@ def _checked(
             axis = ", ".join(f"{v:.3f}" for v in vt[2])
             raise EstimationError(f"affine: {some} lie in one plane: strain along its normal ({axis}) floats")
     return x, y, [f"{name} {axis}" for name in called for axis in "xyz"]
-
-
-def _covariances(
-    first: np.ndarray | None, second: np.ndarray | None, cross: np.ndarray | None, n: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    zero = np.zeros((3 * n, 3 * n))
-    if first is None and second is None:
-        return zero, np.eye(3 * n), zero
-    given = [zero if q is None else np.asarray(q, dtype=float) for q in (first, second, cross)]
-    for name, q in zip(("of the first set", "of the second set", "between the sets"), given, strict=True):
-        if q.shape != zero.shape or not np.isfinite(q).all():
-            raise EstimationError(f"the covariance {name} has shape {q.shape}, expected {zero.shape}, all finite")
-    for name, q in zip(("first", "second"), given[:2], strict=True):
-        if not np.allclose(q, q.T, rtol=0.0, atol=1e-9 * float(np.abs(q).max(initial=0.0))):
-            raise EstimationError(f"the covariance of the {name} set is not symmetric")
-    return given[0], given[1], given[2]

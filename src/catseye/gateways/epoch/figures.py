@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.collections import EllipseCollection, LineCollection
 
 from catseye.constants import DEGREE, MILLIMETRE, PPM, SECONDS_PER_DAY
-from catseye.gateways.epoch.tables import kind_of
+from catseye.gateways.epoch.tables import kinds_of
 from catseye.gateways.writers.drawing import BAD, FAINT, GRID, INK, SERIES, Figure, nice, styled
 from catseye.reduction.epoch.epoch import Reduction
 
@@ -50,14 +50,12 @@ def _view(reduction: Reduction, axes: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 def _draw_network(ax, reduction: Reduction, axes: np.ndarray, rows: Sequence[int], share: float) -> None:
     """Points by kind with the outlines of their ellipsoids, enlarged the usual one to `share` of the view."""
-    names = reduction.coordinates.points
-    kinds = [kind_of(reduction, name) for name in names]
+    kinds = list(kinds_of(reduction).values())
     where, covariance = _view(reduction, axes)
     values, vectors = np.linalg.eigh(covariance)
     sigma = np.sqrt(np.maximum(values, 0.0))
     held = np.array([r for r in rows if sigma[r, 1] < LOOSE], dtype=int)
     loose = np.array([r for r in rows if sigma[r, 1] >= LOOSE], dtype=int)
-    crowd = len(rows) > CROWD
     extent = float(np.max(np.ptp(where[list(rows)], axis=0)))
     for kind, colour in COLOURS.items():
         of_kind = [r for r in held if kinds[r] == kind]
@@ -74,7 +72,7 @@ def _draw_network(ax, reduction: Reduction, axes: np.ndarray, rows: Sequence[int
             label=f"u above {LOOSE / MILLIMETRE:g} mm: no ellipsoid",
         )  # fmt: skip
     ax.set_aspect("equal")
-    if crowd:  # the many are dots
+    if len(rows) > CROWD:  # the many are dots
         held = np.array([r for r in held if kinds[r] != "dish prism"], dtype=int)
     if not len(held):
         return
@@ -112,8 +110,12 @@ def _beams(ax, reduction: Reduction, axes: np.ndarray) -> None:
 
 def _rows(reduction: Reduction) -> list[int]:
     """Points to draw: all but the fixed points, which hide behind their scan points."""
-    names = reduction.coordinates.points
-    return [row for row, name in enumerate(names) if kind_of(reduction, name) != "fixed point"]
+    return [row for row, kind in enumerate(kinds_of(reduction).values()) if kind != "fixed point"]
+
+
+def crowded(reduction: Reduction) -> bool:
+    """True where plan and elevation draw the prisms as dots, without ellipsoids."""
+    return len(_rows(reduction)) > CROWD
 
 
 def _plan(reduction: Reduction) -> Figure:
@@ -125,9 +127,7 @@ def _plan(reduction: Reduction) -> Figure:
     _draw_network(ax, reduction, axes, rows, 0.014)
     flat = reduction.coordinates.x[:, :2]
     centre = flat[rows].mean(axis=0)
-    for row in rows:
-        name = reduction.coordinates.points[row]
-        kind = kind_of(reduction, name)
+    for row, (name, kind) in enumerate(kinds_of(reduction).items()):
         if kind in ("ground ranger", "benchmark"):
             out = flat[row] - centre
             out = out / max(float(np.hypot(*out)), 1e-9) * (1.0 if kind == "ground ranger" else -1.0)
@@ -159,7 +159,7 @@ def _elevation(reduction: Reduction) -> Figure:
 
 def _feed_arm(reduction: Reduction) -> Figure | None:
     names = reduction.coordinates.points
-    rows = [row for row, name in enumerate(names) if kind_of(reduction, name) == "feed-arm ranger"]
+    rows = [row for row, kind in enumerate(kinds_of(reduction).values()) if kind == "feed-arm ranger"]
     if not rows:
         return None
     figure = Figure(figsize=(9.4, 4.9), layout="constrained")
@@ -266,7 +266,8 @@ def _zeros(reduction: Reduction) -> Figure:
     value, u = (np.array([zeros[name][part] for name in names]) * 1e6 for part in (0, 1))
     prior = np.array([reduction.campaign.mirror_of(name).u_d0_mm for name in names]) * 1e3
     at = np.arange(len(names))
-    colour = [COLOURS[kind_of(reduction, name)] for name in names]
+    kinds = kinds_of(reduction)
+    colour = [COLOURS[kinds[name]] for name in names]
     ax.bar(at, 2 * prior, 0.62, bottom=-prior, color=GRID, label="laboratory's uncertainty (1σ)")
     ax.axhline(0.0, color=FAINT, lw=0.8)
     ax.errorbar(at, value, u, fmt="none", ecolor=FAINT, elinewidth=1.0, capsize=3, label="estimate and its 1σ")

@@ -1,12 +1,14 @@
 """All files of a reduction, written into a directory."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from catseye.gateways.epoch.objects import COVARIANCE, MOST_INSIDE, coordinates_object, pose_object, provenance_object
+from catseye.gateways.epoch.objects import COVARIANCE, coordinates_object, matrix_file, pose_object, provenance_object
 from catseye.gateways.epoch.report import report
 from catseye.gateways.epoch.tables import coordinates_csv, ranges_csv, surface_csv
 from catseye.gateways.writers.matrix_fits import matrix_pages
@@ -21,26 +23,32 @@ AT_ONCE = 150  # points whose rows are computed together
 def _covariance(reduction: Reduction) -> Iterator[bytes]:
     """The full covariance of coordinates.json."""
     coordinates = reduction.coordinates
-    count = len(coordinates.points)
+    every = np.arange(len(coordinates.points))
     cards = {
         "BUNIT": ("m2", "ground frame; x, y, z point by point"),
         "CAMPAIGN": (reduction.campaign.site.campaign.name, ""),
         "ORDER": ("covariance_order", "of coordinates.json beside it"),
     }
-    parts = (coordinates.joint.across(np.arange(k, min(k + AT_ONCE, count))).T for k in range(0, count, AT_ONCE))
-    return matrix_pages(parts, 3 * count, cards)
+    parts = (coordinates.joint.between(every[k : k + AT_ONCE], every) for k in range(0, len(every), AT_ONCE))
+    return matrix_pages(parts, 3 * len(every), cards)
 
 
 def write_reduction(reduction: Reduction, directory: Path, progress: Progress | None = None) -> None:
     """Tables, objects, report, and last the provenance with the hashes of the others."""
     when = datetime.now(UTC)
+
+    @cache
+    def held() -> Reduction:  # covariance.fits and the page both ask for most of it
+        return replace(reduction, coordinates=replace(reduction.coordinates, joint=reduction.coordinates.joint.held()))
+
+    beside = matrix_file(reduction.coordinates.points) == COVARIANCE
     files: Files = {
         "ranges.csv": lambda: ranges_csv(reduction),
         "coordinates.csv": lambda: coordinates_csv(reduction),
         "surface.csv": lambda: surface_csv(reduction),
         "coordinates.json": lambda: json_page(coordinates_object(reduction)),
-        **({COVARIANCE: lambda: _covariance(reduction)} if len(reduction.coordinates.points) > MOST_INSIDE else {}),
+        **({COVARIANCE: lambda: _covariance(held())} if beside else {}),
         "pose.json": lambda: json_page(pose_object(reduction)),
-        "report.html": lambda: report(reduction, when),
+        "report.html": lambda: report(held(), when, progress),
     }
     write_files(files, directory, provenance_object(reduction, when), progress=progress)

@@ -1,5 +1,6 @@
 """A reduced night as plain objects for JSON: SI units unless a key says otherwise, null for what is not a number."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
@@ -107,13 +108,18 @@ def surface_object(reduction: "Reduction") -> dict[str, Any] | None:
     }
 
 
+def matrix_file(points: Sequence[str]) -> str:
+    """Name of the file that holds the full covariance of so many points."""
+    return COVARIANCE if len(points) > MOST_INSIDE else "coordinates.json"
+
+
 def coordinates_object(reduction: "Reduction") -> dict[str, Any]:
     """The `--json` object and the full covariance, m², rows and columns in the order stated.
 
     Of more points than MOST_INSIDE the matrix is in a file beside it, which is named; their own blocks stay.
     """
     coordinates = reduction.coordinates
-    inside = len(coordinates.points) <= MOST_INSIDE
+    inside = matrix_file(coordinates.points) != COVARIANCE
     return {
         "format": FORMAT,
         **reduction_object(reduction),

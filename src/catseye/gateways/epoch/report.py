@@ -7,19 +7,20 @@ from html import escape
 import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
-from catseye.gateways.epoch.figures import figures
-from catseye.gateways.epoch.objects import benchmark_object
+from catseye.gateways.epoch.figures import crowded, figures
+from catseye.gateways.epoch.objects import benchmark_object, matrix_file
 from catseye.gateways.epoch.summary import feed_arm_rows, passages, pointing, trust_limits, verdict
-from catseye.gateways.epoch.tables import kind_of
-from catseye.gateways.writers.drawing import svgs
+from catseye.gateways.epoch.tables import kinds_of
+from catseye.gateways.epoch.ways import ways_table
+from catseye.gateways.writers.drawing import svg
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
 from catseye.gateways.writers.verdict import verdict_line
 from catseye.reduction.air.group_index import benchmark_refractometers
 from catseye.reduction.epoch.epoch import Reduction
+from catseye.reduction.epoch.ranges import Progress
 from catseye.reduction.epoch.reason import ShotStatus
 from catseye.reduction.epoch.surface import UNOBSERVED
-from catseye.reduction.pose.dish_ways import dish_ways
 
 CONTENTS = {
     "summary": "Summary",
@@ -35,9 +36,11 @@ CONTENTS = {
 }
 
 
-def report(reduction: Reduction, when: datetime) -> str:
-    """The whole page of a reduction, HTML."""
-    drawn = pictures(reduction)
+def report(reduction: Reduction, when: datetime, progress: Progress | None = None) -> str:
+    """The whole page of a reduction, HTML; `progress` is told of each figure and of the dish's pose."""
+    drawn = pictures(reduction, progress)
+    if progress is not None:
+        progress("page: the dish by each command", len(drawn), len(drawn) + 1)
     name = reduction.campaign.site.campaign.name
     links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())
     header = (
@@ -53,7 +56,7 @@ def report(reduction: Reduction, when: datetime) -> str:
         _summary(reduction),
         _feed_arm(reduction, drawn),
         _dish(reduction, drawn),
-        _network(drawn),
+        _network(reduction, drawn),
         _residuals(reduction, drawn),
         _rejected(reduction),
         _rangers(reduction, drawn),
@@ -64,9 +67,15 @@ def report(reduction: Reduction, when: datetime) -> str:
     return page(f"catseye: {name}", "\n".join(body))
 
 
-def pictures(reduction: Reduction) -> dict[str, str]:
+def pictures(reduction: Reduction, progress: Progress | None = None) -> dict[str, str]:
     """The figures of the page, as SVG text."""
-    return svgs(figures(reduction))
+    made = figures(reduction)
+    texts: dict[str, str] = {}
+    for done, (name, figure) in enumerate(made.items()):
+        if progress is not None:
+            progress(f"page: figure {name.replace('_', ' ')}", done, len(made) + 1)
+        texts[name] = svg(figure)
+    return texts
 
 
 def _summary(reduction: Reduction) -> str:
@@ -167,7 +176,7 @@ def _dish(reduction: Reduction, drawn: dict[str, str]) -> str:
         table(("against the nominal posture", "value", "u"), motion, "tnn"),
         table(("in the ground frame (m)", "x", "y", "z"), places, "tnnn"),
         paragraph(f"Not observed: {UNOBSERVED}.", "faint"),
-        _ways(reduction),
+        ways_table(reduction),
         picture(
             drawn["dish"],
             "Normal deviations of the prisms from that paraboloid in millimetres, "
@@ -178,53 +187,20 @@ def _dish(reduction: Reduction, drawn: dict[str, str]) -> str:
     )
 
 
-def _ways(reduction: Reduction) -> str:
-    """The answers of three commands to where the dish is, with why they differ."""
-    ways = dish_ways(reduction)
-    fitted = "".join(f"<li>{escape(way.command)}: {escape(way.fitted)}</li>" for way in ways)
-    rows = [
-        *(
-            (f"vertex off along {axis} (mm)", *(_both(w.translation[k], w.u[k], MILLIMETRE, 2) for w in ways))
-            for k, axis in enumerate("xyz")
-        ),
-        *(
-            (f"turned about {axis} (″)", *(_both(w.rotation[k], w.u[3 + k], ARCSECOND, 1) for w in ways))
-            for k, axis in enumerate("xyz")
-        ),
-        *(
-            (f"axis leans {which} elevation (″)", *(_both(w.axis[k], w.u_axis[k], ARCSECOND, 1) for w in ways))
-            for k, which in enumerate(("across", "in"))
-        ),
-    ]
-    return "\n".join(
-        (
-            "<h3>The dish, as each command has it</h3>",
-            paragraph(
-                "All against the nominal posture, ground axes, about the nominal vertex. What is fitted differs, not "
-                "the sign: a paraboloid does not show a turn about the dish's own axis and sets it to zero, points "
-                "held against their design show it, and their places across the surface count, too; a focal length "
-                "that is free takes part of an offset dish's turn with it. Compare the last two rows, how far the "
-                "dish's axis leans: that is what pointing feels. Unless the focal length is free they agree within "
-                "their uncertainties."
-            ),
-            f'<ul class="notes">{fitted}</ul>',
-            table(("", *(way.command.removeprefix("catseye ") for way in ways)), rows, "t" + "n" * len(ways)),
+def _network(reduction: Reduction, drawn: dict[str, str]) -> str:
+    every = "Every point with the outline of its 1σ ellipsoid, enlarged as stated above the figure"
+    if crowded(reduction):
+        every = (
+            "Prisms of the dish as dots, too many for ellipsoids; every other point with the outline of its 1σ "
+            "ellipsoid, enlarged as stated above the figure"
         )
-    )
-
-
-def _both(value: float, u: float, unit: float, places: int) -> str:
-    return f"{value / unit:+.{places}f} ± {u / unit:.{places}f}"
-
-
-def _network(drawn: dict[str, str]) -> str:
     return section(
         "network",
         CONTENTS["network"],
         picture(
             drawn["plan"],
-            "Plan. Every point with the outline of its 1σ ellipsoid, enlarged as stated above the figure; thin lines "
-            "are used ranges. Hollow circles: points that the ranges leave open in at least one direction.",
+            f"Plan. {every}; thin lines are used ranges. Hollow circles: points that the ranges leave open in at least "
+            "one direction.",
         ),
         picture(drawn["elevation"], "Elevation, seen across the telescope's azimuth."),
     )
@@ -263,7 +239,7 @@ def _rejected(reduction: Reduction) -> str:
 
 def _rangers(reduction: Reduction, drawn: dict[str, str]) -> str:
     campaign, coordinates = reduction.campaign, reduction.coordinates
-    amplitude = reduction.phases.amplitude
+    amplitude, kinds = reduction.phases.amplitude, kinds_of(reduction)
     rows = []
     for name, (zero, u) in sorted(coordinates.zeros.items()):
         shots = [k for k, ranger in enumerate(campaign.shots.ranger) if ranger == name]
@@ -273,7 +249,7 @@ def _rangers(reduction: Reduction, drawn: dict[str, str]) -> str:
             (
                 name,
                 mirror.zp,
-                kind_of(reduction, name).removesuffix(" ranger").replace("-", " "),
+                kinds[name].removesuffix(" ranger").replace("-", " "),
                 f"{zero * 1e6:+.1f}",
                 f"{u * 1e6:.1f}",
                 f"{mirror.u_d0_mm * 1e3:.1f}",
@@ -347,11 +323,11 @@ def _air(reduction: Reduction, drawn: dict[str, str]) -> str:
 
 def _points(reduction: Reduction) -> str:
     coordinates = reduction.coordinates
-    u = coordinates.u / MILLIMETRE
+    u, kinds = coordinates.u / MILLIMETRE, kinds_of(reduction)
     rows = [
         (
             name,
-            kind_of(reduction, name),
+            kinds[name],
             *(f"{v:.5f}" for v in coordinates.x[row]),
             *(f"{v:.3f}" for v in u[row]),
             str(coordinates.shots[row]),
@@ -364,8 +340,8 @@ def _points(reduction: Reduction) -> str:
         CONTENTS["points"],
         paragraph(
             "A ranger's name is its scan point; its monument's fixed point ends in -F. Covariances are in "
-            "coordinates.csv, the full matrix in coordinates.json. A large u means that the ranges leave that "
-            "direction open and only the typed position holds it."
+            f"coordinates.csv, the full matrix in {matrix_file(coordinates.points)}. A large u means that the ranges "
+            "leave that direction open and only the typed position holds it."
         ),
         table(columns, rows, "ttnnnnnnn"),
     )

@@ -6,7 +6,7 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, SECONDS_PER_DAY
 from catseye.estimation.least_squares.adjustment import CONVERGED
-from catseye.gateways.epoch.tables import kind_of
+from catseye.gateways.epoch.tables import kinds_of
 from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.verdict import Verdict
 from catseye.records.night.campaign import REFERENCE
@@ -79,8 +79,8 @@ def feed_arm_rows(reduction: Reduction) -> list[tuple[str, np.ndarray, np.ndarra
     u = coordinates.u / MILLIMETRE
     return [
         (name, coordinates.x[row], u[row])
-        for row, name in enumerate(coordinates.points)
-        if kind_of(reduction, name) == "feed-arm ranger"
+        for row, (name, kind) in enumerate(kinds_of(reduction).items())
+        if kind == "feed-arm ranger"
     ]
 
 

@@ -1,12 +1,12 @@
 """Results as tables: CSV with a header, units in the names, one row a shot, a point or a prism."""
 
-import csv
-import io
-from collections.abc import Iterable
+import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
+from catseye.gateways.writers.written import csv_text
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.signal.cycles.whole import unwrapped_length
 
@@ -60,6 +60,7 @@ COORDINATES = [
 ]
 SURFACE = ["point", "x_dish_m", "y_dish_m", "z_dish_m", "deviation_mm", "u_deviation_mm", "shots"]
 
+Values = np.ndarray | Sequence[object]
 PLACES = {"_m": 7, "_mm": 4, "_rad": 7, "_v": 5, "_deg": 4, "_ppm": 5, "_mm2": 8, "_utc": 9}
 OTHERS = 4  # decimals of numbers without a unit
 
@@ -75,123 +76,117 @@ def ranges_csv(reduction: Reduction) -> str:
     half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz
     vacuum = unwrapped_length(ranges.cycles, ranges.phase, half)
     air = vacuum * (1.0 / (1.0 + ranges.refractivity) - 1.0)
-    row_of = {int(shot): row for row, shot in enumerate(ranges.shot)}
-    shots = campaign.shots
-    rows = []
-    for k, number in enumerate(shots.shot):
-        cells: dict[str, object] = {
-            "shot": int(number),
-            "mjd_utc": shots.mjd_utc[k],
-            "ranger": shots.ranger[k],
-            "target": shots.target[k],
-            "status": reduction.status[k],
-            "reason": reduction.rejected.get(int(number), ""),
-            "amplitude_v": phases.amplitude[k],
-            "phase_rad": phases.phase[k],
-            "u_phase_rad": phases.u_phase[k],
-            "d0_mm": campaign.mirror_of(shots.ranger[k]).d0_mm,
-        }
-        if k in row_of:
-            row = row_of[k]
-            cells |= {
-                "electronics_rad": ranges.electronics[row] % TWO_PI,
-                "difference_rad": ranges.phase[row],
-                "cycles": int(ranges.cycles[row]),
-                "margin_mm": ranges.margin[row] / MILLIMETRE,
-                "thin": "thin" if ranges.thin[row] else "",
-                "vacuum_length_m": vacuum[row],
-                "refractivity_ppm": ranges.refractivity[row] / PPM,
-                "air_mm": air[row] / MILLIMETRE,
-                "zero_mm": ranges.zero[row] / MILLIMETRE,
-                "glass_mm": ranges.glass[row] / MILLIMETRE,
-                "incidence_deg": ranges.incidence[row] / DEGREE,
-                "obliquity_mm": ranges.obliquity[row] / MILLIMETRE,
-                "leakage_mm": ranges.leakage[row] / MILLIMETRE,
-                "head_mm": ranges.head[row] / MILLIMETRE,
-                "moved_mm": ranges.moved[row] / MILLIMETRE,
-                "range_m": ranges.range_[row],
-                "u_range_mm": ranges.u_range[row] / MILLIMETRE,
-                "residual_mm": ranges.residual[row] / MILLIMETRE,
-                "standardised": ranges.standardised[row],
-                "redundancy": ranges.redundancy[row],
-                "detectable_mm": ranges.detectable[row] / MILLIMETRE,
-            }
-        rows.append(cells)
-    return _csv(RANGES, rows)
+    shots, count = campaign.shots, len(campaign.shots.shot)
+    d0 = {name: campaign.mirror_of(name).d0_mm for name in dict.fromkeys(shots.ranger)}
+    every: dict[str, Values] = {
+        "shot": shots.shot,
+        "mjd_utc": shots.mjd_utc,
+        "ranger": shots.ranger,
+        "target": shots.target,
+        "status": reduction.status,
+        "reason": [reduction.rejected.get(int(number), "") for number in shots.shot],
+        "amplitude_v": phases.amplitude,
+        "phase_rad": phases.phase,
+        "u_phase_rad": phases.u_phase,
+        "d0_mm": [d0[name] for name in shots.ranger],
+    }
+    adjusted: dict[str, Values] = {
+        "electronics_rad": ranges.electronics % TWO_PI,
+        "difference_rad": ranges.phase,
+        "cycles": ranges.cycles.astype(int),
+        "margin_mm": ranges.margin / MILLIMETRE,
+        "thin": ["thin" if each else "" for each in ranges.thin],
+        "vacuum_length_m": vacuum,
+        "refractivity_ppm": ranges.refractivity / PPM,
+        "air_mm": air / MILLIMETRE,
+        "zero_mm": ranges.zero / MILLIMETRE,
+        "glass_mm": ranges.glass / MILLIMETRE,
+        "incidence_deg": ranges.incidence / DEGREE,
+        "obliquity_mm": ranges.obliquity / MILLIMETRE,
+        "leakage_mm": ranges.leakage / MILLIMETRE,
+        "head_mm": ranges.head / MILLIMETRE,
+        "moved_mm": ranges.moved / MILLIMETRE,
+        "range_m": ranges.range_,
+        "u_range_mm": ranges.u_range / MILLIMETRE,
+        "residual_mm": ranges.residual / MILLIMETRE,
+        "standardised": ranges.standardised,
+        "redundancy": ranges.redundancy,
+        "detectable_mm": ranges.detectable / MILLIMETRE,
+    }
+    columns = {name: _cells(name, values) for name, values in every.items()}
+    for name, values in adjusted.items():
+        columns[name] = [""] * count
+        for k, text in zip(ranges.shot.tolist(), _cells(name, values), strict=True):
+            columns[name][k] = text
+    return csv_text(RANGES, zip(*(columns[name] for name in RANGES), strict=True))
 
 
 def coordinates_csv(reduction: Reduction) -> str:
     """Every point in the ground frame, with its standard uncertainties and covariances."""
     coordinates = reduction.coordinates
-    rows = []
-    for row, name in enumerate(coordinates.points):
-        covariance = coordinates.joint.blocks[row] / MILLIMETRE**2
-        u = np.sqrt(np.diag(covariance))
-        moved = np.linalg.norm(coordinates.x[row] - coordinates.start[row])
-        rows.append(
-            {
-                "point": name,
-                "kind": kind_of(reduction, name),
-                **dict(zip(("x_m", "y_m", "z_m"), coordinates.x[row], strict=True)),
-                **dict(zip(("u_x_mm", "u_y_mm", "u_z_mm"), u, strict=True)),
-                "cov_xy_mm2": covariance[0, 1],
-                "cov_xz_mm2": covariance[0, 2],
-                "cov_yz_mm2": covariance[1, 2],
-                "shots": int(coordinates.shots[row]),
-                "from_approximate_mm": moved / MILLIMETRE,
-            }
-        )
-    return _csv(COORDINATES, rows)
+    covariance = coordinates.joint.blocks / MILLIMETRE**2
+    u = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    columns: dict[str, Values] = {
+        "point": coordinates.points,
+        "kind": list(kinds_of(reduction).values()),
+        **dict(zip(("x_m", "y_m", "z_m"), coordinates.x.T, strict=True)),
+        **dict(zip(("u_x_mm", "u_y_mm", "u_z_mm"), u.T, strict=True)),
+        "cov_xy_mm2": covariance[:, 0, 1],
+        "cov_xz_mm2": covariance[:, 0, 2],
+        "cov_yz_mm2": covariance[:, 1, 2],
+        "shots": coordinates.shots.astype(int),
+        "from_approximate_mm": np.linalg.norm(coordinates.x - coordinates.start, axis=1) / MILLIMETRE,
+    }
+    return _csv(COORDINATES, columns)
 
 
 def surface_csv(reduction: Reduction) -> str:
     """The dish prisms in the fitted paraboloid's frame; a deviation is along the normal, positive towards the focus."""
     surface, coordinates = reduction.surface, reduction.coordinates
     if surface is None:
-        return _csv(SURFACE, [])
-    rows = [
-        {
-            "point": name,
-            **dict(zip(("x_dish_m", "y_dish_m", "z_dish_m"), surface.fit.local[i], strict=True)),
-            "deviation_mm": surface.fit.deviation[i] / MILLIMETRE,
-            "u_deviation_mm": surface.u_deviation[i] / MILLIMETRE,
-            "shots": int(coordinates.shots[coordinates.index(name)]),
-        }
-        for i, name in enumerate(surface.names)
-    ]
-    return _csv(SURFACE, rows)
+        return _csv(SURFACE, {name: [] for name in SURFACE})
+    columns: dict[str, Values] = {
+        "point": surface.names,
+        **dict(zip(("x_dish_m", "y_dish_m", "z_dish_m"), surface.fit.local.T, strict=True)),
+        "deviation_mm": surface.fit.deviation / MILLIMETRE,
+        "u_deviation_mm": surface.u_deviation / MILLIMETRE,
+        "shots": coordinates.shots[coordinates.rows(surface.names)].astype(int),
+    }
+    return _csv(SURFACE, columns)
 
 
-def kind_of(reduction: Reduction, name: str) -> str:
-    """What a point is, in a word or two."""
+def kinds_of(reduction: Reduction) -> dict[str, str]:
+    """What each point is, in a word or two, in the points' order."""
     campaign, places = reduction.campaign, reduction.coordinates.places
-    if name not in places:
-        return "fixed point"
-    if name in campaign.monuments:
-        return "ground ranger"
-    if places[name].kind == "ranger":
-        return "feed-arm ranger"
-    if name in {target for triplet in campaign.triplets.values() for target in triplet.targets}:
-        return f"triplet {places[name].kind}"
-    if name in {benchmark.target for benchmark in campaign.benchmarks}:
-        return "benchmark"
-    return "dish prism" if places[name].kind == "prism" else "structure"
+    at_triplets = {target for triplet in campaign.triplets.values() for target in triplet.targets}
+    at_benchmarks = {benchmark.target for benchmark in campaign.benchmarks}
+
+    def kind(name: str) -> str:
+        if name not in places:
+            return "fixed point"
+        if name in campaign.monuments:
+            return "ground ranger"
+        if places[name].kind == "ranger":
+            return "feed-arm ranger"
+        if name in at_triplets:
+            return f"triplet {places[name].kind}"
+        if name in at_benchmarks:
+            return "benchmark"
+        return "dish prism" if places[name].kind == "prism" else "structure"
+
+    return {name: kind(name) for name in reduction.coordinates.points}
 
 
-def _csv(columns: list[str], rows: Iterable[dict[str, object]]) -> str:
-    stream = io.StringIO(newline="")
-    writer = csv.DictWriter(stream, columns, restval="", lineterminator="\n")
-    writer.writeheader()
-    for row in rows:
-        writer.writerow({name: _cell(name, value) for name, value in row.items()})
-    return stream.getvalue()
+def _csv(header: list[str], columns: dict[str, Values]) -> str:
+    cells = [_cells(name, columns[name]) for name in header]
+    return csv_text(header, zip(*cells, strict=True))
 
 
-def _cell(name: str, value: object) -> object:
-    """A number with the digits that its unit deserves; empty where it is none."""
-    if not isinstance(value, float):
-        return value
-    if not np.isfinite(value):
-        return ""
+def _cells(name: str, values: Values) -> list[str]:
+    """A column's numbers with the digits that its unit deserves; empty where one is none."""
     places = PLACES.get(f"_{name.rpartition('_')[2]}", OTHERS) if "_" in name else OTHERS
-    return f"{value:.{places}f}"
+    plain = values.tolist() if isinstance(values, np.ndarray) else values
+    return [
+        (f"{value:.{places}f}" if math.isfinite(value) else "") if isinstance(value, float) else str(value)
+        for value in plain
+    ]

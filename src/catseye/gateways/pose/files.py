@@ -23,7 +23,7 @@ from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
 from catseye.gateways.writers.verdict import verdict_line
-from catseye.gateways.writers.written import Files, origin, write_files
+from catseye.gateways.writers.written import Files, Progress, origin, write_files
 from catseye.reduction.pose.pointing_offsets import PointingOffset
 from catseye.reduction.pose.verdicts import PoseFindings, pose_verdict
 
@@ -43,7 +43,12 @@ HEADER = (
 
 
 def write_pose(
-    result: PoseFindings, directory: Path, inputs: Mapping[str, str], *, settings: Mapping[str, Any]
+    result: PoseFindings,
+    directory: Path,
+    inputs: Mapping[str, str],
+    *,
+    settings: Mapping[str, Any],
+    progress: Progress | None = None,
 ) -> None:
     """Every file, and last the provenance.
 
@@ -51,6 +56,7 @@ def write_pose(
     directory   exists, and is ours to fill: see `writers.output.whole_directory`
     inputs      SHA-256 of each file read, by its name
     settings    what was asked for
+    progress    told of each file
     """
     when = datetime.now(UTC)
     files: Files = {
@@ -59,7 +65,7 @@ def write_pose(
         "report.html": lambda: pose_report(result, when, inputs),
     }
     provenance = {"format": FORMAT, "made_by": "catseye pose", "settings": dict(settings)}
-    write_files(files, directory, {**provenance, **origin(when, inputs)})
+    write_files(files, directory, {**provenance, **origin(when, inputs)}, progress=progress)
     pose = result.pose.pose
     pivot = f"{', '.join(f'{v:.6f}' for v in pose.pivot)} m"
     six = SamplerTable(

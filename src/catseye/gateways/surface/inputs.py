@@ -10,10 +10,11 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError
+from catseye.estimation.least_squares.covariance import Dense, JointPoints
 from catseye.geometry.antenna.frames import ground_from_reflector
 from catseye.geometry.frames.frame import Transform
 from catseye.records.files.columns import TextColumns, columns_of
-from catseye.records.files.covariance_file import stored_covariance
+from catseye.records.files.covariance_file import part_of, stored_covariance
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import refusal, shown
 from catseye.records.files.verdicts import stored_verdict, verdict_of_table
@@ -70,12 +71,12 @@ def prisms_of(reduction: Reduction) -> Prisms:
     name = campaign.site.campaign.name
     if surface is None:
         raise InputError(f"{name}: the reduction found no dish (expected a night that saw its prisms)")
-    rows = [coordinates.index(each) for each in surface.names]
+    rows = coordinates.rows(surface.names)
     posture = campaign.site.campaign
     nominal = _frame(campaign, posture.azimuth_deg, posture.elevation_deg)
     azimuth, elevation = posture.azimuth_deg, posture.elevation_deg
-    block = coordinates.block(surface.names)
-    return Prisms(surface.names, coordinates.x[rows], block, nominal, name, elevation, azimuth)
+    joint = coordinates.joint.of_points(rows)
+    return Prisms(surface.names, coordinates.x[rows], joint, nominal, name, elevation, azimuth)
 
 
 def _frame(site: SiteFolder, azimuth_deg: float, elevation_deg: float) -> Transform:
@@ -111,9 +112,8 @@ def _reduced(
         names = tuple(surface["deviations"])
         points = np.array([[answer["points"][name][axis] for axis in AXES] for name in names], dtype=float)
         at = {label: row for row, label in enumerate(answer["covariance_order"])}
-        rows = [at[f"{name} {axis}"] for name in names for axis in AXES]
-        whole = stored_covariance(answer, folder.directory, len(at))
-        covariance = np.array(np.asarray(whole)[np.ix_(rows, rows)], dtype=float)
+        rows = np.array([at[f"{name} {axis}"] for name in names for axis in AXES])
+        block = part_of(np.asarray(stored_covariance(answer, folder.directory, len(at))), rows, rows)
         posture = pose["nominal_posture"]
         azimuth, elevation = float(posture["azimuth_deg"]), float(posture["elevation_deg"])
         focal = float(surface["focal_length"])
@@ -121,7 +121,7 @@ def _reduced(
         raise refusal(
             f"{source}/coordinates.json", f"is not a reduction's: {problem!r} (expected what catseye reduce writes)"
         ) from problem
-    if not (np.isfinite(points).all() and np.isfinite(covariance).all()):
+    if not (np.isfinite(points).all() and np.isfinite(block).all()):
         raise refusal(f"{source}/coordinates.json", "holds a coordinate or covariance that is no number")
     designed = site.site.paraboloid.focal_length_mm * MILLIMETRE
     if abs(focal - designed) > HELD_F:
@@ -133,6 +133,7 @@ def _reduced(
         raise InputError(f"{source}: was measured at elevation {elevation:g}°, --elevation-deg says {elevation_deg:g}")
     hashes = {f"{source.name}/{name}": digest for name, digest in folder.hashes.items()}
     nominal = _frame(site, azimuth, elevation)
+    covariance = JointPoints(Dense(block), np.arange(len(rows)).reshape(-1, 3))
     prisms = Prisms(names, points, covariance, nominal, str(source), elevation, azimuth, temperature_c)
     return replace(prisms, verdict=stored_verdict(f"{source}/coordinates.json", answer)), hashes
 

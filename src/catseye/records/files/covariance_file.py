@@ -4,6 +4,7 @@ The file is a FITS image of doubles, a row a coordinate, which FITS readers open
 `np.memmap(path, ">f8", "r", offset, (n, n))`, the offset being a multiple of 2880 bytes that follows END.
 """
 
+import mmap
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,20 @@ import numpy as np
 from catseye.records.files.refusal import refusal, shown
 
 KEY = "covariance_file"  # beside "covariance", which is null then
+AT_ONCE = 500  # rows that are read together
+
+
+def part_of(matrix: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """(k, m) doubles of some rows and columns; of a mapped file no more than this part comes into memory at once."""
+    part = np.empty((len(rows), len(columns)))
+    base: Any = matrix
+    while isinstance(base, np.ndarray):
+        base = base.base
+    for k in range(0, len(rows), AT_ONCE):
+        part[k : k + AT_ONCE] = matrix[rows[k : k + AT_ONCE]][:, columns]
+        if isinstance(base, mmap.mmap):
+            base.madvise(mmap.MADV_DONTNEED)
+    return part
 
 
 def stored_covariance(document: Mapping[str, Any], directory: Path, size: int) -> Any:

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import DEGREE
-from catseye.records.files.covariance_file import stored_covariance
+from catseye.estimation.least_squares.covariance import JointPoints
+from catseye.records.files.covariance_file import part_of, stored_covariance
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import refusal, shown
 from catseye.records.files.verdicts import stored_verdict
@@ -29,7 +30,7 @@ class SolvedPoints:
     campaign     name
     names        n
     x            (n, 3) m
-    covariance   (3n, 3n) m^2; of many points mapped from a file
+    covariance   (3n, 3n) m^2; of many points mapped from a file, or what gives its parts
     posture      azimuth and elevation, rad, if pose.json beside it says
     hashes       SHA-256 of the files read, by their names
     verdict      of the reduction; None where the file has none
@@ -39,7 +40,7 @@ class SolvedPoints:
     campaign: str
     names: tuple[str, ...]
     x: np.ndarray
-    covariance: np.ndarray
+    covariance: np.ndarray | JointPoints
     posture: tuple[float, float] | None
     hashes: dict[str, str]
     verdict: Verdict | None = None
@@ -54,16 +55,20 @@ class SolvedPoints:
 
     def between(self, names: Sequence[str], others: Sequence[str]) -> np.ndarray:
         """(3k, 3m) m^2, covariance of some points with others."""
-        return np.array(self.covariance[np.ix_(self._rows(names), self._rows(others))], dtype=float)
+        rows, columns = self.rows(names), self.rows(others)
+        if isinstance(self.covariance, JointPoints):
+            return self.covariance.between(rows, columns)
+        rows, columns = ((3 * each[:, None] + np.arange(3)).ravel() for each in (rows, columns))
+        return part_of(self.covariance, rows, columns)
 
     def places(self, names: Sequence[str]) -> np.ndarray:
         """(k, 3) m, of some points in this order."""
-        at = {name: k for k, name in enumerate(self.names)}
-        return np.asarray(self.x[[at[n] for n in names]])
+        return np.asarray(self.x[self.rows(names)])
 
-    def _rows(self, names: Sequence[str]) -> list[int]:
-        at = {name: 3 * k for k, name in enumerate(self.names)}
-        return [at[n] + axis for n in names for axis in range(3)]
+    def rows(self, names: Sequence[str]) -> np.ndarray:
+        """(k,) where some points stand."""
+        at = {name: k for k, name in enumerate(self.names)}
+        return np.array([at[n] for n in names], dtype=int)
 
 
 def read_solved_points(path: Path | str) -> SolvedPoints:

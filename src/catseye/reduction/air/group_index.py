@@ -221,15 +221,16 @@ def benchmark_refractometers(reduction: "Reduction") -> tuple[BenchmarkSeries, .
     ranges = reduction.coordinates.ranges
     ends = list(zip(ranges.ranger, ranges.target, strict=True))
     series = []
+    field = AirField.of(reduction.campaign, reduction.settings)
     for benchmark in reduction.campaign.benchmarks:
         rows = [row for row, pair in enumerate(ends) if pair == (benchmark.ranger, benchmark.target)]
         if rows:
             times = reduction.campaign.shots.mjd_utc[ranges.shot[rows]]
-            series.append(_series(reduction, benchmark, np.array(rows)[np.argsort(times, kind="stable")]))
+            series.append(_series(reduction, field, benchmark, np.array(rows)[np.argsort(times, kind="stable")]))
     return tuple(series)
 
 
-def _series(reduction: "Reduction", benchmark: "BenchmarkRow", rows: np.ndarray) -> BenchmarkSeries:
+def _series(reduction: "Reduction", field: AirField, benchmark: "BenchmarkRow", rows: np.ndarray) -> BenchmarkSeries:
     campaign, coordinates = reduction.campaign, reduction.coordinates
     ranges, shots = coordinates.ranges, coordinates.ranges.shot[rows]
     sheet, electronics = campaign.mirror_of(benchmark.ranger), reduction.electronics[benchmark.ranger]
@@ -249,7 +250,6 @@ def _series(reduction: "Reduction", benchmark: "BenchmarkRow", rows: np.ndarray)
     u_path = np.sqrt(np.diag(noise) + leakage**2 + u_length**2)
 
     mjd = campaign.shots.mjd_utc[shots]
-    field = AirField.of(campaign, reduction.settings)
     a, b = (coordinates.x[coordinates.index(name)] for name in (benchmark.ranger, benchmark.target))
     nothing = np.zeros(len(field.names))
     air = field.along(mjd, np.tile(a, (len(rows), 1)), np.tile(b, (len(rows), 1)), nothing)

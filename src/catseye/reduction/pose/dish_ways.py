@@ -46,10 +46,11 @@ def dish_ways(reduction: Reduction) -> tuple[DishWay, ...]:
         return ()
     lean = axis_lean(*np.radians([campaign.site.campaign.azimuth_deg, campaign.site.campaign.elevation_deg]))
     names = surface.names
+    rows = reduction.coordinates.rows(names)
     prisms = Prisms(
         names,
-        reduction.coordinates.x[[reduction.coordinates.index(n) for n in names]],
-        reduction.coordinates.block(names),
+        reduction.coordinates.x[rows],
+        reduction.coordinates.joint.of_points(rows),
         nominal_frame(campaign),
         campaign.site.campaign.name,
     )
@@ -82,7 +83,7 @@ def solved_points(reduction: Reduction) -> SolvedPoints:
     angles = (float(np.radians(posture.azimuth_deg)), float(np.radians(posture.elevation_deg)))
     names = tuple(coordinates.points)
     return SolvedPoints(
-        posture.name, posture.name, names, coordinates.x, coordinates.covariance, angles, reduction.campaign.hashes
+        posture.name, posture.name, names, coordinates.x, coordinates.joint, angles, reduction.campaign.hashes
     )
 
 

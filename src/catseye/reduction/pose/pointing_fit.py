@@ -172,7 +172,7 @@ def _solved(
 
 def _standardised(solution: LinearEstimate, used: np.ndarray, factor: float) -> np.ndarray:
     """(n, 2) w = (P v)_i / sqrt(P_ii), over the root of the variance factor; nan where left out or unchecked."""
-    weight = np.diag(solution.weight)
+    weight = solution.weight_diagonal
     good = weight > 1e-12 * max(float(weight.max(initial=0.0)), 1e-300)
     w = np.full((len(used), 2), np.nan)
     scale = np.sqrt(factor) if np.isfinite(factor) and factor > 0.0 else np.nan

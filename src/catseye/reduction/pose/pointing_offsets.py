@@ -16,8 +16,8 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import FrameError, InputError
+from catseye.estimation.shapes.place_covariances import turned_covariance
 from catseye.estimation.shapes.pose import Pose, pivot_change, relative_pose
-from catseye.estimation.shapes.rigid_body import turned_covariance
 from catseye.geometry.antenna.beam_deviation import (
     ApertureNodes,
     Gregorian,

@@ -17,8 +17,9 @@ import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import InputError
-from catseye.estimation.shapes.pose import PlaceCovariances, Pose, fit_pose
-from catseye.estimation.shapes.rigid_body import turned_covariance
+from catseye.estimation.least_squares.covariance import JointPoints
+from catseye.estimation.shapes.place_covariances import Known, PlaceCovariances, TurnedPoints, turn_in_place
+from catseye.estimation.shapes.pose import Pose, fit_pose
 from catseye.geometry.antenna.frames import ground_from_alidade
 from catseye.geometry.frames.frame import Transform
 from catseye.records.network.solved_points import SolvedPoints
@@ -145,16 +146,17 @@ def pose_of_group(
         raise InputError(f"{len(have)} points of {group or 'the list'} are in both (expected {FEWEST} or more)")
     carrier = CARRIES[group] if group is not None else "ground"
     there = frame_transform(carrier, site).inverse()
-    second, q_second = _into(there, later.places(have), later.block(have))
+    second, q_second = _into(there, later, have)
+    q_first: Known
     if earlier is None:
         first, q_first = _design(have, known, site, there)
     else:
         before = frame_transform(carrier, _posture_of(earlier, site, carrier)).inverse()
-        first, q_first = _into(before, earlier.places(have), earlier.block(have))
+        first, q_first = _into(before, earlier, have)
     pose = fit_pose(
         have, first, second, frame=carrier, covariance=PlaceCovariances(first=q_first, second=q_second), robust=robust
     )
-    kept = np.array([n in set(pose.names) for n in have])
+    kept = np.isin(have, pose.names)
     to_frame = frame_transform(frame, site).inverse() @ frame_transform(carrier, site)
     shown = pose if to_frame.to == to_frame.from_ else pose.in_frame(to_frame)
     wanted = pivot if pivot is not None else default_pivot(group or "", frame, site)
@@ -188,20 +190,23 @@ def _posture_of(epoch: SolvedPoints, site: SiteFolder, carrier: str) -> SiteFold
     return at_posture(site, *epoch.posture)
 
 
-def _into(to_from: Transform, x: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    turn = to_from.rotation
-    return to_from.points(x), turned_covariance(turned_covariance(q, turn, columns=True), turn, columns=False)
+def _into(to_from: Transform, epoch: SolvedPoints, names: Sequence[str]) -> tuple[np.ndarray, Known]:
+    """Places (n, 3) of an epoch's points in another frame, and their covariance."""
+    x = to_from.points(epoch.places(names))
+    if isinstance(epoch.covariance, JointPoints):
+        return x, TurnedPoints(epoch.covariance.of_points(epoch.rows(names)), to_from.rotation)
+    return x, turn_in_place(epoch.block(names), to_from.rotation)
 
 
 def _design(
     names: Sequence[str], known: dict[str, RangedPoint], site: SiteFolder, to_from: Transform
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Design places (n, 3) and covariance (3n, 3n), independent from point to point, in the frame `to_from.to`."""
+    """Design places (n, 3) and covariances (n, 3, 3), independent from point to point, in the frame `to_from.to`."""
     settings = ReductionSettings()
     focal = site.site.paraboloid.focal_length_mm * MILLIMETRE
     on_dish = {n for n, t in site.targets.items() if t.type == "prism" and t.frame == "reflector"}
     inside = nominal_frame(site)
-    x, q = np.zeros((len(names), 3)), np.zeros((3 * len(names), 3 * len(names)))
+    x, q = np.zeros((len(names), 3)), np.zeros((len(names), 3, 3))
     for k, name in enumerate(names):
         place = known[name]
         u = place.u_typed(settings.u_position) if place.typed else settings.u_position
@@ -214,5 +219,5 @@ def _design(
             where = inside.points(foot)
             spread = spread + (U_SURFACE**2 - u**2) * np.outer(along, along)
         x[k] = to_from.points(where)
-        q[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = to_from.rotation @ spread @ to_from.rotation.T
+        q[k] = to_from.rotation @ spread @ to_from.rotation.T
     return x, q

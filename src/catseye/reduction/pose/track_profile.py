@@ -164,7 +164,7 @@ def track_profile(
     from scipy import special
 
     free = solution.degrees_of_freedom
-    weight = np.diag(solution.weight)
+    weight = solution.weight_diagonal
     good = weight > 1e-9 * float(weight.max(initial=0.0))
     w = np.where(good, solution.weighted_residual / np.sqrt(np.where(good, weight, 1.0)), np.nan)
     return TrackProfile(

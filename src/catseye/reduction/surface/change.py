@@ -10,7 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catseye.errors import EstimationError
+from catseye.estimation.least_squares.covariance import JointPoints
 from catseye.estimation.shapes.paraboloid import cosine
+from catseye.estimation.shapes.place_covariances import turn_in_place
 from catseye.geometry.frames.rotation import from_vector, skew, to_vector
 from catseye.optics.aperture import cells
 from catseye.optics.zernike import zernike
@@ -151,12 +153,13 @@ def _own_frame(prisms: Prisms, rows: list[int]) -> tuple[np.ndarray, np.ndarray]
     """Points and covariance of some prisms in the nominal paraboloid's frame."""
     turn = prisms.nominal.rotation
     points = (prisms.points[rows] - prisms.nominal.translation) @ turn
-    if prisms.covariance.ndim == 3:
-        return points, turn.T @ prisms.covariance[rows] @ turn
-    k = len(prisms.names)
-    blocks = prisms.covariance.reshape(k, 3, k, 3)[np.ix_(rows, range(3), rows, range(3))]
-    turned = np.einsum("ai,kamb,bj->kimj", turn, blocks, turn, optimize=True)
-    return points, turned.reshape(3 * len(rows), 3 * len(rows))
+    known = prisms.covariance
+    if isinstance(known, JointPoints):
+        return points, turn_in_place(known.block(np.array(rows)), turn.T)
+    if known.ndim == 3:
+        return points, turn.T @ known[rows] @ turn
+    at = (3 * np.array(rows)[:, None] + np.arange(3)).ravel()
+    return points, turn_in_place(known[np.ix_(at, at)], turn.T)
 
 
 def _sum(first: np.ndarray, second: np.ndarray) -> np.ndarray:

@@ -6,7 +6,8 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT
 from catseye.errors import EstimationError, ValidityError
-from catseye.estimation.shapes.paraboloid import ParaboloidFit, fit_paraboloid
+from catseye.estimation.least_squares.covariance import JointPoints
+from catseye.estimation.shapes.paraboloid import ParaboloidFit, covariance_along, fit_paraboloid
 from catseye.geometry.frames.frame import Transform
 from catseye.optics.aperture import cells, coherent_gain, ruze_gain
 from catseye.optics.zernike import Numbering, Term, orthonormal, terms, zernike
@@ -67,7 +68,7 @@ class Prisms:
 
     names         of k prisms
     points        (k, 3) m, in the frame `nominal.to`
-    covariance    (3k, 3k), or (k, 3, 3) where they are independent, m^2
+    covariance    (3k, 3k), or (k, 3, 3) where they are independent, m^2, or of k points what gives its parts
     nominal       that frame from the nominal paraboloid's
     source        where they come from
     elevation_deg, azimuth_deg, temperature_c   of the epoch, where known
@@ -76,13 +77,19 @@ class Prisms:
 
     names: tuple[str, ...]
     points: np.ndarray
-    covariance: np.ndarray
+    covariance: np.ndarray | JointPoints
     nominal: Transform
     source: str
     elevation_deg: float | None = None
     azimuth_deg: float | None = None
     temperature_c: float | None = None
     verdict: Verdict | None = None
+
+    def along(self, normals: np.ndarray) -> np.ndarray:
+        """(k, k) m^2 of the prisms' components along unit vectors (k, 3)."""
+        if isinstance(self.covariance, JointPoints):
+            return self.covariance.along(np.arange(len(self.names)), normals)
+        return covariance_along(self.covariance, normals)
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,7 +194,7 @@ def shape_of(prisms: Prisms, aperture: LitAperture, settings: ShapeSettings | No
     weights = cells(first, edge_db=settings.taper_db)
     fit = fit_paraboloid(
         prisms.points,
-        prisms.covariance,
+        prisms.along,
         prisms.nominal,
         focal_length=aperture.focal_length,
         free=settings.free,
