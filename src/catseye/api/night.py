@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from catseye.records.night.campaign import Campaign
     from catseye.reduction.budget.explanation import Explanation
     from catseye.reduction.epoch.epoch import Reduction
+    from catseye.reduction.epoch.surface import DishPose
     from catseye.simulator.night.night import Night
 
 
@@ -50,7 +51,7 @@ class NightResult(Result):
     degrees_of_freedom: float
     rejected: dict[int, str]
     refractivity_ppm: float
-    pose: dict[str, Any] | None
+    pose: "DishPose | None"
     notes: tuple[str, ...]
     reduction: "Reduction"
 

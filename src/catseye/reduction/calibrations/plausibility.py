@@ -99,8 +99,9 @@ def _columns(limits: Plausibility, readings: SheetReadings) -> Iterator[CheckOut
 
 def _humidity(readings: SheetReadings) -> Iterator[CheckOutcome]:
     """A humidity that is likely a fraction of 1, of the sheet or its column."""
-    values = readings.numbers.get("humidity_percent", getattr(readings.sheet, "humidity_percent", None))
-    for text in humidity_doubts(values) if values is not None else ():
+    of_sheet = getattr(readings.sheet, "humidity_percent", None)
+    values = readings.numbers.get("humidity_percent", np.array([] if of_sheet is None else [of_sheet], dtype=float))
+    for text in humidity_doubts(values):
         largest = float(np.max(values))
         yield CheckOutcome("humidity_percent: largest", largest, LEAST_RESOLVED, False, text, least=True, grave=False)
 
