@@ -247,7 +247,7 @@ def used(arguments: list[str]) -> tuple[float, float, float, str]:
 
 
 def files_and_page(prisms: int, again: float) -> None:
-    """What a user types of a whole dish: the answer alone, with every file and the page, then pose and surface."""
+    """Commands on a whole dish: the answer alone, the answer with every file and the page, then pose and surface."""
     from catseye.api.night import night
 
     with tempfile.TemporaryDirectory() as directory:

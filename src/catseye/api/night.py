@@ -340,7 +340,7 @@ def night(
 
 
 def _truth_page(made: "Night", seed: int, nature: float) -> str:
-    """What a reduction of a simulated night is held against, as JSON."""
+    """Truth of a simulated night, for comparison with its reduction, as JSON."""
     from dataclasses import asdict
 
     from catseye.gateways.writers.objects import json_page

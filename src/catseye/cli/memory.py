@@ -10,12 +10,12 @@ ADVICE = "expected a machine or a limit with more; fewer shots or points at once
 
 
 def lacks_memory(problem: MemoryError | ImportError) -> bool:
-    """Whether an error is one of memory: also a library that could not be loaded into it."""
+    """True for an error of memory, and for a library that did not fit into it."""
     return isinstance(problem, MemoryError) or any(words in str(problem) for words in UNLOADED)
 
 
 def out_of_memory(problem: MemoryError | ImportError) -> str:
-    """What was asked for, as far as the error says it, beside what was in use.
+    """One line: the memory asked for, where the error says it, and the memory in use.
 
     >>> out_of_memory(MemoryError()).partition(" (limit")[0].partition(" with")[0]
     'out of memory'

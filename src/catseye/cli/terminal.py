@@ -142,7 +142,7 @@ class ProgressLine:
             self._write(f"{what} {done}{f' of {total}' if total else ''}{self._left(now, done, total)}\n")
 
     def _left(self, now: float, done: int, total: int) -> str:
-        """How long the step has taken and may still take; of one that is silent, how long it has been."""
+        """Time that the step has taken and may still take; of a silent step, the time since it began."""
         passed, silent = now - self._start, now - self._since
         if silent >= SURE:
             return f", for {duration(silent)}"

@@ -1,4 +1,4 @@
-"""How well two sets of places are known, and what follows for second less turned first, of thousands of points too."""
+"""Covariances of two sets of places and of their difference, second less turned first, for thousands of points too."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -39,7 +39,7 @@ Known = np.ndarray | TurnedPoints
 
 @dataclass(frozen=True, eq=False)
 class PlaceCovariances:
-    """How well the n places of a group are known in two epochs.
+    """Covariances of the n places of a group in two epochs.
 
     first    (3n, 3n) m^2, may be singular, or (n, 3, 3) of points that are independent; None: exact, as a design
     second   likewise; one of the two at least

@@ -14,6 +14,7 @@ from catseye.records.site.validity import expired_of_site
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.epoch.reason import ShotStatus
 
+TOO_WIDE = 0.5  # variance factor: claims 1.4 times the scatter; whole nights of two generators have 0.77 and more
 MOST_REJECTED = 0.1  # share of all shots; more is no usual night
 MEANING = {
     "blocked": "nothing came back",
@@ -43,6 +44,12 @@ def _own_verdict(reduction: Reduction) -> Verdict:
     if factor > 1.0 + 2.0 * spread:
         more = 100.0 * (np.sqrt(factor) - 1.0)
         return Verdict("doubtful", f"the measurements scatter {more:.0f} % more than their uncertainties claim")
+    if factor < TOO_WIDE - 2.0 * spread:
+        less = 100.0 * (1.0 - np.sqrt(factor))
+        return Verdict(
+            "doubtful",
+            f"the measurements scatter {less:.0f} % less than their uncertainties claim: is one in another unit?",
+        )
     shots, rejected = len(reduction.status), len(reduction.rejected)
     if rejected > MOST_REJECTED * shots:
         return Verdict("doubtful", f"{rejected} of {shots} shots were rejected, over {100.0 * MOST_REJECTED:.0f} %")

@@ -156,7 +156,7 @@ def surface_csv(reduction: Reduction) -> str:
 
 
 def kinds_of(reduction: Reduction) -> dict[str, str]:
-    """What each point is, in a word or two, in the points' order."""
+    """Kind of each point, in a word or two, in the points' order."""
     campaign, places = reduction.campaign, reduction.coordinates.places
     at_triplets = {target for triplet in campaign.triplets.values() for target in triplet.targets}
     at_benchmarks = {benchmark.target for benchmark in campaign.benchmarks}

@@ -24,7 +24,7 @@ from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
 from catseye.gateways.journal.chain import chain_object, export_verdict
 from catseye.gateways.journal.export import seal, stamp
-from catseye.gateways.journal.motion import JournalledMotion, ToldMotion
+from catseye.gateways.journal.motion import JournalMotion, MotionRows
 from catseye.gateways.writers.output import whole_directory
 from catseye.gateways.writers.written import origin
 from catseye.records.night.campaign import LONGEST_CAMPAIGN, WEATHER_MARGIN, read_campaign
@@ -118,7 +118,7 @@ def export_campaign(
     readings, why = _readings(reader, run, span, site, left)
     if not readings:
         raise InputError(f"journal {reader.place}: run {run} has no whole weather reading in the span (expected one)")
-    motion = JournalledMotion.of(reader, run, span)
+    motion = JournalMotion.of(reader, run, span)
     chosen = _chosen(reader, run, span, site, left, sorted(reading.ticks for reading in readings), motion)
     if not chosen:
         reasons = "; ".join(left.notes()) or "no shots in the span"
@@ -256,7 +256,7 @@ def _chosen(
     site: SiteFolder,
     left: LeftOut,
     weather: list[int],
-    motion: JournalledMotion,
+    motion: JournalMotion,
 ) -> list[ExportedShot]:
     """The shots that a campaign holds, in order of time."""
     refusal = _refusals(site, weather, motion)
@@ -285,7 +285,7 @@ def _chosen(
     return kept
 
 
-def _refusals(site: SiteFolder, weather: list[int], motion: JournalledMotion) -> Callable[[AnsweredShot], str]:
+def _refusals(site: SiteFolder, weather: list[int], motion: JournalMotion) -> Callable[[AnsweredShot], str]:
     """What says why a campaign of a site cannot hold a shot; "" where it can."""
     rangers, targets = set(site.rangers), set(site.target_names) | {REFERENCE}
     ranging, adc = site.site.ranging, site.site.adc
@@ -318,7 +318,7 @@ def _as_it_stood(
     site: SiteFolder,
     chosen: list[ExportedShot],
     readings: list[LiveWeather],
-    told: ToldMotion,
+    told: MotionRows,
     notes: list[str],
     wrong: list[str],
 ) -> SiteFolder:

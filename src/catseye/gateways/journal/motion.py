@@ -27,8 +27,8 @@ EPOCH_MARGIN = round(60.0 / SECONDS_PER_DAY * TICKS_PER_DAY)  # ticks, of an epo
 
 
 @dataclass(frozen=True)
-class ToldMotion:
-    """What a campaign is told.
+class MotionRows:
+    """Posture, postures and jitter that a campaign is written with.
 
     posture    azimuth and elevation, rad, of its middle; None where nobody said
     wrong      why its postures cannot be believed, in words; "" where they can
@@ -43,7 +43,7 @@ class ToldMotion:
 
 
 @dataclass(frozen=True, eq=False)
-class JournalledMotion:
+class JournalMotion:
     """The postures of a run, in order of time, each instant once, and the reader that knows its epochs."""
 
     reader: JournalReader
@@ -51,8 +51,8 @@ class JournalledMotion:
     postures: list[LivePosture]
 
     @classmethod
-    def of(cls, reader: JournalReader, run: int, span: tuple[int, int] | None) -> "JournalledMotion":
-        """Of a run, within a span of ticks and two seconds more."""
+    def of(cls, reader: JournalReader, run: int, span: tuple[int, int] | None) -> "JournalMotion":
+        """Motion of a run, within a span of ticks and two seconds more."""
         found = {
             entry.ticks: entry
             for _, entry in reader.events(run, kinds=["postures"])
@@ -66,30 +66,30 @@ class JournalledMotion:
         return self._moved(self.postures)
 
     def lacks(self, ticks: int) -> bool:
-        """Whether nobody knows where a telescope that moved was at an instant."""
+        """True where the telescope moved and no posture is near an instant."""
         if self.moved <= STEADY:
             return False
         times = self._ticks
         at = int(np.searchsorted(times, ticks))
         return bool(np.min(np.abs(times[max(at - 1, 0) : at + 1] - ticks)) > MARGIN)
 
-    def during(self, span: tuple[int, int], notes: list[str]) -> ToldMotion:
+    def during(self, span: tuple[int, int], notes: list[str]) -> MotionRows:
         """From the first shot to the last, ticks; notes tell of what moved."""
         within = [read for read in self.postures if span[0] <= read.ticks <= span[1]]
         if not within:
-            return ToldMotion(None, (), self._jitter(span, 0.0, notes))
+            return MotionRows(None, (), self._jitter(span, 0.0, notes))
         moved = self._moved(within)
         if moved <= STEADY:
             azimuth, elevation = np.unwrap([r.azimuth for r in within]), [r.elevation for r in within]
             stood = float(np.median(azimuth)), float(np.median(elevation))
-            return ToldMotion(stood, (), self._jitter(span, 0.0, notes))
+            return MotionRows(stood, (), self._jitter(span, 0.0, notes))
         notes.append(f"the telescope moved by {moved / DEGREE:.3f} deg: {POSTURES} says how")
         near = [read for read in self.postures if span[0] - MARGIN <= read.ticks <= span[1] + MARGIN]
         middle = PostureTrack.of(near).angles(0.5 * (span[0] + span[1]) / TICKS_PER_DAY)
         climbed = float(np.ptp([read.elevation for read in within])) / DEGREE
         wrong = _jump(near)
         notes += [wrong] * bool(wrong)
-        return ToldMotion(middle, tuple(_row(read) for read in near), self._jitter(span, climbed, notes), wrong)
+        return MotionRows(middle, tuple(_row(read) for read in near), self._jitter(span, climbed, notes), wrong)
 
     @cached_property
     def _ticks(self) -> NDArray[np.int64]:

@@ -52,7 +52,7 @@ _undo: list[Callable[[], None] | Unfinished] = []
 
 
 class UnfinishedWork:
-    """What a supervised process said of its unfinished output."""
+    """Unfinished output that a supervised process reported."""
 
     def __init__(self) -> None:
         self._text, self._open = b"", list[Unfinished]()
