@@ -192,7 +192,7 @@ def one_night(prisms: int, place: Path) -> None:
     reduction = reduced(campaign)
     took["whole"] = time.perf_counter() - before
     took["gb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    q = reduction.coordinates.joint.q
+    q = getattr(reduction.coordinates.joint.q, "inner", None)  # beneath the common errors
     took["border"] = len(q.eliminated.blocks.outer) if hasattr(q, "eliminated") else 0
     frames = np.load(place / "frames.npy", mmap_mode="r")
     before = time.perf_counter()

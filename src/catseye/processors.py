@@ -7,16 +7,21 @@ one, the same work taken. Large factorisations ask each time; small ones have on
 import math
 import os
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
+from typing import TypeVar
 
 from threadpoolctl import threadpool_info, threadpool_limits
 
 VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")  # the first that is set counts, as for OpenBLAS
 SPARE = 0.3  # of a core that may be missing for one more thread: the clock ticks of an idle system
+FEW = 200  # rows or blocks that are done before a thread has started
 SHORTEST = 0.5  # s over which load is measured: /proc/stat counts in hundredths
+
+Result = TypeVar("Result")
 
 
 def said(environment: Mapping[str, str]) -> int | None:
@@ -48,6 +53,22 @@ def threads() -> int:
         asked = max(1, math.floor(LOAD.free() + SPARE))
     pool = _pool.get()
     return asked if pool is None or _asked.get() is not None else min(asked, pool)
+
+
+def on_threads(work: Callable[[int, int], Result]) -> list[Result]:
+    """Answers of work(part, parts), each part on a thread of its own; for kernels that release the interpreter."""
+    parts = threads()
+    if parts == 1:
+        return [work(0, 1)]
+    with ThreadPoolExecutor(parts) as pool:
+        return list(pool.map(work, range(parts), [parts] * parts))
+
+
+def in_parts(count: int, work: Callable[[int, int], Result], *, least: int = FEW) -> list[Result]:
+    """Answers of work(low, high) over 0 to count in as many parts as there are threads; below `least` in one."""
+    if count < least:
+        return [work(0, count)]
+    return on_threads(lambda part, parts: work(part * count // parts, (part + 1) * count // parts))
 
 
 @contextmanager

@@ -115,12 +115,14 @@ class SolverSettings:
     tests        False leaves the fits at residual and sigma and the covariance at zero, on the way to an answer
     sparse       solve sparse or dense; chosen by size if None
     border       eliminate everything off a border by blocks, see `bordered`; None: as `sparse` says
+    rough        with a border: tests good to a thousandth will do, on the way to a selection
     """
 
     iterations: int = 50
     tests: bool = True
     sparse: bool | None = None
     border: Border | None = None
+    rough: bool = False
 
 
 COMPLETE = SolverSettings()
@@ -179,7 +181,7 @@ def adjust(
             status = RANK_DEFICIENT.format(names=", ".join(called) + (" ..." if len(worst) > 4 else ""))
             break
         if tests and (size < STEP_IN_SIGMAS or taken == iterations):
-            q = normal.covariance()
+            q = normal.covariance(rough=solver.rough)
         x, moved = _lower(rows, x, step, cost)
         if size < STEP_IN_SIGMAS:
             status = CONVERGED

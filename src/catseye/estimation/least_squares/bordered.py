@@ -10,21 +10,24 @@ Source: elimination of parameters by blocks, [FOERSTNER16] chapter 15 (bundle ad
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import lapack
+from scipy.linalg import blas, lapack
 from scipy.sparse import csr_array, sparray, vstack
 from threadpoolctl import threadpool_limits
 
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.covariance import LARGEST_MATRIX
 from catseye.estimation.least_squares.rows import ActiveRows
-from catseye.processors import threads
+from catseye.processors import in_parts, on_threads, threads
 
 WIDE = 1000  # parameters of the border from which one more core is worth waking
 SAME = 2e-6  # relative change of a row up to which an earlier elimination serves; tests take differences of such
-NEAR = 1e-2  # the same for a step, which is refined
-MOST_CHANGED, MOST_REFINED = 400, 100  # rows that came or went since, beyond which a new elimination is quicker
+ROUGH = 1e-4  # the same where tests good to a thousandth will do
+NEAR = 1e-2  # and for a step, which is refined
+MOST_CHANGED = 400  # rows that came or went since, beyond which a new elimination is quicker
+DENSE = 30  # columns from which rows of a matrix are multiplied as one
 FEW = 30  # parameters whose joint covariance is looked up, not multiplied out; rows that may change in any system
 LEAST_LEFT = 1e-7  # of a row that goes: what the others say of it, over its own variance
 
@@ -149,6 +152,22 @@ class TargetBlocks:
         return np.repeat(np.arange(len(self.row_pointers) - 1), np.diff(self.row_pointers))
 
     @cached_property
+    def rows_without_block(self) -> tuple[np.ndarray, list[tuple[np.ndarray, slice]]]:
+        """Rows of border parameters alone: single ones, and the columns and entries of matrices of many rows."""
+        first, pointers = int(self.rows_of[-2]), self.row_pointers
+        widths, starts = np.diff(pointers)[first:], self.at[pointers[first:-1]]
+        runs = np.flatnonzero((np.diff(widths, prepend=-1) != 0) | (np.diff(starts, prepend=-1) != 0)) + first
+        runs = np.append(runs, len(pointers) - 1)
+        single, dense = [np.zeros(0, dtype=np.int64)], []
+        for low, high in pairwise(runs.tolist()):
+            at = self.at[pointers[low] : pointers[high]].reshape(high - low, -1)
+            if at.shape[1] < DENSE or np.any(at != at[0]) or np.any(np.diff(at[0]) <= 0):
+                single.append(np.arange(low, high))
+            else:
+                dense.append((at[0], slice(int(pointers[low]), int(pointers[high]))))
+        return np.concatenate(single), dense
+
+    @cached_property
     def reach_pattern(self) -> tuple[np.ndarray, np.ndarray]:
         """Indices and pointers of W, (i, g) with a row an inner parameter, as compressed rows."""
         wide = np.diff(self.border_first)
@@ -193,22 +212,21 @@ class Eliminated:
     @staticmethod
     def of(blocks: TargetBlocks, scale: np.ndarray, values: np.ndarray) -> "Eliminated":
         """Blocks eliminated from the rows of `values`."""
-        from catseye.estimation.least_squares.bordered_kernel import eliminate
+        from catseye.estimation.least_squares.bordered_kernel import border_left, eliminate
 
         b = blocks
-        inside, reach, s, loose = eliminate(
-            b.row_pointers,
-            b.rows_of,
-            b.at,
-            values,
-            b.own,
-            np.cumsum(b.own) - b.own,
-            b.border,
-            b.border_first,
-            b.inside_first,
-            b.reach_first,
-            len(b.outer),
-        )
+        inside = np.zeros(b.inside_first[-1])
+        reach, half = np.zeros(b.reach_first[-1]), np.zeros(b.reach_first[-1])
+        rows = b.row_pointers, b.rows_of, b.at, values, b.own
+        arrays = *rows, b.border_first, b.inside_first, b.reach_first, inside, reach, half
+        loose = any(in_parts(len(b.own), lambda low, high: eliminate(low, high, *arrays)))
+        s = np.zeros((len(b.outer), len(b.outer)))
+        single, dense = b.rows_without_block
+        for columns, entries in dense:
+            jacobian = values[entries].reshape(-1, len(columns))
+            s[np.ix_(columns, columns)] += np.tril(jacobian.T @ jacobian)
+        rest = *rows, b.border, b.border_first, b.reach_first, half, single, s
+        on_threads(lambda part, parts: border_left(part, parts, *rest))
         i = len(b.inner)
         indices, pointers = b.inside_pattern
         inverse = csr_array((inside, indices, pointers), shape=(i, i))
@@ -222,18 +240,29 @@ class Eliminated:
     def solve_scaled(self, right: np.ndarray) -> np.ndarray:
         """N^-1 right of all parameters, both scaled, (n,) or (n, k); held ones are zero."""
         b = self.blocks
-        inner = right[b.inner]
-        outer = self._border(right[b.outer] - self.reach.T @ inner)
+        inner, outer = right[b.inner], right[b.outer]
         result = np.zeros_like(right)
-        result[b.outer] = outer
-        result[b.inner] = self.inside @ inner - self.reach @ outer
+        if right.ndim == 1:
+            outer = self._border(outer - self.reach.T @ inner)
+            result[b.outer] = outer
+            result[b.inner] = self.inside @ inner - self.reach @ outer
+            return result
+        from catseye.estimation.least_squares.bordered_kernel import less_inner, less_outer
+
+        arrays = np.append(0, np.cumsum(b.own)), b.border_first, b.border, b.reach_first, self.reach.data
+        in_parts(right.shape[1], lambda low, high: less_inner(low, high, *arrays, inner, outer), least=FEW)
+        outer = np.ascontiguousarray(self._border(outer))
+        solved = self.inside @ inner
+        in_parts(len(b.own), lambda low, high: less_outer(low, high, *arrays, outer, solved))
+        result[b.outer], result[b.inner] = outer, solved
         return result
 
     def _border(self, right: np.ndarray) -> np.ndarray:
         if not len(right):
             return right
         if self._inverse[0]:
-            return self._left[0] @ right
+            z = self._left[0].T
+            return blas.dsymv(1.0, z, right, lower=1) if right.ndim == 1 else z @ right
         return lapack.dpotrs(self._left[0], right, lower=0)[0].reshape(right.shape)
 
     def inverse(self) -> np.ndarray:
@@ -254,8 +283,10 @@ class Eliminated:
         from catseye.estimation.least_squares.bordered_kernel import selected
 
         b = self.blocks
-        arrays = b.own, b.border_first, b.border, b.inside_first, b.reach_first
-        return selected(*arrays, self.inside.data, self.reach.data, self.inverse())
+        with_itself, with_border = self.inside.data.copy(), np.zeros_like(self.reach.data)
+        arrays = b.own, b.border_first, b.border, b.inside_first, b.reach_first, self.reach.data, self.inverse()
+        in_parts(len(b.own), lambda low, high: selected(low, high, *arrays, with_itself, with_border))
+        return with_itself, with_border
 
 
 def _on_cores(size: int, work: Callable):
@@ -293,33 +324,36 @@ class Border:
         """Let the last elimination go, and its memory."""
         self._last, self._since = None, None
 
-    def solved(self, blocks: TargetBlocks, values: np.ndarray, scale: np.ndarray) -> tuple["BorderedCovariance", bool]:
+    def solved(
+        self, blocks: TargetBlocks, values: np.ndarray, scale: np.ndarray, *, rough: bool = False
+    ) -> tuple["BorderedCovariance", bool]:
         """The covariance, and whether the blocks were eliminated now.
 
         values   (e,) see `TargetBlocks.values`
         scale    (n,) of a unit diagonal
+        rough    how nearly the same is enough: `ROUGH`, not `SAME`
 
         An earlier elimination serves where few rows have come or gone since, and the others are nearly the same.
         """
-        return self._served(blocks, values, scale, SAME, MOST_CHANGED)
+        return self._served(blocks, values, scale, ROUGH if rough else SAME)
 
     def near(self, blocks: TargetBlocks, values: np.ndarray, scale: np.ndarray) -> tuple["BorderedCovariance", bool]:
         """The same where a covariance that is nearly that of the rows is enough: a step is refined with it."""
-        return self._served(blocks, values, scale, NEAR, MOST_REFINED)
+        return self._served(blocks, values, scale, NEAR)
 
     def _served(
-        self, blocks: TargetBlocks, values: np.ndarray, scale: np.ndarray, same: float, most: int
+        self, blocks: TargetBlocks, values: np.ndarray, scale: np.ndarray, same: float
     ) -> tuple["BorderedCovariance", bool]:
         last = self._last
         if last is not None and last.blocks is blocks and last.held:
-            updated = self._updated(last, values * last.scale[blocks.parameter], same, most)
+            updated = self._updated(last, values * last.scale[blocks.parameter], same)
             if updated is not None:
                 return updated, False
         self.forget()
         self._last = Eliminated.of(blocks, scale, values * scale[blocks.parameter])
         return BorderedCovariance(len(scale), self._last), True
 
-    def _updated(self, last: Eliminated, values: np.ndarray, same: float, most: int) -> "BorderedCovariance | None":
+    def _updated(self, last: Eliminated, values: np.ndarray, same: float) -> "BorderedCovariance | None":
         """The covariance by what has changed since an elimination, rows by more than `same`; None for too many."""
         blocks, size = last.blocks, len(last.scale)
         change, row = values - last.values, blocks.row_of_entry
@@ -327,7 +361,7 @@ class Border:
         large = moved > same * np.sqrt(np.bincount(row, np.maximum(values**2, last.values**2)))
         if not large.any():
             return BorderedCovariance(size, last)
-        if np.count_nonzero(large) > min(most, max(FEW, len(blocks.outer) // 4)):
+        if np.count_nonzero(large) > min(MOST_CHANGED, max(FEW, len(blocks.outer) // 4)):
             return None
         entries = large[row]
         changed = np.concatenate([np.flatnonzero(entries), values[entries]])
@@ -418,8 +452,10 @@ class BorderedCovariance:
         none = columns < 0
         block, place = np.where(none, -2, b.block[columns]), b.place[columns]
         scale = np.where(none, 0.0, e.scale[columns])
-        arrays = b.own, b.border_first, b.border, b.inside_first, b.reach_first
-        answer = scale * products(block, place, a * scale, *arrays, *e.selected, e.reach.data, e.inverse())
+        answer = np.zeros(a.shape)
+        arrays = b.own, b.border_first, b.border, b.inside_first, b.reach_first, *e.selected, e.reach.data, e.inverse()
+        in_parts(len(a), lambda low, high: products(low, high, block, place, a * scale, answer, *arrays))
+        answer *= scale
         if self.reach is not None:
             low_rank_products(np.where(none, -1, columns), a, self.reach, self._weighed, answer)
         return np.asarray(answer)

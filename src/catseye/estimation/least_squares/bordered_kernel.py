@@ -11,49 +11,44 @@ from numba import njit
 SMALLEST_PIVOT = 1e-14  # of a block of unit diagonal: what falls below is not held
 
 
-@njit(cache=True, error_model="numpy")
-def eliminate(row_pointers, rows_of, at, values, own, own_first, border, border_first, inside_first, reach_first, size):
-    """What is left of N = A' A for the border, and how each block follows from it.
+@njit(cache=True, error_model="numpy", nogil=True)
+def eliminate(
+    low, high, row_pointers, rows_of, at, values, own, border_first, inside_first, reach_first, inside, reach, half
+):
+    """Eliminate the blocks low to high from N = A' A; in place.
 
     row_pointers    (m + 1,) of the rows, block by block, those without a block last
     rows_of         (c + 2,) first row of each block, of those without, and their end
     at              (e,) place of each entry: in its block's own parameters, then l + place in its part of the border;
                     in rows without a block the border's index
     values          (e,)
-    own, border     l and b of each block as pointers are `own_first`, `border_first`; `border` the border's indices
+    own, border     l and b of each block; `border_first` are pointers into the border's indices
     inside_first, reach_first   (c + 1,) where each block's arrays begin
-    size            g of the border
+    inside, reach, half         to fill: V^-1, W = V^-1 B and L^-1 B with V = L L'; zero before
 
-    Returns inside = V^-1 and reach = V^-1 B of all blocks, S (g, g) = N_bb - B' V^-1 B, its lower triangle, and if a
-    block is not held.
+    Returns if a block is not held.
     """
-    count = len(own)
-    inside, reach = np.zeros(inside_first[count]), np.zeros(reach_first[count])
-    s = np.zeros((size, size))
     loose = False
-    widest, longest = 1, 1
-    for c in range(count):
+    widest = 1
+    for c in range(low, high):
         widest = max(widest, own[c])
-        longest = max(longest, border_first[c + 1] - border_first[c])
     v, inverse = np.empty((widest, widest)), np.empty((widest, widest))
-    crossed, solved = np.empty((longest, widest)), np.empty((longest, widest))
-    for c in range(count):
-        n, first = own[c], border_first[c]
-        b = border_first[c + 1] - first
+    for c in range(low, high):
+        n, b, begin = own[c], border_first[c + 1] - border_first[c], reach_first[c]
         v[:n, :n] = 0.0
-        crossed[:b, :n] = 0.0
+        crossed = reach[begin : begin + n * b].reshape(n, b)
+        solved = half[begin : begin + n * b].reshape(n, b)
         for row in range(rows_of[c], rows_of[c + 1]):
             for p in range(row_pointers[row], row_pointers[row + 1]):
                 i, a = at[p], values[p]
+                if i >= n:
+                    continue
                 for q in range(row_pointers[row], row_pointers[row + 1]):
                     j = at[q]
-                    if i < n:
-                        if j < n:
-                            v[i, j] += a * values[q]
-                    elif j < n:
-                        crossed[i - n, j] += a * values[q]
-                    elif i >= j:
-                        s[border[first + i - n], border[first + j - n]] += a * values[q]
+                    if j < n:
+                        v[i, j] += a * values[q]
+                    else:
+                        crossed[i, j - n] += a * values[q]
         for k in range(n):  # Cholesky, lower
             pivot = v[k, k]
             for j in range(k):
@@ -73,39 +68,77 @@ def eliminate(row_pointers, rows_of, at, values, own, own_first, border, border_
                 for j in range(k, i):
                     value -= v[i, j] * inverse[j, k]
                 inverse[i, k] = value / v[i, i]
-        for i in range(b):  # L^-1 B, a row each of the border
-            for k in range(n):
-                value = 0.0
-                for j in range(k + 1):
-                    value += inverse[k, j] * crossed[i, j]
-                solved[i, k] = value
-        for i in range(b):
-            line = s[border[first + i]]
-            for j in range(i + 1):
-                value = 0.0
-                for k in range(n):
-                    value += solved[i, k] * solved[j, k]
-                line[border[first + j]] -= value
-        begin = inside_first[c]
+        for i in range(n):
+            for k in range(i + 1):
+                factor = inverse[i, k]
+                for j in range(b):
+                    solved[i, j] += factor * crossed[k, j]
+        first = inside_first[c]
         for i in range(n):
             for j in range(n):
                 value = 0.0
                 for k in range(max(i, j), n):
                     value += inverse[k, i] * inverse[k, j]
-                inside[begin + i * n + j] = value
-        begin = reach_first[c]
+                inside[first + i * n + j] = value
+        crossed[:] = 0.0
         for i in range(n):
-            for j in range(b):
-                value = 0.0
-                for k in range(i, n):
-                    value += inverse[k, i] * solved[j, k]
-                reach[begin + i * b + j] = value
-    for row in range(rows_of[count], rows_of[count + 1]):
+            for k in range(i, n):
+                factor = inverse[k, i]
+                for j in range(b):
+                    crossed[i, j] += factor * solved[k, j]
+    return loose
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def border_left(
+    part, parts, row_pointers, rows_of, at, values, own, border, border_first, reach_first, half, single, s
+):
+    """Add every parts-th row, from `part` on, of S = N_bb - (L^-1 B)' L^-1 B, its lower triangle; in place.
+
+    border   border's indices of each block, sorted
+    half     as `eliminate` filled it
+    single   rows without a block that count here
+    s        (g, g)
+    """
+    count = len(own)
+    longest = 1
+    for c in range(count):
+        longest = max(longest, border_first[c + 1] - border_first[c])
+    local = np.empty((longest, longest))  # a block's share: S itself is too large for a cache
+    for c in range(count):
+        n, first = own[c], border_first[c]
+        b, begin = border_first[c + 1] - first, reach_first[c]
+        own_border, own_half = border[first : first + b], half[begin : begin + n * b].reshape(n, b)
+        mine = own_border % parts == part
+        for i in range(b):
+            if mine[i]:
+                local[i, : i + 1] = 0.0
+        for row in range(rows_of[c], rows_of[c + 1]):
+            for p in range(row_pointers[row], row_pointers[row + 1]):
+                i = at[p] - n
+                if i < 0 or not mine[i]:
+                    continue
+                for q in range(row_pointers[row], row_pointers[row + 1]):
+                    j = at[q] - n
+                    if 0 <= j <= i:
+                        local[i, j] += values[p] * values[q]
+        for i in range(b):
+            if not mine[i]:
+                continue
+            for k in range(n):
+                factor = own_half[k, i]
+                for j in range(i + 1):
+                    local[i, j] -= factor * own_half[k, j]
+            line = s[own_border[i]]
+            for j in range(i + 1):
+                line[own_border[j]] += local[i, j]
+    for row in single:
         for p in range(row_pointers[row], row_pointers[row + 1]):
+            if at[p] % parts != part:
+                continue
             for q in range(row_pointers[row], row_pointers[row + 1]):
                 if at[p] >= at[q]:
                     s[at[p], at[q]] += values[p] * values[q]
-    return inside, reach, s, loose
 
 
 @njit(cache=True, error_model="numpy")
@@ -119,45 +152,89 @@ def mirrored(s):
                     s[j, i] = s[i, j]
 
 
-@njit(cache=True, error_model="numpy")
-def selected(own, border_first, border, inside_first, reach_first, inside, reach, z):
-    """Covariance of each block with itself, and with its part of the border; arrays as `inside` and `reach`.
+@njit(cache=True, error_model="numpy", nogil=True)
+def less_outer(low, high, own_first, border_first, border, reach_first, reach, outer, inner):
+    """Take W outer off the rows of blocks low to high; in place.
 
-    z   (g, g) covariance of the border
+    own_first   (c + 1,) first parameter of each block
+    outer       (g, k) of the border
+    inner       (i, k)
     """
-    with_itself, with_border = inside.copy(), np.empty_like(reach)
-    for c in range(len(own)):
+    for c in range(low, high):
+        own_border = border[border_first[c] : border_first[c + 1]]
+        w = reach[reach_first[c] : reach_first[c + 1]].reshape(-1, len(own_border))
+        for j in range(len(own_border)):
+            row = outer[own_border[j]]
+            for i in range(len(w)):
+                line, factor = inner[own_first[c] + i], w[i, j]
+                for k in range(outer.shape[1]):
+                    line[k] -= factor * row[k]
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def less_inner(low, high, own_first, border_first, border, reach_first, reach, inner, outer):
+    """Take W' inner off columns low to high of the border; arrays as in `less_outer`, in place."""
+    for c in range(len(own_first) - 1):
+        own_border = border[border_first[c] : border_first[c + 1]]
+        w = reach[reach_first[c] : reach_first[c + 1]].reshape(-1, len(own_border))
+        for i in range(len(w)):
+            row = inner[own_first[c] + i]
+            if not row[low:high].any():
+                continue
+            for j in range(len(own_border)):
+                line, factor = outer[own_border[j]], w[i, j]
+                for k in range(low, high):
+                    line[k] -= factor * row[k]
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def selected(low, high, own, border_first, border, inside_first, reach_first, reach, z, with_itself, with_border):
+    """Covariance of blocks low to high with themselves, and with their parts of the border; arrays as in `eliminate`.
+
+    z             (g, g) covariance of the border
+    with_itself   to fill, V^-1 before
+    with_border   to fill, zero before
+    """
+    longest = 1
+    for c in range(low, high):
+        longest = max(longest, border_first[c + 1] - border_first[c])
+    near = np.empty(longest)
+    for c in range(low, high):
         n, first = own[c], border_first[c]
         b = border_first[c + 1] - first
         begin, at = inside_first[c], reach_first[c]
-        for i in range(n):
-            with_border[at + i * b : at + (i + 1) * b] = 0.0
+        own_border, w = border[first : first + b], reach[at : at + n * b].reshape(n, b)
+        across = with_border[at : at + n * b].reshape(n, b)
         for k in range(b):
-            line = z[border[first + k]]
+            line = z[own_border[k]]
             for j in range(b):
-                value = line[border[first + j]]
-                for i in range(n):
-                    with_border[at + i * b + j] -= reach[at + i * b + k] * value
+                near[j] = line[own_border[j]]
+            for i in range(n):
+                factor = w[i, k]
+                for j in range(b):
+                    across[i, j] -= factor * near[j]
         for i in range(n):
             for j in range(n):
                 value = 0.0
                 for k in range(b):
-                    value += with_border[at + i * b + k] * reach[at + j * b + k]
+                    value += across[i, k] * w[j, k]
                 with_itself[begin + i * n + j] -= value
-    return with_itself, with_border
 
 
-@njit(cache=True, error_model="numpy")
-def products(block, place, a, own, border_first, border, inside_first, reach_first, with_itself, with_border, reach, z):
-    """Sum over j of Q_ij a_j for each row of parameters, of one block at most beside those of the border.
+@njit(cache=True, error_model="numpy", nogil=True)
+def products(
+    low, high, block, place, a, result,
+    own, border_first, border, inside_first, reach_first, with_itself, with_border, reach, z,
+):  # fmt: skip
+    """Sum over j of Q_ij a_j for rows low to high of parameters, of one block at most beside those of the border.
 
     block, place   (m, w) block of each parameter (-1: border, -2: none) and its place there
     a              (m, w)
+    result         (m, w) to fill, zero before
     """
-    m, w = block.shape
-    result = np.zeros((m, w))
+    w = block.shape[1]
     inner = np.empty(w, np.int64)
-    for row in range(m):
+    for row in range(low, high):
         c = -1
         for i in range(w):
             if block[row, i] >= 0:
@@ -168,14 +245,14 @@ def products(block, place, a, own, border_first, border, inside_first, reach_fir
         if c >= 0:  # where each parameter of the border is in the block's part of it
             for i in range(w):
                 if block[row, i] == -1:
-                    low, high = 0, b
-                    while low < high:
-                        middle = (low + high) // 2
+                    left, right = 0, b
+                    while left < right:
+                        middle = (left + right) // 2
                         if border[first + middle] < place[row, i]:
-                            low = middle + 1
+                            left = middle + 1
                         else:
-                            high = middle
-                    inner[i] = low if low < b and border[first + low] == place[row, i] else -1
+                            right = middle
+                    inner[i] = left if left < b and border[first + left] == place[row, i] else -1
         for i in range(w):
             if block[row, i] == -2:
                 continue
@@ -201,7 +278,6 @@ def products(block, place, a, own, border_first, border, inside_first, reach_fir
                     q = with_itself[inside_first[c] + place[row, i] * n + place[row, j]]
                 value += q * a[row, j]
             result[row, i] = value
-    return result
 
 
 @njit(cache=True, error_model="numpy")

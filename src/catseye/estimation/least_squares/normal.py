@@ -20,7 +20,9 @@ from catseye.estimation.least_squares.rows import ActiveRows
 FLOATS = 1e-15  # |A v|^2 / |v|^2: correlation of one parameter with all others within 5e-16 of 1
 DOUBTFUL = 1e-10  # reciprocal condition of the scaled normal matrix from which directions are examined one by one
 LARGEST_DENSE = 2000  # parameters; beyond it the sparse form is faster and smaller
-REFINED, REFINEMENTS = 1e-8, 20  # of a step in its sigmas, and how often at most
+REFINED, REFINEMENTS = 1e-8, 20  # of a step in its sigmas, and how often at most;
+ENOUGH = 1e-5  # sigmas that a step may be off, all parameters together
+STACKED, WIDE = 300, 3  # columns, and one of how many, from which a group hangs on most parameters
 LOOKED_FOR = 8  # directions that the sparse form looks for at once when something floats
 
 
@@ -96,13 +98,14 @@ class NormalEquations:
         """(f, n) directions that nothing holds at the x of the last step, over columns scaled to unit length."""
         return self._floating
 
-    def covariance(self) -> Covariance:
-        """Inverse of N at the x of the last step."""
+    def covariance(self, *, rough: bool = False) -> Covariance:
+        """Inverse of N at the x of the last step; where a border is eliminated, of nearly the same rows if rough."""
         if self.border is not None and self._solved is not None:
             scale = np.zeros(self.size)
             scale[self.moving] = self._scale
             blocks = self.border.blocks(self.rows, self.moving, self.size)
-            self._solved, self._refine = self.border.solved(blocks, self._values, scale)[0], False
+            self._solved = None  # large, and no longer needed
+            self._solved, self._refine = self.border.solved(blocks, self._values, scale, rough=rough)[0], False
             return self._solved
         if self.sparse:
             order, place, *_ = self._order
@@ -144,7 +147,7 @@ class NormalEquations:
         towards = pulled = self._solved.solve(left)
         power = first = float(left @ pulled)
         for _ in range(REFINEMENTS):
-            if power <= REFINED**2 * first:
+            if power <= max(REFINED**2 * first, ENOUGH**2):
                 return x
             image = rows @ towards
             length = power / float(image @ image)
@@ -176,14 +179,7 @@ class NormalEquations:
         if not len(self.moving):
             self._scale = np.zeros(0)
             return
-        normal = np.zeros((self.size, self.size))
-        for r, j in zip(self.rows, self._jacobians, strict=True):
-            if r.columns.ndim == 1:
-                block = np.zeros((len(r.columns), self.size))
-                block[:, r.columns] = j.T @ j
-                normal[r.columns] += block  # whole rows: a third of the time that a scattered block takes
-            else:
-                normal += _gram(r, j, self.size).toarray()
+        normal = self._dense_normal()
         if len(self.moving) < self.size:
             normal = normal[np.ix_(self.moving, self.moving)]
         diagonal = np.diag(normal)
@@ -203,6 +199,24 @@ class NormalEquations:
             none = squares < FLOATS
             if none.any() or failed:
                 self._set_floating(weak @ turned[:, none if none.any() else slice(1)])
+
+    def _dense_normal(self) -> np.ndarray:
+        """N (n, n). Groups that hang on most parameters are multiplied as one matrix, others each by itself."""
+        wide = [r.columns.ndim == 1 and len(r.columns) > max(STACKED, self.size // WIDE) for r in self.rows]
+        pairs = list(zip(self.rows, self._jacobians, strict=True))
+        stacked = np.zeros((sum(len(j) for (_, j), on in zip(pairs, wide, strict=True) if on), self.size))
+        first = 0
+        for (r, j), on in zip(pairs, wide, strict=True):
+            if on:
+                stacked[first : first + len(j), r.columns] = j
+                first += len(j)
+        normal = stacked.T @ stacked
+        for (r, j), on in zip(pairs, wide, strict=True):
+            if not on and r.columns.ndim == 1:
+                normal[np.ix_(r.columns, r.columns)] += j.T @ j
+            elif not on:
+                normal += _gram(r, j, self.size).toarray()
+        return normal
 
     def _factorise_bordered(self, border: Border) -> None:
         blocks = border.blocks(self.rows, self.moving, self.size)

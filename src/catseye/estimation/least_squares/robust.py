@@ -35,10 +35,8 @@ UNCHECKED = 0.05  # share of sigma^2 / variance of the estimated error below whi
 CHECKED = NONCENTRALITY / UNCHECKED**0.5  # detectable error over sigma up to which an observation is checked
 BACK = 0.9  # of `critical`: what is out comes back below it; between the two it stays as it is, or rounds would not end
 MOST_AT_ONCE = 200  # observations left out between two adjustments
-MOST_REWEIGHTED, STEADY = (
-    8,
-    0.3,
-)  # fits of the robust start; and change of a residual, over itself or its sigma, that ends it
+SUSPECT, WRONG = 3.0, 10.0  # sigmas of a residual after the robust start: a suspect, and left out at first
+MOST_REWEIGHTED, CROSSING = 8, 2  # fits of the robust start; and residuals that may still cross at the last
 MOST_RETURNS = 2  # of one observation; so the rounds end
 
 
@@ -85,7 +83,7 @@ def adjust_robustly(
     free        (n,) bool, as for `adjust`
     active      one (m,) bool array a group: start from this selection instead of searching for one
     names       (n,) what the parameters are called
-    border      of a large system, see `bordered`
+    border      of a large system, see `bordered`; its tests are then good to a thousandth
 
     Three steps. A reweighted fit (Cauchy weights of the residual) keeps an observation that is wrong by a thousand
     sigmas from dragging others along. Where few observations meet in a point such a fit can share the blame between
@@ -102,13 +100,13 @@ def adjust_robustly(
         careful = [np.ones(len(g.observed), dtype=bool) for g in groups]
         solution = _reweighted(x0, groups, removable, free, names, border)
         whole = whole_residuals(solution.fits, solution.x, outliers.shared)
-        large = [may & (np.abs(v) > 3.0 * sigma) for (v, sigma), may in zip(whole, removable, strict=True)]
-        active = [~may | (np.abs(v) < 10.0 * sigma) for (v, sigma), may in zip(whole, removable, strict=True)]
+        large = [may & (np.abs(v) > SUSPECT * sigma) for (v, sigma), may in zip(whole, removable, strict=True)]
+        active = [~may | (np.abs(v) < WRONG * sigma) for (v, sigma), may in zip(whole, removable, strict=True)]
     else:
         solution = adjust(x0, groups, free=np.zeros(len(x0), dtype=bool), solver=SolverSettings(tests=False))
         large = [may & ~a for may, a in zip(removable, active, strict=True)] if outliers.advice else []
     active = _searched(solution, groups, removable, outliers, large, active)
-    x, solver = solution.x, SolverSettings(border=border)
+    x, solver = solution.x, SolverSettings(border=border, rough=True)
     returns = [np.zeros(len(g.observed), dtype=int) for g in groups]
     for _ in range(outliers.rounds):
         solution = adjust(x, groups, free=free, active=active, names=names, solver=solver)
@@ -250,11 +248,13 @@ def _reweighted(
 
 
 def _steady(solution: LeastSquaresSolution, before: Sequence[np.ndarray]) -> bool:
-    """True where no residual still changes enough to change a weight."""
-    return all(
-        np.all(np.abs(f.residual - old) < STEADY * np.maximum(f.sigma, np.abs(old)))
-        for f, old in zip(solution.fits, before, strict=False)
-    ) and bool(before)
+    """True where hardly a residual still crosses one of the limits by which observations are sorted."""
+    if not before:
+        return False
+    old, new = np.concatenate(before), np.concatenate([f.residual for f in solution.fits])
+    sigma = np.concatenate([f.sigma for f in solution.fits])
+    crossed = [(np.abs(old) < k * sigma) != (np.abs(new) < k * sigma) for k in (SUSPECT, WRONG)]
+    return int(np.sum(crossed)) <= CROSSING
 
 
 def _searched(

@@ -14,6 +14,7 @@ from catseye.estimation.least_squares.adjustment import (
     SolverSettings,
     adjust,
 )
+from catseye.estimation.least_squares.bordered import Border
 from catseye.estimation.least_squares.robust import OutlierSearch, adjust_robustly
 from catseye.estimation.observations.kinds import Linear, ObservationGroup
 from catseye.reduction.epoch.allowance import Allowance, for_families, for_the_air, refused
@@ -75,53 +76,31 @@ def settle_network(
     Raises EstimationError where it finds no answer.
     """
     network = _holding_unseen(network)
-    layout, settings = network.layout, network.settings
+    layout = network.layout
     x = np.array(layout.start)
     for name, where in starts.items():
         if name in layout.points:
             x[layout.columns(name)] = where
-    free = np.array(layout.free)
     points = [layout.columns(name) for name in network.places if name in layout.points]
     coordinates = np.concatenate(points)
-    solution = None
     advice: list[Linear] = []
-    solver, names = SolverSettings(border=network.border), layout.names
+    border = network.border  # one, whatever strengths: it remembers the last elimination
+    u = np.full(len(coordinates), np.inf)
+    state: _Pass | None = None
     for turn in range(PASSES):
         if progress is not None:
             progress("adjustment", min(turn + FIRST * (turn > 0), PASSES - 1), PASSES)
         shots = [shot_group(network.seen_from(name), name, x) for name in network.rangers]
-        searching = not turn and not predicted and active is None
-        priors = [_while_searching(p, network) for p in network.priors] if searching else network.priors
-        groups: list[ObservationGroup] = [group for group, _ in shots] + priors
-        removable = [_removable(g, network, shots=i < len(shots)) for i, g in enumerate(groups)]
-        if searching:
-            for g, may in zip(groups, removable, strict=True):
-                may &= g.name != THERMOMETERS
-        before, solution = x, None  # its covariance is large
-        if predicted and turn < TESTED and (active is None or all(a.all() for a in active)):
-            solution = adjust(x, groups, free=free, names=names, solver=solver)
-            predicted = _unsuspicious(solution, removable, settings.critical)
-            active = None
-        if turn < TESTED and not predicted:
-            solution = adjust_robustly(
-                x,
-                groups,
-                removable,
-                outliers=OutlierSearch(
-                    points=points,
-                    advice=advice,
-                    critical=settings.critical,
-                    shared=[part.shared_errors for _, part in shots],
-                ),
-                free=free,
-                active=active,
-                names=names,
-                border=network.border,
-            )
-        elif turn >= TESTED:
-            solution = adjust(x, groups, free=free, active=active, names=names, solver=solver)
-        assert solution is not None
-        x, active = solution.require_converged().x, [f.active for f in solution.fits]
+        search = OutlierSearch(
+            points=points,
+            advice=advice,
+            critical=network.settings.critical,
+            shared=[part.shared_errors for _, part in shots],
+        )
+        before, state = x, None  # its covariance is large
+        state = _adjusted(network, x, shots, search, border, turn=turn, predicted=predicted, active=active)
+        solution, predicted = state.solution, state.predicted
+        x, active = solution.x, [f.active for f in solution.fits]
         if not turn:
             advice = dish_advice(network, x, solution.q)
         steady = True
@@ -129,17 +108,83 @@ def settle_network(
             strength = network.processes.estimated(solution, network.strength, [p.distance for _, p in shots])
             steady = strength.near(network.strength)
             network = network if steady else network.with_strength(strength)
+        if turn < TESTED:
+            u = np.sqrt(solution.q.diagonal()[coordinates])
         moved = np.abs(x - before)[coordinates]
-        u = np.sqrt(solution.q.diagonal()[coordinates])
         if turn and steady and np.all(moved < np.maximum(SETTLED + keep, SETTLED_U * u)):
             break
+        del solution  # the same
     else:
         raise _unsettled(layout.parameters[coordinates[np.argmax(moved)]], float(moved.max()))
+    if not state.complete:
+        solution = _plain(state.groups, network, x, active, SolverSettings(border=border))
     if progress is not None:
         progress("adjustment", PASSES, PASSES)
-    assert solution is not None
-    shots = [shot_group(network.seen_from(name), name, x) for name in network.rangers]  # as they are told
+    shots = [shot_group(network.seen_from(name), name, solution.x) for name in network.rangers]  # as they are told
     return SettledNetwork(network, solution, shots)
+
+
+class _Pass(NamedTuple):
+    """One adjustment of several.
+
+    groups      shots and priors
+    complete    it has all tests and the covariance, as good as they can be
+    predicted   no wrong shot had to be searched for
+    """
+
+    solution: LeastSquaresSolution
+    groups: list[ObservationGroup]
+    complete: bool
+    predicted: bool
+
+
+def _adjusted(
+    network: CampaignNetwork,
+    x: np.ndarray,
+    shots: Sequence[tuple[ShotGroup, ShotParts]],
+    search: OutlierSearch,
+    border: Border | None,
+    *,
+    turn: int,
+    predicted: bool,
+    active: list[np.ndarray] | None,
+) -> _Pass:
+    """The adjustment of one pass from x; the first ones search for wrong shots, later ones want no tests."""
+    searching = not turn and not predicted and active is None
+    priors = [_while_searching(p, network) for p in network.priors] if searching else network.priors
+    groups: list[ObservationGroup] = [*(group for group, _ in shots), *priors]
+    removable = [_removable(g, network, shots=i < len(shots)) for i, g in enumerate(groups)]
+    if searching:
+        for g, may in zip(groups, removable, strict=True):
+            may &= g.name != THERMOMETERS
+    solver = SolverSettings(border=border, tests=turn < TESTED)
+    if turn >= TESTED:
+        return _Pass(_plain(groups, network, x, active, solver), groups, complete=False, predicted=predicted)
+    layout = network.layout
+    free, names = np.array(layout.free), layout.names
+    if predicted and (active is None or all(a.all() for a in active)):
+        solution = adjust(x, groups, free=free, names=names, solver=solver)
+        if _unsuspicious(solution, removable, search.critical):
+            return _Pass(solution, groups, complete=True, predicted=True)
+        active = None
+        del solution  # its covariance is large
+    solution = adjust_robustly(
+        x, groups, removable, outliers=search, free=free, active=active, names=names, border=border
+    )
+    return _Pass(solution.require_converged(), groups, complete=border is None, predicted=False)
+
+
+def _plain(
+    groups: list[ObservationGroup],
+    network: CampaignNetwork,
+    x: np.ndarray,
+    active: list[np.ndarray] | None,
+    solver: SolverSettings,
+) -> LeastSquaresSolution:
+    """The adjustment of a selection that stays; EstimationError where it finds no answer."""
+    layout = network.layout
+    free = np.array(layout.free)
+    return adjust(x, groups, free=free, active=active, names=layout.names, solver=solver).require_converged()
 
 
 def _while_searching(prior: ObservationGroup, network: CampaignNetwork) -> ObservationGroup:

@@ -22,6 +22,7 @@ STEP = 1800.0  # s between knots
 SHORTEST = 900.0  # s, of a campaign in which nothing expands that a range sees
 MICRORADIAN = 1e-6
 FEWEST = 6  # points of a dish that may bend
+ROUNDING = 1e-12  # of a displacement, in its part along the line
 PARTS = (
     "scale",
     "dish scale",
@@ -99,7 +100,10 @@ class TelescopeKnots:
         """
         near = self._moved(np.full(len(targets), self.bodies.get(ranger, "")), a)
         far = self._moved(np.array([self.bodies.get(t, "") for t in targets]), b)
-        return np.asarray(np.einsum("mpi,mi->mp", near - far, towards)) * UNITS
+        apart = near - far
+        slopes = np.einsum("mpi,mi->mp", apart, towards)
+        rigid = np.abs(slopes) <= ROUNDING * np.linalg.norm(apart, axis=2)  # both ends turn as one: 0, not 1e-14
+        return np.where(rigid, 0.0, slopes) * UNITS
 
     def _moved(self, bodies: np.ndarray, points: np.ndarray) -> np.ndarray:
         """(m, parts, 3) m: how points move by each part."""

@@ -153,7 +153,7 @@ class CampaignNetwork:
         fine = np.zeros(len(on_border), dtype=bool)
         for name, states in self.states.items():
             at = self.layout.at[Parameter(ParameterKind.ELECTRONICS, name)]
-            fine[at + np.arange(states.count - len(states.strength), states.count)] = True  # the bridges' modes
+            fine[at + np.arange(states.count)] = True
         return Border(on_border, fine)
 
     @property
