@@ -2,6 +2,7 @@
 
 from datetime import date
 
+import numpy as np
 import pytest
 
 from catseye.errors import InputError
@@ -10,7 +11,7 @@ from catseye.records.files.record import Record
 from catseye.records.laboratory.triplet_measurement import TripletMeasurement
 from catseye.records.night.path_temperature import PathTemperature
 from catseye.records.night.recording import AcousticSheet
-from catseye.records.night.shot import ShotRow, read_buffers
+from catseye.records.night.shot import ShotRow, let_go, read_buffers
 from catseye.records.night.weather import WeatherSample
 from catseye.records.panels.actuators import ActuatorCorrection, ActuatorPosition
 from catseye.records.panels.instrument import PanelInstrument
@@ -113,3 +114,11 @@ def test_an_unknown_version_is_refused_with_the_known_ones(tmp_path, version):
         read_record(tmp_path / "M.toml", Mirror)
     expected = "expected 1 or 'catseye-mirror-1', the versions known here"
     assert str(refusal.value) == f"M.toml: format = {shown} ({expected})"
+
+
+def test_buffers_that_were_let_go_are_read_again():
+    buffers = read_buffers(Folder(FORMATS), "frames-1.npy")
+    before = np.array(buffers)
+    let_go(buffers)
+    let_go(before)  # an array of its own stays
+    assert np.array_equal(buffers, before)

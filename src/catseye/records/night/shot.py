@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+import mmap
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -84,6 +85,13 @@ def read_buffers(folder: Folder, file: str = "frames.npy") -> np.memmap:
         return np.memmap(path, dtype="<i2", mode="r", offset=start, shape=shape, order="F" if fortran else "C")
     except OSError as problem:
         raise unreadable(file, problem) from problem
+
+
+def let_go(buffers: np.ndarray) -> None:
+    """Give the memory of mapped buffers back to the system; who reads them again reads the file."""
+    mapped = getattr(buffers, "_mmap", None)
+    if mapped is not None and hasattr(mmap, "MADV_DONTNEED"):
+        mapped.madvise(mmap.MADV_DONTNEED)
 
 
 def header_of(stream: BinaryIO, file: str) -> str:

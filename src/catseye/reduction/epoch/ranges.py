@@ -9,6 +9,7 @@ import numpy as np
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import EstimationError
 from catseye.records.night.campaign import REFERENCE, Campaign, ObservedSite
+from catseye.records.night.shot import let_go
 from catseye.records.site.mirror import Mirror
 from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
@@ -187,6 +188,7 @@ def measure_phases(campaign: Campaign, settings: ReductionSettings, progress: Pr
             done += len(rows)
             if progress is not None:
                 progress("samples to phases", done, n)
+    let_go(campaign.frames)  # of a whole dish a third of a gigabyte
     mirrors = [campaign.mirror_of(ranger) for ranger in shots.ranger]
     phases = judged_phases(
         detected,
