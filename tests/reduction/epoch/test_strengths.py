@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from catseye.constants import PPM
-from catseye.estimation.least_squares.adjustment import adjust
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, adjust
 from catseye.estimation.observations.kinds import Linear
 from catseye.reduction.epoch.air.process import LEAST, MOST, USUAL, WIDE, AirKnots, AirStrength
 from catseye.reduction.epoch.strengths import (
@@ -337,7 +337,10 @@ def fits(rng, true_ppm, *, n=600, claimed_ppm=0.0, rejected=0):
     active = np.ones(n, dtype=bool)
     active[:rejected] = False
     error[:rejected] = 0.01
-    return SimpleNamespace(fits=[SimpleNamespace(sigma=sigma, standardised=error / sigma, active=active)]), [length]
+    fit = SimpleNamespace(
+        sigma=sigma, standardised=error / sigma, active=active, detectable_error=NONCENTRALITY / 0.7 * sigma
+    )
+    return SimpleNamespace(fits=[fit]), [length]
 
 
 @pytest.mark.parametrize("true", [0.3, 1.0])
@@ -370,6 +373,15 @@ def test_eddies_that_went_are_taken_back():
     rng = np.random.default_rng(4)
     solution, lengths = fits(rng, 0.0, claimed_ppm=0.5)
     assert _eddies(solution, 0.5, lengths) < 0.15
+
+
+def test_shots_that_nothing_checks_say_nothing_whatever_their_rounding():
+    rng = np.random.default_rng(6)
+    solution, lengths = fits(rng, 0.3)
+    checked = _eddies(solution, 0.0, lengths)
+    (fit,) = solution.fits
+    fit.standardised[:3], fit.detectable_error[:3] = 1e4, 1e5 * fit.sigma[:3]
+    assert _eddies(solution, 0.0, lengths) == pytest.approx(checked, rel=0.02)
 
 
 def test_more_than_two_ppm_no_air_holds_and_no_shot_says_nothing():

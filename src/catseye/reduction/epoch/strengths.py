@@ -15,7 +15,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 
 from catseye.constants import PPM
-from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, LeastSquaresSolution
 from catseye.estimation.observations.kinds import Linear
 from catseye.reduction.epoch.air.field import AirField
 from catseye.reduction.epoch.air.process import LEAST, MOST, U_LAG, U_RADIATION, USUAL, WIDE, AirStrength
@@ -31,6 +31,7 @@ EXPERIENCE = 6.0  # observations that the strength of experience is worth
 WIDE_PPM = 0.1  # of eddies, where nothing is known yet
 LITTLE_PPM, MOST_PPM = 0.05, 2.0  # of eddies: with less, little changes; more, no air holds
 SAME = 0.25  # relative change of a strength that is none
+LEAST_SHARE = 1e-3  # of sigma^2 in the variance of a test, below which it is rounding
 BISECTIONS = 40
 LONGEST = 2.0  # step in the logarithm of a variance
 STEPS = 12  # cap of steps; it takes some five
@@ -228,9 +229,10 @@ def _eddies(solution: LeastSquaresSolution, before_ppm: float, lengths: list[np.
     """ppm by which each shot's index departs anew, from the shots' own tests.
 
     With a variance v more than the sigma^2 of a shot, its w^2 is expected as (sigma^2 + v) / sigma^2, as if all had so
-    much more; the likeliest is sought.
+    much more; the likeliest is sought. Shots that nothing checks have no test.
     """
-    fits = [(f, length, f.active) for f, length in zip(solution.fits, lengths, strict=False)]
+    tested = [f.active & (f.detectable_error < f.sigma * NONCENTRALITY / LEAST_SHARE**0.5) for f in solution.fits]
+    fits = list(zip(solution.fits, lengths, tested, strict=False))
     per_ppm = np.concatenate([(PPM * length[on] / f.sigma[on]) ** 2 for f, length, on in fits])
     w2 = np.concatenate([f.standardised[on] ** 2 for f, _, on in fits])
     tried = np.linspace(-(before_ppm**2), MOST_PPM**2, 2)
