@@ -206,9 +206,11 @@ def _reduced(campaign: Path, out: Path | None, air_model: str, quiet: bool) -> "
     try:
         from catseye.api.night import reduce as reduced
         from catseye.api.result import save
+        from catseye.cli.memory import give_back
 
         night = reduced(campaign, air_model=air_model, progress=progress)
         if out is not None:
+            give_back()
             save(night, out, progress=progress)
         return night
     finally:

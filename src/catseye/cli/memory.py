@@ -1,5 +1,6 @@
 """One line for a run that has too little memory: how much more it asked for, and what it had."""
 
+import ctypes
 import math
 import resource
 from contextlib import suppress
@@ -7,6 +8,12 @@ from contextlib import suppress
 GIB = 2.0**30
 UNLOADED = ("failed to map segment", "cannot allocate memory", "Cannot allocate memory")  # the loader's words
 ADVICE = "expected a machine or a limit with more; fewer shots or points at once need less"
+
+
+def give_back() -> None:
+    """Return freed memory to the system, before a step that needs much of it; glibc keeps what lies in pieces."""
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def lacks_memory(problem: MemoryError | ImportError) -> bool:
