@@ -1,6 +1,7 @@
 """The commands. What they need is imported when they run, so that `--help` answers at once."""
 
 import math
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -207,9 +208,12 @@ def _reduced(campaign: Path, out: Path | None, air_model: str, quiet: bool) -> "
         from catseye.api.night import reduce as reduced
         from catseye.api.result import save
         from catseye.cli.memory import give_back
+        from catseye.processors import free_threads
 
         night = reduced(campaign, air_model=air_model, progress=progress)
         if out is not None:
+            with free_threads():
+                night = replace(night, reduction=night.reduction.held())  # all else of the adjustment may go
             give_back()
             save(night, out, progress=progress)
         return night

@@ -1,7 +1,6 @@
 """All files of a reduction, written into a directory."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
@@ -36,10 +35,7 @@ def _covariance(reduction: Reduction) -> Iterator[bytes]:
 def write_reduction(reduction: Reduction, directory: Path, progress: Progress | None = None) -> None:
     """Tables, objects, report, and last the provenance with the hashes of the others."""
     when = datetime.now(UTC)
-
-    @cache
-    def held() -> Reduction:  # covariance.fits and the page both ask for most of it
-        return replace(reduction, coordinates=replace(reduction.coordinates, joint=reduction.coordinates.joint.held()))
+    held = cache(reduction.held)  # once, for covariance.fits and the page
 
     beside = matrix_file(reduction.coordinates.points) == COVARIANCE
     files: Files = {

@@ -1,6 +1,6 @@
 """The main job: a campaign's samples to coordinates, pose and surface."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from catseye.processors import one_thread
 from catseye.records.night.campaign import REFERENCE, Campaign
@@ -40,6 +40,10 @@ class Reduction:
     status: tuple[ShotStatus, ...]
     rejected: dict[int, Reason]
     notes: tuple[str, ...]
+
+    def held(self) -> "Reduction":
+        """The same with the covariance of its points at hand, which files and page ask for most of."""
+        return replace(self, coordinates=replace(self.coordinates, joint=self.coordinates.joint.held()))
 
 
 def reduce_epoch(
