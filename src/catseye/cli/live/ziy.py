@@ -60,11 +60,11 @@ def run_coordinator(
     seed     of a simulated site, for the journal
     beside   a coroutine function that runs beside it, told the log: its children
     """
+    from catseye.clock import SystemClock
     from catseye.service.coordinator import LiveCoordinator
     from catseye.service.logs import LiveLog
     from catseye.service.running import LiveRun
     from catseye.service.watchdog import live
-    from catseye.simulator.clock.world_clock import SystemClock
 
     clock = SystemClock(offset)
     coloured = not log_json and sys.stderr is not None and sys.stderr.isatty()
