@@ -121,6 +121,7 @@ class Coordinator:
         self.host_clock = HostClock(self.links, clock, EventLog("coordinator", clock, self.tell))
         for link in self.links.values():
             link.host_believed = lambda: self.host_clock.believed
+        self.host_clock.jumped, self.host_clock.corrected = self.intake.clock_jumped, self._clock_corrected
         self.firing = Firing(
             site,
             self.links,
@@ -223,6 +224,14 @@ class Coordinator:
         self.intake.flush()
         with suppress(InputError):  # what could not be written has been told
             await asyncio.to_thread(self._journal.close)
+
+    def _clock_corrected(self, seconds: float) -> None:
+        """Our clock was corrected: what any part keeps by it is looked at anew."""
+        self.intake.clock_corrected(seconds)
+        self.firing.clock_corrected()
+        self.posture = None
+        for link in self.links.values():
+            link.clock_corrected(seconds)
 
     # Rounds ---------------------------------------------------------------------------------------------------------
 
