@@ -8,7 +8,7 @@ from typing import Any
 from urllib.parse import quote
 
 from catseye.coordinator.journal.chain import Head
-from catseye.coordinator.journal.check import ChainReport, check_whole, parted
+from catseye.coordinator.journal.check import ChainReport, check_whole, held_by, parted
 from catseye.coordinator.journal.place import place_of, refuse_foreign
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
@@ -22,7 +22,7 @@ def checked(
 ) -> tuple[list[ChainReport], list[dict[str, Any]]]:
     """Reports of one run, or of all; and where a copy's runs part from them.
 
-    heads   EVENT:HASH, of the run that is named, or of the last
+    heads   EVENT:HASH, of the run that is named; where none is, of whichever run has it
 
     Raises InputError: no such journal, run or copy; a text that is no head.
     """
@@ -31,8 +31,17 @@ def checked(
         runs = reader.runs() if which is None else (reader.run(which),)
         if not runs:
             raise InputError(f"journal {reader.place}: holds no run (expected one at least)")
-        of = runs[-1].run
-        reports = [check_whole(reader, r.run, heads=told if r.run == of else (), progress=progress) for r in runs]
+        numbers = [run.run for run in runs]
+        holders = {head: _holder(reader, numbers, head) for head in told}
+        reports = []
+        for run in runs:
+            mine = [head for head in told if holders[head] == run.run or which is not None]
+            reports.append(check_whole(reader, run.run, heads=mine, progress=progress))
+        for head in told if which is None else ():
+            if holders[head] is None:
+                text = f"no run has head {head}, which was told: a run was deleted, cut or written anew"
+                reports[-1].given += 1
+                reports[-1].wrong(reports[-1].last[0] + 1, text)
         if against is None:
             return reports, []
         with JournalReader(against) as other:
@@ -48,6 +57,17 @@ def checked(
                 text = same if first is None else f"{other.place} has another history from event {first} on."
                 found.append({"run": run.run, "parts_at_event": first, "both_up_to": last, "text": text})
             return reports, found
+
+
+def _holder(reader: JournalReader, runs: Sequence[int], head: Head) -> int | None:
+    """The run that has a head, None where none has."""
+    for run in runs:
+        try:
+            if held_by(reader, run, head):
+                return run
+        except InputError:  # checking that run will say so
+            continue
+    return None
 
 
 def copied(journal: str, copy: Path, *, progress: Progress) -> list[ChainReport]:

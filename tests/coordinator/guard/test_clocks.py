@@ -268,6 +268,78 @@ def test_clocks_without_a_time_signal_unconnected_or_long_unseen_have_no_vote():
     assert machine.watch.believed
 
 
+def test_a_jump_and_back_that_nobody_can_judge_leaves_nothing_standing():
+    machine = Machine(rangers=0)
+    machine.run(10)
+    machine.jump(3600.0)
+    machine.run(60)
+    assert not machine.watch.believed
+    machine.jump(-3600.0)
+    machine.run(SETTLE + 1)
+    assert machine.watch.believed
+    assert machine.watch.trouble is None
+
+
+def test_nothing_is_fired_before_the_rangers_clocks_are_heard_or_have_had_their_time():
+    machine = Machine()
+    for link in machine.links.values():
+        link.connected = False
+    machine.run(WAIT - 1)
+    assert not machine.watch.believed
+    machine.run(2)
+    assert machine.watch.believed  # nobody to contradict
+    heard = Machine()
+    heard.watch.look(heard.counter / PER_SECOND)
+    assert not heard.watch.believed
+    heard.run(1)
+    assert heard.watch.believed
+
+
+def test_rangers_that_outvoted_the_machine_and_fall_silent_do_not_agree_with_it():
+    machine = Machine()
+    machine.truth = 3600.0
+    machine.run(5)
+    assert not machine.watch.believed
+    for link in machine.links.values():
+        link.clock_seen = -1
+    machine.run(60)
+    assert not machine.watch.believed
+
+
+def test_rangers_that_kept_the_count_and_fall_silent_have_not_changed_their_mind():
+    machine = Machine(kernel=NTP)
+    machine.run(5)
+    machine.jump(3600.0)
+    machine.run(SETTLE + 1)
+    assert machine.watch.believed
+    for link in machine.links.values():
+        link.clock_seen = -1
+    machine.run(60)
+    assert machine.watch.believed
+    assert machine.corrections == []
+
+
+def test_a_wrong_machine_sets_no_ranger_that_has_a_time_signal_before_most_were_heard():
+    """At start they come one by one: two that had been set would have outvoted the two that had not."""
+    machine = Machine(rangers=4)
+    machine.truth = 3600.0
+    links = list(machine.links.values())
+    for link in links:
+        link.connected = False
+    for link in links:
+        link.connected = True
+        machine.run(3)
+        assert not any(machine.watch.may_set(each) for each in links)
+    machine.truth = 0.0
+    machine.run(2)
+    assert all(machine.watch.may_set(each) for each in links)
+    links[0].status = StatusWord.CLOCK_FREE
+    for link in links[1:]:
+        link.clock_seen = -1
+    machine.run(60)
+    assert [machine.watch.may_set(each) for each in links] == [True, False, False, False]
+
+
 # Load ----------------------------------------------------------------------------------------------------------------
 
 

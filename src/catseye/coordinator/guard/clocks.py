@@ -26,7 +26,7 @@ from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, ticks_now
 from catseye.errors import InputError
 from catseye.ranger.status import StatusWord
 
-EVERY = 1.0  # s between two looks
+EVERY, AT_FIRST = 1.0, 0.1  # s between two looks; until the rangers' clocks have been heard
 JUMP = 0.02  # s: slewing gains 0.5 ms a second, so that a larger departure is a step
 SETTLE = 3.0  # s without another jump before one is judged
 WAIT = 15.0  # s that the rangers are given to say which time is right
@@ -116,7 +116,12 @@ class HostClock:
         kernel: Callable[[], KernelSync | None] = kernel_sync,
     ):
         self._links, self._clock, self._event_log, self._kernel = links, clock, event_log, kernel
-        self.believed = True
+        few = len(links) < LEAST_VOTES
+        self._vouched = few or not isinstance(clock, SystemClock)  # rangers agree with the count, or cannot say
+        self.believed = self._vouched
+        self._heard = False  # whether the rangers' clocks have decided at any time
+        self._outvoted = self._kept = False  # as they last said: neither is right; the count is, not the machine
+        self._until: float | None = None  # s of the counter, until which they are waited for at the start
         self.jumped: Callable[[int, int | None], None] = lambda since, until: None
         self.corrected: Callable[[float], None] = lambda seconds: None
         self.sync: KernelSync | None = None
@@ -133,7 +138,7 @@ class HostClock:
         loop = asyncio.get_running_loop()
         while True:
             self.look(loop.time())
-            await asyncio.sleep(EVERY)
+            await asyncio.sleep(EVERY if self.believed or self.trouble else AT_FIRST)
 
     @property
     def trouble(self) -> str | None:
@@ -147,15 +152,26 @@ class HostClock:
 
     def look(self, counted: float) -> None:
         """Look once, at a steady counter's s."""
+        self._until = counted + WAIT if self._until is None else self._until
         if isinstance(self._clock, SystemClock):
             self._ask_kernel()
             self._depart(self._clock.departure(), counted)
         vote = self._vote()
+        if len(self._links) >= LEAST_VOTES and isinstance(self._clock, SystemClock):
+            self._vouched = vote.counts and vote.allows(0.0)
         if abs(self._departed) <= JUMP:
             self._stay(vote, counted)
         else:
             self._judge(vote, counted)
         self._looked = ticks_now(self._clock)
+
+    def may_set(self, link: RangerLink) -> bool:
+        """Whether a ranger's clock may be set by this machine's.
+
+        One with a time signal only where most rangers agree with the count, or a machine that starts with a wrong clock
+        would set them one by one before they outvote it.
+        """
+        return self.believed and (self._vouched or bool(link.status & StatusWord.CLOCK_FREE))
 
     def accept(self) -> float:
         """Take over the machine's UTC as a person asks; s that the count gained.
@@ -196,7 +212,7 @@ class HostClock:
             self._event_log.tell("host-clock-jump", f"{text} {details}", "alarm", always=True, offset_s=gained)
             since = self._looked if self._jump is None else self._jump.since
             self._jump = _Jump(since, ticks_now(self._clock), counted)
-            self._votes_since = self._jump.ticks
+            self._votes_since, self._kept = self._jump.ticks, False
             self.jumped(since, None)
 
     def _stay(self, vote: ClockVote, counted: float) -> None:
@@ -207,7 +223,14 @@ class HostClock:
             self.believed = False
             return
         self._over()
-        self.believed = not vote.counts or vote.allows(0.0)
+        if not vote.counts:  # as it was, or at first for a while nothing: the rangers' clocks are to be heard
+            waited = self._until is None or counted >= self._until
+            self.believed = not self._outvoted and (self._heard or self._vouched or waited)
+            if not self._outvoted:
+                self._stand()
+            return
+        self.believed = vote.allows(0.0)
+        self._outvoted, self._heard = not self.believed, True
         text = (
             f"{vote} that this machine's is {-vote.middle:+.3f} s off: nothing is fired and no clock is set until they "
             f"agree with it {SEE}"
@@ -224,11 +247,15 @@ class HostClock:
         if passed < SETTLE or ((unheard or unclear) and passed < WAIT):
             self.believed = False
             self._stand(unsettled=f"this machine's clock is {away:+.3f} s from the count: nothing is fired meanwhile")
-        elif machine and (not count or not unclear):
+            return
+        if not vote.counts and self._kept:  # they have said, and are silent
+            return
+        self._outvoted = vote.counts and not count and not machine
+        if machine and (not count or not unclear):
             self._correct(f"{vote} with it")
         elif count and not machine:
             self._over()
-            self.believed = True
+            self.believed = self._kept = True
             text = f"{vote} that this machine's is {away:+.3f} s off: measuring goes on by the count of before"
             self._stand(off=f"{text} {SEE}", offset=away)
         elif vote.counts and not count:
@@ -259,6 +286,7 @@ class HostClock:
         gained = self._clock.correct()
         now = ticks_now(self._clock)
         self._departed, self._jump, self._votes_since, self.believed = 0.0, None, now, True
+        self._outvoted = self._kept = False
         self.jumped(since + min(0, round(gained * TICKS_PER_SECOND)), now)
         text = f"the count of UTC is corrected by {gained:+.3f} s to this machine's clock: {why}"
         self._event_log.tell("clock-corrected", text, "warning", always=True, offset_s=gained, why=why)

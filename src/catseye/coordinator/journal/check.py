@@ -7,8 +7,19 @@ from hashlib import sha256
 from sqlalchemy import Connection, func, select
 
 from catseye.coordinator.journal.chain import Head, LinkKind, event_cells, link_of, run_link
-from catseye.coordinator.journal.reader import PIECE, JournalReader
-from catseye.coordinator.journal.tables import BUFFERS, CHAIN, EVENTS, RUN_FILES, RUNS, TEXTS, JournalTable
+from catseye.coordinator.journal.reader import PIECE, JournalReader, highest_seq
+from catseye.coordinator.journal.rows import MOST_WHOLE
+from catseye.coordinator.journal.tables import (
+    BUFFERS,
+    CHAIN,
+    EVENTS,
+    METADATA,
+    PARTS,
+    RUN_FILES,
+    RUNS,
+    TEXTS,
+    JournalTable,
+)
 from catseye.errors import InputError
 
 STORED = (*EVENTS, BUFFERS)
@@ -23,10 +34,12 @@ class ChainReport:
     """What checking one run came to.
 
     run, uuid   of the run; "" where its own record cannot be read
-    chained     whether it has a chain: one written before version 2 has none, and nothing of it was checked
+    chained     whether it has a chain: one written before version 2 has none, and nothing of it was checked; without
+                problems it is one of those
     ended       whether its chain has an end: without one it lasts, was killed, or was cut
     events      stored, by their links
-    heads       that were given and are in the chain
+    given       heads that it was held against
+    heads       of those, that are in the chain
     problems    one line each: the first 20
     count       of all problems
     bad         events that are not as they were written, or cannot be read
@@ -41,6 +54,7 @@ class ChainReport:
     chained: bool = True
     ended: bool = False
     events: int = 0
+    given: int = 0
     heads: int = 0
     problems: list[str] = field(default_factory=list)
     count: int = 0
@@ -71,9 +85,14 @@ def check_whole(
 ) -> ChainReport:
     """`check_run` of a run in all its files, and whether each goes on where the one before ends; one report.
 
-    Raises InputError: a file of the run is missing.
+    A file of the run that is missing, or named in a circle, is a problem of this one, of which the rest is checked.
     """
-    parts = reader.parts(run)
+    try:
+        parts = reader.parts(run)
+    except InputError as problem:
+        report = check_run(reader, run, heads=heads, progress=progress)
+        report.wrong(report.last[0] + 1, f"the run's other files cannot be read: {problem}")
+        return report
     if len(parts) == 1:
         return check_run(reader, run, heads=heads, progress=progress)
     starts = [_begin(part, run) for part in parts]
@@ -94,6 +113,7 @@ def check_whole(
         firsts = [first for first in (whole.first, report.first) if first is not None]
         whole.first = min(firsts) if firsts else None
         whole.events, whole.heads = whole.events + report.events, whole.heads + report.heads
+        whole.given += report.given
         whole.ended, whole.last, whole.head = report.ended, report.last, report.head or whole.head
     return whole
 
@@ -107,19 +127,22 @@ def check_run(
 
     Nothing is raised for a damaged journal: what cannot be read is a problem like others, and what is whole is counted.
     """
-    report = ChainReport(run)
+    report = ChainReport(run, given=len(heads))
     if reader.version < FIRST_CHAINED:
-        report.chained = False
+        _before_chains(reader, report, heads)
+        return report
+    if not _tables_there(reader, report):
         return report
     first, stored, last = _of_the_run(reader, report)
     if first is None and not (last and _count(reader, run)):
-        report.chained = False
+        _without_chain(reader, report, heads)
         return report
     if first is None:
         report.wrong(0, "the run's first link is missing, though links of its events are there")
     elif stored is not None and first != stored:
         report.wrong(0, "the run's own record, or the list of its files, is not what was written")
     _files(reader, report)
+    _numbers(reader, report)
     before, at = tuple(link for link in (first, stored) if link is not None), 0
     links = {} if first is None else {0: first}
     for seq, kind, link, rows in _links(reader, report, last or 0, progress):
@@ -136,6 +159,79 @@ def check_run(
         report.wrong(at + 1, f"the run ended, and its chain stops at event {at}: what stood behind is missing")
     _heads(report, heads, links, at)
     return report
+
+
+def _before_chains(reader: JournalReader, report: ChainReport, heads: Sequence[Head]) -> None:
+    """A run of version 1: without a chain, unless the version was set back."""
+    report.chained = False
+    later = sorted({CHAIN.name, PARTS.name} & reader.tables)
+    if later:
+        text = f"its version is {reader.version} and it has the table {later[0]!r} of version {FIRST_CHAINED}"
+        report.wrong(0, f"{text}: the version was set back")
+    _unheld(report, heads)
+
+
+def _tables_there(reader: JournalReader, report: ChainReport) -> bool:
+    """Whether all tables are there; one that was taken away is a problem."""
+    missing = sorted(set(METADATA.tables) - reader.tables)
+    for name in missing:
+        report.wrong(0, f"table {name!r} is missing (expected in a journal of version {reader.version})")
+    report.chained = CHAIN.name not in missing
+    return not missing
+
+
+def _without_chain(reader: JournalReader, report: ChainReport, heads: Sequence[Head]) -> None:
+    """A run without links in a journal that has chains: of before it was carried to version 2, or robbed.
+
+    The first link of the first run with a chain was made from nothing where no run before it had one.
+    """
+    report.chained = False
+    try:
+        with reader.reading() as connection:
+            first = connection.execute(
+                select(CHAIN.c.run, CHAIN.c.link).where(CHAIN.c.seq == 0).order_by(CHAIN.c.run).limit(1)
+            ).first()
+            carried = first is not None and first.run > report.run and first.link == run_link(connection, first.run)
+    except InputError as problem:
+        report.wrong(0, f"the journal's chains cannot be read: {problem}")
+        return
+    if not carried:
+        report.wrong(0, f"the run has no chain in a journal of version {reader.version}: it was taken away")
+    _unheld(report, heads)
+
+
+def _unheld(report: ChainReport, heads: Sequence[Head]) -> None:
+    for head in heads:
+        report.wrong(head.seq, f"head {head} was told, and the run has no chain")
+
+
+def _numbers(reader: JournalReader, report: ChainReport) -> None:
+    """Rows whose numbers no event has: text, bytes, or below the first."""
+    for table in (*STORED, CHAIN):
+        seq, least = table.c.seq, 0 if table is CHAIN else 1
+        try:
+            with reader.reading() as connection:
+                strange = seq < least
+                if connection.dialect.name == "sqlite":
+                    strange |= seq > MOST_WHOLE
+                row = connection.execute(select(seq).where(table.c.run == report.run, strange).limit(1)).first()
+        except InputError as problem:
+            report.wrong(0, f"table {table.name!r} cannot be read: {problem}")
+            continue
+        if row is not None:
+            report.wrong(0, f"a row of {table.name!r} has the number {row[0]!r}, which no event has: it was put in")
+
+
+def held_by(reader: JournalReader, run: int, head: Head) -> bool:
+    """Whether a run, in any of its files, has the link that a head tells."""
+    for part in reader.parts(run):
+        if CHAIN.name not in part.tables:
+            continue
+        with part.reading() as connection:
+            link = connection.scalar(select(CHAIN.c.link).where(CHAIN.c.run == run, CHAIN.c.seq == head.seq))
+        if isinstance(link, bytes) and head.fits(link):
+            return True
+    return False
 
 
 def _heads(report: ChainReport, heads: Sequence[Head], links: Mapping[int, bytes], last: int) -> None:
@@ -204,13 +300,15 @@ def _integrity(connection: Connection, report: ChainReport) -> None:
 
 
 def _last_stored(connection: Connection, run: int) -> int:
-    highest = (connection.scalar(select(func.max(t.c.seq)).where(t.c.run == run)) for t in (*STORED, CHAIN))
-    return max(seq if isinstance(seq, int) else 0 for seq in highest)
+    return max(highest_seq(connection, table, run) for table in (*STORED, CHAIN))
 
 
 def _count(reader: JournalReader, run: int) -> int:
-    with reader.reading() as connection:
-        return int(connection.scalar(select(func.count()).select_from(CHAIN).where(CHAIN.c.run == run)) or 0)
+    try:
+        with reader.reading() as connection:
+            return int(connection.scalar(select(func.count()).select_from(CHAIN).where(CHAIN.c.run == run)) or 0)
+    except InputError:
+        return 0
 
 
 def _files(reader: JournalReader, report: ChainReport) -> None:
@@ -259,10 +357,10 @@ def _piece(reader: JournalReader, run: int, after: int, upto: int) -> list[tuple
             wanted = select(table).where(table.c.run == run, table.c.seq > after, table.c.seq <= upto)
             return [dict(row) for row in connection.execute(wanted).mappings()]
 
-        links = {int(str(row["seq"])): row for row in read(CHAIN)}
+        links = {_seq(row): row for row in read(CHAIN)}
         for table in STORED:
             for row in read(table):
-                rows.setdefault(int(str(row["seq"])), []).append((table, row))
+                rows.setdefault(_seq(row), []).append((table, row))
     found = []
     for seq in sorted(set(links) | set(rows)):
         link = links.get(seq)
@@ -270,6 +368,13 @@ def _piece(reader: JournalReader, run: int, after: int, upto: int) -> list[tuple
         kind = str(link["kind"]) if link is not None else ""
         found.append((seq, kind, kept if isinstance(kept, bytes) else None, rows.get(seq, [])))
     return found
+
+
+def _seq(row: Mapping[str, object]) -> int:
+    seq = row["seq"]
+    if not isinstance(seq, int):
+        raise InputError(f"a row has the number {seq!r} (expected a whole one)")
+    return seq
 
 
 def _link(

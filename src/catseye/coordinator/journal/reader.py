@@ -7,13 +7,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Literal
 
-from sqlalchemy import Connection, Engine, Select, func, select
+from sqlalchemy import Connection, Engine, Select, inspect, select
 from sqlalchemy.exc import SQLAlchemyError
 
 from catseye.coordinator.journal.cells import check_cells, damaged, json_object
 from catseye.coordinator.journal.entries import AnsweredShot, Entry, EpochSolution
 from catseye.coordinator.journal.place import place_of, reading_engine, refuse_foreign, refused
-from catseye.coordinator.journal.rows import StoredRow, entry_of, unpack
+from catseye.coordinator.journal.rows import MOST_WHOLE, StoredRow, entry_of, unpack
 from catseye.coordinator.journal.tables import (
     BUFFERS,
     EVENTS,
@@ -28,7 +28,6 @@ from catseye.coordinator.journal.tables import (
 from catseye.errors import InputError
 from catseye.records.site.folder import SiteFolder, read_site
 
-WITH_PARTS = 2  # version
 PIECE = 512  # events read at once: 8 MB where each is a buffer
 Kind = Literal["shots", "weather", "postures", "commands", "happenings", "solutions", "documents"]
 
@@ -75,8 +74,10 @@ class JournalReader:
         self._folders: list[TemporaryDirectory[str]] = []
         self._others: dict[str, JournalReader] = {}
         self.left_out: Mapping[int, Collection[int]] = {}  # by run: events passed over, as they do not check
+        self.alone = False  # whether files before and behind this one are passed over
         with self.reading() as connection:
             self.version = version_of(connection, self.place)
+            self.tables = frozenset(inspect(connection).get_table_names())
             if self.version == 0:
                 raise InputError(f"journal {self.place}: holds no tables: it is no journal (expected one)")
 
@@ -167,22 +168,30 @@ class JournalReader:
     def parts(self, run: int) -> "tuple[JournalReader, ...]":
         """The files of a run, in order: this one, and those before and behind it into which the run was rotated.
 
-        Raises InputError: one of them is missing.
+        Raises InputError: one of them is missing, or is named twice.
         """
-        parts = [self]
-        while (name := parts[0]._beside(run, "follows")) is not None:
+        if self.alone or self._where.path is None:
+            return (self,)
+        parts, names = [self], {self._where.path.name}
+        while (name := parts[0]._beside(run, "follows", names)) is not None:
             parts.insert(0, self._part(name))
-        while (name := parts[-1]._beside(run, "followed_by")) is not None:
+        while (name := parts[-1]._beside(run, "followed_by", names)) is not None:
             parts.append(self._part(name))
         return tuple(parts)
 
-    def _beside(self, run: int, which: str) -> str | None:
-        if self.version < WITH_PARTS or self._where.path is None:
+    def _beside(self, run: int, which: str, names: set[str]) -> str | None:
+        """The name of the file before or behind this one, None of none; noted among `names`."""
+        if PARTS.name not in self.tables:
             return None
         with self.reading() as connection:
-            name = connection.scalar(select(PARTS.c[which]).where(PARTS.c.run == run))
-        if name is not None and (not name or Path(name).name != name):
+            name: object = connection.scalar(select(PARTS.c[which]).where(PARTS.c.run == run))
+        if name is None:
+            return None
+        if not isinstance(name, str) or not name or Path(name).name != name:
             raise InputError(f"journal {self.place}: run {run} goes on in {name!r} (expected a file beside it)")
+        if name in names:
+            raise damaged(f"journal {self.place}: the table 'parts' of run {run}", f"{name!r} once more, a circle")
+        names.add(name)
         return name
 
     def _part(self, name: str) -> "JournalReader":
@@ -276,8 +285,16 @@ def _between(table: JournalTable, run: int, after: int, upto: int) -> Select[tup
 
 
 def _last(connection: Connection, run: int) -> int:
-    highest = (connection.scalar(select(func.max(table.c.seq)).where(table.c.run == run)) for table in EVENTS)
-    return max(seq if isinstance(seq, int) else 0 for seq in highest)
+    return max(highest_seq(connection, table, run) for table in EVENTS)
+
+
+def highest_seq(connection: Connection, table: JournalTable, run: int) -> int:
+    """The highest number of a run's rows in a table; 0 of none. Text and bytes, damage, sort above all numbers."""
+    seq = table.c.seq
+    highest: object = connection.scalar(
+        select(seq).where(table.c.run == run, seq <= MOST_WHOLE).order_by(seq.desc()).limit(1)
+    )
+    return int(highest) if isinstance(highest, int | float) else 0
 
 
 def _is(run: StoredRun, which: int | str) -> bool:
