@@ -216,6 +216,11 @@ SOURCES: dict[str, Source] = {
         used="section 10, the clock filter; section 11.2, selection and combination (`coordinator.link.clock_watch`, "
         "`coordinator.guard.clocks`)",
     ),
+    "SQLITE24": Source(
+        title="D. R. Hipp and others, Database File Format, SQLite documentation, 2024",
+        locator="sqlite.org, fileformat2",
+        used="sections 1.3, 1.6, 2.1 and 4.1: header, pages, records, log (`coordinator.journal.recovery`)",
+    ),
     "PELZER71": Source(
         title="H. Pelzer, Zur Analyse geodätischer Deformationsmessungen, 1971",
         locator="Deutsche Geodätische Kommission, Reihe C, Heft 164, München",

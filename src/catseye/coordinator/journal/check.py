@@ -13,6 +13,7 @@ from catseye.coordinator.journal.tables import (
     BUFFERS,
     CHAIN,
     EVENTS,
+    FIRST_CHAINED,
     METADATA,
     PARTS,
     RUN_FILES,
@@ -24,7 +25,6 @@ from catseye.errors import InputError
 
 STORED = (*EVENTS, BUFFERS)
 MOST_TOLD = 20  # problems in words
-FIRST_CHAINED = 2  # version of a journal
 Progress = Callable[[str, int, int], None]
 Stored = list[tuple[JournalTable, Mapping[str, object]]]
 
@@ -43,6 +43,7 @@ class ChainReport:
     problems    one line each: the first 20
     count       of all problems
     bad         events that are not as they were written, or cannot be read
+    unlinked    of those, that have no link: put in, or robbed of it, or it was lost
     ended_ticks when, by the run's record
     first       the first event from which on something is wrong; None where nothing is
     head        the last link; None without a chain
@@ -59,6 +60,7 @@ class ChainReport:
     problems: list[str] = field(default_factory=list)
     count: int = 0
     bad: set[int] = field(default_factory=set)
+    unlinked: set[int] = field(default_factory=set)
     first: int | None = None
     ended_ticks: int | None = None
     head: Head | None = None
@@ -105,11 +107,11 @@ def check_whole(
         if report.begins != whole.last:
             text = f"{part.place} does not go on where the file before it ends, at event {whole.last[0]}"
             whole.wrong(whole.last[0] + 1, text)
-        for problem in report.problems:
-            whole.problems.append(f"{part.place}: {problem}")
+        whole.problems += [f"{part.place}: {text}" for text in report.problems]
         del whole.problems[MOST_TOLD:]
         whole.count += report.count
         whole.bad |= report.bad
+        whole.unlinked |= report.unlinked
         firsts = [first for first in (whole.first, report.first) if first is not None]
         whole.first = min(firsts) if firsts else None
         whole.events, whole.heads = whole.events + report.events, whole.heads + report.heads
@@ -384,6 +386,7 @@ def _link(
     if link is None:
         if rows:
             report.wrong(seq, f"event {seq} has no link: it was put in, or its link was taken out", bad=True)
+            report.unlinked.add(seq)
         return ()
     if report.ended:
         report.wrong(seq, f"event {seq} stands behind the run's end", bad=True)

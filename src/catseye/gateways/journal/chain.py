@@ -70,7 +70,6 @@ def chain_verdict(reports: list[ChainReport]) -> Verdict:
     if bare:
         return Verdict("doubtful", f"run {bare[0]} has no chain, so that nothing of it could be checked")
     heads = sum(report.heads for report in reports)
-    known = f"and the chain has the {heads} heads that were told" if heads else NO_HEAD
-    return Verdict(
-        "good", f"every event is as it was written, by a chain of hashes from the first to the last, {known}"
-    )
+    known = f"which has the {heads} heads that were told" if heads else NO_HEAD
+    whole = "every event is as it was written, by a chain of hashes from the first to the last"
+    return Verdict("good", f"{whole}, {known}")
