@@ -1,6 +1,8 @@
 """Journals looked after: all runs checked, against heads and copies; a copy made while it is written; an export."""
 
+import glob
 import os
+import shutil
 import sqlite3
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
@@ -22,7 +24,7 @@ from catseye.gateways.journal.export import export_tables
 from catseye.gateways.writers.interruption import Unfinished, undone_when_interrupted
 from catseye.verdict import Verdict
 
-STEP = 20_000  # of SQLite's virtual machine between two looks at signals and progress: some ms
+STEP = 500  # of SQLite's virtual machine between two looks at signals and progress: some ms, 2 MB of buffers
 Progress = Callable[[str, int, int], None]
 Span = tuple[int, int]  # ticks
 Format = Literal["csv", "fits", "campaign"]
@@ -96,10 +98,12 @@ def copied(journal: str, copy: Path, *, progress: Progress) -> list[ChainReport]
         raise InputError(f"journal {place.shown}: is a server's (expected a file; a server's is copied by pg_dump)")
     if os.path.lexists(copy):
         raise InputError(f"{copy}: is there already (expected a new name)")
-    new = copy.with_name(f".{copy.name}.{os.getpid()}.new")
+    folder = copy.with_name(f".{copy.name}.{os.getpid()}.new")  # of its own: SQLite puts a file beside what it makes
+    new = folder / copy.name
     _forget_dead(copy)
     try:
-        with undone_when_interrupted(Unfinished(str(new))):
+        with undone_when_interrupted(Unfinished(str(folder))):
+            folder.mkdir()
             _copy(place.path, new, progress)
             if os.path.lexists(copy):
                 raise FileExistsError(f"{copy.name} has come meanwhile")
@@ -111,8 +115,7 @@ def copied(journal: str, copy: Path, *, progress: Progress) -> list[ChainReport]
             "a damaged one copy the file and its log)"
         ) from problem
     finally:
-        for path in (new, Path(f"{new}-journal")):
-            path.unlink(missing_ok=True)
+        shutil.rmtree(folder, ignore_errors=True)
     with JournalReader(copy) as reader:
         return [check_whole(reader, run.run, progress=progress) for run in reader.runs()]
 
@@ -154,10 +157,10 @@ def _sync(path: Path) -> None:
 
 def _forget_dead(copy: Path) -> None:
     """Remove what a backup to this name left that was killed."""
-    for path in copy.absolute().parent.glob(f".{copy.name}.*.new*"):
+    for path in copy.absolute().parent.glob(f".{glob.escape(copy.name)}.*.new"):
         number = path.name.removeprefix(f".{copy.name}.").partition(".")[0]
         if number.isdecimal() and not Path(f"/proc/{number}").exists() and Path("/proc/self").exists():
-            path.unlink(missing_ok=True)
+            shutil.rmtree(path, ignore_errors=True)
 
 
 # Export --------------------------------------------------------------------------------------------------------------

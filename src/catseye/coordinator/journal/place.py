@@ -213,9 +213,9 @@ class WriterLock:
             except OSError as problem:
                 holder = _holder(os.read(file, 1000))
                 os.close(file)
-                real = "" if str(place.path) == place.shown else f", which is {place.path},"
+                real = "" if str(place.path) == place.shown else f", which is {place.path}"
                 raise InputError(
-                    f"journal {place.shown}:{real} {holder} is writing to it (expected one writer: stop it, or another "
+                    f"journal {place.shown}{real}: {holder} is writing to it (expected one writer: stop it, or another "
                     "file)"
                 ) from problem
             if _same_file(file, self._path):
