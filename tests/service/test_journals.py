@@ -11,6 +11,7 @@ import time
 import numpy as np
 import pytest
 
+from catseye.coordinator.journal.entries import EpochSolution
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.writer import Journal
 from catseye.errors import InputError
@@ -18,7 +19,7 @@ from catseye.gateways.journal.chain import chain_verdict
 from catseye.records.night.live import LiveShot
 from catseye.service.journals import checked, copied
 from catseye.simulator.clock.world_clock import ManualClock
-from cli.living_scene import RUN, SOON
+from cli.living_scene import RUN, SOON, recorded
 from journal_scene import MOST_WAIT, START, scene_answer, scene_entries, scene_run
 from process_scene import ends_with_us
 from repository import TESTS
@@ -89,6 +90,20 @@ def test_a_head_is_looked_for_in_the_run_that_is_named(night):
     path, (first, last) = night
     assert verdict(path, first, run=1).word == "good"
     assert verdict(path, last, run=1).word == "failed"
+
+
+def test_behind_each_epoch_the_head_is_told_to_all_who_subscribe_to_events():
+    """What is in the journal as an event was pushed: in a run of two epochs, and the heads are its chain's."""
+    with JournalReader(recorded()) as reader:
+        entries = list(reader.events(1, kinds=["happenings", "solutions"]))
+    epochs = [seq for seq, entry in entries if isinstance(entry, EpochSolution)]
+    told = [(seq, entry) for seq, entry in entries if getattr(entry, "kind", "") == "journal-head"]
+    assert len(told) == len(epochs) >= 2
+    heads = [entry.details["head"] for _, entry in told]
+    for epoch, (seq, entry), head in zip(epochs, told, heads, strict=True):
+        assert epoch <= int(head.partition(":")[0]) < seq
+        assert entry.text == f"head {head} of run 1"
+    assert verdict(recorded(), *heads).why.endswith(f"which has the {len(heads)} heads that were told")
 
 
 # Chains that were taken away -----------------------------------------------------------------------------------------
