@@ -210,9 +210,10 @@ def exported(
                 f"journal {reader.place}: run {number} is not as it was written: {chain.problems[0]} (expected a "
                 "journal that checks: take its backup, or --damaged to leave out what does not)"
             )
-        if notes and chain.unlinked:  # pages were lost, links among them: what has none was not put in for that
-            notes = (*notes, f"{len(chain.unlinked)} events are in it that lost their links: nothing vouches for them")
-            chain.bad -= chain.unlinked
+        if notes and chain.unvouched:  # pages were lost, links or samples among them: they were not put in for that
+            count = len(chain.unvouched)
+            notes = (*notes, f"{count} events are in it that lost link or samples: nothing vouches for them")
+            chain.bad -= chain.unvouched
         if form == "campaign":
             progress("writing the campaign", 0, 1)
             written = export_campaign(reader, out, run=number, span=span, chain=chain)

@@ -18,6 +18,7 @@ from catseye.coordinator.journal.tables import (
     PARTS,
     RUN_FILES,
     RUNS,
+    SHOTS,
     TEXTS,
     JournalTable,
 )
@@ -43,7 +44,7 @@ class ChainReport:
     problems    one line each: the first 20
     count       of all problems
     bad         events that are not as they were written, or cannot be read
-    unlinked    of those, that have no link: put in, or robbed of it, or it was lost
+    unvouched   of those, that have no link, or no samples: put in, robbed of them, or pages were lost
     ended_ticks when, by the run's record
     first       the first event from which on something is wrong; None where nothing is
     head        the last link; None without a chain
@@ -60,7 +61,7 @@ class ChainReport:
     problems: list[str] = field(default_factory=list)
     count: int = 0
     bad: set[int] = field(default_factory=set)
-    unlinked: set[int] = field(default_factory=set)
+    unvouched: set[int] = field(default_factory=set)
     first: int | None = None
     ended_ticks: int | None = None
     head: Head | None = None
@@ -111,7 +112,7 @@ def check_whole(
         del whole.problems[MOST_TOLD:]
         whole.count += report.count
         whole.bad |= report.bad
-        whole.unlinked |= report.unlinked
+        whole.unvouched |= report.unvouched
         firsts = [first for first in (whole.first, report.first) if first is not None]
         whole.first = min(firsts) if firsts else None
         whole.events, whole.heads = whole.events + report.events, whole.heads + report.heads
@@ -386,7 +387,7 @@ def _link(
     if link is None:
         if rows:
             report.wrong(seq, f"event {seq} has no link: it was put in, or its link was taken out", bad=True)
-            report.unlinked.add(seq)
+            report.unvouched.add(seq)
         return ()
     if report.ended:
         report.wrong(seq, f"event {seq} stands behind the run's end", bad=True)
@@ -404,6 +405,8 @@ def _link(
     ):  # without the one before nothing can be said, which has been told
         what = "the end" if kind == LinkKind.END.value else f"event {seq}"
         report.wrong(seq, f"{what} is not what was written, or its link is not", bad=True)
+        if {table.name for table, _ in rows} == {SHOTS.name}:
+            report.unvouched.add(seq)
     return (link,) if link in wanted else (link, *wanted[:1])
 
 
