@@ -154,7 +154,7 @@ def test_a_run_of_an_older_catseye_is_still_that_in_a_journal_that_went_on(tmp_p
     assert verdict(path).word == "failed"
 
 
-@pytest.mark.parametrize("value", ["'zzz'", "x'ff00'", "-5", "5.5"])
+@pytest.mark.parametrize("value", ["'zzz'", "x'ff00'", "-5", "5.5", str(10**15), str(2**63 - 1)])
 @pytest.mark.parametrize("table", ["chain", "postures"])
 def test_a_row_by_a_number_that_no_event_has_hides_nothing(night, table, value):
     """Text and bytes stand above all numbers: the highest of a table is then none, and a killed run seems empty."""

@@ -7,7 +7,7 @@ from hashlib import sha256
 from sqlalchemy import Connection, func, select
 
 from catseye.coordinator.journal.chain import Head, LinkKind, event_cells, link_of, run_link
-from catseye.coordinator.journal.reader import PIECE, JournalReader, highest_seq
+from catseye.coordinator.journal.reader import PIECE, JournalReader, highest_seq, next_seq
 from catseye.coordinator.journal.rows import MOST_WHOLE
 from catseye.coordinator.journal.tables import (
     BUFFERS,
@@ -145,10 +145,10 @@ def check_run(
     elif stored is not None and first != stored:
         report.wrong(0, "the run's own record, or the list of its files, is not what was written")
     _files(reader, report)
-    _numbers(reader, report)
+    last = min(last or 0, _numbers(reader, report))
     before, at = tuple(link for link in (first, stored) if link is not None), 0
     links = {} if first is None else {0: first}
-    for seq, kind, link, rows in _links(reader, report, last or 0, progress):
+    for seq, kind, link, rows in _links(reader, report, last, progress):
         if kind == LinkKind.PART.value and at == 0 and link is not None:
             report.begins = seq, link
             before = ()
@@ -208,8 +208,12 @@ def _unheld(report: ChainReport, heads: Sequence[Head]) -> None:
         report.wrong(head.seq, f"head {head} was told, and the run has no chain")
 
 
-def _numbers(reader: JournalReader, report: ChainReport) -> None:
-    """Rows whose numbers no event has: text, bytes, or below the first."""
+def _numbers(reader: JournalReader, report: ChainReport) -> int:
+    """The highest number that an event of the file can have; rows whose numbers none has are problems.
+
+    Text, bytes, a number below the first, or far above the last.
+    """
+    most = min(MOST_WHOLE, max(0, _begin(reader, report.run)) + reader.most_events)
     for table in (*STORED, CHAIN):
         seq, least = table.c.seq, 0 if table is CHAIN else 1
         try:
@@ -218,11 +222,17 @@ def _numbers(reader: JournalReader, report: ChainReport) -> None:
                 if connection.dialect.name == "sqlite":
                     strange |= seq > MOST_WHOLE
                 row = connection.execute(select(seq).where(table.c.run == report.run, strange).limit(1)).first()
+                far = select(seq).where(table.c.run == report.run, seq > most, seq <= MOST_WHOLE).limit(PIECE)
+                beyond = [int(str(each).partition(".")[0]) for each in connection.scalars(far)]
         except InputError as problem:
             report.wrong(0, f"table {table.name!r} cannot be read: {problem}")
             continue
         if row is not None:
             report.wrong(0, f"a row of {table.name!r} has the number {row[0]!r}, which no event has: it was put in")
+        for each in beyond:
+            text = f"event {each} is beyond what the file can hold (at most {most}): it was put in"
+            report.wrong(each, text, bad=True)
+    return most
 
 
 def held_by(reader: JournalReader, run: int, head: Head) -> bool:
@@ -251,11 +261,14 @@ def _heads(report: ChainReport, heads: Sequence[Head], links: Mapping[int, bytes
 
 
 def _begin(reader: JournalReader, run: int) -> int:
-    """Seq of the link with which a later file of a run begins; -1 of the first file."""
-    with reader.reading() as connection:
-        seq = connection.scalar(
-            select(CHAIN.c.seq).where(CHAIN.c.run == run, CHAIN.c.kind == LinkKind.PART.value).limit(1)
-        )
+    """Seq of the link with which a later file of a run begins; -1 of the first file, or where it cannot be read."""
+    try:
+        with reader.reading() as connection:
+            first = select(CHAIN.c.seq, CHAIN.c.kind).where(CHAIN.c.run == run, CHAIN.c.seq > 0)
+            row = connection.execute(first.order_by(CHAIN.c.seq).limit(1)).first()
+    except InputError:
+        return -1
+    seq = None if row is None or row.kind != LinkKind.PART.value else row.seq
     return seq if isinstance(seq, int) else -1
 
 
@@ -335,7 +348,30 @@ def _links(
     reader: JournalReader, report: ChainReport, last: int, progress: Progress
 ) -> Iterator[tuple[int, str, bytes | None, Stored]]:
     """Each number's kind ("" without a link), link and rows, in order; what cannot be read is noted and passed over."""
-    spans = [(at, min(at + PIECE, last)) for at in range(0, last, PIECE)][::-1]
+    at = 0
+    while at < last:
+        upto, empty = min(at + PIECE, last), True
+        for found in _span(reader, report, at, upto):
+            empty = False
+            yield found
+        progress("events", upto, last)
+        at = max(upto, _next(reader, report.run, upto) - 1) if empty else upto  # a number may be far above the others
+
+
+def _next(reader: JournalReader, run: int, after: int) -> int:
+    """The first number behind one that any row has; the one behind it where that cannot be read."""
+    try:
+        with reader.reading() as connection:
+            return next_seq(connection, (*STORED, CHAIN), run, after)
+    except InputError:
+        return after + 1
+
+
+def _span(
+    reader: JournalReader, report: ChainReport, first: int, last: int
+) -> Iterator[tuple[int, str, bytes | None, Stored]]:
+    """Those between two numbers; what cannot be read is looked for by halves."""
+    spans = [(first, last)]
     while spans:
         after, upto = spans.pop()
         try:
@@ -349,7 +385,6 @@ def _links(
                 yield upto, "", None, []
             continue
         yield from piece
-        progress("events", upto, last)
 
 
 def _piece(reader: JournalReader, run: int, after: int, upto: int) -> list[tuple[int, str, bytes | None, Stored]]:

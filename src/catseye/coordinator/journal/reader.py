@@ -12,7 +12,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from catseye.coordinator.journal.cells import check_cells, damaged, json_object
 from catseye.coordinator.journal.entries import AnsweredShot, Entry, EpochSolution
-from catseye.coordinator.journal.place import place_of, reading_engine, refuse_foreign, refused
+from catseye.coordinator.journal.place import bytes_of, place_of, reading_engine, refuse_foreign, refused
 from catseye.coordinator.journal.rows import MOST_WHOLE, StoredRow, entry_of, unpack
 from catseye.coordinator.journal.tables import (
     BUFFERS,
@@ -28,6 +28,7 @@ from catseye.coordinator.journal.tables import (
 from catseye.errors import InputError
 from catseye.records.site.folder import SiteFolder, read_site
 
+LINK_BYTES = 40  # at least, of a row of the chain
 PIECE = 512  # events read at once: 8 MB where each is a buffer
 Kind = Literal["shots", "weather", "postures", "commands", "happenings", "solutions", "documents"]
 
@@ -141,8 +142,12 @@ class JournalReader:
         for stop in (*stops, last + 1):
             while after < stop - 1:
                 upto = min(after + PIECE, stop - 1)
-                yield from self._piece(run, after, upto, tables, buffers)
+                piece = self._piece(run, after, upto, tables, buffers)
+                yield from piece
                 after = upto
+                if not piece:  # a number may be far above the others
+                    with self.reading() as connection:
+                        after = min(stop - 1, next_seq(connection, tables, run, upto) - 1)
             after = stop
 
     def shots(self, run: int, *, buffers: bool = True) -> Iterator[tuple[int, AnsweredShot]]:
@@ -160,6 +165,11 @@ class JournalReader:
     def last(self, run: int) -> int:
         """The seq of a run's last event; 0 of none."""
         return max(part._own_last(run) for part in self.parts(run))
+
+    @property
+    def most_events(self) -> int:
+        """How many events this file can hold at most: each has a link, of 32 bytes and its row's head."""
+        return MOST_WHOLE if self._where.path is None else bytes_of(self._where) // LINK_BYTES
 
     def _own_last(self, run: int) -> int:
         with self.reading() as connection:
@@ -295,6 +305,18 @@ def highest_seq(connection: Connection, table: JournalTable, run: int) -> int:
         select(seq).where(table.c.run == run, seq <= MOST_WHOLE).order_by(seq.desc()).limit(1)
     )
     return int(highest) if isinstance(highest, int | float) else 0
+
+
+def next_seq(connection: Connection, tables: Sequence[JournalTable], run: int, after: int) -> int:
+    """The lowest number above one that a run's rows in some tables have; above all of them where there is none."""
+    found = []
+    for table in tables:
+        seq = table.c.seq
+        lowest: object = connection.scalar(
+            select(seq).where(table.c.run == run, seq > after, seq <= MOST_WHOLE).order_by(seq).limit(1)
+        )
+        found.append(int(lowest) if isinstance(lowest, int | float) else MOST_WHOLE)
+    return max(after + 1, min(found, default=MOST_WHOLE))
 
 
 def _is(run: StoredRun, which: int | str) -> bool:
