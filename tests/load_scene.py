@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from catseye.clock import SystemClock
 from catseye.constants import TWO_PI
 from catseye.coordinator.link.settings import Address
 from catseye.coordinator.parts import TICKS_PER_SECOND, PlannedShot, Round
@@ -23,7 +24,6 @@ from catseye.ranger.line import nanoseconds_to_ticks
 from catseye.records.night.live import TICKS_PER_DAY
 from catseye.records.site.folder import REFERENCE, SiteFolder, read_site
 from catseye.records.site.target import TargetRow
-from catseye.simulator.clock.world_clock import SystemClock
 from process_scene import ends_with_us
 from repository import ROOT
 

@@ -209,6 +209,18 @@ SOURCES: dict[str, Source] = {
         locator="doi:10.1109/34.88573",
         used="the sign that keeps the rotation proper, and the scale",
     ),
+    "MILLS10": Source(
+        title="D. Mills, J. Martin, J. Burbank, W. Kasch, Network Time Protocol Version 4: Protocol and Algorithms "
+        "Specification, Internet Engineering Task Force, 2010",
+        locator="RFC 5905",
+        used="section 10, the clock filter; section 11.2, selection and combination (`coordinator.link.clock_watch`, "
+        "`coordinator.guard.clocks`)",
+    ),
+    "SQLITE24": Source(
+        title="D. R. Hipp and others, Database File Format, SQLite documentation, 2024",
+        locator="sqlite.org, fileformat2",
+        used="sections 1.3, 1.6, 2.1 and 4.1: header, pages, records, log (`coordinator.journal.recovery`)",
+    ),
     "PELZER71": Source(
         title="H. Pelzer, Zur Analyse geodätischer Deformationsmessungen, 1971",
         locator="Deutsche Geodätische Kommission, Reihe C, Heft 164, München",

@@ -128,3 +128,121 @@ def test_a_shot_stamped_long_ago_or_of_the_future_is_not_used_and_told_and_spoil
         assert f"ZY101: a shot's stamp is {off:+.1f} s from now" in told[0].text
 
     asyncio.run(story())
+
+
+# A jump of our clock -------------------------------------------------------------------------------------------------
+
+
+class Forgetful:
+    """A reduction that uses every shot, and writes down corrections; solving waits until it may."""
+
+    failed = ""
+
+    def __init__(self):
+        self.corrected, self.taken = [], []
+
+    def shot(self, shot):
+        raise InputError("no such line")
+
+    def clock_corrected(self, ticks):
+        self.corrected.append(ticks)
+
+    def begin(self, ticks):
+        return ticks
+
+    def take_in(self, job, epoch):
+        self.taken.append(job)
+        return {"number": 1}
+
+
+def shot_at(seconds):
+    ticks = ticks_now(CLOCK) + round(seconds * TICKS_PER_SECOND)
+    return LiveShot("ZY101", "TR01-B", ticks, 128, 64, 1000, 1e-4, None)  # 0.128 s long
+
+
+def jumping(told, journal=None, solver=None):
+    live, judged = Forgetful(), []
+    log = EventLog("journal", CLOCK, told.append)
+    intake = Intake(
+        live, journal or SlowJournal(), judged=judged.append, publish=None, event_log=log, clock=CLOCK, solver=solver
+    )
+    return intake, live, judged
+
+
+@pytest.mark.parametrize(
+    ("seconds", "used"), [(-10.2, True), (-10.1, False), (-9.0, False), (-5.1, False), (-4.9, True)]
+)
+def test_a_shot_any_part_of_which_lies_across_a_jump_is_not_used(seconds, used):
+    async def story():
+        told = []
+        intake, _, judged = jumping(told)
+        ticks = ticks_now(CLOCK)
+        intake.clock_jumped(ticks - round(10.0 * TICKS_PER_SECOND), ticks - round(5.0 * TICKS_PER_SECOND))
+        intake.take(shot_at(seconds))
+        intake.flush()
+        assert len(judged) == used
+        assert [what.kind for what in told] == ([] if used else ["stamp-across-jump"])
+
+    asyncio.run(story())
+
+
+def test_while_a_jump_is_not_judged_no_later_shot_is_used():
+    async def story():
+        told = []
+        intake, _, judged = jumping(told)
+        intake.take(shot_at(-0.4))  # has come before: it is fed first
+        intake.clock_jumped(ticks_now(CLOCK), None)
+        intake.take(shot_at(-0.1))
+        intake.take(shot_at(0.3))
+        intake.flush()
+        assert [answered.shot.ticks for answered in judged] == [shot_at(-0.4).ticks]
+
+    asyncio.run(story())
+
+
+def test_a_clock_set_back_by_an_hour_refuses_no_shot_of_the_hour_and_the_journal_says_when():
+    clock = ManualClock(60_635.125)
+
+    async def story():
+        journal, live, judged = SlowJournal(), Forgetful(), []
+        log = EventLog("journal", clock, lambda said: None)
+        intake = Intake(live, journal, judged=judged.append, publish=None, event_log=log, clock=clock)
+        ahead = ticks_now(clock) + round(0.3 * TICKS_PER_SECOND)
+        intake.take(LiveShot("ZY101", "TR01-B", ahead, 128, 64, 1000, 1e-4, None))
+        intake.flush()
+        clock._now -= 3600 * 10**9
+        now = ticks_now(clock)
+        intake.clock_corrected(-3600.0)
+        intake.take(LiveShot("ZY101", "TR01-B", now, 128, 64, 1000, 1e-4, None))
+        intake.flush()
+        assert [answered.shot.ticks for answered in judged] == [ahead, now]
+        assert live.corrected == [now]
+        document = journal.given[1]
+        assert (document.ticks, document.name, document.text) == (now, "clock-corrected", '{"gained_s": -3600.0}')
+
+    asyncio.run(story())
+
+
+def test_an_epoch_that_was_being_solved_when_the_clock_was_corrected_is_not_taken_in():
+    async def story():
+        told, journal, going = [], SlowJournal(), asyncio.Event()
+
+        async def solver(job):
+            await going.wait()
+            return "an epoch"
+
+        intake, live, _ = jumping(told, journal, solver)
+        intake.take(shot_at(-0.2))
+        solving = asyncio.ensure_future(intake.solve(ticks_now(CLOCK)))
+        await asyncio.sleep(0.0)
+        intake.clock_corrected(10.0)
+        going.set()
+        assert await solving is None
+        assert live.taken == []
+        assert [(what.kind, what.severity) for what in told] == [("not-solved", "warning")]
+        assert "the clock was corrected meanwhile" in told[0].text
+        names = [getattr(entry, "name", type(entry).__name__) for entry in journal.given]
+        assert names == ["AnsweredShot", "epoch-begun", "clock-corrected", "EpochSolution"]
+        assert journal.given[-1].answer == {}
+
+    asyncio.run(story())

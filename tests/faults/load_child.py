@@ -14,10 +14,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
 
+from catseye.clock import SystemClock
 from catseye.ranger.server import LOOPBACK
 from catseye.service.warm import WarmingClock, warm
 from catseye.service.world import TwinWords, twin_heads
-from catseye.simulator.clock.world_clock import SystemClock
 from catseye.simulator.twin.faults import FaultBoard
 from catseye.simulator.twin.feed import SiteFeed
 from catseye.simulator.twin.servers import TwinSite

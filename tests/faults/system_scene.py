@@ -12,6 +12,7 @@ from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from catseye.clock import SystemClock
 from catseye.coordinator.clients.samplers import rows_of
 from catseye.coordinator.clients.server import PUSHED
 from catseye.coordinator.journal.reader import JournalReader
@@ -21,7 +22,6 @@ from catseye.ranger.addresses import ranger_addresses
 from catseye.records.site.folder import read_site
 from catseye.reduction.live.live import Live
 from catseye.service.settings import live_settings
-from catseye.simulator.clock.world_clock import SystemClock
 from cli.living_scene import PATIENCE, RUN, smallest_site
 from process_scene import ends_with_us
 

@@ -8,9 +8,9 @@ import signal
 
 import pytest
 
+from catseye.clock import SystemClock
 from catseye.coordinator.clients.server import ZiyServer
 from catseye.ranger.server import LOOPBACK, ZyServer
-from catseye.simulator.clock.world_clock import SystemClock
 from catseye.simulator.twin.feed import SiteFeed
 from coordinator.ziy_scene import Site
 from process_scene import ends_with_us

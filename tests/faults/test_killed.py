@@ -8,8 +8,10 @@ import os
 import random
 import select
 import signal
+import subprocess
 import time
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -17,10 +19,12 @@ import pytest
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.writer import PATIENCE as PATIENCE_OF_JOURNAL
 from catseye.coordinator.journal.writer import Journal
+from catseye.service.journals import checked
 from catseye.simulator.clock.world_clock import ManualClock
-from cli.living_scene import PATIENCE, small_site, started
+from cli.living_scene import PATIENCE, RUN, small_site, started
 from faults.system_scene import GROUPS, RANGERS, free_base, living_site, replays, stretches, told_of
 from journal_scene import PostgresServer, scene_run
+from process_scene import ends_with_us
 
 UP = 5.0  # s from a coordinator's start until all rangers that stayed are ready again, the issue's
 
@@ -92,6 +96,25 @@ class Killer:
         self.site.measuring(GROUPS[name])
         self._noted("ranger acknowledged", time.monotonic() - node.began)
 
+    def backup(self):
+        """A copy under way: there is none under its name, or a whole one; the next one ends while shots go on."""
+        copy = Path(self.site.journal).with_name("copy.db")
+        words = [*RUN, "journal", "backup", str(self.site.journal), str(copy), "--quiet"]
+        process = subprocess.Popen(words, preexec_fn=ends_with_us())
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(self.draw.uniform(0.0, 2.5))
+        process.kill()
+        process.wait(PATIENCE)
+        if copy.exists():
+            assert_checks(copy)
+            copy.unlink()
+        since = time.monotonic()
+        subprocess.run(words, check=True, timeout=PATIENCE)
+        self._noted("backup", time.monotonic() - since)
+        assert_checks(copy)
+        copy.unlink()
+        assert not list(copy.parent.glob(".copy.db*"))  # what the killed one left is gone
+
     def database(self):
         self._a_while()
         self.server.kill()
@@ -122,8 +145,22 @@ def ready(heard):
     return {line[3] for line in heard.lines if line[1:2] == ("EVENT",) and line[4] == "ready"}
 
 
+def assert_checks(place, heads=(), run=None):
+    """Each event of a journal is as it was written, and each head that was told is in its chain."""
+    reports, _ = checked(str(place), run, heads, None, progress=lambda *_: None)
+    assert [report.problems for report in reports] == [[]] * len(reports)
+    assert sum(report.heads for report in reports) == len(heads)
+
+
+def heads_of(heard):
+    """Heads of the chain that a coordinator told behind its epochs."""
+    told = [line[5] for line in heard.lines if line[1] == "EVENT" and line[4] == "journal-head"]
+    return [text.split()[1] for text in told]
+
+
 def assert_nothing_lost(place, heard):
-    """What each coordinator pushed is in its run as it was pushed; each shot is there once and whole; runs replay.
+    """What each coordinator pushed is in its run as it was pushed; each shot is there once and whole; runs replay, and
+    their chains check, with each head that was told before a kill.
 
     Returns shots acknowledged, shots in the journal, runs, epochs replayed.
     """
@@ -134,6 +171,7 @@ def assert_nothing_lost(place, heard):
         for each in heard:
             if each.lines:
                 assert stretches(each.lines, told_of(reader, runs[each.pid].run)), f"run {runs[each.pid].run}"
+                assert_checks(place, heads_of(each), runs[each.pid].run)
             acknowledged += len(each.shots)
         for run in runs.values():
             shots = [entry.shot for _, entry in reader.shots(run.run)]
@@ -172,7 +210,7 @@ def killed(place, folder, kinds, seed, server=None, longest=1.5):
 
 def test_coordinator_and_rangers_killed_at_any_moment_lose_and_double_nothing(tmp_path):
     times, (acknowledged, stored, runs, _) = killed(
-        tmp_path / "j.db", tmp_path, ["coordinator", "ranger", "starting_coordinator"], seed=1
+        tmp_path / "j.db", tmp_path, ["coordinator", "ranger", "backup", "starting_coordinator"], seed=1
     )
     assert runs in (3, 4)  # the one killed while it started may have begun a run
     assert 12 <= acknowledged <= stored
@@ -223,8 +261,8 @@ def test_a_site_that_is_killed_leaves_no_twin(tmp_path):
         os.close(gone)
 
 
-# a hundred kills each: one that hits a coordinator while it starts comes behind one that made it start
-OF_A_FILE = {"coordinator": 25, "starting_coordinator": 20, "ranger": 35}
+# more than two hundred kills: one that hits a coordinator while it starts comes behind one that made it start
+OF_A_FILE = {"coordinator": 25, "starting_coordinator": 20, "ranger": 35, "backup": 20}
 OF_A_SERVER = {"coordinator": 10, "starting_coordinator": 5, "ranger": 10, "database": 40, "outage": 5, "backend": 25}
 
 

@@ -135,6 +135,11 @@ class Firing:
         """Lines that are left alone."""
         return self.suspensions.lines(now) | self._misfits.lines(now)
 
+    def clock_corrected(self) -> None:
+        """Forget when lines were to rest until, and when references were shot: the clock was corrected."""
+        self.suspensions, self._misfits = Suspensions(), Suspensions()
+        self.references.clear()
+
     # Inside ---------------------------------------------------------------------------------------------------------
 
     def _free(self, ranger: str, now: int) -> bool:

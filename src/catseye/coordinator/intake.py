@@ -5,6 +5,7 @@ posture are dropped, shots that were on their way wait in line, and nothing is a
 """
 
 import asyncio
+import json
 from collections import deque
 from collections.abc import Awaitable, Callable
 from concurrent.futures import Future
@@ -12,7 +13,15 @@ from dataclasses import replace
 from functools import partial
 
 from catseye.coordinator.event_log import EventLog
-from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Document, Entry, EpochSolution, SentCommand
+from catseye.coordinator.journal.entries import (
+    CLOCK_CORRECTED,
+    EPOCH_BEGUN,
+    AnsweredShot,
+    Document,
+    Entry,
+    EpochSolution,
+    SentCommand,
+)
 from catseye.coordinator.journal.protocol import JournalWriter, NotDurable
 from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, ticks_now
 from catseye.errors import CatseyeError, InputError
@@ -62,6 +71,8 @@ class Intake:
         self._arrived: list[Incoming] = []
         self._timer: asyncio.TimerHandle | None = None
         self._last: dict[str, int] = {}  # stamp of each ranger's last shot
+        self._across: tuple[int, int | None] | None = None  # ticks across which our clock jumped, None: not over yet
+        self._corrections = 0  # of our clock
         self._held: deque[tuple[Entry, ...]] = deque()  # given to the reduction, and not yet taken by the journal
         self._late: list[tuple[Entry, ...]] = []  # taken by the journal, and not durable when they should have been
         self._fresh = 0  # shots since the last solution
@@ -123,16 +134,35 @@ class Intake:
             return None
         self._fresh, self._solving = 0, True
         self._write((Document(ticks, EPOCH_BEGUN, ""),))
+        corrections = self._corrections
         try:
             epoch = await self._solver(job)
         finally:
             self._solving = False
         self.flush()
-        answer = self._live.take_in(job, epoch)
+        stale = corrections != self._corrections
+        answer = None if stale else self._live.take_in(job, epoch)
         self._write((EpochSolution.of(ticks, answer),))
         if answer is None:
-            self._event_log.tell("not-solved", f"the epoch was not solved: {self._live.failed}", "alarm")
+            why = "the clock was corrected meanwhile" if stale else self._live.failed
+            self._event_log.tell("not-solved", f"the epoch was not solved: {why}", "warning" if stale else "alarm")
         return answer
+
+    def clock_jumped(self, since: int, until: int | None) -> None:
+        """Believe no shot whose buffer lies between two ticks, or from the first on while the second is None."""
+        self.flush()
+        self._across = since, until
+
+    def clock_corrected(self, seconds: float) -> None:
+        """Our clock gained so many s at once: what was stamped later than now is forgotten, in a replay too."""
+        if self._clock is None:
+            return
+        self.flush()
+        now = ticks_now(self._clock)
+        self._corrections += 1
+        self._last = {ranger: ticks for ranger, ticks in self._last.items() if ticks <= now}
+        self._live.clock_corrected(now)
+        self._write((Document(now, CLOCK_CORRECTED, json.dumps({"gained_s": seconds})),))
 
     def _fed(self, item: Incoming) -> Entry | None:
         """The reduction has it now; what the journal is to have."""
@@ -150,6 +180,13 @@ class Intake:
             if not -OLDEST <= off <= FUTURE:
                 text = f"{shot.ranger}: a shot's stamp is {off:+.1f} s from now: its clock, or ours, is wrong: not used"
                 self._event_log.tell("stamp-off", text, "alarm", about=shot.ranger, offset_s=off)
+                return None
+        if self._across is not None:
+            since, until = self._across
+            end = shot.ticks + round(shot.cycles / shot.if_hz * TICKS_PER_SECOND)
+            if end >= since and (until is None or shot.ticks <= until):
+                text = f"{shot.ranger}: a shot lies across a jump of this machine's clock: not used"
+                self._event_log.tell("stamp-across-jump", text, "warning", about=shot.ranger)
                 return None
         last = self._last.get(shot.ranger, -1)
         if shot.ticks <= last:  # a clock that was set back; a journal has each shot once

@@ -7,11 +7,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.clock import Clock
 from catseye.constants import SECONDS_PER_DAY
 from catseye.ranger.line import Reply, Request
 from catseye.ranger.network import ConnectionMaker
 from catseye.records.night.live import TICKS_PER_DAY, Happening, LivePosture
-from catseye.simulator.clock.world_clock import Clock
 
 TICKS_PER_SECOND = TICKS_PER_DAY / SECONDS_PER_DAY
 

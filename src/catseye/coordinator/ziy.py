@@ -8,6 +8,7 @@ import asyncio
 from collections.abc import Callable, Coroutine, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 
 from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.feed import FeedClient, FeedSettings, MotionScript, play
@@ -120,7 +121,8 @@ class Coordinator:
         self.links = self._linked(addresses, commands, environment)
         self.host_clock = HostClock(self.links, clock, EventLog("coordinator", clock, self.tell))
         for link in self.links.values():
-            link.host_believed = lambda: self.host_clock.believed
+            link.host_believed = partial(self.host_clock.may_set, link)
+        self.host_clock.jumped, self.host_clock.corrected = self.intake.clock_jumped, self._clock_corrected
         self.firing = Firing(
             site,
             self.links,
@@ -223,6 +225,14 @@ class Coordinator:
         self.intake.flush()
         with suppress(InputError):  # what could not be written has been told
             await asyncio.to_thread(self._journal.close)
+
+    def _clock_corrected(self, seconds: float) -> None:
+        """Our clock was corrected: what any part keeps by it is looked at anew."""
+        self.intake.clock_corrected(seconds)
+        self.firing.clock_corrected()
+        self.posture = None
+        for link in self.links.values():
+            link.clock_corrected(seconds)
 
     # Rounds ---------------------------------------------------------------------------------------------------------
 

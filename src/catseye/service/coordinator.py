@@ -19,7 +19,7 @@ from catseye.coordinator.guard.guard import SafetyGuard
 from catseye.coordinator.journal.chain import Head
 from catseye.coordinator.journal.disk import EVERY as DISK_EVERY
 from catseye.coordinator.journal.disk import DiskWatch
-from catseye.coordinator.journal.entries import Run
+from catseye.coordinator.journal.entries import Entry, EpochSolution, Run
 from catseye.coordinator.journal.writer import Journal, JournalSettings
 from catseye.coordinator.link.settings import Address
 from catseye.coordinator.modes import Mode
@@ -146,8 +146,8 @@ class LiveCoordinator:
     peers     rangers and feed
     seed      of a simulated site, for the journal
     virtual   its loop's time is not the machine's; epochs are solved in a thread then, time stands still meanwhile
-    tell      told of the journal at once, by any thread: its trouble ("journal"), and its chain's head at each epoch
-              and at the end ("journal-head")
+    tell      told of the journal at once, by any thread: its trouble ("journal"), and its chain's last head at the end
+              ("journal-head"); heads of epochs are events like others
 
     Raises InputError: a file or a journal that cannot be used, a ranger that is not there.
     """
@@ -176,6 +176,8 @@ class LiveCoordinator:
         plan = replace(RoundSettings(), period=orders.round_s, settle=SETTLE)
         self.planner = RoundPlanner(site, keep_clear=keep_clear, solids=solids, settings=plan)
         self.guard = SafetyGuard(site, keep_clear=keep_clear, interlocks=locks)
+        self._tell = tell
+        self._run = 0  # its number in the journal
         self._journal = self._opened(clock, seed, virtual, tell)
         self._solver = None if virtual else SolverProcess(self.live.site)
         self.ziy = Coordinator(
@@ -197,6 +199,7 @@ class LiveCoordinator:
         self._certificates: dict[str, Certificate] = {
             str(file): record for file, record in files.items() if file is not None and record is not None
         }
+        self.ziy.listeners.append(self._tell_head)
         for name in orders.drop:
             self.ziy.firing.dropped.add(name)
             self.ziy.links[name].wanted = "hold"
@@ -220,8 +223,8 @@ class LiveCoordinator:
             ),
             on_alarm=lambda text: tell("journal", text, "alarm"),
             on_recovery=lambda text: tell("journal", text, "note"),
-            on_head=lambda head: tell("journal-head", f"head {head} of run {journal.run}", "note"),
         )
+        self._run = journal.run
         return WaitingJournal(journal) if virtual else journal
 
     async def _start_solver(self, solver: SolverProcess) -> None:
@@ -233,6 +236,18 @@ class LiveCoordinator:
     def journal_head(self) -> Head | None:
         """The head of the journal's chain; None without a journal."""
         return self._journal.head
+
+    @property
+    def journal_end(self) -> str | None:
+        """Where the journal's chain ends, in a line to be kept elsewhere; None without a journal."""
+        head = self.journal_head
+        return None if head is None else f"head {head} of run {self._run}"
+
+    def _tell_head(self, entry: Entry) -> None:
+        """The chain's head behind each epoch, to the log and all who subscribe: kept elsewhere, it vouches for all."""
+        if isinstance(entry, EpochSolution) and self.journal_end is not None:
+            log = EventLog("journal", self.ziy.clock, self.ziy.tell)
+            log.tell("journal-head", self.journal_end, head=str(self.journal_head), run=float(self._run))
 
     def _tell_expired(self) -> None:
         """Certificates that are not valid today: measured with all the same, and told."""
@@ -292,6 +307,8 @@ class LiveCoordinator:
             if self._journal is not None:
                 with suppress(InputError):  # what could not be written has been told
                     await asyncio.to_thread(self._journal.close)
+            if self.journal_end is not None:
+                self._tell("journal-head", f"{self.journal_end}, its last", "note")
 
 
 def _load_kernel() -> None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from catseye.clock import Clock
 from catseye.errors import CatseyeError, InputError
 from catseye.ranger.addresses import PORT_BASE, Address, Addresses, feed_address
 from catseye.ranger.door import USUAL_DOOR, Door
@@ -19,7 +20,6 @@ from catseye.ranger.network import ConnectionMaker, SocketListener, Sockets
 from catseye.ranger.ranger import Ranger
 from catseye.records.site.folder import SiteFolder
 from catseye.service.warm import WarmingClock, warm
-from catseye.simulator.clock.world_clock import Clock
 from catseye.simulator.twin.faults import FaultBoard
 from catseye.simulator.twin.feed import SiteFeed
 from catseye.simulator.twin.servers import TwinSite

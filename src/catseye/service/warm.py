@@ -8,6 +8,7 @@ import asyncio
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+from catseye.clock import Clock
 from catseye.coordinator.guard.guard import SafetyGuard
 from catseye.coordinator.link.preparation import Preparation
 from catseye.errors import InputError
@@ -19,7 +20,6 @@ from catseye.ranger.sun_watch import sun_leaves
 from catseye.records.night.live import LivePosture
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.site.places import places_of
-from catseye.simulator.clock.world_clock import Clock
 
 BEFORE = 300.0  # s before the start, when the rangers are powered on
 STEP = 0.05  # s between two looks at a ranger that is busy

@@ -3,10 +3,10 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
+from catseye.clock import Clock, SystemClock
 from catseye.coordinator.visibility.vantage import pace_by
 from catseye.errors import InputError
 from catseye.records.site.folder import SiteFolder
-from catseye.simulator.clock.world_clock import Clock, SystemClock
 from catseye.simulator.twin.conditions import DEWY_NIGHT, LIVING_NIGHT, WINDY_DAY
 from catseye.simulator.twin.faults import Fault, FaultBoard
 from catseye.simulator.twin.head import HeadBuild, TwinHead

@@ -74,3 +74,19 @@ def test_what_cannot_be_exported_is_refused_and_nothing_is_written(catseye, tmp_
     assert (code, out) == (status, "")
     assert said in " ".join(err.split())
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_left_of_a_cut_journal_is_exported_when_asked(catseye, tmp_path):
+    """Refused in one line, and with --damaged what is left, doubtful; beside --out nothing stays."""
+    raw = recorded().read_bytes()
+    cut = tmp_path / "cut.db"
+    cut.write_bytes(raw[: len(raw) * 2 // 3])
+    words = ["--to", "csv", "--out", tmp_path / "out", "--json"]
+    status, out, err = catseye("export", cut, *words)
+    assert (status, out, err.count("\n")) == (1, "", 1)
+    status, said, err = catseye("export", cut, *words, "--damaged")
+    told = json.loads(said)
+    assert (status, err, told["verdict"]["word"]) == (0, "", "doubtful")
+    assert "cut.db is damaged" in told["notes"][0]
+    assert len(rows(tmp_path / "out", "shots")) == told["rows"]["shots"] > 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cut.db", "out"]

@@ -7,6 +7,7 @@ import socket
 import pytest
 
 from catseye.coordinator.journal.reader import JournalReader
+from catseye.service.journals import checked
 from cli.living_scene import PATIENCE, ended, small_site, started
 
 
@@ -80,7 +81,11 @@ def test_it_measures_with_rangers_of_another_process_and_ends_clean(tmp_path):
             assert "HELLO This is ZIY" in heard[0]
             assert heard[2].split("\t")[2].startswith("STATUS 1, hold")
             status, out, _ = ended(process, signal.SIGTERM)
-            assert (status, out) == (0, "")
+            assert status == 0
+            last = out.partition(": head ")[2].partition(" of run 1")[0]
+            assert out == f"journal {tmp_path / 'night.db'}: head {last} of run 1\n"
+            reports, _ = checked(str(tmp_path / "night.db"), None, [last], None, progress=lambda *_: None)
+            assert (reports[0].intact, reports[0].ended, reports[0].heads) == (True, True, 1)
         assert ended(twin, signal.SIGTERM)[0] == 0
     with JournalReader(tmp_path / "night.db") as reader:
         assert reader.run().ended is not None

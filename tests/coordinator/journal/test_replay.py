@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Document, EpochSolution
+from catseye.coordinator.journal.entries import CLOCK_CORRECTED, EPOCH_BEGUN, AnsweredShot, Document, EpochSolution
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.replay import replay
 from catseye.coordinator.journal.sameness import Sameness
@@ -210,6 +210,30 @@ def test_shots_that_came_while_an_epoch_was_solved_belong_to_the_next(tmp_path):
     assert [replayed.same for replayed in found] == [True] * 3
     assert (rest.shots.count, rest.same) == (1, True)
     assert [replayed.new.answer["shots"] for replayed in found] == [5, 10, 10]
+
+
+def test_a_correction_of_the_clock_is_fed_again_where_it_stood_and_ends_the_epoch_under_way(tmp_path):
+    class Set(OrderedLive):
+        def clock_corrected(self, ticks):
+            self._fed(float(ticks % 1000))
+
+    live = Set(scene_run().site, 1.1)
+    with Journal.open(tmp_path / "j.db", run=scene_run(), clock=ManualClock(START / 1e8)) as journal:
+        for k in range(30):
+            shot = scene_shot(k)
+            journal.append(AnsweredShot.of(shot, live.shot(shot)))
+            if k in (6, 16, 26):
+                journal.append(Document(shot.ticks, EPOCH_BEGUN, ""))
+                if k == 16:  # corrected while it is solved: what it found was not taken in
+                    live.clock_corrected(shot.ticks)
+                    journal.append(Document(shot.ticks, CLOCK_CORRECTED, '{"gained_s": 3600.0}'))
+                    journal.append(EpochSolution.of(shot.ticks, None))
+                else:
+                    journal.append(EpochSolution.of(shot.ticks, live.solve(shot.ticks)))
+    with JournalReader(tmp_path / "j.db") as reader:
+        found = list(replay(reader, 1, lambda site, run: Set(site, 1.1)))
+    assert [replayed.sameness for replayed in found] == [Sameness.IDENTICAL] * 4
+    assert found[1].new.answer == {}
 
 
 def test_shots_behind_the_last_epoch_are_compared_and_those_without_an_answer_told(tmp_path):

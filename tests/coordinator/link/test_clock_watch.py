@@ -81,3 +81,40 @@ def test_a_clock_that_is_not_to_be_set_by_ours_is_left(watched):
     assert watch.look(stamp(clock, 10.0), 0.001) is None
     assert watch.offset == pytest.approx(10.0, abs=1e-3)
     assert happenings == []
+
+
+@pytest.mark.parametrize("jitter", [0.0, 1.0])
+def test_long_ways_of_a_busy_machine_hide_nothing_and_set_nothing(watched, jitter):
+    """One short way among seven long ones says where the clock is; the long ones never say otherwise."""
+    watch, clock, happenings = watched
+    for k in range(64):
+        trip = 0.004 if k % 7 == 0 else 1.5
+        late = trip * (0.5 + jitter * (k * 37 % 10 - 4.5) / 10.0)  # anywhere within its way
+        assert watch.look(stamp(clock, -late), trip) is None
+        assert watch.error < 0.004
+        assert abs(watch.offset) <= watch.error
+        clock.advance(2.0)
+    assert happenings == []
+    assert watch.look(stamp(clock, 0.4 - 0.75), 1.5) is None  # within what a long way allows
+    clock.advance(2.0)
+    assert watch.look(stamp(clock, 0.04 - 0.002), 0.004) is not None  # off, and a short way shows it
+    assert [each.kind for each in happenings] == ["clock-off", "clock-jump"]
+
+
+def test_without_a_short_way_the_offset_is_as_unsure_as_the_way_is_long(watched):
+    watch, clock, _ = watched
+    watch.look(stamp(clock, -0.9), 1.0)
+    assert watch.offset == pytest.approx(-0.4, abs=1e-3)
+    assert watch.error == pytest.approx(0.5, abs=1e-3)
+
+
+def test_after_our_own_clock_was_corrected_all_is_heard_anew(watched):
+    watch, clock, happenings = watched
+    for _ in range(3):
+        assert watch.look(stamp(clock, 0.0), 0.002) is None
+        clock.advance(2.0)
+    watch.corrected()
+    assert (watch.seen, watch.error) == (0, float("inf"))
+    assert watch.look(stamp(clock, 3600.0), 0.002) is None
+    assert watch.look(stamp(clock, 3600.0), 0.002) is not None  # a ranger that had been set by ours
+    assert [each.kind for each in happenings] == ["clock-off"]  # no jump of its own

@@ -504,3 +504,38 @@ def test_both_stations_may_come_and_go():
         answer = live.solve(night.ticks(k))
         assert answer is not None, live.failed
     assert {"WX1", "WX2"} <= set(answer.air)
+
+
+# A clock that was set back --------------------------------------------------------------------------------------------
+
+
+def later(item, seconds):
+    return replace(item, ticks=item.ticks + round(seconds * TICKS_PER_DAY / 86400.0))
+
+
+def test_what_was_fed_by_a_clock_an_hour_ahead_leaves_no_trace_when_it_is_set_back(settled):
+    """The same answer, to the last bit but for the carried age, as of a reduction that was never fed with it."""
+    night, live, feed = settled
+    never = copy.deepcopy(live)
+    wrong = Feed(tuple(later(item, 3600.0) for item in feed.items if not isinstance(item, LiveShot)))
+    wrong.into(live)
+    live.clock_corrected(night.ticks(2))
+    for each in (live, never):
+        feed.into(each)
+    answers = [each.solve(night.ticks(3)) for each in (live, never)]
+    np.testing.assert_array_equal(answers[0].x, answers[1].x)
+    np.testing.assert_array_equal(answers[0].covariance, answers[1].covariance)
+
+
+def test_shots_of_a_clock_ahead_are_not_in_the_next_epoch_and_what_is_carried_counts_from_now(settled):
+    night, live, feed = settled
+    shots = [later(shot, 3600.0) for shot in feed.shots]
+    Feed(tuple(later(item, 3600.0) if not isinstance(item, LiveShot) else item for item in feed.items)).into(live)
+    for shot in shots[:20]:
+        live.shot(replace(shot, number=shot.number + 10_000))
+    live.carried = replace(live.carried, ticks=night.ticks(2) + 10**7)
+    live.clock_corrected(night.ticks(2))
+    assert live.carried.ticks == night.ticks(2)
+    assert all(row.shot.ticks <= night.ticks(2) for row in live._pending)
+    assert all(row.shot.ticks <= night.ticks(2) for now in live.rangers.values() for row in now.references)
+    assert live.track.latest.ticks <= night.ticks(2)

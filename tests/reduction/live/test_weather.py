@@ -164,3 +164,15 @@ def test_a_station_that_says_fractions_of_one_is_told_with_both_readings():
     [note] = watch.notes()
     assert note.startswith("WX1: a humidity of 0.62 %")
     assert "62 %" in note
+
+
+def test_what_was_stamped_later_is_forgotten_when_the_clock_is_set_back():
+    watch = StationWatch(("WX1", "WX2"))
+    fed(watch, np.arange(0.0, 600.0, 10.0), WX1=lambda t: 10.0, WX2=lambda t: 10.0)
+    fed(watch, np.arange(610.0, 900.0, 10.0), WX1=lambda t: 14.0, WX2=lambda t: 10.0)
+    assert speaking(watch, 900.0) == {"WX2"}
+    assert watch.add(read("WX2", 605.0)) != ""  # an earlier time
+    watch.forget_after(ticks(600.0))
+    assert watch.add(read("WX2", 605.0)) == ""
+    assert watch.add(read("WX1", 605.0)) == ""  # its jump has not been
+    assert {w.ticks for w in watch.believed(ticks(610.0))} == {*map(ticks, np.arange(0.0, 600.0, 10.0)), ticks(605.0)}

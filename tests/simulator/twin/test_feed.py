@@ -198,7 +198,7 @@ def test_a_port_that_is_taken_and_a_weather_without_pause_are_refused():
 
 
 def test_it_serves_on_real_sockets_in_real_time():
-    from catseye.simulator.clock.world_clock import SystemClock
+    from catseye.clock import SystemClock
 
     async def story():
         feed = SiteFeed("gbt", ["WX1"], World(), SystemClock.starting_at(START))

@@ -314,7 +314,7 @@ def test_a_ground_ranger_has_its_own_sun_and_one_of_the_feed_arm_asks_for_it(few
 
 
 def test_it_serves_on_real_sockets(few):
-    from catseye.simulator.clock.world_clock import SystemClock
+    from catseye.clock import SystemClock
 
     async def story():
         clock = SystemClock.starting_at(NIGHT)

@@ -1,7 +1,7 @@
 """The command that takes a journal to others' formats."""
 
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple, cast
 
 import typer
 
@@ -51,59 +51,38 @@ def export(
     quiet: Quiet = False,
 ) -> None:
     """A run as tables (CSV, FITS), or as a campaign that `catseye reduce` reads."""
-    from catseye.coordinator.journal.check import check_whole
-    from catseye.coordinator.journal.reader import JournalReader
-    from catseye.gateways.journal.campaign import export_campaign
-    from catseye.gateways.journal.export import export_tables
     from catseye.gateways.writers.output import refuse_output
+    from catseye.service.journals import exported
 
     span = _span(which.since, which.until)
     refuse_output(out, Path(journal))
     progress = ProgressLine(quiet)
-    notes: tuple[str, ...] = ()
-    verdict = None
-    with JournalReader(journal) as reader:
-        number = reader.run(run_of(which.run)).run
-        try:
-            chain = check_whole(reader, number, progress=progress)
-            if chain.count and not damaged:
-                raise InputError(
-                    f"journal {reader.place}: run {number} is not as it was written: {chain.problems[0]} (expected a "
-                    "journal that checks: take its backup, or --damaged to leave out what does not)"
-                )
-            if to == "campaign":
-                progress("writing the campaign", 0, 1)
-                written = export_campaign(reader, out, run=number, span=span, chain=chain)
-                counts, notes = {"shots": written.shots, "weather": written.readings}, written.notes
-                verdict = written.verdict
-            else:
-                form: Literal["csv", "fits"] = "csv" if to == "csv" else "fits"
-                counts = export_tables(
-                    reader, out, runs=[number], forms=[form], span=span, progress=progress, chains=[chain]
-                )
-        finally:
-            progress.clear()
-    from catseye.gateways.journal.chain import chain_object, chain_words, export_verdict
+    form = cast(Literal["csv", "fits", "campaign"], to)
+    try:
+        outcome = exported(journal, out, form, which=run_of(which.run), span=span, damaged=damaged, progress=progress)
+    finally:
+        progress.clear()
+    from catseye.gateways.journal.chain import chain_object, chain_words
 
     if json:
         from catseye.gateways.writers.objects import json_line
 
         summary = {
-            "verdict": (verdict or export_verdict(chain, sum(counts.values()))).to_object(),
-            "chain": chain_object(chain),
-            "run": number,
+            "verdict": outcome.verdict.to_object(),
+            "chain": chain_object(outcome.chain),
+            "run": outcome.run,
             "out": str(out),
             "format": to,
-            "rows": counts,
-            "notes": list(notes),
+            "rows": outcome.rows,
+            "notes": list(outcome.notes),
         }
         say(json_line(summary))
     elif not quiet:
-        rows = ", ".join(f"{count} {name}" for name, count in counts.items())
-        say(wrapped("Written to", f"{out}/: run {number}, {rows}."))
-        for text in chain_words(chain) if chain.count or not chain.chained else ():
+        rows = ", ".join(f"{count} {name}" for name, count in outcome.rows.items())
+        say(wrapped("Written to", f"{out}/: run {outcome.run}, {rows}."))
+        for text in chain_words(outcome.chain) if outcome.chain.count or not outcome.chain.chained else ():
             say(wrapped("Chain", text))
-        for note in notes:
+        for note in outcome.notes:
             say(wrapped("Note", note))
 
 

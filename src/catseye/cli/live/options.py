@@ -157,8 +157,8 @@ def mjd_start(text: str | None, usual: float | None = None, *, offset: float = 0
         return mjd_of(text)
     if usual is not None:
         return usual
+    from catseye.clock import SystemClock
     from catseye.geometry.sky.time_tag import PER_DAY
-    from catseye.simulator.clock.world_clock import SystemClock
 
     return SystemClock(offset).now_ns() / PER_DAY
 

@@ -7,7 +7,7 @@ import typer
 
 from catseye.cli.commands import Quiet, app
 from catseye.cli.live.groups import CoordinatorOptions
-from catseye.cli.live.options import Site, leave, site_of, tell_people, within
+from catseye.cli.live.options import Site, leave, say_now, site_of, tell_people, within
 from catseye.cli.option_groups import grouped
 
 if TYPE_CHECKING:
@@ -60,15 +60,17 @@ def run_coordinator(
     seed     of a simulated site, for the journal
     beside   a coroutine function that runs beside it, told the log: its children
     """
+    from catseye.clock import SystemClock
     from catseye.service.coordinator import LiveCoordinator
     from catseye.service.logs import LiveLog
     from catseye.service.running import LiveRun
     from catseye.service.watchdog import live
-    from catseye.simulator.clock.world_clock import SystemClock
 
     clock = SystemClock(offset)
     coloured = not log_json and sys.stderr is not None and sys.stderr.isatty()
     log = LiveLog(lambda line: None if quiet else tell_people(line), clock=clock, json=log_json, colour=coloured)
+
+    ran: list[LiveCoordinator] = []
 
     async def work() -> None:
         import asyncio
@@ -81,6 +83,7 @@ def run_coordinator(
             seed=seed,
             tell=lambda kind, text, severity: log.tell("journal", kind, text, severity),
         )
+        ran.append(running)
         running.ziy.listeners.append(log.entry)
 
         def started() -> None:
@@ -100,4 +103,7 @@ def run_coordinator(
 
     run: LiveRun[None] = LiveRun(work)
     run.result()
+    end = ran[0].journal_end if ran else None
+    if end is not None and not quiet:
+        say_now(f"journal {orders.journal}: {end}")
     leave(run, terminated=0)

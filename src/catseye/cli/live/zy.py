@@ -92,10 +92,10 @@ def zy(  # noqa: PLR0913 - its options are its command line
     names = _named(records, rangers or [])
     if ports is not None and len(names) != 1:
         raise InputError(f"--ports: {len(names)} rangers cannot share two ports (expected one ranger, or --port-base)")
+    from catseye.clock import SystemClock
     from catseye.ranger.door import Door, key_of
     from catseye.service.rangers import RangersServed, ServedAt, heads_of
     from catseye.service.running import LiveRun
-    from catseye.simulator.clock.world_clock import SystemClock
 
     at = ServedAt(
         "loopback" if loopback else port_base, host, None if ports is None else _pair(ports), Door(key=key_of())

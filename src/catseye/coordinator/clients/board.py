@@ -25,6 +25,10 @@ HELP = {
     "DROP": ("DROP ranger", "leave a ranger out; it stays connected"),
     "TAKE": ("TAKE ranger", "use a ranger again"),
     "STREAM": ("STREAM ranger, target | STREAM ranger", "one target again and again; without a target it ends"),
+    "CLOCK": (
+        "CLOCK | CLOCK ACCEPT",
+        "s that its machine's UTC is ahead; kernel's word; trouble; ACCEPT believes it",
+    ),
     "LEASE": ("LEASE | LEASE name | LEASE none", "who may command here; take it by a name; give it back"),
     "VER": ("VER", "name and version; sent behind a command of many lines it ends them"),
     "HLP": ("HLP | HLP command", "commands, or one command's forms; HELP is the same"),
@@ -53,6 +57,7 @@ class Board:
             "DROP": ((1,), lambda words: self._done(coordinator.drop, *words)),
             "TAKE": ((1,), lambda words: self._done(coordinator.take, *words)),
             "STREAM": ((1, 2), lambda words: self._stream(*words)),
+            "CLOCK": ((0, 1), lambda words: self._clock(*words)),
             "VER": ((0,), lambda _: [("ZIY", VERSION)]),
             "HLP": ((0, 1), lambda words: self._help(*words)),
         }
@@ -109,6 +114,15 @@ class Board:
         if text is not None:
             self._ziy.set_mode(mode_of(text))
         return [(self._ziy.mode,)]
+
+    def _clock(self, word: str = "") -> Rows:
+        watch = self._ziy.host_clock
+        if word and word.upper() != "ACCEPT":
+            raise InputError(f"CLOCK {word[:20]!a} (expected CLOCK or CLOCK ACCEPT)")
+        if word:
+            watch.accept()
+        kernel = "unknown" if watch.sync is None else watch.sync.source
+        return [(f"{watch.departure:.6f}", kernel, plain(watch.trouble or "none"))]
 
     def _stream(self, ranger: str, target: str | None = None) -> Rows:
         self._ziy.stream(ranger.upper(), target)

@@ -38,7 +38,7 @@ LOG = logging.getLogger(__name__)
 
 def commands(request: Request) -> bool:
     """Whether a request is more than a question: those need the lease."""
-    return request.command in SETTING or (request.command == "MODE" and bool(request.parameters))
+    return request.command in SETTING or (request.command in ("MODE", "CLOCK") and bool(request.parameters))
 
 
 class Client(asyncio.Protocol):

@@ -14,7 +14,7 @@ REMEDY = "the journal is damaged; restore it from a copy"
 
 
 @cache
-def _kinds(table: JournalTable) -> tuple[tuple[type, ...], ...]:
+def cell_kinds(table: JournalTable) -> tuple[tuple[type, ...], ...]:
     """Python's types that each column may hold; a number's column takes a whole number, too."""
     kinds = []
     for column in table.columns:
@@ -29,7 +29,7 @@ def check_cells(table: JournalTable, row: "sqlalchemy.Row[tuple[object, ...]]", 
 
     place   for the refusal: journal, run and event
     """
-    kinds = _kinds(table)
+    kinds = cell_kinds(table)
     if all(map(isinstance, row, kinds)):
         return
     at = next(k for k, (cell, kind) in enumerate(zip(row, kinds, strict=True)) if not isinstance(cell, kind))

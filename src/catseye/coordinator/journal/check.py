@@ -7,13 +7,25 @@ from hashlib import sha256
 from sqlalchemy import Connection, func, select
 
 from catseye.coordinator.journal.chain import Head, LinkKind, event_cells, link_of, run_link
-from catseye.coordinator.journal.reader import PIECE, JournalReader
-from catseye.coordinator.journal.tables import BUFFERS, CHAIN, EVENTS, RUN_FILES, RUNS, TEXTS, JournalTable
+from catseye.coordinator.journal.reader import PIECE, JournalReader, highest_seq, next_seq
+from catseye.coordinator.journal.rows import MOST_WHOLE
+from catseye.coordinator.journal.tables import (
+    BUFFERS,
+    CHAIN,
+    EVENTS,
+    FIRST_CHAINED,
+    METADATA,
+    PARTS,
+    RUN_FILES,
+    RUNS,
+    SHOTS,
+    TEXTS,
+    JournalTable,
+)
 from catseye.errors import InputError
 
 STORED = (*EVENTS, BUFFERS)
 MOST_TOLD = 20  # problems in words
-FIRST_CHAINED = 2  # version of a journal
 Progress = Callable[[str, int, int], None]
 Stored = list[tuple[JournalTable, Mapping[str, object]]]
 
@@ -23,13 +35,16 @@ class ChainReport:
     """What checking one run came to.
 
     run, uuid   of the run; "" where its own record cannot be read
-    chained     whether it has a chain: one written before version 2 has none, and nothing of it was checked
+    chained     whether it has a chain: one written before version 2 has none, and nothing of it was checked; without
+                problems it is one of those
     ended       whether its chain has an end: without one it lasts, was killed, or was cut
     events      stored, by their links
-    heads       that were given and are in the chain
+    given       heads that it was held against
+    heads       of those, that are in the chain
     problems    one line each: the first 20
     count       of all problems
     bad         events that are not as they were written, or cannot be read
+    unvouched   of those, that have no link, or no samples: put in, robbed of them, or pages were lost
     ended_ticks when, by the run's record
     first       the first event from which on something is wrong; None where nothing is
     head        the last link; None without a chain
@@ -41,10 +56,12 @@ class ChainReport:
     chained: bool = True
     ended: bool = False
     events: int = 0
+    given: int = 0
     heads: int = 0
     problems: list[str] = field(default_factory=list)
     count: int = 0
     bad: set[int] = field(default_factory=set)
+    unvouched: set[int] = field(default_factory=set)
     first: int | None = None
     ended_ticks: int | None = None
     head: Head | None = None
@@ -71,9 +88,14 @@ def check_whole(
 ) -> ChainReport:
     """`check_run` of a run in all its files, and whether each goes on where the one before ends; one report.
 
-    Raises InputError: a file of the run is missing.
+    A file of the run that is missing, or named in a circle, is a problem of this one, of which the rest is checked.
     """
-    parts = reader.parts(run)
+    try:
+        parts = reader.parts(run)
+    except InputError as problem:
+        report = check_run(reader, run, heads=heads, progress=progress)
+        report.wrong(report.last[0] + 1, f"the run's other files cannot be read: {problem}")
+        return report
     if len(parts) == 1:
         return check_run(reader, run, heads=heads, progress=progress)
     starts = [_begin(part, run) for part in parts]
@@ -86,14 +108,15 @@ def check_whole(
         if report.begins != whole.last:
             text = f"{part.place} does not go on where the file before it ends, at event {whole.last[0]}"
             whole.wrong(whole.last[0] + 1, text)
-        for problem in report.problems:
-            whole.problems.append(f"{part.place}: {problem}")
+        whole.problems += [f"{part.place}: {text}" for text in report.problems]
         del whole.problems[MOST_TOLD:]
         whole.count += report.count
         whole.bad |= report.bad
+        whole.unvouched |= report.unvouched
         firsts = [first for first in (whole.first, report.first) if first is not None]
         whole.first = min(firsts) if firsts else None
         whole.events, whole.heads = whole.events + report.events, whole.heads + report.heads
+        whole.given += report.given
         whole.ended, whole.last, whole.head = report.ended, report.last, report.head or whole.head
     return whole
 
@@ -107,22 +130,25 @@ def check_run(
 
     Nothing is raised for a damaged journal: what cannot be read is a problem like others, and what is whole is counted.
     """
-    report = ChainReport(run)
+    report = ChainReport(run, given=len(heads))
     if reader.version < FIRST_CHAINED:
-        report.chained = False
+        _before_chains(reader, report, heads)
+        return report
+    if not _tables_there(reader, report):
         return report
     first, stored, last = _of_the_run(reader, report)
     if first is None and not (last and _count(reader, run)):
-        report.chained = False
+        _without_chain(reader, report, heads)
         return report
     if first is None:
         report.wrong(0, "the run's first link is missing, though links of its events are there")
     elif stored is not None and first != stored:
         report.wrong(0, "the run's own record, or the list of its files, is not what was written")
     _files(reader, report)
+    last = min(last or 0, _numbers(reader, report))
     before, at = tuple(link for link in (first, stored) if link is not None), 0
     links = {} if first is None else {0: first}
-    for seq, kind, link, rows in _links(reader, report, last or 0, progress):
+    for seq, kind, link, rows in _links(reader, report, last, progress):
         if kind == LinkKind.PART.value and at == 0 and link is not None:
             report.begins = seq, link
             before = ()
@@ -136,6 +162,89 @@ def check_run(
         report.wrong(at + 1, f"the run ended, and its chain stops at event {at}: what stood behind is missing")
     _heads(report, heads, links, at)
     return report
+
+
+def _before_chains(reader: JournalReader, report: ChainReport, heads: Sequence[Head]) -> None:
+    """A run of version 1: without a chain, unless the version was set back."""
+    report.chained = False
+    later = sorted({CHAIN.name, PARTS.name} & reader.tables)
+    if later:
+        text = f"its version is {reader.version} and it has the table {later[0]!r} of version {FIRST_CHAINED}"
+        report.wrong(0, f"{text}: the version was set back")
+    _unheld(report, heads)
+
+
+def _tables_there(reader: JournalReader, report: ChainReport) -> bool:
+    """Whether all tables are there; one that was taken away is a problem."""
+    missing = sorted(set(METADATA.tables) - reader.tables)
+    for name in missing:
+        report.wrong(0, f"table {name!r} is missing (expected in a journal of version {reader.version})")
+    report.chained = CHAIN.name not in missing
+    return not missing
+
+
+def _without_chain(reader: JournalReader, report: ChainReport, heads: Sequence[Head]) -> None:
+    """A run without links in a journal that has chains: of before it was carried to version 2, or robbed.
+
+    The first link of the first run with a chain was made from nothing where no run before it had one.
+    """
+    report.chained = False
+    try:
+        with reader.reading() as connection:
+            first = connection.execute(
+                select(CHAIN.c.run, CHAIN.c.link).where(CHAIN.c.seq == 0).order_by(CHAIN.c.run).limit(1)
+            ).first()
+            carried = first is not None and first.run > report.run and first.link == run_link(connection, first.run)
+    except InputError as problem:
+        report.wrong(0, f"the journal's chains cannot be read: {problem}")
+        return
+    if not carried:
+        report.wrong(0, f"the run has no chain in a journal of version {reader.version}: it was taken away")
+    _unheld(report, heads)
+
+
+def _unheld(report: ChainReport, heads: Sequence[Head]) -> None:
+    for head in heads:
+        report.wrong(head.seq, f"head {head} was told, and the run has no chain")
+
+
+def _numbers(reader: JournalReader, report: ChainReport) -> int:
+    """The highest number that an event of the file can have; rows whose numbers none has are problems.
+
+    Text, bytes, a number below the first, or far above the last.
+    """
+    most = min(MOST_WHOLE, max(0, _begin(reader, report.run)) + reader.most_events)
+    for table in (*STORED, CHAIN):
+        seq, least = table.c.seq, 0 if table is CHAIN else 1
+        try:
+            with reader.reading() as connection:
+                strange = seq < least
+                if connection.dialect.name == "sqlite":
+                    strange |= seq > MOST_WHOLE
+                row = connection.execute(select(seq).where(table.c.run == report.run, strange).limit(1)).first()
+                far = select(seq).where(table.c.run == report.run, seq > most, seq <= MOST_WHOLE).limit(PIECE)
+                beyond = [int(str(each).partition(".")[0]) for each in connection.scalars(far)]
+        except InputError as problem:
+            report.wrong(0, f"table {table.name!r} cannot be read: {problem}")
+            continue
+        if row is not None:
+            report.wrong(0, f"a row of {table.name!r} has the number {row[0]!r}, which no event has: it was put in")
+        for each in beyond:
+            text = f"event {each} is beyond what the file can hold (at most {most}): it was put in"
+            report.wrong(each, text, bad=True)
+    return most
+
+
+def held_by(reader: JournalReader, run: int, head: Head) -> bool:
+    """Whether a run, in any of its files, has the link that a head tells."""
+    for part in reader.parts(run):
+        if CHAIN.name not in part.tables:
+            continue
+        with part.reading() as connection:
+            link = connection.scalar(select(CHAIN.c.link).where(CHAIN.c.run == run, CHAIN.c.seq == head.seq))
+        if isinstance(link, bytes) and head.fits(link):
+            return True
+    return False
 
 
 def _heads(report: ChainReport, heads: Sequence[Head], links: Mapping[int, bytes], last: int) -> None:
@@ -152,11 +261,14 @@ def _heads(report: ChainReport, heads: Sequence[Head], links: Mapping[int, bytes
 
 
 def _begin(reader: JournalReader, run: int) -> int:
-    """Seq of the link with which a later file of a run begins; -1 of the first file."""
-    with reader.reading() as connection:
-        seq = connection.scalar(
-            select(CHAIN.c.seq).where(CHAIN.c.run == run, CHAIN.c.kind == LinkKind.PART.value).limit(1)
-        )
+    """Seq of the link with which a later file of a run begins; -1 of the first file, or where it cannot be read."""
+    try:
+        with reader.reading() as connection:
+            first = select(CHAIN.c.seq, CHAIN.c.kind).where(CHAIN.c.run == run, CHAIN.c.seq > 0)
+            row = connection.execute(first.order_by(CHAIN.c.seq).limit(1)).first()
+    except InputError:
+        return -1
+    seq = None if row is None or row.kind != LinkKind.PART.value else row.seq
     return seq if isinstance(seq, int) else -1
 
 
@@ -204,13 +316,15 @@ def _integrity(connection: Connection, report: ChainReport) -> None:
 
 
 def _last_stored(connection: Connection, run: int) -> int:
-    highest = (connection.scalar(select(func.max(t.c.seq)).where(t.c.run == run)) for t in (*STORED, CHAIN))
-    return max(seq if isinstance(seq, int) else 0 for seq in highest)
+    return max(highest_seq(connection, table, run) for table in (*STORED, CHAIN))
 
 
 def _count(reader: JournalReader, run: int) -> int:
-    with reader.reading() as connection:
-        return int(connection.scalar(select(func.count()).select_from(CHAIN).where(CHAIN.c.run == run)) or 0)
+    try:
+        with reader.reading() as connection:
+            return int(connection.scalar(select(func.count()).select_from(CHAIN).where(CHAIN.c.run == run)) or 0)
+    except InputError:
+        return 0
 
 
 def _files(reader: JournalReader, report: ChainReport) -> None:
@@ -234,7 +348,30 @@ def _links(
     reader: JournalReader, report: ChainReport, last: int, progress: Progress
 ) -> Iterator[tuple[int, str, bytes | None, Stored]]:
     """Each number's kind ("" without a link), link and rows, in order; what cannot be read is noted and passed over."""
-    spans = [(at, min(at + PIECE, last)) for at in range(0, last, PIECE)][::-1]
+    at = 0
+    while at < last:
+        upto, empty = min(at + PIECE, last), True
+        for found in _span(reader, report, at, upto):
+            empty = False
+            yield found
+        progress("events", upto, last)
+        at = max(upto, _next(reader, report.run, upto) - 1) if empty else upto  # a number may be far above the others
+
+
+def _next(reader: JournalReader, run: int, after: int) -> int:
+    """The first number behind one that any row has; the one behind it where that cannot be read."""
+    try:
+        with reader.reading() as connection:
+            return next_seq(connection, (*STORED, CHAIN), run, after)
+    except InputError:
+        return after + 1
+
+
+def _span(
+    reader: JournalReader, report: ChainReport, first: int, last: int
+) -> Iterator[tuple[int, str, bytes | None, Stored]]:
+    """Those between two numbers; what cannot be read is looked for by halves."""
+    spans = [(first, last)]
     while spans:
         after, upto = spans.pop()
         try:
@@ -248,7 +385,6 @@ def _links(
                 yield upto, "", None, []
             continue
         yield from piece
-        progress("events", upto, last)
 
 
 def _piece(reader: JournalReader, run: int, after: int, upto: int) -> list[tuple[int, str, bytes | None, Stored]]:
@@ -259,10 +395,10 @@ def _piece(reader: JournalReader, run: int, after: int, upto: int) -> list[tuple
             wanted = select(table).where(table.c.run == run, table.c.seq > after, table.c.seq <= upto)
             return [dict(row) for row in connection.execute(wanted).mappings()]
 
-        links = {int(str(row["seq"])): row for row in read(CHAIN)}
+        links = {_seq(row): row for row in read(CHAIN)}
         for table in STORED:
             for row in read(table):
-                rows.setdefault(int(str(row["seq"])), []).append((table, row))
+                rows.setdefault(_seq(row), []).append((table, row))
     found = []
     for seq in sorted(set(links) | set(rows)):
         link = links.get(seq)
@@ -272,6 +408,13 @@ def _piece(reader: JournalReader, run: int, after: int, upto: int) -> list[tuple
     return found
 
 
+def _seq(row: Mapping[str, object]) -> int:
+    seq = row["seq"]
+    if not isinstance(seq, int):
+        raise InputError(f"a row has the number {seq!r} (expected a whole one)")
+    return seq
+
+
 def _link(
     report: ChainReport, seq: int, kind: str, link: bytes | None, rows: Stored, before: tuple[bytes, ...]
 ) -> tuple[bytes, ...]:
@@ -279,6 +422,7 @@ def _link(
     if link is None:
         if rows:
             report.wrong(seq, f"event {seq} has no link: it was put in, or its link was taken out", bad=True)
+            report.unvouched.add(seq)
         return ()
     if report.ended:
         report.wrong(seq, f"event {seq} stands behind the run's end", bad=True)
@@ -296,6 +440,8 @@ def _link(
     ):  # without the one before nothing can be said, which has been told
         what = "the end" if kind == LinkKind.END.value else f"event {seq}"
         report.wrong(seq, f"{what} is not what was written, or its link is not", bad=True)
+        if {table.name for table, _ in rows} == {SHOTS.name}:
+            report.unvouched.add(seq)
     return (link,) if link in wanted else (link, *wanted[:1])
 
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 NAN = float("nan")
 EPOCH_BEGUN = "epoch-begun"  # name of the document that says when an epoch's shots were taken out
+CLOCK_CORRECTED = "clock-corrected"  # of the one that says when the count of UTC was corrected, and by how much
 
 
 # JSON's own types; what is no finite number is None

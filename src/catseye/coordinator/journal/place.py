@@ -4,6 +4,7 @@ import json
 import os
 import socket
 import sqlite3
+from collections.abc import Callable
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,18 +36,23 @@ class JournalAddress:
 def place_of(url: str | Path) -> JournalAddress:
     """The place that a URL or a file's name means; InputError for any other text."""
     if isinstance(url, Path) or "://" not in url:
-        return JournalAddress(str(url), path=Path(url))
+        return JournalAddress(str(url), path=_real(Path(url)))
     try:
         parsed = make_url(url)
         backend = parsed.get_backend_name()
     except (ArgumentError, ValueError):
         raise InputError(f"journal {url.partition('://')[0]}://...: is no URL ({EXPECTED})") from None
     if backend == "sqlite" and parsed.database and not parsed.host and parsed.database != ":memory:":
-        return JournalAddress(parsed.database, path=Path(parsed.database))
+        return JournalAddress(parsed.database, path=_real(Path(parsed.database)))
     if backend in ("postgresql", "postgres") and parsed.database:
         shown = parsed.set(drivername="postgresql").render_as_string(hide_password=True)
         return JournalAddress(shown, url=parsed.set(drivername="postgresql+psycopg"))
     raise InputError(f"journal {parsed.render_as_string(hide_password=True)}: cannot be used ({EXPECTED})")
+
+
+def _real(path: Path) -> Path:
+    """The file that a link names: its log, its lock and its neighbours stand beside it, not beside the link."""
+    return Path(os.path.realpath(path)) if path.is_symlink() else path
 
 
 def refuse_foreign(place: JournalAddress, *, fresh: bool) -> None:
@@ -99,7 +105,7 @@ def reading_engine(place: JournalAddress) -> Engine:
         return _server_engine(place.url).execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
     path = Path(str(place.path))
     whole = not Path(f"{path}-wal").exists() and not os.access(path.absolute().parent, os.W_OK)
-    engine = _file_engine(place, "mode=ro&immutable=1" if whole else "mode=ro")
+    engine = _file_engine(place, "mode=ro&immutable=1" if whole else "mode=ro", text=_text_or_bytes)
 
     @event.listens_for(engine, "begin")
     def begin(connection: Connection) -> None:
@@ -108,13 +114,24 @@ def reading_engine(place: JournalAddress) -> Engine:
     return engine
 
 
-def _file_engine(place: JournalAddress, options: str) -> Engine:
+def _file_engine(place: JournalAddress, options: str, text: Callable[[bytes], str | bytes] | None = None) -> Engine:
     address = f"file:{quote(str(place.path))}?{options}"
 
     def connected() -> sqlite3.Connection:
-        return sqlite3.connect(address, uri=True, timeout=BUSY, isolation_level=None, check_same_thread=False)
+        connection = sqlite3.connect(address, uri=True, timeout=BUSY, isolation_level=None, check_same_thread=False)
+        if text is not None:
+            connection.text_factory = text
+        return connection
 
     return create_engine("sqlite://", creator=connected, poolclass=NullPool)
+
+
+def _text_or_bytes(raw: bytes) -> str | bytes:
+    """A cell of text; its bytes where they are no UTF-8, which is damage that the reader names."""
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError:
+        return raw
 
 
 def _server_engine(url: URL) -> Engine:
@@ -179,6 +196,12 @@ class WriterLock:
             return
         import fcntl
 
+        names = place.path.stat().st_nlink if place.path.exists() else 1
+        if names > 1:
+            raise InputError(
+                f"journal {place.shown}: its file has {names} names (hard links), and a writer by one of them does not "
+                "see a writer by another (expected one name: write to a copy, or to another file)"
+            )
         self._path = Path(f"{place.path}.writer")
         while self._file is None:
             try:
@@ -190,8 +213,10 @@ class WriterLock:
             except OSError as problem:
                 holder = _holder(os.read(file, 1000))
                 os.close(file)
+                real = "" if str(place.path) == place.shown else f", which is {place.path}"
                 raise InputError(
-                    f"journal {place.shown}: {holder} is writing to it (expected one writer: stop it, or another file)"
+                    f"journal {place.shown}{real}: {holder} is writing to it (expected one writer: stop it, or another "
+                    "file)"
                 ) from problem
             if _same_file(file, self._path):
                 self._file = file

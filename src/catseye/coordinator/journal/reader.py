@@ -7,13 +7,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Literal
 
-from sqlalchemy import Connection, Engine, Select, func, select
+from sqlalchemy import Connection, Engine, Select, inspect, select
 from sqlalchemy.exc import SQLAlchemyError
 
 from catseye.coordinator.journal.cells import check_cells, damaged, json_object
 from catseye.coordinator.journal.entries import AnsweredShot, Entry, EpochSolution
-from catseye.coordinator.journal.place import place_of, reading_engine, refuse_foreign, refused
-from catseye.coordinator.journal.rows import StoredRow, entry_of, unpack
+from catseye.coordinator.journal.place import bytes_of, place_of, reading_engine, refuse_foreign, refused
+from catseye.coordinator.journal.rows import MOST_WHOLE, StoredRow, entry_of, unpack
 from catseye.coordinator.journal.tables import (
     BUFFERS,
     EVENTS,
@@ -28,7 +28,7 @@ from catseye.coordinator.journal.tables import (
 from catseye.errors import InputError
 from catseye.records.site.folder import SiteFolder, read_site
 
-WITH_PARTS = 2  # version
+LINK_BYTES = 40  # at least, of a row of the chain
 PIECE = 512  # events read at once: 8 MB where each is a buffer
 Kind = Literal["shots", "weather", "postures", "commands", "happenings", "solutions", "documents"]
 
@@ -75,8 +75,10 @@ class JournalReader:
         self._folders: list[TemporaryDirectory[str]] = []
         self._others: dict[str, JournalReader] = {}
         self.left_out: Mapping[int, Collection[int]] = {}  # by run: events passed over, as they do not check
+        self.alone = False  # whether files before and behind this one are passed over
         with self.reading() as connection:
             self.version = version_of(connection, self.place)
+            self.tables = frozenset(inspect(connection).get_table_names())
             if self.version == 0:
                 raise InputError(f"journal {self.place}: holds no tables: it is no journal (expected one)")
 
@@ -140,8 +142,12 @@ class JournalReader:
         for stop in (*stops, last + 1):
             while after < stop - 1:
                 upto = min(after + PIECE, stop - 1)
-                yield from self._piece(run, after, upto, tables, buffers)
+                piece = self._piece(run, after, upto, tables, buffers)
+                yield from piece
                 after = upto
+                if not piece:  # a number may be far above the others
+                    with self.reading() as connection:
+                        after = min(stop - 1, next_seq(connection, tables, run, upto) - 1)
             after = stop
 
     def shots(self, run: int, *, buffers: bool = True) -> Iterator[tuple[int, AnsweredShot]]:
@@ -160,6 +166,11 @@ class JournalReader:
         """The seq of a run's last event; 0 of none."""
         return max(part._own_last(run) for part in self.parts(run))
 
+    @property
+    def most_events(self) -> int:
+        """How many events this file can hold at most: each has a link, of 32 bytes and its row's head."""
+        return MOST_WHOLE if self._where.path is None else bytes_of(self._where) // LINK_BYTES
+
     def _own_last(self, run: int) -> int:
         with self.reading() as connection:
             return _last(connection, run)
@@ -167,22 +178,30 @@ class JournalReader:
     def parts(self, run: int) -> "tuple[JournalReader, ...]":
         """The files of a run, in order: this one, and those before and behind it into which the run was rotated.
 
-        Raises InputError: one of them is missing.
+        Raises InputError: one of them is missing, or is named twice.
         """
-        parts = [self]
-        while (name := parts[0]._beside(run, "follows")) is not None:
+        if self.alone or self._where.path is None:
+            return (self,)
+        parts, names = [self], {self._where.path.name}
+        while (name := parts[0]._beside(run, "follows", names)) is not None:
             parts.insert(0, self._part(name))
-        while (name := parts[-1]._beside(run, "followed_by")) is not None:
+        while (name := parts[-1]._beside(run, "followed_by", names)) is not None:
             parts.append(self._part(name))
         return tuple(parts)
 
-    def _beside(self, run: int, which: str) -> str | None:
-        if self.version < WITH_PARTS or self._where.path is None:
+    def _beside(self, run: int, which: str, names: set[str]) -> str | None:
+        """The name of the file before or behind this one, None of none; noted among `names`."""
+        if PARTS.name not in self.tables:
             return None
         with self.reading() as connection:
-            name = connection.scalar(select(PARTS.c[which]).where(PARTS.c.run == run))
-        if name is not None and (not name or Path(name).name != name):
+            name: object = connection.scalar(select(PARTS.c[which]).where(PARTS.c.run == run))
+        if name is None:
+            return None
+        if not isinstance(name, str) or not name or Path(name).name != name:
             raise InputError(f"journal {self.place}: run {run} goes on in {name!r} (expected a file beside it)")
+        if name in names:
+            raise damaged(f"journal {self.place}: the table 'parts' of run {run}", f"{name!r} once more, a circle")
+        names.add(name)
         return name
 
     def _part(self, name: str) -> "JournalReader":
@@ -276,8 +295,28 @@ def _between(table: JournalTable, run: int, after: int, upto: int) -> Select[tup
 
 
 def _last(connection: Connection, run: int) -> int:
-    highest = (connection.scalar(select(func.max(table.c.seq)).where(table.c.run == run)) for table in EVENTS)
-    return max(seq if isinstance(seq, int) else 0 for seq in highest)
+    return max(highest_seq(connection, table, run) for table in EVENTS)
+
+
+def highest_seq(connection: Connection, table: JournalTable, run: int) -> int:
+    """The highest number of a run's rows in a table; 0 of none. Text and bytes, damage, sort above all numbers."""
+    seq = table.c.seq
+    highest: object = connection.scalar(
+        select(seq).where(table.c.run == run, seq <= MOST_WHOLE).order_by(seq.desc()).limit(1)
+    )
+    return int(highest) if isinstance(highest, int | float) else 0
+
+
+def next_seq(connection: Connection, tables: Sequence[JournalTable], run: int, after: int) -> int:
+    """The lowest number above one that a run's rows in some tables have; above all of them where there is none."""
+    found = []
+    for table in tables:
+        seq = table.c.seq
+        lowest: object = connection.scalar(
+            select(seq).where(table.c.run == run, seq > after, seq <= MOST_WHOLE).order_by(seq).limit(1)
+        )
+        found.append(int(lowest) if isinstance(lowest, int | float) else MOST_WHOLE)
+    return max(after + 1, min(found, default=MOST_WHOLE))
 
 
 def _is(run: StoredRun, which: int | str) -> bool:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from catseye.coordinator.journal.entries import EPOCH_BEGUN, AnsweredShot, Document, EpochSolution
+from catseye.coordinator.journal.entries import CLOCK_CORRECTED, EPOCH_BEGUN, AnsweredShot, Document, EpochSolution
 from catseye.coordinator.journal.reader import JournalReader, Kind, StoredRun
 from catseye.coordinator.journal.sameness import (
     Sameness,
@@ -125,6 +125,9 @@ def replay(
             live.posture(entry)
         elif isinstance(entry, Document) and entry.name == EPOCH_BEGUN:
             job = live.begin(entry.ticks)
+        elif isinstance(entry, Document) and entry.name == CLOCK_CORRECTED:
+            live.clock_corrected(entry.ticks)
+            job = None  # what was being solved then was not taken in
         elif isinstance(entry, EpochSolution):
             new = EpochSolution.of(entry.ticks, None if job is None else live.take_in(job, job.solve()))
             yield Replayed(seq, entry, new, shots, compare_solutions(entry, new))

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 JournalTable: TypeAlias = "Table[ReadOnlyColumnCollection[str, Column[object]]]"
 FORMAT = "catseye-journal"
 VERSION = 2
+FIRST_CHAINED = 2  # version with chain and parts
 APPLICATION_ID = 0x43_41_54_53  # "CATS" in the header of an SQLite file
 
 METADATA = MetaData()

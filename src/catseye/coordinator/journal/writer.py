@@ -113,8 +113,8 @@ class Journal:
         settings: JournalSettings,
         told: _Told,
     ):
-        (self.run, self._link), self.place = begun, place.shown
-        self._linked = 0  # seq of the last link
+        (self.run, first), self.place = begun, place.shown
+        self._last = 0, first  # seq and hash of the last link that is durable: one object, other threads read it
         self._where, self._engine, self._lock = place, engine, lock
         self._clock, self._settings = clock, settings
         self._packing = PACKED if settings.compress else RAW
@@ -184,7 +184,7 @@ class Journal:
     @property
     def head(self) -> Head:
         """The chain's last link that is durable."""
-        return Head.of(self._linked, self._link)
+        return Head.of(*self._last)
 
     @property
     def trouble(self) -> str | None:
@@ -327,7 +327,7 @@ class Journal:
     def _store(self, batches: Sequence[Batch]) -> None:
         """Write some entries in one transaction."""
         rows: dict[str, list[Row]] = defaultdict(list)
-        link, linked = self._link, self._linked
+        linked, link = self._last
         for batch in batches:
             events: dict[int, list[tuple[JournalTable, Row]]] = defaultdict(list)
             for table, row in batch.rows:
@@ -348,7 +348,7 @@ class Journal:
                 self._connection.execute(self._inserts[table], rows[table])
         if identity(self._where) != self._file:
             raise InputError(f"journal {self.place}: the file was moved or removed (put it back, or start again)")
-        self._link, self._linked = link, linked
+        self._last = linked, link
 
     def _night_now(self) -> int:
         """The night, which changes at noon UTC."""
@@ -371,7 +371,8 @@ class Journal:
             lock = WriterLock(new)
             try:
                 with self._connection.begin():
-                    go_on(self._connection, new, self.run, seq=self._linked, link=self._link, follows=old.path.name)
+                    linked, link = self._last
+                    go_on(self._connection, new, self.run, seq=linked, link=link, follows=old.path.name)
                     row = {"run": self.run, "follows": None, "followed_by": Path(str(new.path)).name}
                     done = self._connection.execute(
                         update(PARTS).where(PARTS.c.run == self.run).values(followed_by=row["followed_by"])
@@ -452,13 +453,13 @@ class Journal:
         with suppress(SQLAlchemyError):
             if self._connection is None:
                 self._connection = self._engine.connect()
-            ended, seq = ticks_now(self._clock), self._linked + 1
-            link = link_of(self._link, LinkKind.END, seq, [ended])
+            ended, (linked, before) = ticks_now(self._clock), self._last
+            seq, link = linked + 1, link_of(before, LinkKind.END, linked + 1, [ended])
             with self._connection.begin():
                 self._connection.execute(update(RUNS).where(RUNS.c.run == self.run).values(ended_ticks=ended))
                 row = {"run": self.run, "seq": seq, "kind": LinkKind.END.value, "link": link}
                 self._connection.execute(self._inserts[CHAIN.name], row)
-            self._link, self._linked = link, seq
+            self._last = seq, link
             fold(self._where, self._connection)
             if self._on_head is not None:
                 self._on_head(self.head)

@@ -116,6 +116,11 @@ class RangerLink:
         return self._watch.offset
 
     @property
+    def clock_error(self) -> float:
+        """Bound of that offset by the round trip, s."""
+        return self._watch.error
+
+    @property
     def clock_seen(self) -> int:
         """Ticks of ours when its clock was last seen; 0 before."""
         return self._watch.seen
@@ -319,6 +324,11 @@ class RangerLink:
         now = ticks_now(self._clock)
         for request in self.preparation.requests:
             self._guard.refusal(self.ranger, request, now)
+
+    def clock_corrected(self, seconds: float) -> None:
+        """Make the ranger ready anew, and judge its clock anew: our own was corrected."""
+        self._watch.corrected()
+        self._restarted(f"{self.ranger} is looked at anew: our clock was corrected by {seconds:+.3f} s")
 
     # Asking ---------------------------------------------------------------------------------------------------------
 

@@ -6,6 +6,11 @@ from typing import Any
 from catseye.coordinator.journal.check import ChainReport
 from catseye.gateways.writers.verdict import Verdict
 
+NO_HEAD = (
+    "checked against no head: a history that was written anew, cut at its end, or whose last run was deleted would not "
+    "show (--head EVENT:HASH, from the coordinator's log)"
+)
+
 
 def chain_object(report: ChainReport) -> dict[str, Any]:
     """A run's chain as a plain object for JSON."""
@@ -17,6 +22,7 @@ def chain_object(report: ChainReport) -> dict[str, Any]:
         "ended": report.ended,
         "events": report.events,
         "head": None if report.head is None else str(report.head),
+        "heads_given": report.given,
         "heads_found": report.heads,
         "problems": list(report.problems),
         "problem_count": report.count,
@@ -38,7 +44,7 @@ def chain_words(report: ChainReport) -> list[str]:
             f"{len(report.bad)} are wrong themselves. Take a backup's, or leave those out: export --damaged.",
         ]
     end = "" if report.ended else "; it has no end: it lasts, was killed, or was cut there"
-    told = f", and has the {report.heads} heads that were told" if report.heads else ""
+    told = f", and has the {report.heads} heads that were told" if report.heads else ", checked against no head"
     return [f"{report.events} events are as they were written up to head {report.head}{told}{end}."]
 
 
@@ -63,4 +69,7 @@ def chain_verdict(reports: list[ChainReport]) -> Verdict:
     bare = [report.run for report in reports if not report.chained]
     if bare:
         return Verdict("doubtful", f"run {bare[0]} has no chain, so that nothing of it could be checked")
-    return Verdict("good", "every event is as it was written, by a chain of hashes from the first to the last")
+    heads = sum(report.heads for report in reports)
+    known = f"which has the {heads} heads that were told" if heads else NO_HEAD
+    whole = "every event is as it was written, by a chain of hashes from the first to the last"
+    return Verdict("good", f"{whole}, {known}")

@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.clock import PER_DAY, PER_SECOND
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import ValidityError
 
 MJD_EPOCH = datetime(1858, 11, 17, tzinfo=UTC)
-PER_SECOND = 1_000_000_000
-PER_DAY = 86_400 * PER_SECOND
 LAST_DAY = 106_000  # the difference of any two instants still fits 64 bits
 MICROSECOND_DECIMALS = 11  # of an MJD: steps of 0.864 us
 EXACT_DECIMALS = 14  # steps of 0.864 ns: each nanosecond has its own text

@@ -252,6 +252,18 @@ class Live:
             self._pending.append(row)
         return said
 
+    def clock_corrected(self, ticks: int) -> None:
+        """Forget what was stamped later than now: the clock was set back; what is known counts from now on."""
+        self.track.forget_after(ticks)
+        self.stations.forget_after(ticks)
+        self._pending = [row for row in self._pending if row.shot.ticks <= ticks]
+        for now in self.rangers.values():
+            kept = [row for row in now.references if row.shot.ticks <= ticks]
+            now.references.clear()
+            now.references.extend(kept)
+        if self.carried is not None and self.carried.ticks > ticks:
+            self.carried = replace(self.carried, ticks=ticks)
+
     def place(self, name: str, mjd: ArrayLike) -> Array:
         """(..., 3) m, ground frame: where a point is predicted at times (...).
 

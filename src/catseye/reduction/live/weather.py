@@ -58,6 +58,16 @@ class StationWatch:
             station.good.popleft()
         return ""
 
+    def forget_after(self, ticks: int) -> None:
+        """Forget what was stamped later: the clock was set back."""
+        for station in self._stations.values():
+            while station.good and station.good[-1].ticks > ticks:
+                station.good.pop()
+            if station.last is not None and station.last.ticks > ticks:
+                station.last = None
+            if station.doubted_since is not None and station.doubted_since > ticks:
+                station.doubted_since, station.doubt = None, ""
+
     def believed(self, ticks: int) -> list[LiveWeather]:
         """Readings of the stations that speak and are believed, in order of station and time."""
         readings: list[LiveWeather] = []

@@ -48,6 +48,14 @@ class PostureTrack:
             del self._ticks[:first]
             self._filled = 0
 
+    def forget_after(self, ticks: int) -> None:
+        """Forget what was stamped later: the clock was set back."""
+        first = bisect_right(self._ticks, ticks)
+        for gone in self._ticks[first:]:
+            del self._reads[gone]
+        del self._ticks[first:]
+        self._filled = 0
+
     @classmethod
     def of(cls, reads: Sequence[LivePosture]) -> "PostureTrack":
         """All of some readings, in order of time, to which nothing is added."""

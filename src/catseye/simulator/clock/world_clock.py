@@ -1,44 +1,10 @@
-"""The twin's time: the machine's with an offset, or time that moves only when told."""
+"""Time that moves only when told."""
 
-import time
-from typing import Protocol
-
-from catseye.constants import SECONDS_PER_DAY
-from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND
-
-UNIX_EPOCH_DAY = 40_587  # MJD of 1970-01-01
-
-
-class Clock(Protocol):
-    """A clock that tells the true UTC of a world."""
-
-    def now_ns(self) -> int:
-        """Nanoseconds since MJD 0; never backwards."""
-        ...
-
-
-class SystemClock:
-    """This machine's UTC, read once and then counted on without steps, plus an offset: two processes agree to a ms.
-
-    offset   s, added to UTC: a night at noon
-    """
-
-    def __init__(self, offset: float = 0.0):
-        self.offset = offset
-        self._zero = UNIX_EPOCH_DAY * PER_DAY + time.time_ns() + round(offset * PER_SECOND) - time.monotonic_ns()
-
-    def now_ns(self) -> int:
-        return self._zero + time.monotonic_ns()
-
-    @staticmethod
-    def starting_at(mjd: float) -> "SystemClock":
-        """A clock that reads an MJD now."""
-        now = UNIX_EPOCH_DAY + time.time() / SECONDS_PER_DAY
-        return SystemClock((mjd - now) * SECONDS_PER_DAY)
+from catseye.clock import PER_DAY, PER_SECOND
 
 
 class ManualClock:
-    """Time that moves only when told.
+    """A clock that stands still until somebody lets time pass.
 
     >>> clock = ManualClock(52889.125)
     >>> clock.advance(0.5)
@@ -50,6 +16,7 @@ class ManualClock:
         self._now = round(mjd * PER_DAY)
 
     def now_ns(self) -> int:
+        """Nanoseconds since MJD 0."""
         return self._now
 
     def advance(self, seconds: float) -> None:

@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from catseye.clock import Clock
 from catseye.constants import DEGREE
 from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import PER_SECOND
@@ -23,7 +24,6 @@ from catseye.ranger.first_line import BLANK, opening_of, peer_of
 from catseye.ranger.line import LONGEST_REQUEST, TICK_NS, Reply, format_reply, nanoseconds_to_ticks
 from catseye.ranger.network import ConnectionMaker, Listener, Sockets
 from catseye.records.night.live import LiveWeather
-from catseye.simulator.clock.world_clock import Clock
 from catseye.simulator.twin.faults import FaultBoard
 
 WEATHER_EVERY = 10.0  # s

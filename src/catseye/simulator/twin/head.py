@@ -13,12 +13,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from catseye.clock import Clock
 from catseye.constants import TWO_PI
 from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND, TimeTag
 from catseye.ranger.head import Buffer, Homing, SamplingSettings
 from catseye.ranger.motion_units import CLOCK_HZ, CLOCKS_PER_SAMPLE, SAMPLE_TIME
-from catseye.simulator.clock.world_clock import Clock
 from catseye.simulator.night.faults import Streams
 from catseye.simulator.night.head import VOLT_PER_CODE
 from catseye.simulator.twin.converter import Converter
