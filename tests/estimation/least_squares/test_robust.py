@@ -169,6 +169,45 @@ def test_four_ranges_of_which_one_is_wrong_end_without_an_answer_not_with_a_wron
     assert "P5" in status
 
 
+@pytest.mark.parametrize("station", range(3))
+def test_of_three_ranges_the_one_that_the_typed_place_contradicts_is_left_out(station):
+    """Three ranges agree on any place; 0.6 m of one of them is twenty sigmas of a typed place."""
+    field = Field(4, targets=3, stations=STATIONS[[0, 1, 3]], prior=0.03)
+    field.observed[station][1] += 0.6
+    solution = field.adjusted().require_converged()
+    assert field.left_out(solution) == {(station, 1)}
+    error = (solution.x - field.true)[12:15]
+    assert np.all(np.abs(error) < 4.0 * np.sqrt(np.diag(solution.covariance))[12:15])
+
+
+def test_a_typed_place_that_no_one_range_explains_leaves_all_of_them():
+    field = Field(4, targets=3, stations=STATIONS[[0, 1, 3]], prior=0.03)
+    columns = field.prior[0].columns
+    to_points = field.true[12:15] - field.true[:9].reshape(3, 3)
+    directions = np.linalg.inv(
+        to_points / np.linalg.norm(to_points, axis=1)[:, None]
+    )  # a column for each range's error
+    away = np.sum(directions / np.linalg.norm(directions, axis=0), axis=1)  # as far from one as from another
+    field.prior[0].observed[np.argsort(columns)[3:6]] += 0.5 * away / np.linalg.norm(away)
+    assert field.left_out(field.adjusted().require_converged()) == set()
+
+
+def test_a_typed_place_on_a_body_that_many_know_is_known_of_the_point():
+    """Typed places share three parameters of how their body stands: 30 m off, and known by forty points."""
+    field = Field(5, targets=40, stations=STATIONS[[0, 1, 3]])
+    body = len(field.x0) + np.arange(3)
+    shift = np.array([30.0, -20.0, 10.0])
+    places = field.true[9:].reshape(-1, 3) + np.random.default_rng(6).normal(0.0, 0.03, (40, 3)) - shift
+    columns = np.stack([np.arange(9, 9 + 120), np.tile(body, 40)], axis=1)
+    field.prior = [Linear("typed", places.ravel(), np.full(120, 0.03**2), columns, np.tile([1.0, -1.0], (120, 1)))]
+    field.x0, field.free = np.append(field.x0, np.zeros(3)), np.append(field.free, [True] * 3)
+    field.observed[1][7] += 0.6
+    removable = [np.ones(40, dtype=bool)] * 3 + [np.zeros(120, dtype=bool)]
+    outliers = OutlierSearch(field.points, settled=body.tolist())
+    solution = adjust_robustly(field.x0, field.groups(), removable, outliers=outliers, free=field.free)
+    assert field.left_out(solution.require_converged()) == {(1, 7)}
+
+
 def test_advice_decides_between_four_ranges_and_takes_no_part_in_the_answer():
     field = Field(4, targets=2, stations=STATIONS[[0, 1, 3, 5]])
     field.observed[2][1] += 0.02

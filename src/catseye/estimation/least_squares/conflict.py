@@ -15,6 +15,7 @@ from catseye.estimation.observations.kinds import Distances, MovingDistances, Ob
 MOST_AT_ONE_POINT = 2  # wrong observations searched for at one point, exhaustively
 LARGEST_SEARCH = 24  # observations at a point; a point with more has redundancy enough for the robust fit alone
 SEARCHES = 6  # at one point, each about the place that the one before found likeliest
+FAR = 6.0  # sigmas from what is known of a point besides, which its observations are then asked about
 SLACK = 2.0  # on sigma in the search, because everything but the point itself is held there
 
 
@@ -77,6 +78,12 @@ class LocalConflict:
                 return best
         return None
 
+    def decisive(self, out: tuple[int, ...], margin: float) -> bool:
+        """True where leaving out any others, as many, leaves a sum of squares larger by the margin."""
+        limit = self.cost(out) + margin
+        others = (each for each in combinations(range(len(self.rows)), len(out)) if each != out)
+        return all(self.cost(each) > limit for each in others)
+
 
 @dataclass(frozen=True, eq=False)
 class SharedErrors:
@@ -123,6 +130,7 @@ class MeetingLines:
     by_column           columns in order, and group and row of the entries that stand in them
     advice_at           column of a point: index of an advice
     shared              of the first groups
+    settled             columns that so many observations know that who depends on them and a point depends on that
     """
 
     groups: Sequence[ObservationGroup]
@@ -135,6 +143,7 @@ class MeetingLines:
     by_column: tuple[np.ndarray, np.ndarray, np.ndarray]
     advice_at: Mapping[int, Sequence[int]]
     shared: Sequence[SharedErrors | None]
+    settled: np.ndarray
 
     @staticmethod
     def of(
@@ -143,6 +152,7 @@ class MeetingLines:
         removable: Sequence[np.ndarray],
         advice: Sequence[ObservationGroup],
         shared: Sequence[SharedErrors | None] = (),
+        settled: Sequence[int] = (),
     ) -> "MeetingLines":
         """Of a solution of the groups."""
         advice_at: dict[int, list[int]] = {}
@@ -162,6 +172,7 @@ class MeetingLines:
             _by_column(groups, jacobians),
             advice_at,
             shared,
+            np.array(settled, dtype=int),
         )
 
     def rows(self, columns: np.ndarray) -> list[tuple[int, np.ndarray]]:
@@ -243,7 +254,7 @@ def at_point(columns: np.ndarray, meeting: MeetingLines, *, slack: float) -> Loc
     doubted: list[tuple[float, np.ndarray]] = []
     prior: list[tuple[float, np.ndarray]] = []
     for i, near in meeting.rows(columns):
-        slope, alone = _slopes(columns, meeting.groups[i].columns, meeting.jacobians[i], near)
+        slope, alone = _slopes(columns, meeting.groups[i].columns, meeting.jacobians[i], near, meeting.settled)
         residual, sigma, may = meeting.residual[i][near], meeting.sigma[i][near], meeting.removable[i][near]
         for k in np.flatnonzero(may):
             doubted.append((residual[k] / (slack * sigma[k]), slope[k] / (slack * sigma[k])))
@@ -252,7 +263,7 @@ def at_point(columns: np.ndarray, meeting: MeetingLines, *, slack: float) -> Loc
     for i in dict.fromkeys(i for c in columns.tolist() for i in meeting.advice_at.get(c, ())):
         group = meeting.advice[i]
         values, jacobian = group.predict(meeting.x)
-        slope, alone = _slopes(columns, group.columns, jacobian, np.arange(len(values)))
+        slope, alone = _slopes(columns, group.columns, jacobian, np.arange(len(values)), meeting.settled)
         sigma, residual = np.sqrt(variances(group)), group.observed - values
         prior += [(residual[k] / sigma[k], slope[k] / sigma[k]) for k in np.flatnonzero(alone)]
     (residual, slopes), (prior_residual, prior_slopes) = (
@@ -262,16 +273,32 @@ def at_point(columns: np.ndarray, meeting: MeetingLines, *, slack: float) -> Loc
 
 
 def _slopes(
-    columns: np.ndarray, own: np.ndarray, jacobian: np.ndarray, rows: np.ndarray
+    columns: np.ndarray, own: np.ndarray, jacobian: np.ndarray, rows: np.ndarray, settled: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives (k, 3) of some rows of a group by a point, and which of them depend on nothing else."""
+    """Derivatives (k, 3) of some rows of a group by a point, and which of them depend on nothing else that is open."""
     at, jacobian = (own if own.ndim == 1 else own[rows]), jacobian[rows]
     here = at[..., None] == columns  # in any order, and perhaps not all three
+    known = here.any(axis=-1) | np.isin(at, settled)
     if here.ndim == 2:
-        slope, others = jacobian @ here, jacobian[:, ~here.any(axis=1)]
+        slope, others = jacobian @ here, jacobian[:, ~known]
     else:
-        slope, others = np.einsum("mw,mwa->ma", jacobian, here), np.where(here.any(axis=2), 0.0, jacobian)
+        slope, others = np.einsum("mw,mwa->ma", jacobian, here), np.where(known, 0.0, jacobian)
     return slope, np.any(slope != 0.0, axis=1) & ~np.any(others != 0.0, axis=1)
+
+
+def contradicted(points: Sequence[np.ndarray], meeting: MeetingLines) -> list[np.ndarray]:
+    """The points that are far from what is known of each besides its observations, for all that these agree."""
+    far = [
+        ~may & (np.abs(v) > FAR * sigma)
+        for v, sigma, may in zip(meeting.residual, meeting.sigma, meeting.removable, strict=True)
+    ]
+    columns = set()
+    for group in meeting.advice:
+        values, jacobian = group.predict(meeting.x)
+        columns |= set(_columns_of(group, jacobian, np.abs(group.observed - values) > FAR * np.sqrt(variances(group))))
+    near = touched(points, meeting, chosen=far)
+    near += [p for p in points if columns.intersection(p.tolist()) and not any(p is one for one in near)]
+    return [p for p in near if np.any(np.abs(at_point(p, meeting, slack=SLACK).prior) > FAR)]
 
 
 def touched(points: Sequence[np.ndarray], meeting: MeetingLines, *, chosen: Sequence[np.ndarray]) -> list[np.ndarray]:

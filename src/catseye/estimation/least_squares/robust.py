@@ -20,6 +20,7 @@ from catseye.estimation.least_squares.conflict import (
     MeetingLines,
     SharedErrors,
     at_point,
+    contradicted,
     search,
     touched,
     whole_residuals,
@@ -51,6 +52,8 @@ class OutlierSearch:
                one good observation in 2000
     rounds     cap of removal rounds; if they do not end, the status says so
     shared     what the observations of the first groups share, where that is parameters
+    settled    columns of parameters that are known well beside a point's: what depends on them and the point alone is
+               known of the point
     """
 
     points: Sequence[np.ndarray] = ()
@@ -58,6 +61,7 @@ class OutlierSearch:
     critical: float = 3.5
     rounds: int = 100
     shared: Sequence[SharedErrors | None] = ()
+    settled: Sequence[int] = ()
 
 
 TESTS_ALONE = OutlierSearch()
@@ -104,7 +108,7 @@ def adjust_robustly(
         active = [~may | (np.abs(v) < WRONG * sigma) for (v, sigma), may in zip(whole, removable, strict=True)]
     else:
         solution = adjust(x0, groups, free=np.zeros(len(x0), dtype=bool), solver=SolverSettings(tests=False))
-        large = [may & ~a for may, a in zip(removable, active, strict=True)] if outliers.advice else []
+        large = [may & ~a & bool(outliers.advice) for may, a in zip(removable, active, strict=True)]
     active = _searched(solution, groups, removable, outliers, large, active)
     x, solver = solution.x, SolverSettings(border=border, rough=True)
     returns = [np.zeros(len(g.observed), dtype=int) for g in groups]
@@ -186,7 +190,7 @@ def _without_undecided(
     rejected = [may & ~f.active for f, may in zip(solution.fits, removable, strict=True)]
     if not any(r.any() for r in rejected):
         return solution
-    meeting = MeetingLines.of(groups, solution, removable, outliers.advice, outliers.shared)
+    meeting = MeetingLines.of(groups, solution, removable, outliers.advice, outliers.shared, outliers.settled)
     for columns in touched(outliers.points, meeting, chosen=rejected):
         local = at_point(columns, meeting, slack=1.0)
         out = [index for index, (i, k) in enumerate(local.rows) if not solution.fits[i].active[k]]
@@ -265,16 +269,25 @@ def _searched(
     suspects: Sequence[np.ndarray],
     active: Sequence[np.ndarray],
 ) -> list[np.ndarray]:
-    """The selection, with the smallest conflict left out at each point that a suspect depends on."""
+    """The selection, without the smallest conflict at each point that a suspect depends on, or that is elsewhere.
+
+    Observations that check nothing among themselves agree on a wrong place; what is known of the place tells.
+    """
     active = [a.copy() for a in active]
     if not solution.solved:
         return [np.ones(len(g.observed), dtype=bool) for g in groups]
-    if not any(s.any() for s in suspects):
+    if not (outliers.points or any(s.any() for s in suspects)):
         return active
-    meeting = MeetingLines.of(groups, solution, removable, outliers.advice, outliers.shared)
+    meeting = MeetingLines.of(groups, solution, removable, outliers.advice, outliers.shared, outliers.settled)
     for columns in touched(outliers.points, meeting, chosen=suspects):
         local, wrong = search(columns, meeting)
         if wrong is not None:
             for index, (i, k) in enumerate(local.rows):
                 active[i][k] = index not in wrong
+    for columns in contradicted(outliers.points, meeting):
+        local, wrong = search(columns, meeting)
+        if wrong and local.decisive(wrong, DECISIVE):
+            for index in wrong:
+                i, k = local.rows[index]
+                active[i][k] = False
     return active

@@ -83,6 +83,7 @@ def settle_network(
             x[layout.columns(name)] = where
     points = [layout.columns(name) for name in network.places if name in layout.points]
     coordinates = np.concatenate(points)
+    bodies = [i for i, p in enumerate(layout.parameters) if p.kind is ParameterKind.BODY]
     advice: list[Linear] = []
     border = network.border  # one, whatever strengths: it remembers the last elimination
     u = np.full(len(coordinates), np.inf)
@@ -96,6 +97,7 @@ def settle_network(
             advice=advice,
             critical=network.settings.critical,
             shared=[part.shared_errors for _, part in shots],
+            settled=bodies,
         )
         before, state = x, None  # its covariance is large
         state = _adjusted(network, x, shots, search, border, turn=turn, predicted=predicted, active=active)
