@@ -664,7 +664,7 @@ def test_no_search_that_is_allowed_comes_near_the_sun():
             told.turns(3)
         else:
             assert least < 8.0 * DEGREE
-        told.head.laser = True
+        told.ranger.switch_laser(True)
     assert 40 < passed < 190
 
 
@@ -844,11 +844,12 @@ def test_lines_behind_a_lease_that_come_with_it_are_judged_when_their_turn_comes
     told = ready()
     told.ranger.guarded = True
     said = at_once(told, "LEASE anna", "CYC 64", "CYC")
-    assert said == [("LEASE", True, None), ("CYC", True, None), ("CYC", True, None)]
+    told_all = ("LEASE", True, None)  # but who took it, which has been answered
+    assert said == [("LEASE", True, 1), ("CYC", True, None), told_all, ("CYC", True, 1)]
     said = at_once(told, "LEASE none", "CYC 32")
-    assert said == [("LEASE", True, None), ("CYC", False, 1)]
-    assert at_once(told, "CYC 32", "LEASE ben", client=2) == [("CYC", False, 2), ("LEASE", True, None)]
-    assert at_once(told, "LEASE none", "CYC 32", client=1) == [("LEASE", False, None), ("CYC", False, 1)]
+    assert said == [("LEASE", True, 1), told_all, ("CYC", False, 1)]
+    assert at_once(told, "CYC 32", "LEASE ben", client=2) == [("CYC", False, 2), ("LEASE", True, 2), told_all]
+    assert at_once(told, "LEASE none", "CYC 32", client=1) == [("CYC", False, 1), ("LEASE", False, 1)]
     assert told.one("CYC").text == "64"
 
 

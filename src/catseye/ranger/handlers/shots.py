@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from catseye.errors import CatseyeError, InputError
+from catseye.ranger.commands import LONGEST_PAGE
 from catseye.ranger.cubes import Cube, RangerShot
 from catseye.ranger.handlers.axes import Handler, wait_until
 from catseye.ranger.handlers.cubes import illuminate, refuse_unready
@@ -37,7 +38,10 @@ def _shoot(z: RangerState) -> Generator[int | None, None, None]:
     owner = z.aimed
     _fire(z)
     z.measured = None
-    z.measured = MeasuredBuffer((yield from _taken(z)), owner)
+    buffer = yield from _taken(z)
+    if not z.head.laser_on():
+        raise InputError("the laser went off meanwhile (expected PS 1 first)")
+    z.measured = MeasuredBuffer(buffer, owner)
 
 
 def _fire(z: RangerState) -> None:
@@ -103,13 +107,18 @@ def _mag(z: RangerState, _: int) -> Values:
     return (f"{_known(z).amplitude:.6g}",)
 
 
-def _seq(z: RangerState, _: int) -> Work:
+def _seq(z: RangerState, _: int, first: int = 1, count: int = LONGEST_PAGE) -> Work:
+    """Cycles from a number on; where there are more, the last line says from where."""
     measured = _computed(z)
     n = measured.buffer.sampling.samples
-    each = detect(measured.buffer.samples.reshape(-1, n), n, measured.buffer.volts_per_code, harmonics=())
-    for k, (amplitude, phase) in enumerate(zip(each.amplitude.tolist(), each.phase.tolist(), strict=True), 1):
+    cycles = measured.buffer.samples.reshape(-1, n)
+    if first > len(cycles):
+        raise InputError(f"cycle {first} is not in a buffer of {len(cycles)} (expected 1 to {len(cycles)})")
+    page = cycles[first - 1 : first - 1 + count]
+    each = detect(page, n, measured.buffer.volts_per_code, harmonics=())
+    for k, (amplitude, phase) in enumerate(zip(each.amplitude.tolist(), each.phase.tolist(), strict=True), first):
         yield str(k), f"{amplitude:.6g}", f"{phase:.7f}"
-    return None
+    return ("more", str(first + count)) if first - 1 + count < len(cycles) else None
 
 
 def _keep(z: RangerState, cube: Cube, measured: MeasuredBuffer) -> RangerShot:
@@ -226,6 +235,8 @@ def stream_shots(z: RangerState, stream: Stream) -> Generator[Outgoing | int | N
             try:
                 buffer = yield from _taken(z)
                 problem = fire() if left else None
+                if not z.head.laser_on():
+                    raise InputError("the laser went off meanwhile (expected PS 1 first)")
                 z.measured = MeasuredBuffer(buffer, stream.cube)
                 yield Outgoing(Reply("CMEAS", True, _measured(z, 2, stream.cube), stream.tid))
                 yield Outgoing(Reply("BUF", True, _buf(z, stream.client), stream.tid), stream.client)
