@@ -21,7 +21,7 @@ from catseye.ranger.network import NO_TLS, TlsFiles, is_here
 KEY, KEY_FILE = "CATSEYE_KEY", "CATSEYE_KEY_FILE"  # in the environment
 SHORTEST = 16  # characters
 FEWEST_LETTERS = 8  # different ones: fewer are soon guessed
-LONGEST_RUN = 5  # characters that follow each other as in the alphabet
+LONGEST_RUN = 7  # characters that follow each other as in the alphabet
 TYPED = ("password", "changeme", "letmein", "secret", "qwerty", "admin", "default")
 PROBES = ((socket.TCP_KEEPIDLE, 20), (socket.TCP_KEEPINTVL, 5), (socket.TCP_KEEPCNT, 3))  # s: gone is noticed in 35
 

@@ -494,7 +494,7 @@ class RangerLink:
             await self._darkened(self.settings.move_timeout)
 
     async def _darkened(self, timeout: float) -> bool:
-        """PS 0, where the lease is ours: another's order would hold against its holder. Whether nothing is left to do."""
+        """Say PS 0 where the lease is ours: from outside it would hold against who has it. False: not answered."""
         if self._token is None and not self._leaseless:
             return True
         return (await self._ask(Request("PS", ("0",)), timeout)).ok is True

@@ -109,7 +109,7 @@ class TwinHead:
     def _forget(self) -> None:
         self._taking: tuple[SamplingSettings, int, TimeTag, bool] | None = None
         self._last: Buffer | None = None
-        self._laser = False
+        self._laser = True
 
     # Time -----------------------------------------------------------------------------------------------------------
 
@@ -283,7 +283,7 @@ class TwinHead:
         return mean + swing * float(np.sin(TWO_PI * (self._clock.now_ns() % PER_DAY) / PER_DAY + phase))
 
     def reset(self) -> None:
-        """As when power comes on: amplifiers off, nothing homed, no buffer, laser off; the mirror stays where it is."""
+        """As when power comes on: amplifiers off, nothing homed, no buffer, laser on; the mirror stays where it is."""
         self._caught_up(exactly=True).reset()
         self._forget()
 
