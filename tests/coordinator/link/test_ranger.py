@@ -14,7 +14,7 @@ from catseye.ranger.client import SECOND_CLIENT_TID, ZyClient
 from catseye.ranger.door import Door
 from catseye.ranger.line import Request
 from catseye.ranger.server import LOOPBACK
-from coordinator.link_scene import COMMANDS, Free, Linked, LoopClock, Served, network, planned, run, until
+from coordinator.link_scene import COMMANDS, LATENCY, Free, Linked, LoopClock, Served, network, planned, run, until
 
 
 def test_a_cold_ranger_is_made_ready_and_its_shot_comes_whole():
@@ -683,6 +683,23 @@ def test_a_dark_order_of_another_is_journalled_with_its_peer_and_obeyed_until_it
             assert served.head.laser_on()
             assert "darkened" not in link.troubles
             assert any("cleared by anna at memory port 0" in h.text for h in served.happenings)
+
+    run(story)
+
+
+def test_who_leaves_lights_nothing_again():
+    """Attack: the probe that saw the laser off, by the coordinator's own leaving, switched it on again."""
+
+    async def story():
+        guard = Free()
+        async with Linked(guard=guard) as (served, link):
+            leaving = asyncio.ensure_future(link.leave())
+            while served.head.laser_on():
+                await asyncio.sleep(LATENCY / 10)
+            await link._lives()
+            await leaving
+            assert not served.head.laser_on()
+            assert guard.asked[-1] == Request("PS", ("0",))
 
     run(story)
 

@@ -249,6 +249,8 @@ class RangerLink:
 
     async def _light(self) -> None:
         """The laser on; where that is refused, from inside the instrument; else it stays dark, and fires nothing."""
+        if self._left:  # it has been switched off for good
+            return
         if self.status & StatusWord.LATCHED:
             self._dark = True
             return
