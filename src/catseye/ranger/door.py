@@ -74,12 +74,13 @@ def key_of(environment: Mapping[str, str] = os.environ) -> str | None:
 def _key_in(path: Path, where: str) -> str:
     """The line of a key's file. Raises InputError: not readable, or readable by others."""
     try:
-        mode = path.stat().st_mode
+        about = path.stat()
         key = path.read_text("ascii").strip()
     except (OSError, UnicodeDecodeError) as problem:
         raise InputError(f"{where}: cannot be read (expected a file of one line of ASCII)") from problem
-    if mode & 0o077:
-        raise InputError(f"{where}: others can use it, {stat.filemode(mode)} (expected -rw-------: chmod 600)")
+    of_root = about.st_uid == about.st_gid == 0  # as systemd's credentials, whose group bits are a list's mask
+    if about.st_mode & (0o037 if of_root else 0o077):
+        raise InputError(f"{where}: others can use it, {stat.filemode(about.st_mode)} (expected -rw-------: chmod 600)")
     return key
 
 

@@ -7,6 +7,7 @@ an address is not this machine's own the sockets speak TLS.
 import asyncio
 import errno
 import ipaddress
+import logging
 import os
 import socket
 import ssl
@@ -24,6 +25,7 @@ FOLDER_OWNER_ONLY = 0o700
 CERTIFICATE, CERTIFICATE_KEY = "CATSEYE_TLS_CERTIFICATE", "CATSEYE_TLS_KEY"  # in the environment
 AUTHORITY, CLEAR = "CATSEYE_TLS_AUTHORITY", "CATSEYE_CLEAR"
 HANDSHAKE = 5.0  # s
+LOG = logging.getLogger(__name__)
 
 
 class Listener(Protocol):
@@ -136,6 +138,13 @@ class Sockets:
 
     def __init__(self, tls: TlsFiles = NO_TLS):
         self._tls = tls
+        self._warned: set[str] = set()
+
+    def _warn(self, host: str) -> None:
+        """Tell the log once of an address that is reached in clear."""
+        if self._tls.clear and not is_here(host) and host not in self._warned:
+            self._warned.add(host)
+            LOG.warning("%s: lines go in clear (%s=yes): whoever is on the way reads and commands", host, CLEAR)
 
     async def serve(self, factory: Callable[[], asyncio.Protocol], host: str, port: int) -> "SocketListener":
         return await self.listen(factory, host, port)
@@ -150,6 +159,7 @@ class Sockets:
             server = await loop.create_unix_server(factory, sock=bound, start_serving=at_once)
             return SocketListener(server, number)
         context = self._tls.of_server(host)
+        self._warn(host)
         limit = None if context is None else HANDSHAKE
         server = await loop.create_server(
             factory, host, port, ssl=context, ssl_handshake_timeout=limit, start_serving=at_once
@@ -162,6 +172,7 @@ class Sockets:
             _, protocol = await loop.create_unix_connection(factory, str(socket_path(host.removeprefix(UNIX), port)))
             return protocol
         context = self._tls.of_client(host)
+        self._warn(host)
         limit = None if context is None else HANDSHAKE
         _, protocol = await loop.create_connection(factory, host, port, ssl=context, ssl_handshake_timeout=limit)
         return protocol
