@@ -254,7 +254,7 @@ WORDS = frozenset([*COMMANDS, "AT", "KEY"])  # what a connection's first line ma
 
 
 def stops(request: Request) -> bool:
-    """Whether a request makes dark or stops: it passes every queue and needs no lease.
+    """True for a request that makes dark or stops: it passes every queue and needs no lease.
 
     >>> [stops(Request(*words)) for words in (("PS", ("0",)), ("PS", ("1",)), ("STOP",), ("AXIS", ("0", "0")))]
     [True, False, True, True]
@@ -266,7 +266,7 @@ def stops(request: Request) -> bool:
 
 
 def undoes(request: Request, stop: Request) -> bool:
-    """Whether a request that waits would undo a stop that was given after it.
+    """True for a waiting request that would undo a stop given after it.
 
     >>> undoes(Request("PS", ("1",)), Request("PS", ("0",))), undoes(Request("PS"), Request("PS", ("0",)))
     (True, False)

@@ -85,7 +85,7 @@ def _key_in(path: Path, where: str) -> str:
 
 
 def triviality(key: str) -> str | None:
-    """What makes a key easy to guess, in words; None where nothing does.
+    """Weakness of a key, in words; None for one that is hard to guess.
 
     >>> triviality("aaaaaaaaaaaaaaaab"), triviality("f3b0c44298fc1c14")
     ('2 different characters', None)
@@ -119,7 +119,7 @@ def refuse_open(what: str, host: str, door: Door) -> None:
 
 
 def answer_to(nonce: str, key: str) -> str:
-    """What proves that one has the key: HMAC-SHA256 of a server's random word, hexadecimal.
+    """Proof of the key: HMAC-SHA256 of a server's random word, hexadecimal.
 
     >>> answer_to("00", "Jefe-of-the-site-11")[:16]
     '2dc447d20cdc3ef5'

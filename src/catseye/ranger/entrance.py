@@ -23,8 +23,8 @@ NONCE_BYTES = 16
 LOG = logging.getLogger(__name__)
 
 
-class Gate:
-    """What the entrances of one port share.
+class Doorway:
+    """Shared part of one port's entrances: who is not in yet, and wrong keys.
 
     name    of the port, for the log: "ZY101: port 5240"
     door    what it asks
@@ -73,7 +73,7 @@ class Entrance:
     say   sends it a reply, which needs a stamp still
     """
 
-    def __init__(self, gate: Gate, transport: asyncio.Transport, say: Callable[[Reply], None]):
+    def __init__(self, gate: Doorway, transport: asyncio.Transport, say: Callable[[Reply], None]):
         self._gate, self._transport, self._say = gate, transport, say
         self._nonce = ""
         self._unread = bytearray()
@@ -89,7 +89,7 @@ class Entrance:
             self._say(Reply("NONCE", True, (self._nonce,)))
 
     def take(self, data: bytes) -> bytes | None:
-        """What of the bytes received goes on; None while the first line is not whole, or where it is refused."""
+        """Bytes that go on from here; None while the first line is not whole, or where it is refused."""
         if self._open:
             return data
         if self.judged or self._transport.is_closing():
@@ -110,7 +110,7 @@ class Entrance:
         return rest if self._unlocked(line.decode("ascii", "replace").removesuffix("\r")) else None
 
     def over(self) -> None:
-        """The connection is gone."""
+        """Forget a connection that is gone."""
         self._gate.forget(self)
 
     def refuse(self) -> None:
@@ -118,7 +118,7 @@ class Entrance:
         self._refuse(f"the site's key is expected first: KEY and the HMAC-SHA256 of the nonce within {PATIENCE:g} s")
 
     def close(self) -> None:
-        """Close without a word."""
+        """Close the connection without a word."""
         self._transport.abort()
 
     def _unlocked(self, line: str) -> bool:

@@ -40,7 +40,7 @@ class Lane:
 
 
 def acts(request: Request) -> bool:
-    """Whether a request changes the ranger: those need the lease, and run one at a time.
+    """True for a request that changes the ranger: those need the lease, and run one at a time.
 
     >>> acts(Request("ACP", ("0",))), acts(Request("CIL", ("1",))), acts(Request("BYE")), acts(Request("XYZ"))
     (False, True, False, False)
@@ -56,7 +56,7 @@ class Lanes:
         self._lanes: dict[int, Lane] = {SCHEDULE: Lane(SCHEDULE)}
 
     def of(self, client: int) -> Lane:
-        """A connection's lane."""
+        """The lane of one connection."""
         return self._lanes.setdefault(client, Lane(client))
 
     def drop(self, client: int) -> None:
@@ -76,17 +76,17 @@ class Lanes:
         return next((lane.running for lane in self._lanes.values() if lane.running and lane.running.acts), None)
 
     def can_begin(self, lane: Lane) -> bool:
-        """Whether a lane's next command can begin now."""
+        """True where a lane's next command can begin now."""
         return bool(lane.waiting) and lane.running is None and (self.acting is None or not acts(lane.waiting[0]))
 
     @property
     def busy(self) -> bool:
-        """Whether a command runs or waits."""
+        """True while a command runs or waits."""
         return any(lane.running is not None or lane.waiting for lane in self._lanes.values())
 
     @property
     def running(self) -> list[Running]:
-        """All commands under way."""
+        """Commands under way, of all lanes."""
         return [lane.running for lane in self._lanes.values() if lane.running is not None]
 
     def take_out(

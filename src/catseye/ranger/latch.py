@@ -14,7 +14,7 @@ MOVING = frozenset(["AXIS", "STT", "FHM", "CIL", "CMEAS", "TRK", "SCN"])
 
 @dataclass(frozen=True)
 class Latch:
-    """What is refused until it is cleared.
+    """An order that holds until it is cleared.
 
     light, moves   which of both
     order          the command and who gave it, in words
@@ -31,12 +31,12 @@ class Latch:
         return Latch(self.light or other.light, self.moves or other.moves, other.order)
 
     def refuses(self, command: str) -> bool:
-        """Whether a command that switches on, fires or moves is refused."""
+        """True for a command that it forbids, of those that switch on, fire or move."""
         return (self.light and command in LIGHTING) or (self.moves and command in MOVING)
 
     @property
     def extent(self) -> str:
-        """What is off, in words."""
+        """Extent of the order, in words."""
         return " and ".join(word for word, off in (("light", self.light), ("moves", self.moves)) if off)
 
 

@@ -117,7 +117,7 @@ NO_TLS = TlsFiles()
 
 
 def is_here(host: str) -> bool:
-    """Whether only this machine reaches an address.
+    """True for an address that only this machine reaches.
 
     >>> is_here("127.0.8.3"), is_here("::1"), is_here("localhost"), is_here("unix:/run/site"), is_here("0.0.0.0")
     (True, True, True, True, False)

@@ -127,7 +127,7 @@ class Ranger(RangerState):
         return f"{request.command} needs the lease: {who} (expected LEASE and a name first)"
 
     def _leases_at_once(self, client: int, request: Request) -> bool:
-        """Whether it renews the lease, or takes it: it does not wait for what its holder is doing."""
+        """True for a request that renews or takes the lease: it waits for nothing."""
         words = request.parameters
         return len(words) == 2 or (len(words) == 1 and words[0].lower() != "none")
 
@@ -303,7 +303,7 @@ class Ranger(RangerState):
 
     @property
     def has_queued(self) -> bool:
-        """Whether the next turn can begin a command that waits, or go on with a long answer."""
+        """True where the next turn can begin a command, or go on with a long answer."""
         lanes = self._lanes
         return any(lanes.can_begin(lane) for lane in lanes.in_turn(None)) or any(
             each.more and self.room(each.client) for each in lanes.running
@@ -311,7 +311,7 @@ class Ranger(RangerState):
 
     @property
     def busy(self) -> bool:
-        """Whether a command runs or waits."""
+        """True while a command runs or waits."""
         return self._lanes.busy
 
     @property

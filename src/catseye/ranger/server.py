@@ -17,7 +17,7 @@ from functools import partial
 from catseye.errors import InputError
 from catseye.ranger.commands import WORDS, stops
 from catseye.ranger.door import USUAL_DOOR, Door, notice_death, refuse_open
-from catseye.ranger.entrance import Entrance, Gate
+from catseye.ranger.entrance import Doorway, Entrance
 from catseye.ranger.first_line import peer_of
 from catseye.ranger.line import LONGEST_REQUEST, Reply, format_reply, parse_request
 from catseye.ranger.network import ConnectionMaker, Listener, Sockets
@@ -62,7 +62,7 @@ class ClientConnection(asyncio.Protocol):
 
     @property
     def admitted(self) -> bool:
-        """Whether it may hear."""
+        """True once it is in: it may hear."""
         return self.entrance is not None and self.entrance.admitted
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -137,7 +137,7 @@ class ClientConnection(asyncio.Protocol):
 
     @property
     def has_room(self) -> bool:
-        """Whether it can be given more of a long answer."""
+        """True where it can be given more of a long answer."""
         held = 0 if self.transport is None else self.transport.get_write_buffer_size()
         return self.replies_left >= 1.0 and held <= MOST_HELD
 
@@ -170,7 +170,7 @@ class ClientConnection(asyncio.Protocol):
 
 
 def _stops(line: str) -> bool:
-    """Whether a line makes dark or stops, now."""
+    """True for a line that makes dark or stops at once."""
     try:
         request = parse_request(line)
     except InputError:
@@ -204,7 +204,7 @@ class ZyServer:
         self._orders = 0
         self.network: ConnectionMaker = network or Sockets(door.tls)
         self.connections: dict[int, ClientConnection] = {}
-        self.gates = tuple(Gate(partial(self._port_name, number), door, WORDS, clock) for number in (0, 1))
+        self.gates = tuple(Doorway(partial(self._port_name, number), door, WORDS, clock) for number in (0, 1))
         self._listeners: list[Listener] = []
         self._waker: asyncio.Future[None] | None = None
         self._last_keep_alive = self._last_rate = clock()

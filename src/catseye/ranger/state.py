@@ -44,7 +44,7 @@ class Outgoing:
 
 
 class Lease(NamedTuple):
-    """Who may command: a connection, the name it gave, the token that only it was told, its peer's address."""
+    """Right to command: a connection, the name it gave, the token that only it was told, its peer's address."""
 
     client: int
     name: str
@@ -174,7 +174,7 @@ class RangerState:
         store_latch(self.files, latch)
 
     def peer(self, client: int) -> str:
-        """Who is at the other end of a connection, in words."""
+        """Address of a connection's other end, in words."""
         return self.peers.get(client, f"connection {client + 1}")
 
     def switch_laser(self, on: bool) -> None:

@@ -90,7 +90,7 @@ def test_it_serves_people_and_ends_clean(tmp_path, number, status):
         with socket.create_connection((host, port), timeout=PATIENCE) as person:
             lines = person.makefile("rw")
             print("LEASE anna", file=lines, flush=True)
-            print("CIL 0", file=lines, flush=True)
+            print("PS 1\nCIL 0", file=lines, flush=True)
             print("CMEAS 2, 0", file=lines, flush=True)
             heard = []
             while not heard or "CMEAS" not in heard[-1]:

@@ -22,7 +22,7 @@ from catseye.coordinator.parts import ticks_now
 from catseye.coordinator.ziy import Coordinator
 from catseye.errors import CatseyeError, InputError
 from catseye.ranger.door import USUAL_DOOR, Door, notice_death, refuse_open
-from catseye.ranger.entrance import Entrance, Gate
+from catseye.ranger.entrance import Doorway, Entrance
 from catseye.ranger.first_line import peer_of
 from catseye.ranger.line import LONGEST_REQUEST, Reply, Request, parse_request, stamp_text
 from catseye.ranger.network import ConnectionMaker, Listener, Sockets
@@ -69,7 +69,7 @@ class Client(asyncio.Protocol):
 
     @property
     def peer(self) -> str:
-        """Who is at the other end, in words."""
+        """Address of the other end, in words."""
         return peer_of(self.transport)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -202,7 +202,7 @@ class ZiyServer:
         self.holder: Client | None = None  # who may set and command
         self.board = Board(coordinator)
         self.clients: set[Client] = set()
-        self.gate = Gate(lambda: f"ZIY: port {self.port}", door, WORDS, _loop_time)
+        self.gate = Doorway(lambda: f"ZIY: port {self.port}", door, WORDS, _loop_time)
         self._network: ConnectionMaker = network or Sockets(door.tls)
         self._listener: Listener | None = None
         self._keeping: asyncio.Task[None] | None = None
@@ -375,5 +375,5 @@ class ZiyServer:
 
 
 def _loop_time() -> float:
-    """s of the running loop."""
+    """Time of the running loop, s."""
     return asyncio.get_running_loop().time()

@@ -514,5 +514,5 @@ class RangerLink:
 
 
 def _holder(reply: Reply) -> str:
-    """Who has the lease by a ranger's line: name and address."""
+    """Name and address of the lease's holder by a ranger's line."""
     return " at ".join((reply.values[0], reply.values[2])) if len(reply.values) > LEASE_WITH_NUMBER else reply.text

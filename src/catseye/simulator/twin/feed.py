@@ -20,7 +20,7 @@ from catseye.constants import DEGREE
 from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import PER_SECOND
 from catseye.ranger.door import USUAL_DOOR, Door, notice_death, refuse_open
-from catseye.ranger.entrance import Entrance, Gate
+from catseye.ranger.entrance import Doorway, Entrance
 from catseye.ranger.line import LONGEST_REQUEST, TICK_NS, Reply, format_reply, nanoseconds_to_ticks
 from catseye.ranger.network import ConnectionMaker, Listener, Sockets
 from catseye.records.night.live import LiveWeather
@@ -81,7 +81,7 @@ class SiteFeed:
         self.name, self.stations, self.world, self.clock = name, tuple(stations), world, clock
         self._network: ConnectionMaker = network or Sockets(door.tls)
         self.door = door
-        self.gate = Gate(lambda: f"feed: port {self.port}", door, WORDS, _loop_time)
+        self.gate = Doorway(lambda: f"feed: port {self.port}", door, WORDS, _loop_time)
         self._weather_ns = round(weather_every * PER_SECOND)
         self._listener: Listener | None = None
         self.clients: set[FeedConnection] = set()
@@ -244,5 +244,5 @@ def _line(reply: Reply) -> bytes:
 
 
 def _loop_time() -> float:
-    """s of the running loop."""
+    """Time of the running loop, s."""
     return asyncio.get_running_loop().time()
