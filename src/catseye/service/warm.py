@@ -96,7 +96,8 @@ async def warm(
                 raise InputError(f"{name}: {request.command} takes time (expected what is done at once)")
         _tell_sun(guard, name, ranger, clock, posture)
         problem = await _homed_and_lit(name, ranger, clock)
-        ranger.work_of(CLIENT, Request("PS", ("0",)))  # dark until who has the lease lights it
+        if problem is not None or not ranger.laser_at_boot:
+            ranger.work_of(CLIENT, Request("PS", ("0",)))  # dark until who has the lease lights it
         if problem is not None:
             left.append(problem)
         ranger.disconnect(CLIENT)
