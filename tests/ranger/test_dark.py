@@ -262,12 +262,17 @@ def test_no_initialisation_file_lights(tmp_path):
     assert not told.head.laser_on()
 
 
-def test_a_buffer_in_which_the_laser_went_off_is_no_measurement():
+@pytest.mark.parametrize("order", ["CMEAS 2, 1", "STM 1, 50"])
+@pytest.mark.parametrize("again", [False, True])
+def test_a_buffer_in_which_the_laser_went_off_is_no_measurement(order, again):
     told = leased()
     told.say("CIL 1", client=HOLDER)
-    told.ranger.receive(HOLDER, "CMEAS 2, 1")
-    told.turns(1, 0.02)
+    told.ranger.receive(HOLDER, order)
+    told.turns(2, 0.02)
     told.ranger.receive(OTHER, "PS 0")
+    if again:  # lit before the buffer ends
+        told.ranger.set_latch(None)
+        told.ranger.switch_laser(True)
     reply = [out.reply for out in told.turns(10, 0.02) if out.reply.command == "CMEAS"][-1]
     assert (reply.ok, "went off" in reply.text) == (False, True)
 

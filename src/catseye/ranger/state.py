@@ -123,6 +123,7 @@ class RangerState:
         self.lease: Lease | None = None
         self.peers: dict[int, str] = {}  # who is at the other end of a connection, in words
         self.latch: Latch | None = stored_latch(files)
+        self.times_off = 0  # that the laser was switched off
         self.cleared_by = ""  # who cleared the last one, and from where
         self._head_interlock: Callable[[], str] | None = getattr(head, "interlock", None)  # a head may offer it
         self.scheduler = Scheduler()
@@ -180,6 +181,7 @@ class RangerState:
     def switch_laser(self, on: bool) -> None:
         """Switch the laser as a command asks, which is remembered: one that comes on by itself is switched off."""
         self.lit = on
+        self.times_off += not on
         self.head.switch_laser(on)
 
     def now_ns(self) -> int:

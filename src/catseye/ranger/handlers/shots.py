@@ -35,12 +35,11 @@ def _sampled(name: str) -> Handler:
 
 
 def _shoot(z: RangerState) -> Generator[int | None, None, None]:
-    owner = z.aimed
+    owner, times_off = z.aimed, z.times_off
     _fire(z)
     z.measured = None
     buffer = yield from _taken(z)
-    if not z.head.laser_on():
-        raise InputError("the laser went off meanwhile (expected PS 1 first)")
+    _refuse_dark(z, times_off)
     z.measured = MeasuredBuffer(buffer, owner)
 
 
@@ -50,6 +49,12 @@ def _fire(z: RangerState) -> None:
     if not z.head.laser_on():
         raise InputError("the laser is off (expected PS 1 first)")
     z.head.trigger(z.sampling)
+
+
+def _refuse_dark(z: RangerState, times_off: int) -> None:
+    """Raises InputError where the laser has been off since so many times; light that is on again is no help."""
+    if z.times_off != times_off or not z.head.laser_on():
+        raise InputError("the laser went off meanwhile (expected PS 1 first)")
 
 
 def _taken(z: RangerState) -> Generator[int | None, None, Buffer]:
@@ -221,6 +226,8 @@ def _stm(z: RangerState, client: int, key: Value, count: int) -> Values:
 def stream_shots(z: RangerState, stream: Stream) -> Generator[Outgoing | int | None, None, None]:
     """Measure one cube again and again; the next buffer is fired before the last is computed and told."""
 
+    times_off = z.times_off
+
     def fire() -> str | None:
         try:
             _refuse_other(z, z.cubes.find(stream.cube))
@@ -234,9 +241,8 @@ def stream_shots(z: RangerState, stream: Stream) -> Generator[Outgoing | int | N
         if problem is None:
             try:
                 buffer = yield from _taken(z)
+                _refuse_dark(z, times_off)
                 problem = fire() if left else None
-                if not z.head.laser_on():
-                    raise InputError("the laser went off meanwhile (expected PS 1 first)")
                 z.measured = MeasuredBuffer(buffer, stream.cube)
                 yield Outgoing(Reply("CMEAS", True, _measured(z, 2, stream.cube), stream.tid))
                 yield Outgoing(Reply("BUF", True, _buf(z, stream.client), stream.tid), stream.client)
