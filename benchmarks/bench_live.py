@@ -222,14 +222,15 @@ class FiringRanger:
         self._say(self._other, *["COO"] * behind, f"{tid}\tPS 0")
         await self.until("PS 1, 0", tid)
         took = time.perf_counter() - began
+        await self.until("CMEAS 0", fresh=False)  # the stream is over, and a new one may begin
         self._say(self._other, "UNLATCH bench")
         await self.until("LATCH 1, none")
         self._say(self._holder, "PS 1", "STM 0, 1000000")
         return took
 
-    async def until(self, words: str, tid: int | None = None) -> None:
-        """Wait for a line that was not there before."""
-        while not self.heard.empty():
+    async def until(self, words: str, tid: int | None = None, *, fresh: bool = True) -> None:
+        """Wait for a line; a fresh one was not there before."""
+        while fresh and not self.heard.empty():
             self.heard.get_nowait()
         while True:
             head, _, body = (await self.heard.get()).rpartition("\t")

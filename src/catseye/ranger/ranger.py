@@ -179,7 +179,8 @@ class Ranger(RangerState):
             return []
         self._told_latch = self.latch
         if self.latch is None:
-            return [Outgoing(self._reply(Request("LATCH"), True, ("none", f"cleared by {self.cleared_by or 'a person'}")))]
+            cleared = f"cleared by {self.cleared_by or 'a person'}"
+            return [Outgoing(self._reply(Request("LATCH"), True, ("none", cleared)))]
         return [Outgoing(self._reply(Request("LATCH"), True, latch_of(self)))]
 
     def make_safe(self, why: str, *, free: bool = True) -> list[Outgoing]:
