@@ -2,6 +2,7 @@
 
 python benchmarks/bench_live.py [--seconds 30] [--rangers 18] [--heads fast|twin] [--postgresql URL] [--json]
 python benchmarks/bench_live.py --seconds 600 --series FILE.csv
+python benchmarks/bench_live.py --only-dark --dark 1000 --heads twin
 
 The rangers are the twin's, in a process of their own, on sockets; 128 ms buffers back to back. `fast`: their heads have
 the buffers ready (returns of the twin's truth), so that the generator does not take the second core; `twin`: the
@@ -12,6 +13,9 @@ and not in the journal.
 
 Beside it what a user would write instead, on the same rangers: asyncio streams, a phase of each buffer, and sqlite3
 with a commit a shot, samples as JSON or as bytes; no reduction, no guard, no epochs.
+
+First it times dark orders: all rangers fire for one connection, and another says PS 0 to one after the other, each
+second time behind a packet of long questions; the time from the order to its answer, by which the laser is off.
 
 `--series` measures catseye alone, and the machine beside it: five times a second a buffer is written and flushed to the
 same disk, and each second the kernel is asked how much of both cores' time a virtual machine's host gave to others.
@@ -47,6 +51,10 @@ from load_scene import LoadChild, load_site, lost_and_doubled
 TICK = 864e-6  # s
 LONGEST_START, SETTLED, DRAINED = 60.0, 14.0, 2.0  # s
 PEER_SECONDS = 10.0
+COMMANDING = ("LEASE peer", "AXIS 0, 1", "AXIS 1, 1", "PS 1", "CIL 0", "STM 0, 1000000")  # who fires by hand
+DARK_LIMIT_MS = 100.0
+LISTINGS = 8  # long answers that a dark order stands behind, each second time
+RENEWED = 5.0  # s
 BUFFER_BYTES = 16_384
 
 
@@ -138,7 +146,7 @@ async def by_hand(child: LoadChild, path: Path, name: str, seconds: float, *, as
         async def listen(ranger: str) -> None:
             at = child.addresses[ranger]
             reader, writer = await asyncio.open_connection(at.host, at.ports[0], limit=2**20)
-            writer.write(b"1000\tCIL 0\n1001\tSTM 0, 100000\n")
+            writer.write("".join(f"{line}\n" for line in COMMANDING).encode())
             try:
                 while line := await reader.readline():
                     _, stamp, body = line.decode().rstrip().split("\t") if b"\t" in line else ("", "", "")
@@ -169,6 +177,102 @@ async def by_hand(child: LoadChild, path: Path, name: str, seconds: float, *, as
     return result(name, measured, cpu, wall, len(child.addresses))
 
 
+@dataclass(frozen=True)
+class DarkResult:
+    """Of dark orders to rangers that all fire: how many, ms until answered, % within the limit."""
+
+    tries: int
+    p50_ms: float
+    p99_ms: float
+    max_ms: float
+    within_percent: float
+    load: float
+
+
+class FiringRanger:
+    """A ranger that one connection has fire without end, and another makes dark."""
+
+    def __init__(self, at: Any):
+        self._at, self._token, self.heard = at, "", asyncio.Queue[str]()
+        self._tasks: list[asyncio.Task[None]] = []
+
+    async def start(self) -> None:
+        host, ports = self._at.host, self._at.ports
+        self._holder = await asyncio.open_connection(host, ports[0], limit=2**20)
+        self._other = await asyncio.open_connection(host, ports[1], limit=2**20)
+        self._say(self._holder, *COMMANDING)
+        self._tasks = [asyncio.create_task(each) for each in (self._hold(), self._renew(), self._listen())]
+        await self.until("CMEAS 1")
+
+    async def stop(self) -> None:
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        for _, writer in (self._holder, self._other):
+            writer.close()
+
+    async def darkened(self, tid: int, *, behind: int, pause: float) -> float:
+        """s from a PS 0, behind so many listings, to its answer; then it fires again.
+
+        pause   s, from a measurement to the order
+        """
+        await self.until("CMEAS 1")
+        await asyncio.sleep(pause)
+        began = time.perf_counter()
+        self._say(self._other, *["COO"] * behind, f"{tid}\tPS 0")
+        await self.until("PS 1, 0", tid)
+        took = time.perf_counter() - began
+        await self.until("CMEAS 0", fresh=False)  # the stream is over, and a new one may begin
+        self._say(self._other, "UNLATCH bench")
+        await self.until("LATCH 1, none")
+        self._say(self._holder, "PS 1", "STM 0, 1000000")
+        return took
+
+    async def until(self, words: str, tid: int | None = None, *, fresh: bool = True) -> None:
+        """Wait for a line; a fresh one was not there before."""
+        while fresh and not self.heard.empty():
+            self.heard.get_nowait()
+        while True:
+            head, _, body = (await self.heard.get()).rpartition("\t")
+            if body.startswith(words) and (tid is None or head.startswith(f"{tid}\t")):
+                return
+
+    def _say(self, connection: Any, *lines: str) -> None:
+        connection[1].write("".join(f"{line}\n" for line in lines).encode())
+
+    async def _hold(self) -> None:
+        while line := await self._holder[0].readline():
+            if b"\tLEASE 1, peer" in line and not self._token:
+                self._token = line.decode().rsplit(", ", 1)[1].strip()
+
+    async def _renew(self) -> None:
+        while True:
+            await asyncio.sleep(RENEWED)
+            self._say(self._holder, f"LEASE peer, {self._token}")
+
+    async def _listen(self) -> None:
+        while line := await self._other[0].readline():
+            self.heard.put_nowait(line.decode("ascii").rstrip())
+
+
+async def dark_orders(child: LoadChild, tries: int) -> DarkResult:
+    """How soon rangers that all fire are dark, one after another."""
+    rangers = [FiringRanger(at) for at in child.addresses.values()]
+    late: list[float] = []
+    rng = np.random.default_rng(40)
+    try:
+        await asyncio.gather(*(ranger.start() for ranger in rangers))
+        for k in range(tries):
+            ranger = rangers[k % len(rangers)]
+            behind = LISTINGS * (k // len(rangers) % 2)
+            late.append(1e3 * await ranger.darkened(1000 + k, behind=behind, pause=rng.uniform(0.0, 0.128)))
+    finally:
+        await asyncio.gather(*(ranger.stop() for ranger in rangers))
+    p50, p99, most = (float(v) for v in np.percentile(late, [50, 99, 100]))
+    within = 100.0 * float(np.mean(np.array(late) <= DARK_LIMIT_MS))
+    return DarkResult(tries, p50, p99, most, within, os.getloadavg()[0])
+
+
 def machine(folder: Path) -> dict[str, float]:
     """What no program here can be faster than: a flush of one buffer to the disk, copying it, its base64."""
     raw = os.urandom(BUFFER_BYTES)
@@ -196,10 +300,11 @@ def machine(folder: Path) -> dict[str, float]:
     }
 
 
-async def measured(options: argparse.Namespace, folder: Path) -> list[Result]:
+async def measured(options: argparse.Namespace, folder: Path) -> tuple[list[Result], DarkResult]:
     site = load_site(options.rangers)
     found = []
     with LoadChild(options.rangers, twin=options.heads == "twin") as child:
+        dark = await dark_orders(child, options.dark)
         places = [("catseye, SQLite", str(folder / "night.db"))]
         if options.postgresql:
             places.append(("catseye, PostgreSQL", options.postgresql))
@@ -208,7 +313,20 @@ async def measured(options: argparse.Namespace, folder: Path) -> list[Result]:
         for name, as_json in (("asyncio, JSON, a commit each", True), ("asyncio, bytes, a commit each", False)):
             path = folder / f"{len(found)}.db"
             found.append(await by_hand(child, path, name, min(options.seconds, PEER_SECONDS), as_json=as_json))
-    return found
+    return found, dark
+
+
+async def darkness(options: argparse.Namespace) -> DarkResult:
+    with LoadChild(options.rangers, twin=options.heads == "twin") as child:
+        return await dark_orders(child, options.dark)
+
+
+def tell_dark(dark: DarkResult, rangers: int) -> None:
+    sys.stdout.write(
+        f"dark orders: {dark.tries} to {rangers} rangers that fire, answered in p50 {dark.p50_ms:.1f} ms, p99 "
+        f"{dark.p99_ms:.1f}, most {dark.max_ms:.1f}; {dark.within_percent:.1f} % within {DARK_LIMIT_MS:g} ms; load of "
+        f"the machine {dark.load:.1f}\n"
+    )
 
 
 class Machine(threading.Thread):
@@ -281,18 +399,26 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, help="where the journals are written and removed again")
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--series", type=Path, metavar="FILE.csv", help="a row for each shot, flush and second")
+    parser.add_argument("--dark", type=int, default=200, help="dark orders that are timed")
+    parser.add_argument("--only-dark", action="store_true", help="nothing else")
     options = parser.parse_args()
+    if options.only_dark:
+        tell_dark(asyncio.run(darkness(options)), options.rangers)
+        return
     with tempfile.TemporaryDirectory(dir=options.folder) as name:
         folder = Path(name)
         if options.series:
             asyncio.run(series(options, folder))
             return
-        found = asyncio.run(measured(options, folder))
+        found, dark = asyncio.run(measured(options, folder))
         limits = machine(folder)
     load = os.getloadavg()[0]
     if options.json:
         sys.stdout.write(
-            json.dumps({"results": [asdict(each) for each in found], "machine": limits, "load": load}) + "\n"
+            json.dumps(
+                {"results": [asdict(each) for each in found], "dark": asdict(dark), "machine": limits, "load": load}
+            )
+            + "\n"
         )
         return
     ours = found[0]
@@ -325,6 +451,7 @@ def main() -> None:
         row += [f"{v:.1f}" for v in (r.p50_ms, r.p90_ms, r.p99_ms, r.max_ms)]
         row += ["" if v is None else str(v) for v in (r.lost, r.doubled)]
         sys.stdout.write(f"  {r.name:<30}" + "".join(f"{each:>12}" for each in row) + "\n")
+    tell_dark(dark, options.rangers)
     sys.stdout.write(
         f"machine: a flush of {BUFFER_BYTES} bytes {limits['flush_p50_ms']:.1f} ms (99th percentile "
         f"{limits['flush_p99_ms']:.1f}), a copy {limits['copy_us']:.1f} us, base64 {limits['base64_us']:.0f} us\n"

@@ -6,6 +6,7 @@ It says where they listen in one JSON line, answers `report` with another, and e
 import asyncio
 import gc
 import json
+import logging
 import sys
 import time
 from pathlib import Path
@@ -85,5 +86,6 @@ def say(what):
 
 
 if __name__ == "__main__":
+    logging.getLogger("catseye").setLevel(logging.ERROR)  # a dark order a line would be all that is seen
     count, prisms, late, kind = sys.argv[1:]
     asyncio.run(serve(load_site(int(count), int(prisms) or None), float(late), kind == "twin"))

@@ -11,7 +11,8 @@ PLACES = {1: ("ZG11", (0.0, 80_000.0, 12_000.0)), 2: ("ZG12", (30_000.0, 70_000.
 GEOMETRY = ["BP 0, 0, 0", "ALPHA 0, 0, 0", "BETA 0, 0", "MO 0, 250, 0", "EZ 0, 0", f"D0 {D0}"]
 CUBES = ["INI 4", *(f"COO {n}, {x}, {y}, {z}, {name}" for n, (name, (x, y, z)) in PLACES.items())]
 ZRG = ["AZM 0, -900", "ELV 0, 400"]
-READY = [*GEOMETRY, *CUBES, *ZRG, "AXIS 0,1", "AXIS 1,1", "ABV 0, 400000000", "ABV 1, 400000000", "FHM 0", "FHM 1"]
+HOME = ["AXIS 0,1", "AXIS 1,1", "ABV 0, 400000000", "ABV 1, 400000000", "FHM 0", "FHM 1", "PS 1"]
+READY = [*GEOMETRY, *CUBES, *ZRG, *HOME]
 REFERENCE_PHASE = 0.7
 
 
@@ -40,7 +41,7 @@ class Told:
             replies += [o.reply for o in self.ranger.receive(client, line)]
             for _ in range(2000):
                 replies += [o.reply for o in self.turns()]
-                if self.ranger._running is None and not self.ranger._waiting:
+                if not self.ranger.busy:
                     break
         command = {"RAD", "STW"} if any("STW" in line.upper() for line in lines) else set()
         return [r for r in replies if r.command != "STW" or "STW" in command]

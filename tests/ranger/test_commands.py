@@ -123,7 +123,7 @@ def test_good_parameters_are_read(line, values):
         ("CYC 0", "outside 1 to 65536"),
         ("IFF 10001", "outside 1 to 10000 Hz"),
         ("SFQ 2", "outside 3"),
-        ("COO 1, 2", "2 parameters do not fit"),
+        ("COO 1, 2, 3", "3 parameters do not fit"),
         ("DST 1.5", "no name"),
         ("COO 1, 0, 0, 0, 7ZG", "no name"),
         ("TRG 1", "1 parameters do not fit"),

@@ -1,15 +1,21 @@
 """The site's key: where it comes from, and what it may be."""
 
+import os
+import random
+import subprocess
+
 import pytest
 
 from catseye.errors import InputError
-from catseye.ranger.door import is_here, key_of, opens
+from catseye.ranger.door import answer_to, key_of, triviality
+from catseye.ranger.network import is_here
 
 KEY = "a-key-of-the-site"
 
 
 def test_the_key_is_of_the_environment_or_of_a_file_that_it_names(tmp_path):
     (tmp_path / "key").write_text(f"{KEY}\n")
+    (tmp_path / "key").chmod(0o600)
     assert key_of({}) is None
     assert key_of({"CATSEYE_KEY": KEY}) == KEY
     assert key_of({"CATSEYE_KEY_FILE": str(tmp_path / "key")}) == KEY
@@ -28,13 +34,45 @@ def test_a_file_that_is_not_there_is_refused(tmp_path):
         key_of({"CATSEYE_KEY_FILE": str(tmp_path / "none")})
 
 
-def test_only_the_key_opens():
-    assert opens(f"KEY {KEY}".encode(), KEY)
-    assert opens(f"1000\tkey {KEY}\r".encode(), KEY)
-    for line in (b"", b"KEY", f"KEY {KEY} ".encode() + b"x", f"KEY {KEY}, x".encode(), KEY.encode(), b"\xff\xfe"):
-        assert not opens(line, KEY)
+@pytest.mark.parametrize("mode", [0o640, 0o604, 0o660, 0o602])
+def test_a_file_that_others_can_use_is_refused(tmp_path, mode):
+    (tmp_path / "key").write_text(f"{KEY}\n")
+    if os.geteuid() == 0:
+        os.chown(tmp_path / "key", 1000, 1000)
+    (tmp_path / "key").chmod(mode)
+    with pytest.raises(InputError, match=r"others can use it, -rw.* \(expected -rw-------"):
+        key_of({"CATSEYE_KEY_FILE": str(tmp_path / "key")})
+
+
+@pytest.mark.parametrize(
+    ("key", "why"),
+    [
+        ("aaaaaaaaaaaaaaaaaaaa", "1 different characters"),
+        ("abababababababababab", "2 different characters"),
+        ("0123456789abcdef0123", "in a row"),
+        ("xq2-jihgfedcb-7kQpZ-w", "in a row"),
+        ("kQ7-zx1pkQ7-zx1pkQ7-zx1p", "again and again"),
+        ("our-Password-of-2026", "holds 'password'"),
+        ("GBT-changeme-x2-key1", "holds 'changeme'"),
+    ],
+)
+def test_a_trivial_key_is_refused(key, why):
+    with pytest.raises(InputError, match=f"trivial: .*{why}"):
+        key_of({"CATSEYE_KEY": key})
+
+
+def test_no_random_key_is_trivial():
+    rng = random.Random(40)
+    assert all(triviality(f"{rng.getrandbits(128):032x}") is None for _ in range(2000))
+
+
+def test_the_answer_to_a_nonce_is_what_openssl_says():
+    asked = ["openssl", "dgst", "-sha256", "-hmac", KEY]
+    said = subprocess.run(asked, input=b"00ff", capture_output=True, check=True).stdout.split()[-1]
+    assert answer_to("00ff", KEY) == said.decode()
+    assert answer_to("00fe", KEY) != said.decode()
 
 
 def test_what_is_here():
-    assert all(map(is_here, ("127.0.0.1", "127.9.9.9", "::1", "localhost")))
+    assert all(map(is_here, ("127.0.0.1", "127.9.9.9", "::1", "localhost", "unix:/run/catseye")))
     assert not any(map(is_here, ("0.0.0.0", "::", "10.0.0.1", "example.org", "")))

@@ -17,6 +17,10 @@ from catseye.ranger.first_line import opening_of
         b"Host: a\r\n",
         b"\r\n\r\nPUT / HTTP/1.1\r\n",
         b"\x16\x03\x01\x02\x00",
+        b"\x00\x01\x00\x08\x21\x12\xa4\x42",  # STUN, of a browser's WebRTC
+        b"\xff\n",
+        b"\r\n\x80",
+        b"\x7f",
     ],
 )
 def test_a_browsers_first_bytes_are_known(data):
@@ -32,7 +36,7 @@ def test_a_browsers_first_bytes_are_known(data):
         (b"VER\n\xff\n", "read"),
         (b"7\t52889.0\tcmeas 1, 17\r\n", "read"),
         (b"XYZ 1\n", "read"),
-        (b"\xff\n", "unreadable"),
+        (b"VER\xff\n", "unreadable"),
         (b"a;b\n", "unreadable"),
         (b"A" * 1025 + b"\n", "unreadable"),
         (b"A" * 3000, "unreadable"),
@@ -40,3 +44,8 @@ def test_a_browsers_first_bytes_are_known(data):
 )
 def test_all_else_is_read_waited_for_or_answered(data, expected):
     assert opening_of(data)[0] == expected
+
+
+@pytest.mark.parametrize(("line", "expected"), [(b"EHLO a\n", "unreadable"), (b"7\tver\n", "read"), (b"\n", "waiting")])
+def test_a_first_line_in_the_languages_shape_needs_a_known_word(line, expected):
+    assert opening_of(line, {"VER"})[0] == expected

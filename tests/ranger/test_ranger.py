@@ -209,12 +209,12 @@ def test_seq_gives_a_line_a_cycle_and_coo_a_line_a_cube():
     assert [r.values[:2] for r in told.say("COO")] == [("0", "ZRG"), ("1", "ZG11"), ("2", "ZG12")]
 
 
-def test_commands_of_two_clients_run_in_the_order_received():
+def test_a_clients_commands_run_in_their_order_and_anothers_question_does_not_wait_for_them():
     told = ready()
     told.ranger.receive(1, "1\tCIL 1")
     told.ranger.receive(2, "2\tACP 0")
     told.ranger.receive(1, "3\tD0")
-    assert [o.reply.tid for o in told.turns(60) if o.reply.command != "STW"] == [1, 2, 3]
+    assert [o.reply.tid for o in told.turns(60) if o.reply.command != "STW"] == [2, 1, 3]
 
 
 def test_the_status_word_is_pushed_on_any_change_and_only_then():
@@ -223,7 +223,7 @@ def test_the_status_word_is_pushed_on_any_change_and_only_then():
     told.ranger.receive(1, "AXIS 0, 1")
     heard = told.turns(5)
     words = [o.reply.text for o in heard if o.reply.command == "STW"]
-    assert words == [f"0x{StatusWord.AUTO | StatusWord.AZIMUTH_ENABLED:08x}"]
+    assert words == [f"0x{StatusWord.AUTO | StatusWord.LASER_OFF | StatusWord.AZIMUTH_ENABLED:08x}"]
     told.head.locked = False
     assert [o.reply.tid for o in told.turns(3) if o.reply.command == "STW"] == [0]
 
@@ -390,7 +390,7 @@ def test_reset_is_a_cold_boot():
     told = ready()
     told.say("CYC 10", "RST")
     assert told.one("CYC").text == "128"
-    assert told.ranger.status() == StatusWord.AUTO
+    assert told.ranger.status() == StatusWord.AUTO | StatusWord.LASER_OFF
     assert told.say(*READY)[-1].ok
 
 
@@ -470,7 +470,7 @@ def test_a_stream_ends_with_its_connection_and_says_why_where_it_cannot_go_on():
     assert told.ranger.idle
     told.say("STM 1, 1000", "PS 0")
     told.turns(10)
-    assert "laser is off" in heard(told, "CMEAS")[-1].text
+    assert "the laser went off" in heard(told, "CMEAS")[-1].text
     assert told.ranger.idle
     told.say("PS 1", "STM 1, 1000")
     told.ranger.reset()
@@ -568,9 +568,9 @@ def test_amplitude_and_phase_are_those_of_the_signal_s_own_detection():
 
 def test_each_bit_of_the_status_word_is_the_one_documented():
     told = Told()
-    assert told.ranger.status() == StatusWord.AUTO
+    assert told.ranger.status() == StatusWord.AUTO | StatusWord.LASER_OFF
     head, z = told.head, told.ranger
-    z.auto = False
+    z.auto, head.laser = False, True
     changes = {
         1: (head.homes, 0, "home"),
         2: (head.homes, 1, "home"),
@@ -591,6 +591,7 @@ def test_each_bit_of_the_status_word_is_the_one_documented():
         10: (head, "laser", False),
         11: (head, "locked", False),
         14: (z, "sun_refused", True),
+        15: (z, "latch", object()),
         16: (z, "given", {"BP", "ALPHA", "BETA", "MO", "EZ", "D0"}),
     }.items():
         before = getattr(whose, name)
@@ -664,7 +665,7 @@ def test_no_search_that_is_allowed_comes_near_the_sun():
             told.turns(3)
         else:
             assert least < 8.0 * DEGREE
-        told.head.laser = True
+        told.ranger.switch_laser(True)
     assert 40 < passed < 190
 
 
@@ -844,11 +845,12 @@ def test_lines_behind_a_lease_that_come_with_it_are_judged_when_their_turn_comes
     told = ready()
     told.ranger.guarded = True
     said = at_once(told, "LEASE anna", "CYC 64", "CYC")
-    assert said == [("LEASE", True, None), ("CYC", True, None), ("CYC", True, None)]
+    told_all = ("LEASE", True, None)  # but who took it, which has been answered
+    assert said == [("LEASE", True, 1), ("CYC", True, None), told_all, ("CYC", True, 1)]
     said = at_once(told, "LEASE none", "CYC 32")
-    assert said == [("LEASE", True, None), ("CYC", False, 1)]
-    assert at_once(told, "CYC 32", "LEASE ben", client=2) == [("CYC", False, 2), ("LEASE", True, None)]
-    assert at_once(told, "LEASE none", "CYC 32", client=1) == [("LEASE", False, None), ("CYC", False, 1)]
+    assert said == [("LEASE", True, 1), told_all, ("CYC", False, 1)]
+    assert at_once(told, "CYC 32", "LEASE ben", client=2) == [("CYC", False, 2), ("LEASE", True, 2), told_all]
+    assert at_once(told, "LEASE none", "CYC 32", client=1) == [("CYC", False, 1), ("LEASE", False, 1)]
     assert told.one("CYC").text == "64"
 
 

@@ -8,8 +8,10 @@ import pytest
 
 from catseye.constants import DEGREE
 from catseye.coordinator.visibility.vantage import reflector_at, vantages_of
+from catseye.errors import InputError
 from catseye.gateways.examples import located
 from catseye.geometry.mirror.pointing import beam
+from catseye.ranger.line import Request
 from catseye.ranger.sun_watch import HALF_ANGLE, PARKED, SET, nearest_sun, own_sun, sun_leaves, way_out
 from catseye.records.night.live import LivePosture
 from catseye.records.site.folder import read_site
@@ -103,7 +105,8 @@ def test_a_site_starts_when_a_mirror_looks_at_the_sun(hour, name):
     for each in served.values():
         assert each.initialised
         assert each.homed
-        assert each.head.laser_on() or each.in_sun or each is ranger  # it may be dark until it is lit by who commands
+        assert not each.head.laser_on()  # until who has the lease lights it
+        assert lightable(each) or each.in_sun or each is ranger
     seen = suns()[hour]
     assert nearest_sun(ranger.cubes.station, ranger.here, ranger.here, suns=[seen], exact=True) >= HALF_ANGLE or (
         not ranger.head.laser_on()
@@ -114,7 +117,15 @@ def test_a_ranger_that_does_not_find_its_index_stays_dark_and_the_others_serve()
     served, warned = started(61000.0, faults=("lost-index ZY105:0 0",))
     assert len(warned) == 1
     assert warned[0].startswith("ZY105 stays dark: FHM 0 was refused: ")
-    assert [name for name, ranger in served.items() if not ranger.head.laser_on()] == ["ZY105"]
+    assert [name for name, ranger in served.items() if not lightable(ranger)] == ["ZY105"]
+
+
+def lightable(ranger):
+    """Whether who has the lease can light a ranger."""
+    try:
+        return ranger.work_of(0, Request("PS", ("1",)))[0] == "1"
+    except InputError:
+        return False
 
 
 def started(mjd, faults=()):

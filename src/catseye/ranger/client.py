@@ -1,6 +1,6 @@
 """A client of a ZY: many requests outstanding, a future or a callback each, unsolicited lines, keep-alive.
 
-Both clients of a ranger hear all replies, so their TIDs must differ: give the second another `first_tid`. Nothing here
+Both clients of a ranger hear what is done, so their TIDs must differ: give the second another `first_tid`. Nothing here
 raises for what the network does: a lost connection answers what is outstanding with f = 0 and says why.
 """
 
@@ -10,7 +10,8 @@ from collections.abc import Callable
 from functools import partial
 
 from catseye.errors import InputError
-from catseye.ranger.door import notice_death
+from catseye.ranger.commands import LONGEST_PAGE
+from catseye.ranger.door import answer_to, notice_death
 from catseye.ranger.line import (
     FIRST_CLIENT_TID,
     LAST_TID,
@@ -37,7 +38,7 @@ class ZyClient(asyncio.Protocol):
     first_tid   TID of the first request, 1000 to 4 294 967 295
     heard       called with every line that is no reply to this client: unsolicited, and the other client's
     clock       s, never backwards
-    key         of the site, said first; None: the port is taken to ask for none
+    key         of the site, by which a server's nonce is answered; with one, requests wait for the server's first line
 
     `bad_lines` counts lines that could not be read; the last is in `last_bad`.
     """
@@ -56,6 +57,7 @@ class ZyClient(asyncio.Protocol):
         self._outstanding: dict[int, tuple[str, asyncio.Future[Reply], Listener | None]] = {}
         self._transport: asyncio.Transport | None = None
         self._unread = bytearray()
+        self._held: list[str] | None = None if key is None else []  # lines until the server has said its first
         self._last_sent = self._last_heard = clock()
         self.closed: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         self.bad_lines, self.last_bad = 0, ""
@@ -114,12 +116,17 @@ class ZyClient(asyncio.Protocol):
         return await self.request(command, *parameters, ticks=ticks)[1]
 
     async def ask_all(self, command: str, *parameters: object) -> list[Reply]:
-        """All replies to a command that gives many: a VER behind it, in the order received, ends them."""
-        replies: list[Reply] = []
-        tid, first = self.request(command, *parameters, then=replies.append)
-        await self.ask("VER")
-        self.forget(tid)
-        return replies if replies else [await first]
+        """All replies to a command that gives many, page by page: a VER behind it, in the order received, ends one."""
+        whole: list[Reply] = []
+        while True:
+            replies: list[Reply] = []
+            tid, first = self.request(command, *parameters, then=replies.append)
+            await self.ask("VER")
+            self.forget(tid)
+            whole += replies or [await first]
+            if not (whole[-1].ok is True and whole[-1].values[:1] == ("more",)):
+                return whole
+            parameters = (whole.pop().values[1], LONGEST_PAGE)
 
     def forget(self, tid: int) -> None:
         """No more replies of a request with `then` are expected."""
@@ -154,8 +161,6 @@ class ZyClient(asyncio.Protocol):
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
         notice_death(transport)
-        if self._key is not None:
-            self._write(f"KEY {self._key}")
 
     def connection_lost(self, exc: Exception | None) -> None:
         self.close("connection lost" if exc is None else f"connection lost: {exc}")
@@ -176,8 +181,17 @@ class ZyClient(asyncio.Protocol):
         except InputError as problem:
             self.bad_lines, self.last_bad = self.bad_lines + 1, str(problem)
             return
-        if reply is not None:
-            self._answer(reply)
+        if reply is None:
+            return
+        if reply.command == "NONCE" and reply.ok and len(reply.values) == 1:
+            if self._key is None:
+                self.close("the port asks for the site's key (expected CATSEYE_KEY or CATSEYE_KEY_FILE)")
+                return
+            self._send(f"KEY {answer_to(reply.values[0], self._key)}")
+        held, self._held = self._held or [], None
+        for each in held:
+            self._send(each)
+        self._answer(reply)
 
     def _answer(self, reply: Reply) -> None:
         command, future, then = self._outstanding.get(reply.tid, ("", None, None))
@@ -194,6 +208,12 @@ class ZyClient(asyncio.Protocol):
             future.set_result(reply)
 
     def _write(self, line: str) -> None:
+        if self._held is None:
+            self._send(line)
+        else:
+            self._held.append(line)
+
+    def _send(self, line: str) -> None:
         self._last_sent = self._clock()
         if self._transport is not None and not self._transport.is_closing():
             self._transport.write(line.encode("ascii") + b"\n")

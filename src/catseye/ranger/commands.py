@@ -6,6 +6,7 @@ what the sources say the ranger did without saying how it was asked (docs/format
 """
 
 import math
+import re
 from dataclasses import dataclass
 
 from catseye.errors import InputError
@@ -14,8 +15,10 @@ from catseye.ranger.motion_units import LIMITS
 from catseye.ranger.values import CommandParameter, Value
 
 MOST_CUBES = 4096
+LONGEST_PAGE = 128  # lines of one answer
 FARTHEST_MM = 1e7
 COUNTS_LIMIT = 2**30
+ZERO = re.compile(r"[+-]?0{1,12}")
 Form = tuple[CommandParameter, ...]
 
 
@@ -145,12 +148,13 @@ ROWS = (
     _row("CMEAS", "measure a cube: f = 1 points first, 2 measures at once", (_of("f", 1, 2), CUBE)),
     _row(
         "COO",
-        "cubes: list all, ask one, move it, create or replace it",
+        "cubes: list them by pages, ask one, move it, create or replace it",
         (),
         (CUBE,),
+        (_of("first", 0, MOST_CUBES), _of("count", 1, LONGEST_PAGE)),
         (CUBE, *XYZ),
         (CUBE, *XYZ, CommandParameter("cube_name", "name")),
-        asks=(0, 1),
+        asks=(0, 1, 2),
     ),
     _row("INI", "allocate n cubes, dropping those there were", (_of("cubes", 0, MOST_CUBES),)),
     _setting("CYC", "cycles of a buffer", _of("cycles", 1, 65_536)),
@@ -161,7 +165,13 @@ ROWS = (
     _row("MPC", "compute amplitude and phase of the buffer"),
     _row("RAD", "phase of the buffer, rad", asks=(0,)),
     _row("MAG", "amplitude of the buffer, V", asks=(0,)),
-    _row("SEQ", "amplitude and phase of each cycle of the buffer, a line each", asks=(0,)),
+    _row(
+        "SEQ",
+        "amplitude and phase of each cycle of the buffer, a line each, by pages",
+        (),
+        (_of("first", 1, 65_536), _of("count", 1, LONGEST_PAGE)),
+        asks=(0, 2),
+    ),
     _setting("NUM", "cubes in the scan list", _of("number", 0, MOST_CUBES)),
     _setting("ORD", "which cube stands at a place of the scan list", CUBE, before=(PLACE,)),
     _row(
@@ -215,10 +225,20 @@ ROWS = (
     ),
     _row(
         "LEASE",
-        "who may command; take it by a name, from whoever has it; none gives it back",
+        "who may command; take it by a name, from whoever has it; with its token renew it; none gives it back",
         (),
         (CommandParameter("holder", "name"),),
-        asks=(0, 1),
+        (CommandParameter("holder", "name"), CommandParameter("token", "text")),
+        asks=(0, 1, 2),
+        chosen=True,
+    ),
+    _row("STOP", "at once and for everybody: laser and motors off, nothing goes on", chosen=True),
+    _row("LATCH", "the dark order from outside the lease that holds", asks=(0,), chosen=True),
+    _row(
+        "UNLATCH",
+        "clear that order, by the name of a person who has not the lease",
+        (CommandParameter("person", "name"),),
+        asks=(1,),
         chosen=True,
     ),
     _row("LST", "scheduled commands of this connection", asks=(0,), chosen=True),
@@ -229,6 +249,36 @@ ROWS = (
     _row("HELP", "the same as HLP", (), (CommandParameter("command", "name"),), asks=(0, 1), chosen=True),
 )
 COMMANDS = {row.name: row for row in ROWS}
+UNSCHEDULED = ("AT", "BYE", "RST", "INITZY", "LEASE", "UNLATCH")
+WORDS = frozenset([*COMMANDS, "AT", "KEY"])  # what a connection's first line may begin with
+
+
+def stops(request: Request) -> bool:
+    """True for a request that makes dark or stops: it passes every queue and needs no lease.
+
+    >>> [stops(Request(*words)) for words in (("PS", ("0",)), ("PS", ("1",)), ("STOP",), ("AXIS", ("0", "0")))]
+    [True, False, True, True]
+    """
+    if request.command == "STOP":
+        return not request.parameters
+    count = {"PS": 1, "SCN": 1, "AXIS": 2, "STM": 2}.get(request.command)
+    return len(request.parameters) == count and ZERO.fullmatch(request.parameters[-1]) is not None
+
+
+def undoes(request: Request, stop: Request) -> bool:
+    """True for a waiting request that would undo a stop given after it.
+
+    >>> undoes(Request("PS", ("1",)), Request("PS", ("0",))), undoes(Request("PS"), Request("PS", ("0",)))
+    (True, False)
+    """
+    if request.command == "AT":
+        try:
+            return undoes(schedule_of(request.parameters)[3], stop)
+        except InputError:
+            return False
+    if request.command != stop.command or stops(request) or COMMANDS[request.command].only_asks(request):
+        return False
+    return request.command != "AXIS" or request.parameters[:1] == stop.parameters[:1]
 
 
 def schedule_of(parameters: tuple[str, ...]) -> tuple[int, int, float, Request]:
@@ -251,8 +301,8 @@ def schedule_of(parameters: tuple[str, ...]) -> tuple[int, int, float, Request]:
     word, _, first = parameters[3].partition(" ")
     rest = tuple(part for part in (first.strip(" "), *parameters[4:]) if part)
     name = word.upper()
-    if name in ("AT", "BYE", "RST", "INITZY") or name not in COMMANDS:
-        raise InputError(f"AT: {word!a} cannot be scheduled (expected a command other than AT, BYE, RST, INITZY)")
+    if name in UNSCHEDULED or name not in COMMANDS:
+        raise InputError(f"AT: {word!a} cannot be scheduled (expected a command other than {', '.join(UNSCHEDULED)})")
     request = Request(name, rest)
     COMMANDS[name].read(request)
     return int(start), int(repeats), float(interval), request

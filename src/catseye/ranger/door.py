@@ -1,23 +1,28 @@
 """Who may come in at a port, and for how long a silent connection keeps its place: at rangers, feed and coordinator.
 
-A port beyond this machine asks for the site's key: the first line of a connection is KEY and the key, in clear; until
-then nothing is told. Where that travels over what others can read, a tunnel belongs around it.
+A port beyond this machine asks for the site's key, which never travels: the server says NONCE and a random word, and
+the first line of a connection is KEY and the HMAC-SHA256 of that word by the key, in hexadecimal; until then nothing
+is told.
 """
 
 import asyncio
 import hmac
-import ipaddress
 import os
 import socket
+import stat
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from catseye.errors import InputError
-from catseye.ranger.line import parse_request
+from catseye.ranger.network import NO_TLS, TlsFiles, is_here
 
 KEY, KEY_FILE = "CATSEYE_KEY", "CATSEYE_KEY_FILE"  # in the environment
 SHORTEST = 16  # characters
+FEWEST_LETTERS = 8  # different ones: fewer are soon guessed
+LONGEST_RUN = 7  # characters that follow each other as in the alphabet
+TYPED = ("password", "changeme", "letmein", "secret", "qwerty", "admin", "default")
 PROBES = ((socket.TCP_KEEPIDLE, 20), (socket.TCP_KEEPINTVL, 5), (socket.TCP_KEEPCNT, 3))  # s: gone is noticed in 35
 
 
@@ -27,14 +32,18 @@ class Door:
 
     key        the site's; None: whoever reaches the port comes in
     lease      commands that move, light or configure need the lease
-    dead_man   s without a line of who has the lease, or without one who has it, until laser and motors go off
+    dead_man   s without an order of who has the lease, or without one who has it, until laser and motors go off
     idle       s without a line after which a connection is closed
+    tls        files for addresses beyond this machine
+    laser_at_boot  as at the notes' rangers the laser is at boot as its hardware has it; else off until it is lit
     """
 
     key: str | None = None
     lease: bool = True
     dead_man: float = 30.0
     idle: float = 3600.0
+    tls: TlsFiles = NO_TLS
+    laser_at_boot: bool = False
 
 
 USUAL_DOOR = Door()
@@ -43,54 +52,79 @@ USUAL_DOOR = Door()
 def key_of(environment: Mapping[str, str] = os.environ) -> str | None:
     """The site's key, of CATSEYE_KEY or the file that CATSEYE_KEY_FILE names; None where neither is set.
 
-    Raises InputError: a file that cannot be read, a key too short or not of printable ASCII without blanks and commas.
+    Raises InputError: a file that cannot be read or that others can read, a key too short, trivial, or not of printable
+    ASCII without blanks and commas.
     """
     key, where = environment.get(KEY), KEY
     if key is None and environment.get(KEY_FILE):
         where = f"{KEY_FILE}={environment[KEY_FILE]}"
-        try:
-            key = Path(environment[KEY_FILE]).read_text("ascii").strip()
-        except (OSError, UnicodeDecodeError) as problem:
-            raise InputError(f"{where}: cannot be read (expected a file of one line of ASCII)") from problem
+        key = _key_in(Path(environment[KEY_FILE]), where)
     if key is None:
         return None
     if len(key) < SHORTEST or not all("!" <= c <= "~" and c not in ",;" for c in key):
         raise InputError(
             f"{where}: {len(key)} characters (expected {SHORTEST} or more, printable, no blank, comma or semicolon)"
         )
+    problem = triviality(key)
+    if problem is not None:
+        raise InputError(f"{where}: the key is trivial: {problem} (expected a random one: openssl rand -hex 16)")
     return key
 
 
-def refuse_open(what: str, host: str, key: str | None) -> None:
-    """Raises InputError where a port would be open to others without a key."""
-    if key is None and not is_here(host):
+def _key_in(path: Path, where: str) -> str:
+    """The line of a key's file. Raises InputError: not readable, or readable by others."""
+    try:
+        about = path.stat()
+        key = path.read_text("ascii").strip()
+    except (OSError, UnicodeDecodeError) as problem:
+        raise InputError(f"{where}: cannot be read (expected a file of one line of ASCII)") from problem
+    of_root = about.st_uid == about.st_gid == 0  # as systemd's credentials, whose group bits are a list's mask
+    if about.st_mode & (0o037 if of_root else 0o077):
+        raise InputError(f"{where}: others can use it, {stat.filemode(about.st_mode)} (expected -rw-------: chmod 600)")
+    return key
+
+
+def triviality(key: str) -> str | None:
+    """Weakness of a key, in words; None for one that is hard to guess.
+
+    >>> triviality("aaaaaaaaaaaaaaaab"), triviality("f3b0c44298fc1c14")
+    ('2 different characters', None)
+    """
+    if len(set(key)) < FEWEST_LETTERS:
+        return f"{len(set(key))} different characters"
+    steps = [ord(b) - ord(a) for a, b in pairwise(key)]
+    for step in (1, -1):
+        if any(all(s == step for s in steps[at : at + LONGEST_RUN]) for at in range(len(steps) - LONGEST_RUN + 1)):
+            return "characters in a row of the alphabet or of digits"
+    half = len(key) // 2
+    if any(key == (key[:n] * (len(key) // n + 1))[: len(key)] for n in range(1, half + 1)):
+        return "one part again and again"
+    word = next((word for word in TYPED if word in key.lower()), None)
+    return None if word is None else f"it holds {word!a}"
+
+
+def refuse_open(what: str, host: str, door: Door) -> None:
+    """Raises InputError where a port would be open to others without a key, or their lines in clear unasked."""
+    if is_here(host):
+        return
+    if door.key is None:
         raise InputError(
             f"{what}: {host} can be reached by other machines (expected the site's key in {KEY} or a file named by "
             f"{KEY_FILE}, or 127.0.0.1)"
         )
+    try:
+        door.tls.of_server(host)
+    except InputError as problem:
+        raise InputError(f"{what}: {problem}") from problem
 
 
-def is_here(host: str) -> bool:
-    """Whether only this machine reaches an address.
+def answer_to(nonce: str, key: str) -> str:
+    """Proof of the key: HMAC-SHA256 of a server's random word, hexadecimal.
 
-    >>> is_here("127.0.8.3"), is_here("::1"), is_here("localhost"), is_here("0.0.0.0"), is_here("")
-    (True, True, True, False, False)
+    >>> answer_to("00", "Jefe-of-the-site-11")[:16]
+    '2dc447d20cdc3ef5'
     """
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
-
-
-def opens(line: bytes, key: str) -> bool:
-    """Whether a connection's first line is the key."""
-    try:
-        request = parse_request(line.decode("ascii", "replace").removesuffix("\r"))
-    except InputError:
-        return False
-    if request is None or request.command != "KEY" or len(request.parameters) != 1:
-        return False
-    return hmac.compare_digest(request.parameters[0].encode(), key.encode())
+    return hmac.new(key.encode(), nonce.encode(), "sha256").hexdigest()
 
 
 def notice_death(transport: asyncio.BaseTransport) -> None:

@@ -1,33 +1,38 @@
 """One ZY: the loop that serves commands, schedule, scan, updates and status, around its state. No socket here.
 
 A transport gives it lines of connections (`receive`), calls `turn` again and again, and sends what that returns.
-Commands run in the order received, one at a time; one that waits for the hardware gives its turn back and is asked
-again. In a turn: the running or next command, at most one scheduled one, a step of the scan or the stream, the Sun,
-updates, the status word. `rest` says how long nothing will be due.
+Each connection's commands run in the order received, one at a time; one that waits for the hardware gives its turn
+back and is asked again, and a long answer comes in slices. What makes dark or stops passes all queues: it is carried
+out when it is received. In a turn: interlock and laser, the holder's command, then the others', at most one scheduled
+one, a step of the scan or the stream, the Sun, updates, the status word. `rest` says how long nothing will be due.
 """
 
-from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 from catseye.errors import CatseyeError, InputError
 from catseye.geometry.sky.time_tag import PER_SECOND
-from catseye.ranger.commands import COMMANDS
-from catseye.ranger.handlers.table import HANDLERS, holder_of, scan_rounds, stream_shots, watch_sun
+from catseye.ranger.commands import COMMANDS, stops, undoes
+from catseye.ranger.handlers.table import HANDLERS, holder_of, latch_of, scan_rounds, stream_shots, watch_sun
 from catseye.ranger.head import RangerHead
+from catseye.ranger.lanes import SCHEDULE, Lane, Lanes, Running, acts
+from catseye.ranger.latch import Latch
 from catseye.ranger.line import TICK_NS, Reply, Request, nanoseconds_of, nanoseconds_to_ticks, parse_request
 from catseye.ranger.schedule import Scheduler
-from catseye.ranger.state import VERSION, Outgoing, RangerState, Values, Work
+from catseye.ranger.state import VERSION, Lease, Outgoing, RangerState, Values
 from catseye.ranger.status import StatusWord, word_text
 from catseye.ranger.sun_watch import SunSource
 
-MOST_QUEUED = 256  # commands of all connections
-REPLIES_A_TURN = 64
+MOST_QUEUED = 256  # commands of one connection
+REPLIES_A_TURN = 16  # of a long answer: what else is due waits no longer
 UPDATE_NS = PER_SECOND // 2
 POLL_NS = 5_000_000  # while something is under way
 FINE_NS, FINE_SPAN_NS = 1_000_000, 10_000_000  # when it is due, and for how long
 WATCH_NS = 100_000_000  # the head's own changes
 UNHEARD_NS = PER_SECOND  # the same where nobody listens
+SLOW_NS = 20_000_000  # a long answer that waits for its reader
+LIVE_NS = 50_000_000  # an interlock, while there is light or an amplifier is on
 OF_A_SHOT = frozenset(["TRG", "MPC", "RAD", "MAG", "SEQ", "CMEAS", "BUF"])
 WATCHED = (
     ("ACP", "0"),
@@ -46,6 +51,10 @@ class Ranger(RangerState):
     mirror    name of its head, as in its initialisation file's
     sun       the ranger's own direction of the Sun for an MJD, None without
     turning   its frame turns, as on the feed arm: it moves only if SUN was told within 60 s, and has no own Sun
+    laser_at_boot   as the notes' rangers: at boot the laser is as its hardware has it, homed or not
+
+    `room` says whether a connection can be given more of a long answer now; `orders` counts what the holder of the
+    lease has ordered.
     """
 
     def __init__(
@@ -58,15 +67,19 @@ class Ranger(RangerState):
         mirror: str = "zp",
         sun: SunSource | None = None,
         turning: bool = False,
+        laser_at_boot: bool = False,
     ):
+        self.laser_at_boot = laser_at_boot
         super().__init__(name, head, HANDLERS, limits=limits, files=files, mirror=mirror, sun=sun, turning=turning)
-        self._waiting: deque[tuple[int, Request]] = deque()
-        self._running: tuple[int, Request, Work] | None = None
+        self.room: Callable[[int], bool] = lambda client: True
+        self.orders = 0
+        self._lanes = Lanes()
         self._ask_at: dict[str, int | None] = {}  # by what waits for the head: when to ask it again
         self._word: StatusWord | None = None
         self._pushed: dict[tuple[str, ...], Values] = {}
         self._next_update = 0
-        self._told_lease: tuple[int, str] | None = None
+        self._told_lease: Lease | None = None
+        self._told_latch: Latch | None = self.latch
 
     # What a transport calls -----------------------------------------------------------------------------------------
 
@@ -80,30 +93,95 @@ class Ranger(RangerState):
         return [Outgoing(replace(reply, ticks=self.now_ticks())) for reply in greetings]
 
     def receive(self, client: int, line: str) -> list[Outgoing]:
-        """A line of a connection: queued, or refused at once; an empty one asks nothing."""
+        """A line of a connection: queued, refused or, where it cannot wait, done at once; an empty one asks nothing."""
         try:
             request = parse_request(line)
             if request is None:
                 return []
-            if len(self._waiting) >= MOST_QUEUED:
+            lane = self._lanes.of(client)
+            if len(lane.waiting) >= MOST_QUEUED:
                 raise InputError(f"{MOST_QUEUED} commands wait already (expected fewer: send slower)")
         except InputError as problem:
             return [Outgoing(Reply("LINE", False, (plain_text(str(problem)),), 0, self.now_ticks()), client)]
+        due = request.ticks is None or request.ticks * TICK_NS <= self.now_ns()
+        if stops(request) and due:
+            return self._stop(client, request)
+        if request.command == "LEASE" and self._leases_at_once(client, request):
+            return self._leased(client, request)
         stranger = self._stranger(client, request)
-        if stranger is not None and (client, "LEASE") not in ((each, queued.command) for each, queued in self._waiting):
-            return [replace(self._refused(request, stranger), client=client)]
-        self._waiting.append((client, request))
+        if stranger is not None:
+            return [self._refused(request, stranger, client)]
+        if self._holds(client) and acts(request):
+            self.orders += 1
+        lane.waiting.append(request)
         return []
+
+    def _holds(self, client: int) -> bool:
+        return self.lease is not None and self.lease.client == client
 
     def _stranger(self, client: int, request: Request) -> str | None:
         """Why a connection may not give a command, having no lease; None where it may."""
-        if not self.guarded or request.command == "BYE" or (self.lease is not None and self.lease[0] == client):
+        if not self.guarded or not acts(request) or self._holds(client):
             return None
-        row = COMMANDS.get(request.command)
-        if request.command != "AT" and (row is None or row.only_asks(request)):
-            return None
-        who = "nobody has it" if self.lease is None else f"{self.lease[1]} has it"
+        who = "nobody has it" if self.lease is None else f"{self.lease.name} has it"
         return f"{request.command} needs the lease: {who} (expected LEASE and a name first)"
+
+    def _leases_at_once(self, client: int, request: Request) -> bool:
+        """True for a request that renews or takes the lease: it waits for nothing."""
+        words = request.parameters
+        return len(words) == 2 or (len(words) == 1 and words[0].lower() != "none")
+
+    def _leased(self, client: int, request: Request) -> list[Outgoing]:
+        """Take or renew the lease; what the holder before it had ordered is dropped."""
+        before = self.lease
+        try:
+            values = self.work_of(client, request)
+        except CatseyeError as problem:
+            return [self._refused(request, str(problem), client)]
+        assert isinstance(values, tuple)
+        self.orders += 1
+        outgoing = [self._answer(client, request, values)]
+        if before is not None and self.lease is not None and before.client != client:
+            outgoing += self._dropped(f"{self.lease.name} has the lease now", before.client)
+        return outgoing
+
+    # Dark and still -------------------------------------------------------------------------------------------------
+
+    def _stop(self, client: int, request: Request) -> list[Outgoing]:
+        """Make dark, or stop, before all that waits; from outside the lease it holds until it is cleared."""
+        outside = self.guarded and not self._holds(client)
+        outgoing: list[Outgoing] = []
+        try:
+            COMMANDS[request.command].read(request)
+            if request.command == "STOP":
+                outgoing += self._all_stopped(f"STOP of {self.peer(client)}")
+            answer = self.work_of(client, request)
+        except CatseyeError as problem:
+            return [self._refused(request, str(problem), client)]
+        assert isinstance(answer, tuple)
+        for whose, undoing in self._lanes.take_out(lambda waiting: undoes(waiting, request)):
+            outgoing.append(self._refused(undoing, f"{request.command} came after it", whose))
+        self.scheduler.entries = [e for e in self.scheduler.entries if not undoes(e.request, request)]
+        if outside and request.command in ("PS", "AXIS", "STOP"):
+            order = f"{request.command} from {self.peer(client)} which has not the lease"
+            light, moves = request.command != "AXIS", request.command != "PS"
+            self.set_latch(Latch(light, moves, order).joined(self.latch))
+        return [self._answer(client, request, answer), *outgoing, *self._latch_told()]
+
+    def _all_stopped(self, why: str) -> list[Outgoing]:
+        outgoing = self.make_safe(why, free=False)
+        self.scheduler = Scheduler()
+        return [*outgoing, *self._dropped(why)]
+
+    def _latch_told(self) -> list[Outgoing]:
+        """Tell all that a dark order holds now, or is cleared."""
+        if self.latch == self._told_latch:
+            return []
+        self._told_latch = self.latch
+        if self.latch is None:
+            cleared = f"cleared by {self.cleared_by or 'a person'}"
+            return [Outgoing(self._reply(Request("LATCH"), True, ("none", cleared)))]
+        return [Outgoing(self._reply(Request("LATCH"), True, latch_of(self)))]
 
     def make_safe(self, why: str, *, free: bool = True) -> list[Outgoing]:
         """Laser and motors off, nothing under way or scheduled any more; what is to be told.
@@ -115,48 +193,66 @@ class Ranger(RangerState):
         head = self.head
         if not (head.laser_on() or head.enabled(0) or head.enabled(1) or (free and self.lease is not None)):
             return []
-        self._waiting.clear()
-        self._running = None
         self.scheduler = Scheduler()
         self.end_scan()
         self.end_stream()
-        head.switch_laser(False)
+        self.switch_laser(False)
         for axis in (0, 1):
             head.enable(axis, False)
         self.aimed = self.heading = None
         self.lease = None if free else self.lease
-        return [Outgoing(self._reply(Request("SAFE"), False, (plain_text(f"{why}: laser and motors are off"),)))]
+        safe = Outgoing(self._reply(Request("SAFE"), False, (plain_text(f"{why}: laser and motors are off"),)))
+        return [safe, *self._dropped("laser and motors are off")]
+
+    def _dropped(self, why: str, client: int | None = None) -> list[Outgoing]:
+        """Drop what changes the ranger, under way or waiting; those who asked are answered."""
+        taken = self._lanes.take_out(acts, client, running=True)
+        return [self._refused(request, f"dropped: {why}", whose) for whose, request in taken]
+
+    def _watch(self) -> list[Outgoing]:
+        """The interlock, and light that nobody switched on or whose direction nobody knows."""
+        why = self.interlock()
+        outgoing = self.make_safe(f"the interlock is open ({why})", free=False) if why else []
+        if not self.head.laser_on():
+            self.lit = False
+            return outgoing
+        why = "" if self.lit else "the laser came on by itself"
+        if not self.homed and not self.laser_at_boot:
+            why = "an axis is not homed"
+        if why:
+            self.switch_laser(False)
+            outgoing.append(Outgoing(self._reply(Request("SAFE"), False, (f"{why}: laser off",))))
+        return outgoing
+
+    # Turns ----------------------------------------------------------------------------------------------------------
 
     def disconnect(self, client: int) -> None:
-        """A connection is gone, its lease with it: queued and scheduled commands are dropped; a scan goes on."""
-        if self.lease is not None and self.lease[0] == client:
+        """A connection is gone, its lease with it: its commands are dropped, also scheduled ones; a scan goes on."""
+        if self._holds(client):
             self.lease = None
-        self._waiting = deque(item for item in self._waiting if item[0] != client)
+        self._lanes.drop(client)
+        self.peers.pop(client, None)
         self.scheduler.clear(client)
         if self.stream is not None and self.stream.client == client:
             self.end_stream()
 
     def turn(self) -> list[Outgoing]:
         """One pass of the loop; what is to be sent."""
-        outgoing: list[Outgoing] = []
-        if self._running is None and self._waiting:
-            outgoing += self._begin(*self._waiting.popleft())
-        elif self._running is not None:
-            outgoing += self._go_on()
-        if self._running is None and not self.scanning and self.scheduler.entries:
+        outgoing = self._watch()
+        for lane in self._lanes.in_turn(None if self.lease is None else self.lease.client):
+            outgoing += self._lane_step(lane)
+        if self._lanes.acting is None and not self.scanning and self.scheduler.entries:
             entry = self.scheduler.take(self.now_ns())
             if entry is not None:
-                outgoing += self._begin(entry.client, replace(entry.request, ticks=None))
+                outgoing += self._begin(self._lanes.of(SCHEDULE), entry.client, replace(entry.request, ticks=None))
         outgoing += self._scan_step()
         outgoing += self._stream_step()
         outgoing += [Outgoing(self._reply(Request("SUN"), False, (text,))) for text in watch_sun(self)]
-        why = self.interlock()
-        if why:
-            outgoing += self.make_safe(f"the interlock is open ({why})", free=False)
         if self.lease != self._told_lease:
             self._told_lease = self.lease
-            if not any(each.reply.command == "LEASE" for each in outgoing):  # which all heard
-                outgoing.append(Outgoing(self._reply(Request("LEASE"), True, holder_of(self))))
+            but = None if self.lease is None else self.lease.client  # who has been answered
+            outgoing.append(Outgoing(self._reply(Request("LEASE"), True, holder_of(self)), but=but))
+        outgoing += self._latch_told()
         outgoing += self._updates()
         word = self.status()
         if word != self._word:
@@ -173,48 +269,77 @@ class Ranger(RangerState):
         if self.has_queued:
             return 0.0
         if self.idle and not self.updates and not self.scheduler.entries:
-            return (WATCH_NS if heard else UNHEARD_NS) / PER_SECOND
+            return self._watch_ns(heard) / PER_SECOND
         now = self.now_ns()
-        due = [now + (WATCH_NS if heard else UNHEARD_NS)]
-        for work, at in (
-            (self._running, self._ask_at.get("command")),
-            (self._scan_work, self._ask_at.get("scan")),
-            (self._stream_work, self._ask_at.get("stream")),
-        ):
-            if work is not None:
-                fine = at is not None and now < at + FINE_SPAN_NS
-                due.append(now + POLL_NS if at is None else max(at, now + (FINE_NS if fine else POLL_NS)))
+        due = [now + self._watch_ns(heard)]
+        waits = [(each.ask_at, each.more) for each in self._lanes.running]
+        if self._scan_work is not None:
+            waits.append((self._ask_at.get("scan"), False))
+        if self._stream_work is not None:
+            waits.append((self._ask_at.get("stream"), False))
+        for at, more in waits:
+            if more:  # a long answer whose reader takes no more for now
+                due.append(now + SLOW_NS)
+                continue
+            fine = at is not None and now < at + FINE_SPAN_NS
+            due.append(now + POLL_NS if at is None else max(at, now + (FINE_NS if fine else POLL_NS)))
         if (self.scanning and self._scan_work is None) or (self.stream is not None and self._stream_work is None):
             return 0.0
-        if self._running is None and not self.scanning and self.scheduler.due_ns is not None:
+        if self._lanes.acting is None and not self.scanning and self.scheduler.due_ns is not None:
             due.append(self.scheduler.due_ns)
         if self.updates:
             due.append(self._next_update)
         return max(0, min(due) - now) / PER_SECOND
 
+    def _watch_ns(self, heard: bool) -> int:
+        """ns after which the head is looked at again, when nothing is under way."""
+        head = self.head
+        if self._head_interlock is not None and (head.laser_on() or head.enabled(0) or head.enabled(1)):
+            return LIVE_NS
+        return WATCH_NS if heard else UNHEARD_NS
+
     def waiting(self, client: int) -> int:
         """Commands of a connection that have not begun."""
-        return sum(each == client for each, _ in self._waiting)
+        return len(self._lanes.of(client).waiting)
 
     @property
     def has_queued(self) -> bool:
-        """Whether the next turn can begin a command that waits."""
-        return self._running is None and bool(self._waiting)
+        """True where the next turn can begin a command, or go on with a long answer."""
+        lanes = self._lanes
+        return any(lanes.can_begin(lane) for lane in lanes.in_turn(None)) or any(
+            each.more and self.room(each.client) for each in lanes.running
+        )
+
+    @property
+    def busy(self) -> bool:
+        """True while a command runs or waits."""
+        return self._lanes.busy
 
     @property
     def idle(self) -> bool:
         """Whether nothing runs, waits, scans or streams."""
-        return self._running is None and not self._waiting and not self.scanning and self.stream is None
+        return not self._lanes.busy and not self.scanning and self.stream is None
 
     # Inside ---------------------------------------------------------------------------------------------------------
 
-    def _begin(self, client: int, request: Request) -> list[Outgoing]:
+    def _lane_step(self, lane: Lane) -> list[Outgoing]:
+        """Go on with a connection's command, or begin its next."""
+        if lane.running is not None:
+            return self._go_on(lane, lane.running)
+        if not self._lanes.can_begin(lane):
+            return []
+        request = lane.waiting.popleft()
+        return self._begin(lane, lane.client, request)
+
+    def _begin(self, lane: Lane, client: int, request: Request) -> list[Outgoing]:
+        if stops(request) and (request.ticks is None or request.ticks * TICK_NS <= self.now_ns()):
+            return self._stop(client, request)  # it was scheduled
         stranger = self._stranger(client, request)
-        if stranger is not None:  # behind a LEASE that was refused, or scheduled by one who has it no more
-            return [replace(self._refused(request, stranger), client=client)]
+        if stranger is not None:  # the lease went elsewhere meanwhile
+            return [self._refused(request, stranger, client)]
         if request.command != "AT" and request.command not in COMMANDS:
             unknown = Reply("UNKNOWN", None, (f"command {request.command}",), request.tid, self.now_ticks())
-            return [Outgoing(unknown)]
+            return [Outgoing(unknown, client)]
         try:
             if request.ticks is not None and request.ticks * TICK_NS > self.now_ns():
                 COMMANDS[request.command].read(request)
@@ -222,43 +347,52 @@ class Ranger(RangerState):
                 return []
             answer = self.work_of(client, request)
         except KeyError:
-            return [self._refused(request, "a command that schedules takes no stamp (expected AT start, ...)")]
+            text = "a command that schedules takes no stamp (expected AT start, ...)"
+            return [self._refused(request, text, client)]
         except CatseyeError as problem:
-            return [self._refused(request, str(problem))]
+            return [self._refused(request, str(problem), client)]
         if isinstance(answer, tuple):
             return [self._answer(client, request, answer)]
-        self._running = (client, request, answer)
-        return self._go_on()
+        lane.running = Running(client, request, answer, acts(request))
+        return self._go_on(lane, lane.running)
 
-    def _go_on(self) -> list[Outgoing]:
-        if self._running is None:
-            return []
-        client, request, work = self._running
+    def _go_on(self, lane: Lane, running: Running) -> list[Outgoing]:
+        client, request = running.client, running.request
         outgoing: list[Outgoing] = []
+        running.more = False
+        if not running.acts and not self.room(client):
+            running.more = True
+            return []
         for _ in range(REPLIES_A_TURN):
             try:
-                values = next(work)
+                values = next(running.work)
             except StopIteration as end:
-                self._running = None
+                lane.running = None
                 return outgoing if end.value is None else [*outgoing, self._answer(client, request, end.value)]
             except CatseyeError as problem:
-                self._running = None
-                return [*outgoing, self._refused(request, str(problem))]
+                lane.running = None
+                return [*outgoing, self._refused(request, str(problem), client)]
             if values is None or isinstance(values, int):
-                self._ask_at["command"] = values
+                running.ask_at = values
                 return outgoing
             if isinstance(values, Reply):  # of a command that this one runs
                 outgoing.append(Outgoing(replace(values, tid=request.tid, ticks=self._stamp(values))))
             else:
                 outgoing.append(self._answer(client, request, values))
+        running.more = True
         return outgoing
 
     def _answer(self, client: int, request: Request, values: Values) -> Outgoing:
-        private = request.command in ("BUF", "BYE")
-        return Outgoing(self._reply(request, True, values), client if private else None)
+        """To who asked; what was done all hear."""
+        return Outgoing(self._reply(request, True, values), None if acts(request) else client)
 
-    def _refused(self, request: Request, text: str) -> Outgoing:
-        return Outgoing(self._reply(request, False, (plain_text(text.removeprefix(f"{request.command}: ")),)))
+    def _refused(self, request: Request, text: str, client: int) -> Outgoing:
+        """To who asked; of what would have changed the ranger all hear."""
+        reply = self._reply(request, False, (plain_text(text.removeprefix(f"{request.command}: ")),))
+        return Outgoing(reply, None if acts(request) and self._may(client) else client)
+
+    def _may(self, client: int) -> bool:
+        return not self.guarded or self._holds(client)
 
     def _reply(self, request: Request, ok: bool, values: Values) -> Reply:
         reply = Reply(request.command, ok, values, request.tid)
@@ -271,7 +405,7 @@ class Ranger(RangerState):
         return self.now_ticks()
 
     def _scan_step(self) -> list[Outgoing]:
-        if not self.scanning or self._running is not None:
+        if not self.scanning or self._lanes.acting is not None:
             return []
         if self._scan_work is None:
             self._scan_work = scan_rounds(self)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from numpy.typing import ArrayLike
 
@@ -12,6 +12,7 @@ from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND
 from catseye.ranger.commands import COMMANDS, schedule_of
 from catseye.ranger.cubes import Cubes
 from catseye.ranger.head import Buffer, RangerHead, SamplingSettings
+from catseye.ranger.latch import Latch, store_latch, stored_latch
 from catseye.ranger.line import TICK_NS, Reply, Request, nanoseconds_of, nanoseconds_to_ticks
 from catseye.ranger.ranging import NOMINAL_INDEX
 from catseye.ranger.schedule import Scheduler
@@ -35,10 +36,20 @@ BITS = tuple(int(bit) for bit in StatusWord)  # in the order of `RangerState.sta
 
 @dataclass(frozen=True)
 class Outgoing:
-    """A reply and the one connection it is for, None for all."""
+    """A reply and the one connection it is for, None for all; `but` is left out of all."""
 
     reply: Reply
     client: int | None = None
+    but: int | None = None
+
+
+class Lease(NamedTuple):
+    """Right to command: a connection, the name it gave, the token that only it was told, its peer's address."""
+
+    client: int
+    name: str
+    token: str
+    peer: str
 
 
 @dataclass(frozen=True)
@@ -84,7 +95,11 @@ class RangerState:
     mirror    name of its head, as in its initialisation file's
     sun       the ranger's own direction of the Sun for an MJD, None without
     turning   its frame turns, as on the feed arm: it moves only if SUN was told within 60 s, and has no own Sun
+
+    `laser_at_boot`: as the notes' rangers, at boot the laser is as its hardware has it, homed or not.
     """
+
+    laser_at_boot = False
 
     def __init__(
         self,
@@ -105,7 +120,11 @@ class RangerState:
         self._stream_work: Generator[Outgoing | int | None, None, None] | None = None
         self.tid = 0  # of the command that runs
         self.guarded = False  # whether commands need the lease
-        self.lease: tuple[int, str] | None = None  # the connection that may command, and the name that it gave
+        self.lease: Lease | None = None
+        self.peers: dict[int, str] = {}  # who is at the other end of a connection, in words
+        self.latch: Latch | None = stored_latch(files)
+        self.times_off = 0  # that the laser was switched off
+        self.cleared_by = ""  # who cleared the last one, and from where
         self._head_interlock: Callable[[], str] | None = getattr(head, "interlock", None)  # a head may offer it
         self.scheduler = Scheduler()
         self.next_sun_ns = 0
@@ -114,7 +133,10 @@ class RangerState:
         self._boot()
 
     def _boot(self) -> None:
-        """Everything but hardware and queues as when power comes on."""
+        """Everything but hardware and queues as when power comes on; the laser is off."""
+        self.lit = self.laser_at_boot and self.head.laser_on()  # a command switched it on
+        if not self.lit:
+            self.head.switch_laser(False)
         self.cubes = Cubes(self.limits)
         self.axes = (AxisSettings(), AxisSettings())
         self.sampling = SamplingSettings()
@@ -147,6 +169,21 @@ class RangerState:
         """Why hardware forbids light and moves at this instant; empty where it does not, or there is none."""
         return "" if self._head_interlock is None else self._head_interlock()
 
+    def set_latch(self, latch: Latch | None) -> None:
+        """Hold a dark order, or clear it; also in the ranger's folder."""
+        self.latch = latch
+        store_latch(self.files, latch)
+
+    def peer(self, client: int) -> str:
+        """Address of a connection's other end, in words."""
+        return self.peers.get(client, f"connection {client + 1}")
+
+    def switch_laser(self, on: bool) -> None:
+        """Switch the laser as a command asks, which is remembered: one that comes on by itself is switched off."""
+        self.lit = on
+        self.times_off += not on
+        self.head.switch_laser(on)
+
     def now_ns(self) -> int:
         """Nanoseconds since MJD 0."""
         return self._head_now_ns()
@@ -174,6 +211,7 @@ class RangerState:
             head.enabled(0),
             head.enabled(1),
             self.sun_refused or self.in_sun,
+            self.latch is not None,
             self.initialised,
         )
         return StatusWord(sum(bit for bit, is_on in zip(BITS, on, strict=True) if is_on))
@@ -225,6 +263,10 @@ class RangerState:
             off = request.command in ("PS", "AXIS", "SCN", "STM") and values[-1:] == (0,)
             if request.command in PULLED and not off and (why := self.interlock()):
                 raise InputError(f"the interlock is open: {why} (expected it closed first)")
+            if self.latch is not None and not off and self.latch.refuses(request.command):
+                raise InputError(
+                    f"no {self.latch.extent} by order: {self.latch.order} (expected UNLATCH and a name, of a person)"
+                )
             if self.scanning and request.command in REFUSED_IN_A_SCAN:
                 raise InputError("a scan is under way (expected SCN 0 first)")
             if self.stream is not None and request.command in REFUSED_IN_A_STREAM:

@@ -25,6 +25,7 @@ class StatusWord(IntFlag):
     AZIMUTH_ENABLED = 1 << 12
     ELEVATION_ENABLED = 1 << 13
     SUN_REFUSED = 1 << 14  # the last move asked was refused for the Sun, or the beam rests in its cone
+    LATCHED = 1 << 15  # a dark order from outside the lease holds
     INITIALISED = 1 << 16  # BP, ALPHA, BETA, MO, EZ and D0 have been given
 
 

@@ -30,7 +30,7 @@ from catseye.coordinator.ziy import Coordinator, CoordinatorParts
 from catseye.errors import InputError
 from catseye.ranger.addresses import COORDINATOR_PORT
 from catseye.ranger.door import Door
-from catseye.ranger.network import ConnectionMaker
+from catseye.ranger.network import NO_TLS, ConnectionMaker, Sockets, TlsFiles
 from catseye.ranger.server import LOOPBACK
 from catseye.records.files.reading import read_record
 from catseye.records.files.record import Certificate
@@ -68,6 +68,7 @@ class Orders:
     rotate_night   whether it does at noon UTC
     host, port     of its own clients; port 0: any free one
     key            of the site, asked for at its own port and said to those of rangers and feed; None: there is none
+    tls            files of TLS for addresses beyond this machine
     keep_out, interlocks, solids   files; None: only the Sun is kept clear of, nothing stands in the way
     """
 
@@ -82,6 +83,7 @@ class Orders:
     host: str = LOOPBACK
     port: int = COORDINATOR_PORT
     key: str | None = field(default=None, repr=False)
+    tls: TlsFiles = NO_TLS
     keep_out: Path | None = None
     interlocks: Path | None = None
     solids: Path | None = None
@@ -190,7 +192,7 @@ class LiveCoordinator:
                 self._journal,
                 None if self._solver is None else self._solver.solve,
             ),
-            environment=Environment(clock, network, seed or 0, orders.key),
+            environment=Environment(clock, network or Sockets(orders.tls), seed or 0, orders.key),
             feed=peers.feed,
             mode=orders.mode,
             commands=initialising_commands(site),
@@ -203,7 +205,7 @@ class LiveCoordinator:
         for name in orders.drop:
             self.ziy.firing.dropped.add(name)
             self.ziy.links[name].wanted = "hold"
-        door = Door(key=orders.key)
+        door = Door(key=orders.key, tls=orders.tls)
         self.server = ZiyServer(self.ziy, orders.host, orders.port, network=network, door=door)
 
     def _opened(

@@ -16,7 +16,7 @@ from catseye.errors import CatseyeError, InputError
 from catseye.ranger.addresses import PORT_BASE, Address, Addresses, feed_address
 from catseye.ranger.door import USUAL_DOOR, Door
 from catseye.ranger.head import RangerHead
-from catseye.ranger.network import ConnectionMaker, SocketListener, Sockets
+from catseye.ranger.network import NO_TLS, ConnectionMaker, SocketListener, Sockets, TlsFiles
 from catseye.ranger.ranger import Ranger
 from catseye.records.site.folder import SiteFolder
 from catseye.service.warm import WarmingClock, warm
@@ -46,15 +46,16 @@ class Listening:
 class LateSockets(Sockets):
     """TCP whose ports are had at once, and answer from `open` on: nobody connects to rangers that are not ready."""
 
-    def __init__(self) -> None:
+    def __init__(self, tls: TlsFiles = NO_TLS) -> None:
+        super().__init__(tls)
         self._closed: list[asyncio.Server] | None = []
 
     async def serve(self, factory: Callable[[], asyncio.Protocol], host: str, port: int) -> SocketListener:
         if self._closed is None:
             return await super().serve(factory, host, port)
-        server = await asyncio.get_running_loop().create_server(factory, host, port, start_serving=False)
-        self._closed.append(server)
-        return SocketListener(server)
+        listener = await self.listen(factory, host, port, at_once=False)
+        self._closed.append(listener.server)
+        return listener
 
     async def open(self) -> None:
         """Answer from now on. Raises InputError: somebody else has taken a port meanwhile."""
@@ -63,10 +64,9 @@ class LateSockets(Sockets):
             try:
                 await server.start_serving()
             except OSError as problem:
-                host, port = server.sockets[0].getsockname()[:2]
-                raise InputError(
-                    f"{host} port {port} cannot be had: {problem.strerror} (expected a free one)"
-                ) from problem
+                at = server.sockets[0].getsockname()
+                where = at if isinstance(at, str) else f"{at[0]} port {at[1]}"
+                raise InputError(f"{where} cannot be had: {problem.strerror} (expected a free one)") from problem
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class RangersServed:
         warming: WarmingClock | None = None,
     ):
         self._site, self._twin, self._warming = site, twin, warming
-        self._late = LateSockets() if network is None else None
+        self._late = LateSockets(at.door.tls) if network is None else None
         network = network or self._late
         begun = clock.now_ns()
         self._served = TwinSite(
@@ -151,6 +151,7 @@ class RangersServed:
                 posture = self._twin.live_posture
                 for text in await warm(self._site, self._served.rangers, self._warming, posture=posture):
                     self.warned(text)
+            self._served.rearm()  # the time of the warm-up is not the dead man's
             if self._late is not None:
                 await self._late.open()
             at = None

@@ -25,8 +25,16 @@ BEFORE = 300.0  # s before the start, when the rangers are powered on
 STEP = 0.05  # s between two looks at a ranger that is busy
 HOMING_TIMEOUT = 35.0  # s an axis: a ZY gives up after 30
 LEAVING = 20.0  # s: a quarter turn of either axis, and the look at the Sun behind it
-HOMING = (  # amplifiers, then the indices with the laser off, then the laser
-    *(("AXIS", "0", "1"), ("AXIS", "1", "1"), ("PS", "0"), ("FHM", "0"), ("FHM", "1"), ("PS", "1")),
+HOMING = (  # amplifiers, then the indices with the laser off, then the laser, to see whether it may shine
+    *(
+        ("LEASE", "warm-up"),
+        ("AXIS", "0", "1"),
+        ("AXIS", "1", "1"),
+        ("PS", "0"),
+        ("FHM", "0"),
+        ("FHM", "1"),
+        ("PS", "1"),
+    ),
 )
 CLIENT = 0
 
@@ -88,8 +96,9 @@ async def warm(
                 raise InputError(f"{name}: {request.command} takes time (expected what is done at once)")
         _tell_sun(guard, name, ranger, clock, posture)
         problem = await _homed_and_lit(name, ranger, clock)
+        if problem is not None or not ranger.laser_at_boot:
+            ranger.work_of(CLIENT, Request("PS", ("0",)))  # dark until who has the lease lights it
         if problem is not None:
-            ranger.work_of(CLIENT, Request("PS", ("0",)))
             left.append(problem)
         ranger.disconnect(CLIENT)
         await asyncio.sleep(0.0)

@@ -7,6 +7,7 @@ import subprocess
 
 import pytest
 
+from catseye.ranger.status import StatusWord
 from cli.living_scene import PATIENCE, ended, processes_with, small_site, started
 
 HEADS = """
@@ -90,7 +91,7 @@ def test_it_serves_people_and_ends_clean(tmp_path, number, status):
         with socket.create_connection((host, port), timeout=PATIENCE) as person:
             lines = person.makefile("rw")
             print("LEASE anna", file=lines, flush=True)
-            print("CIL 0", file=lines, flush=True)
+            print("PS 1\nCIL 0", file=lines, flush=True)
             print("CMEAS 2, 0", file=lines, flush=True)
             heard = []
             while not heard or "CMEAS" not in heard[-1]:
@@ -112,3 +113,22 @@ def test_a_child_leaves_with_whoever_holds_its_standard_input(tmp_path):
         assert process.wait(timeout=PATIENCE) == 0
     assert list(tmp_path.iterdir()) == []
     assert processes_with(str(tmp_path)) == []
+
+
+@pytest.mark.parametrize("lit", [False, True])
+def test_a_unix_socket_is_served_and_the_laser_is_off_at_boot_unless_asked_for(tmp_path, lit):
+    folder = tmp_path / "run"
+    words = ["zy", small_site(), "ZY102", "--twin", "--cold", "--host", f"unix:{folder}", "--port-base", "0", "--json"]
+    with started(*words, *["--laser-at-boot"] * lit, home=tmp_path) as process:
+        host, port, _ = json.loads(process.stdout.readline())["rangers"]["ZY102"]
+        assert host == f"unix:{folder}"
+        with socket.socket(socket.AF_UNIX) as person:
+            person.settimeout(PATIENCE)
+            person.connect(str(folder / f"{port}.sock"))
+            lines = person.makefile("r")
+            heard = [lines.readline() for _ in range(3)]
+        assert bool(int(heard[-1].split("0x")[1], 16) & StatusWord.LASER_OFF) is not lit
+        _, out, err = ended(process, signal.SIGTERM)
+        assert out == ""
+        assert ("warning: --laser-at-boot: lasers shine from power-up on" in err) is lit
+    assert list(folder.iterdir()) == []

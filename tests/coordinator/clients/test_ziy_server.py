@@ -234,14 +234,18 @@ def test_who_has_no_lease_asks_and_does_not_command():
             for command in ("MODE", "STATUS", "RANGERS", "PARAMETERS", "LEASE", "VER"):
                 assert (await ben.ask(command)).ok
             assert site.ziy.mode == "active"
-            assert (await ben.ask("LEASE", "ben")).text == "ben"
+            name, peer, token = (await ben.ask("LEASE", "ben")).values
+            assert (name, peer, len(token)) == ("ben", "memory port 0", 32)
             assert (await anna.ask("LEASE", "none")).ok is False
             assert (await ben.ask("MODE", "hold")).ok
-            assert (await anna.ask("LEASE", "anna")).text == "anna"  # told to all, and journalled
+            assert (await anna.ask("LEASE", "anna")).values[0] == "anna"  # told to all, and journalled
             assert (
                 await ben.ask("MODE", "active")
             ).text == "MODE needs the lease: anna has it (expected LEASE and a name first)"
-            assert [r.text for r in heard if r.command == "LEASE" and r.tid == 0] == ["ben", "anna"]
+            assert [r.values for r in heard if r.command == "LEASE" and r.tid == 0] == [("ben", peer)]  # no token
+            await until(lambda: site.kinds().count("lease") == 2)
+            journalled = [row.text for row in site.journal.rows if getattr(row, "kind", "") == "lease"]
+            assert "to ben (memory port 0)" in journalled[0]  # with its address
             anna.close()
             await asyncio.sleep(0.1)
             assert (await ben.ask("LEASE")).text == "none"
@@ -261,10 +265,11 @@ def test_a_key_is_asked_for_first():
             await site.server.start()
             stranger = await site.raw()
             await asyncio.sleep(0.05)
-            assert stranger.got == b""
+            assert stranger.got.count(b"\n") == 1
+            assert b"NONCE 1, " in stranger.got
             stranger.transport.write(b"STATUS\nMODE hold\n")
             await until(lambda: stranger.gone)
-            assert stranger.got.count(b"\n") == 1
+            assert stranger.got.count(b"\n") == 2
             assert b"LINE 0, the site's key is expected first" in stranger.got
             client = await site.client(key=key)
             assert (await client.ask("STATUS")).ok

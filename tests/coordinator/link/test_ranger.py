@@ -14,7 +14,8 @@ from catseye.ranger.client import SECOND_CLIENT_TID, ZyClient
 from catseye.ranger.door import Door
 from catseye.ranger.line import Request
 from catseye.ranger.server import LOOPBACK
-from coordinator.link_scene import COMMANDS, Free, Linked, LoopClock, Served, network, planned, run, until
+from catseye.ranger.status import StatusWord
+from coordinator.link_scene import COMMANDS, LATENCY, Free, Linked, LoopClock, Served, network, planned, run, until
 
 
 def test_a_cold_ranger_is_made_ready_and_its_shot_comes_whole():
@@ -198,6 +199,7 @@ def test_a_reconnect_within_two_seconds_needs_nothing_sent_again():
 def test_another_coordinator_takes_a_ranger_over_as_it_is_and_one_with_other_records_does_not():
     async def story():
         async with Linked() as (served, first):
+            first.wanted = "hold"
             for commands, text in (
                 (COMMANDS, "was ready still"),
                 ([*COMMANDS, Request("KND", ("1", "S", "-30"))], "made"),
@@ -410,8 +412,11 @@ def test_the_laser_is_off_while_the_indices_are_searched():
         guard = Free()
         async with Linked(guard=guard) as (served, _):
             lines = [(r.command, r.parameters) for r in guard.asked if r.command in ("PS", "FHM")]
-            assert lines == [("PS", ("0",)), ("FHM", ("0",)), ("FHM", ("1",)), ("PS", ("1",))]
+            assert lines == [("FHM", ("0",)), ("FHM", ("1",)), ("PS", ("1",))]  # off since it was switched on
             assert served.head.laser_on()
+            served.by_hand("FHM 0")  # a search of a lit ranger
+            await until(lambda: served.head.homing(0) == "searching", 1.0)
+            assert not served.head.laser_on()
 
     run(story)
 
@@ -479,7 +484,13 @@ def test_a_listening_link_hears_another_clients_shots_and_sends_nothing_that_cha
 def test_leaving_switches_off_a_laser_that_was_switched_on_here_and_no_other():
     async def story(dark):
         served = await Served().start()
-        served.head.switch_laser(not dark)
+        if not dark:  # as another left it that was killed a moment ago
+            other = served.link()
+            lighting = asyncio.ensure_future(other.run())
+            await until(lambda: other.ready)
+            lighting.cancel()
+            await asyncio.gather(lighting, return_exceptions=True)
+            assert served.head.laser_on()
         link = served.link()
         task = asyncio.ensure_future(link.run())
         await until(lambda: link.ready)
@@ -593,13 +604,118 @@ async def person(served, **options):
 def test_the_coordinator_has_the_lease_of_a_ranger_that_it_measures_with():
     async def story():
         async with Linked() as (served, link):
-            assert served.ranger.lease == (0, HOLDER)
+            assert served.ranger.lease[:2] == (0, HOLDER)
             anna = await person(served)
-            assert (await anna.ask("PS", 0)).ok is False
+            assert (await anna.ask("PS", 1)).ok is False
             assert (await anna.ask("ACP", 0)).ok
             link.wanted = "hold"  # left out on purpose: it is nobody's
             await until(lambda: served.ranger.lease is None)
             assert link.state == "connected"
+            assert not served.head.laser_on()  # who gives it back lit it
+            assert served.ranger.latch is None
+
+    run(story)
+
+
+def test_a_second_program_that_says_the_same_name_is_not_the_holder():
+    """Attack: both called themselves by the same process number, and both commanded."""
+
+    async def story():
+        async with Linked() as (served, link):
+            other = served.link()
+            task = asyncio.ensure_future(other.run())
+            await until(lambda: "leased" in other.troubles)
+            await asyncio.sleep(30.0)
+            assert not other.ready
+            assert link.ready
+            assert served.ranger.lease[:2] == (0, HOLDER)
+            assert any("memory port 0 commands it" in h.text for h in served.happenings)
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+
+    run(story)
+
+
+def test_the_lease_goes_along_where_the_ranger_has_not_noticed_the_cut():
+    async def story():
+        async with Linked() as (served, link):
+            token = served.ranger.lease.token
+            old = served.server.connections[0]
+            link._client.close("cut")  # of which nothing arrives
+            old.connection_lost = lambda exc: None
+            served.server.connections[0] = old
+            await until(lambda: link.ready and served.ranger.lease is not None and served.ranger.lease.client == 1)
+            assert served.ranger.lease.token == token
+
+    run(story)
+
+
+def test_a_coordinator_that_waits_renews_the_lease():
+    """Attack: a homing of 35 s, or a move that hangs, was longer than the dead man's time."""
+
+    async def story():
+        async with Linked() as (served, link):
+            served.by_hand("WTMO 3600")
+            served.by_hand("AXIS 0, 0")
+            served.by_hand("CWT 1")
+            link.settings = replace(link.settings, probe_timeout=3600.0)
+            await asyncio.sleep(300.0)
+            assert served.head.laser_on()
+            assert "made-safe" not in served.kinds()
+
+    run(story)
+
+
+def test_a_dark_order_of_another_is_journalled_with_its_peer_and_obeyed_until_it_is_cleared():
+    async def story():
+        async with Linked() as (served, link):
+            anna = await person(served)
+            assert (await anna.ask("PS", 0)).ok
+            await until(lambda: not link.ready)
+            alarm = next(h for h in served.happenings if h.kind == "darkened")
+            assert alarm.severity == "alarm"
+            assert "PS from memory port 0" in alarm.text
+            await asyncio.sleep(120.0)
+            assert not served.head.laser_on()
+            assert not link.ready
+            assert "darkened" in link.troubles
+            assert (await anna.ask("UNLATCH", "anna")).ok
+            await until(lambda: link.ready, 5.0)
+            assert served.head.laser_on()
+            assert "darkened" not in link.troubles
+            assert any("cleared by anna at memory port 0" in h.text for h in served.happenings)
+
+    run(story)
+
+
+def test_who_leaves_lights_nothing_again():
+    """Attack: the probe that saw the laser off, by the coordinator's own leaving, switched it on again."""
+
+    async def story():
+        guard = Free()
+        async with Linked(guard=guard) as (served, link):
+            link._left = True  # as `leave` does first; its PS 0 is answered:
+            served.by_hand("PS 0")
+            await until(lambda: link.status & StatusWord.LASER_OFF, step=LATENCY)
+            asked = len(guard.asked)
+            assert await link._lives()
+            await asyncio.sleep(10.0)
+            assert not served.head.laser_on()
+            assert Request("PS", ("1",)) not in guard.asked[asked:]
+
+    run(story)
+
+
+def test_who_has_lost_the_lease_darkens_nobody():
+    async def story():
+        async with Linked() as (served, link):
+            anna = await person(served)
+            assert (await anna.ask("LEASE", "anna")).ok
+            await until(lambda: not link.ready)
+            await link.leave()
+            await asyncio.sleep(0.1)
+            assert served.ranger.latch is None
+            assert served.head.laser_on()
 
     run(story)
 
@@ -608,17 +724,18 @@ def test_who_takes_the_lease_has_the_ranger_until_it_is_given_back():
     async def story():
         async with Linked() as (served, link):
             anna = await person(served)
-            assert (await anna.ask("LEASE", "anna")).ok
+            token = (await anna.ask("LEASE", "anna")).values[-1]
             await until(lambda: not link.ready)
             assert "leased" in link.troubles
-            assert "ZY101: anna took the lease: nothing is sent that it needs" in [h.text for h in served.happenings]
+            said = "ZY101: anna at memory port 0 took the lease: nothing is sent that it needs"  # with her address
+            assert said in [h.text for h in served.happenings]
             for _ in range(20):  # a person who goes on keeps it
                 await asyncio.sleep(5.0)
-                assert (await anna.ask("VER")).ok
-            assert served.ranger.lease == (1, "anna")
+                assert (await anna.ask("LEASE", "anna", token)).ok
+            assert served.ranger.lease[:2] == (1, "anna")
             assert (await anna.ask("LEASE", "none")).ok
             await until(lambda: link.ready, 5.0)
-            assert served.ranger.lease == (0, HOLDER)
+            assert served.ranger.lease[:2] == (0, HOLDER)
             assert "leased" not in link.troubles
             served.light()
             assert await link.fire(planned("ZG11")) is not None
@@ -647,6 +764,7 @@ def test_a_ranger_that_knows_no_lease_is_commanded_as_ever():
     async def story():
         served = await Served().start()
         served.server.door = Door(lease=False)
+        served.server.ranger = served.ranger
         receive = served.ranger.receive
 
         def old(client, line):

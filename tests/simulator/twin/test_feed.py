@@ -7,6 +7,8 @@ import pytest
 
 from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND
+from catseye.ranger.door import Door, answer_to
+from catseye.ranger.entrance import MOST_PENDING, PATIENCE
 from catseye.ranger.line import TICK_NS, parse_reply
 from catseye.ranger.server import LOOPBACK
 from catseye.records.night.live import LiveWeather
@@ -219,3 +221,50 @@ def test_it_serves_on_real_sockets_in_real_time():
         await feed.stop()
 
     asyncio.run(story())
+
+
+KEY = "a-key-of-the-site"
+
+
+def test_peers_without_the_key_take_no_place_and_hear_nothing():
+    async def story(feed, world, network):
+        strangers = [await network.connect(Listening, LOOPBACK, 5250) for _ in range(MOST_CLIENTS + 5)]
+        await asyncio.sleep(0.5)
+        assert sum(not each.lost for each in strangers) <= MOST_PENDING
+        client = await network.connect(Listening, LOOPBACK, 5250)
+        await asyncio.sleep(0.1)
+        (nonce,) = client.lines("NONCE")
+        client.transport.write(f"KEY {answer_to(nonce.text, KEY)}\n".encode())
+        await asyncio.sleep(1.0)
+        assert len(client.lines("TEL")) >= 9
+        assert len(feed.clients) == 1
+        await asyncio.sleep(PATIENCE)
+        assert all(each.lost and b"TEL" not in each.heard for each in strangers)
+
+    run(story, door=Door(key=KEY))
+
+
+@pytest.mark.parametrize("first", [b"\x00\x01\x00\x08", b"EHLO mail\n", b"\xff\n", b"PS 0\n"])
+def test_what_is_no_word_of_the_feed_is_closed(first, caplog):
+    async def story(feed, world, network):
+        client = await network.connect(Listening, LOOPBACK, 5250)
+        client.transport.write(first)
+        await asyncio.sleep(0.2)
+        assert client.lost
+        assert not feed.clients
+        assert "feed: port 5250: " in caplog.text
+
+    run(story)
+
+
+def test_who_says_nothing_for_an_hour_is_closed_and_an_empty_line_is_enough():
+    async def story(feed, world, network):
+        mute, alive = [await network.connect(Listening, LOOPBACK, 5250) for _ in range(2)]
+        for _ in range(4):
+            await asyncio.sleep(25.0)
+            alive.transport.write(b"\n")
+        assert mute.lost
+        assert b"LINE 0, nothing was said for 60 s" in mute.heard
+        assert not alive.lost
+
+    run(story, door=Door(idle=60.0))

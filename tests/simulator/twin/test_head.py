@@ -332,7 +332,7 @@ def test_a_ranger_homes_points_and_measures_with_it_as_it_boots():
     """No filter is sent: the ranger's five zeros leave the head its own."""
     clock = ManualClock(START)
     ranger = Ranger("ZY101", TwinHead("ZY101", World(), clock, seed=5), limits=(-30_000, 80_000))
-    lines = [*GEOMETRY, *CUBES, "AZM 0, -900", "ELV 0, 400", "AXIS 0,1", "AXIS 1,1", "FHM 0", "FHM 1"]
+    lines = [*GEOMETRY, *CUBES, "AZM 0, -900", "ELV 0, 400", "AXIS 0,1", "AXIS 1,1", "FHM 0", "FHM 1", "PS 1"]
     for line in (*lines, "CMEAS 1, 0", "CIL 1", "CMEAS 2, 1", "BUF"):
         ranger.receive(1, line)
     replies = []

@@ -77,7 +77,16 @@ class Running:
     async def at_work(self, name):
         """A client of a ranger that is initialised from its files and homed."""
         client = await self.client(name)
-        for command in ("INITZY", "AXIS 0, 1", "AXIS 1, 1", "FHM 0", "FHM 1", "ABV 0, 400000000", *SUN.get(name, ())):
+        for command in (
+            "INITZY",
+            "AXIS 0, 1",
+            "AXIS 1, 1",
+            "FHM 0",
+            "FHM 1",
+            "PS 1",
+            "ABV 0, 400000000",
+            *SUN.get(name, ()),
+        ):
             word, _, rest = command.partition(" ")
             reply = await self.ask(client, word, *rest.split(", ") if rest else ())
             assert reply.ok, reply
@@ -159,7 +168,6 @@ def test_a_dead_ranger_comes_back_cold(few):
     async def story(world):
         client, other = await world.at_work("ZY101"), await world.at_work("ZY102")
         assert (await world.ask(client, "AT", 60_000, 1, 0, "VER")).ok
-        world.heads["ZY101"].switch_laser(True)
         _, waiting = client.request("WAI", 0, ticks=world.site.rangers["ZY101"].now_ticks() + 10**7)
         await asyncio.sleep(99.9 - world.loop.time())
         assert not client.closed.done()
@@ -173,7 +181,7 @@ def test_a_dead_ranger_comes_back_cold(few):
         assert (await world.ask(other, "VER")).ok
         await asyncio.sleep(150.1 - world.loop.time())
         client = await world.client("ZY101")
-        assert world.site.rangers["ZY101"].status() == StatusWord.AUTO
+        assert world.site.rangers["ZY101"].status() == StatusWord.AUTO | StatusWord.LASER_OFF
         assert (await world.ask(client, "LST")).values == ("0",)
         assert not (await world.ask(client, "CIL", 1)).ok
         client.close()

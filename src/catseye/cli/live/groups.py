@@ -60,7 +60,7 @@ MotionScriptText = Annotated[
     str | None,
     typer.Option("--motion-script", metavar='FILE|"fixed AZ EL"', help="A motion known beforehand; no feed."),
 ]
-Host = Annotated[str | None, typer.Option("--host", help="Address of its own port.  [default: 127.0.0.1]")]
+Host = Annotated[str | None, typer.Option("--host", help="Address of its own port, or unix:DIR.  [default: 127.0.0.1]")]
 
 
 class TwinOptions(NamedTuple):

@@ -166,10 +166,13 @@ def mjd_start(text: str | None, usual: float | None = None, *, offset: float = 0
 def orders_of(*, drop: list[str] | None, **given: Any) -> "Orders":
     """Of a coordinator, from the options; one that was not given is as `Orders` has it."""
     from catseye.ranger.door import key_of
+    from catseye.ranger.network import TlsFiles
     from catseye.service.coordinator import Orders
 
     names = tuple(name.upper() for name in drop or ())
-    return Orders(drop=names, key=key_of(), **{key: value for key, value in given.items() if value is not None})
+    return Orders(
+        drop=names, key=key_of(), tls=TlsFiles.of(), **{key: value for key, value in given.items() if value is not None}
+    )
 
 
 def leave(run: "LiveRun[Any]", *, terminated: int = 143) -> None:

@@ -15,6 +15,7 @@ from catseye.cli.live.options import (
     leave,
     say_now,
     site_of,
+    tell_people,
     within,
 )
 from catseye.cli.option_groups import grouped
@@ -68,7 +69,12 @@ def zy(  # noqa: PLR0913 - its options are its command line
         ),
     ] = None,
     cold: Annotated[bool, typer.Option("--cold", help="The twin's rangers are just powered on, not ready.")] = False,
-    host: Annotated[str | None, typer.Option("--host", help="Address to listen at.  [default: 127.0.0.1]")] = None,
+    laser_at_boot: Annotated[
+        bool, typer.Option("--laser-at-boot", help="As the notes' rangers: it shines as soon as its hardware does.")
+    ] = False,
+    host: Annotated[
+        str | None, typer.Option("--host", help="Address to listen at, or unix:DIR.  [default: 127.0.0.1]")
+    ] = None,
     port_base: PortBase = PORT_BASE,
     ports: Annotated[
         str | None, typer.Option("--ports", metavar="A,B", callback=_ports, help="Of the one ranger.")
@@ -94,12 +100,14 @@ def zy(  # noqa: PLR0913 - its options are its command line
         raise InputError(f"--ports: {len(names)} rangers cannot share two ports (expected one ranger, or --port-base)")
     from catseye.clock import SystemClock
     from catseye.ranger.door import Door, key_of
+    from catseye.ranger.network import TlsFiles
     from catseye.service.rangers import RangersServed, ServedAt, heads_of
     from catseye.service.running import LiveRun
 
-    at = ServedAt(
-        "loopback" if loopback else port_base, host, None if ports is None else _pair(ports), Door(key=key_of())
-    )
+    door = Door(key=key_of(), tls=TlsFiles.of(), laser_at_boot=laser_at_boot)
+    at = ServedAt("loopback" if loopback else port_base, host, None if ports is None else _pair(ports), door)
+    if laser_at_boot:
+        tell_people("warning: --laser-at-boot: lasers shine from power-up on, where nobody has the lease and unhomed")
     if head is not None:
         served = RangersServed(records, heads_of(head, names), clock=SystemClock(), at=at, files=files)
     else:

@@ -1,24 +1,30 @@
 """The coordinator's own port, for displays and for monitor and control, in the ZY grammar: a person on `nc` can use it.
 
 What one client may cost is bounded as at a ranger: a line of 1024 bytes, 200 lines a second (what comes faster is left
-unread), 1 MiB that it does not take (then it is cut off), 64 clients. docs/formats/ziy.md is the reference.
+unread), 1 MiB that it does not take (then it is cut off), 64 clients; long answers come in slices.
+docs/formats/ziy.md is the reference.
 """
 
 import asyncio
+import hmac
 import logging
 import re
-from collections.abc import Iterable
+import secrets
+from collections import deque
+from collections.abc import Iterable, Iterator
 from functools import partial
+from itertools import islice
 
-from catseye.coordinator.clients.board import VERSION, Board
+from catseye.coordinator.clients.board import ALIASES, HELP, VERSION, Board
 from catseye.coordinator.clients.samplers import plain
 from catseye.coordinator.journal.entries import Entry
 from catseye.coordinator.parts import ticks_now
 from catseye.coordinator.ziy import Coordinator
 from catseye.errors import CatseyeError, InputError
-from catseye.ranger.door import USUAL_DOOR, Door, notice_death, opens, refuse_open
-from catseye.ranger.first_line import BLANK, opening_of, peer_of
-from catseye.ranger.line import LONGEST_REQUEST, Request, parse_request, stamp_text
+from catseye.ranger.door import USUAL_DOOR, Door, notice_death, refuse_open
+from catseye.ranger.entrance import Doorway, Entrance
+from catseye.ranger.first_line import peer_of
+from catseye.ranger.line import LONGEST_REQUEST, Reply, Request, parse_request, stamp_text
 from catseye.ranger.network import ConnectionMaker, Listener, Sockets
 
 PORT = 5260
@@ -29,6 +35,10 @@ MOST_AT_ONCE = 400.0  # lines
 MOST_UNSENT = 2**20  # bytes
 MOST_CLIENTS = 64
 AGAIN = 0.1  # s until a client that came too fast is read on
+LINES_A_SLICE, SLICE_EVERY = 32, 0.005  # of a long answer; s between two
+LOOK = 0.5  # s between two looks for silent clients
+TOKEN_BYTES = 16
+WORDS = frozenset([*HELP, *ALIASES, "KEY"])  # that a first line may begin with
 KINDS = {"SHOT": "RANGES", "EPOCH": "EPOCHS", "EVENT": "EVENTS", "POSTURE": "POSTURE", "WEATHER": "WEATHER"}
 PUSHED = {sampler: kind for kind, sampler in KINDS.items()}
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,15}")
@@ -48,61 +58,80 @@ class Client(asyncio.Protocol):
         self.server = server
         self.transport: asyncio.Transport | None = None
         self.wants: set[str] = set()
+        self._entrance: Entrance | None = None
         self._unread = bytearray()
-        self._opened = False  # its first line was one of the language
-        self.admitted = server.door.key is None  # it may hear
+        self._rows: deque[tuple[int, Iterator[str]]] = deque()  # answers under way: TID, and lines without stamp
         self.name = ""  # under which it has the lease
-        self._left, self._since = MOST_AT_ONCE, asyncio.get_running_loop().time()
+        self.token = ""  # of that lease
+        self.heard = self._since = asyncio.get_running_loop().time()
+        self._left = MOST_AT_ONCE
         self._timer: asyncio.TimerHandle | None = None
+
+    @property
+    def peer(self) -> str:
+        """Address of the other end, in words."""
+        return peer_of(self.transport)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
         self.transport = transport
         notice_death(transport)
-        self.server.joined(self)
+        self._entrance = Entrance(self.server.gate, transport, self._say)
+        self._entrance.begin()
+        if self._entrance.admitted:
+            self.server.joined(self)
 
     def connection_lost(self, exc: Exception | None) -> None:
         if self._timer is not None:
             self._timer.cancel()
+        if self._entrance is not None:
+            self._entrance.over()
+        self._rows.clear()
         self.server.left(self)
 
     def data_received(self, data: bytes) -> None:
-        if self.transport is None or self.transport.is_closing():
+        if self._entrance is None or self.transport is None or self.transport.is_closing():
             return  # turned away: what else it sends is not looked at
-        self._unread += data
-        if self._opened or self._opens():
-            self._read_on()
+        self.heard, was_in = asyncio.get_running_loop().time(), self._entrance.admitted
+        more = self._entrance.take(data)
+        if more is None:
+            return
+        if not was_in:
+            self.server.joined(self)
+        self._unread += more
+        self._read_on()
 
-    def _opens(self) -> bool:
-        """Whether the first line is one of the language; a connection that begins with anything else is closed."""
-        opening, problem = opening_of(bytes(self._unread))
-        self._opened = opening == "read"
-        if opening == "waiting":
-            self._unread = self._unread.lstrip(BLANK)
-        if opening in ("foreign", "unreadable") and self.transport is not None:
-            LOG.warning("ZIY: port %d: %s %s: closed", self.server.port, peer_of(self.transport), plain(problem))
-            self._unread.clear()
-            if opening == "foreign":
-                self.transport.abort()
-            else:
-                self.tell(0, f"LINE 0, {plain(problem)}")
-                self.transport.close()
-        elif self._opened and not self.admitted:
-            self._admit()
-        return self._opened and self.admitted
+    def answer(self, tid: int, lines: Iterable[str]) -> None:
+        """Give an answer of many lines, in slices: other clients, and links, are served between them."""
+        self._rows.append((tid, iter(lines)))
+        self._give()
+        if self._rows and self._timer is None:
+            self._timer = asyncio.get_running_loop().call_later(SLICE_EVERY, self._go_on)
 
-    def _admit(self) -> None:
-        """Take the first line, which must be the site's key; who has it hears the greeting."""
-        line, _, rest = bytes(self._unread.lstrip(BLANK)).partition(b"\n")
-        self._unread = bytearray(rest)
-        self.admitted = opens(line, self.server.door.key or "")
-        if self.admitted:
-            self.tell(0, "KEY 1")
-            self.server.greet(self)
-        elif self.transport is not None:
-            LOG.warning("ZIY: port %d: %s has not the site's key: closed", self.server.port, peer_of(self.transport))
-            self.tell(0, "LINE 0, the site's key is expected first (KEY and the key)")
-            self.transport.close()
+    def _give(self) -> None:
+        """Send the next slice of the answers under way."""
+        left = LINES_A_SLICE
+        told: list[str] = []
+        while self._rows and left > 0:
+            tid, lines = self._rows[0]
+            taken = [f"{tid}\t{stamp_text(self.server.now_ticks())}\t{body}\n" for body in islice(lines, left)]
+            told += taken
+            if len(taken) < left:
+                self._rows.popleft()
+            left -= len(taken)
+        self.write("".join(told).encode("ascii", "replace"))
+
+    def _go_on(self) -> None:
+        """The next slice; behind the last, what was sent meanwhile."""
+        self._timer = None
+        if self.transport is None or self.transport.is_closing():
+            self._rows.clear()
+            return
+        self._give()
+        if self._rows:
+            self._timer = asyncio.get_running_loop().call_later(SLICE_EVERY, self._go_on)
+        else:
+            self._resume()
 
     def _read_on(self) -> None:
         """Answer whole lines as far as the rate allows; otherwise stop reading from the peer for a while."""
@@ -110,7 +139,7 @@ class Client(asyncio.Protocol):
             return
         now = asyncio.get_running_loop().time()
         self._left, self._since = min(MOST_AT_ONCE, self._left + (now - self._since) * LINES_A_SECOND), now
-        while self._left >= 1.0 and not self.transport.is_closing():
+        while self._left >= 1.0 and not self._rows and not self.transport.is_closing():
             end = self._unread.find(b"\n", 0, LONGEST_REQUEST + 3)
             if end < 0:
                 if len(self._unread) > LONGEST_REQUEST + 2:
@@ -124,6 +153,7 @@ class Client(asyncio.Protocol):
             self.server.answer(self, line.decode("ascii", "replace"))
         if b"\n" in self._unread and not self.transport.is_closing():
             self.transport.pause_reading()
+        if b"\n" in self._unread and self._timer is None and not self.transport.is_closing():
             self._timer = asyncio.get_running_loop().call_later(AGAIN, self._resume)
 
     def _resume(self) -> None:
@@ -132,12 +162,18 @@ class Client(asyncio.Protocol):
             self.transport.resume_reading()
             self._read_on()
 
+    def _say(self, reply: Reply) -> None:
+        flag = "1" if reply.ok else "0"
+        self.tell(0, ", ".join([f"{reply.command} {flag}", *reply.values]))
+
     def tell(self, tid: int, body: str) -> None:
         """A line with TID and the stamp of now."""
         self.write(f"{tid}\t{stamp_text(self.server.now_ticks())}\t{body}\n".encode("ascii", "replace"))
 
     def write(self, data: bytes) -> None:
         """Send; who does not take what it is sent is cut off, and costs nobody else anything."""
+        if not data:
+            return
         if self.transport is None or self.transport.is_closing():
             return
         self.transport.write(data)
@@ -166,13 +202,14 @@ class ZiyServer:
         self.holder: Client | None = None  # who may set and command
         self.board = Board(coordinator)
         self.clients: set[Client] = set()
-        self._network: ConnectionMaker = network or Sockets()
+        self.gate = Doorway(lambda: f"ZIY: port {self.port}", door, WORDS, _loop_time)
+        self._network: ConnectionMaker = network or Sockets(door.tls)
         self._listener: Listener | None = None
         self._keeping: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
         """Listen. Raises InputError where the port cannot be had, or would be open to others without a key."""
-        refuse_open("ZIY", self.host, self.door.key)
+        refuse_open("ZIY", self.host, self.door)
         try:
             self._listener = await self._network.serve(partial(Client, self), self.host, self.port)
         except OSError as problem:
@@ -208,8 +245,7 @@ class ZiyServer:
                 client.transport.close()
             return
         self.clients.add(client)
-        if client.admitted:
-            self.greet(client)
+        self.greet(client)
 
     def greet(self, client: Client) -> None:
         """Who this is, and that the client is connected."""
@@ -253,39 +289,64 @@ class ZiyServer:
                 who = "nobody has it" if self.holder is None else f"{self.holder.name} has it"
                 raise InputError(f"{request.command} needs the lease: {who} (expected LEASE and a name first)")
             if request.command == "LEASE":
-                client.tell(request.tid, f"LEASE 1, {self._leased(client, request)}")
+                values = self._leased(client, request)
+                client.tell(request.tid, ", ".join(["LEASE 1", *values]))
                 return
-            rows = self._subscribed(client, request) if request.command == "SUBSCRIBE" else self.board.rows(request)
+            found = self._subscribed(client, request) if request.command == "SUBSCRIBE" else self.board.rows(request)
+            rows = None if found is None else list(found)
         except CatseyeError as problem:
             client.tell(request.tid, f"{request.command} 0, {plain(str(problem))}")
             return
         if rows is None:
             client.tell(request.tid, f"UNKNOWN command {request.command}")
             return
-        for row in rows:
-            client.tell(request.tid, ", ".join([f"{request.command} 1", *row]))
+        client.answer(request.tid, (", ".join([f"{request.command} 1", *row]) for row in rows))
 
-    def _leased(self, client: Client, request: Request) -> str:
-        """LEASE asks who has it, LEASE name takes it from whoever has, LEASE none gives it back; who has it then."""
-        if len(request.parameters) > 1 or not all(NAME.fullmatch(word) for word in request.parameters):
+    def _leased(self, client: Client, request: Request) -> tuple[str, ...]:
+        """LEASE asks who has it, LEASE name takes it, with its token renews it, LEASE none gives it back.
+
+        Name and address of who has it then; who takes it is told its token, too.
+        """
+        words = request.parameters
+        if len(words) > 2 or not all(NAME.fullmatch(word) for word in words[:1]):
             raise InputError("that is no name (expected LEASE, or LEASE and a letter with up to 15 letters and digits)")
-        if request.parameters:
-            name = request.parameters[0]
-            if name.lower() == "none" and self.holder is not client:
-                raise InputError("it is not yours to give back (expected LEASE to see whose)")
-            self._lease(*((None, "") if name.lower() == "none" else (client, name)))
-        return "none" if self.holder is None else self.holder.name
+        if not words:
+            return self._holder()
+        if len(words) == 2:
+            self._renewed(client, *words)
+            return self._holder()
+        if words[0].lower() != "none":
+            self._lease(client, words[0], secrets.token_hex(TOKEN_BYTES))
+            return *self._holder(), client.token
+        if self.holder is not client:
+            raise InputError("it is not yours to give back (expected LEASE to see whose)")
+        self._lease(None, "")
+        return self._holder()
 
-    def _lease(self, client: Client | None, name: str) -> None:
-        """Another one has the lease now: told to all clients, and in the journal."""
-        before = "nobody" if self.holder is None else self.holder.name
+    def _renewed(self, client: Client, name: str, token: str) -> None:
+        """Keep the lease of who shows its token; it goes along to another connection of the same program."""
+        holder = self.holder
+        if holder is None or not hmac.compare_digest(token.encode(), holder.token.encode()):
+            raise InputError("that is not the token of the lease (expected LEASE and a name to take it)")
+        if holder is not client:
+            self._lease(client, name, token)
+
+    def _holder(self) -> tuple[str, ...]:
+        return ("none",) if self.holder is None else (self.holder.name, self.holder.peer)
+
+    def _lease(self, client: Client | None, name: str, token: str = "") -> None:
+        """Give the lease to another: told to all other clients, and in the journal, with their addresses."""
+        before = "nobody" if self.holder is None else f"{self.holder.name} ({self.holder.peer})"
+        if self.holder is not None:
+            self.holder.token = ""
         self.holder = client
         if client is not None:
-            client.name = name
-        self.coordinator.leased(before, name or "nobody")
+            client.name, client.token = name, token
+        self.coordinator.leased(before, "nobody" if client is None else f"{name} ({client.peer})")
+        line = ", ".join(["LEASE 1", *self._holder()])
         for each in self.clients:
-            if each.admitted:
-                each.tell(0, f"LEASE 1, {name or 'none'}")
+            if each is not client:
+                each.tell(0, line)
 
     def _subscribed(self, client: Client, request: Request) -> Iterable[tuple[str, ...]]:
         """SUBSCRIBE [what ...], commas or blanks between: the three usual kinds where none is named; NONE ends it."""
@@ -297,7 +358,22 @@ class ZiyServer:
         return [(" ".join(sorted(client.wants)) or "NONE",)]
 
     async def _keep_alive(self) -> None:
+        """An empty line to each client once a minute; meanwhile close the silent, and count wrong keys."""
+        told = _loop_time()
         while True:
-            await asyncio.sleep(KEEP_ALIVE)
+            await asyncio.sleep(LOOK)
+            now = _loop_time()
+            self.gate.check()
             for client in list(self.clients):
-                client.write(b"\n")
+                if now - client.heard > self.door.idle and client.transport is not None:
+                    client.tell(0, f"LINE 0, nothing was said for {self.door.idle:g} s")
+                    client.transport.close()
+                elif now - told >= KEEP_ALIVE:
+                    client.write(b"\n")
+            if now - told >= KEEP_ALIVE:
+                told = now
+
+
+def _loop_time() -> float:
+    """Time of the running loop, s."""
+    return asyncio.get_running_loop().time()

@@ -34,6 +34,7 @@ State = Literal["down", "connected", "preparing", "ready"]
 LONGEST_KEPT = 200  # characters of a reply, in the journal
 LONGEST_PATIENCE = 60.0  # s between two attempts to make a ranger ready
 HOLDER = f"ziy-{os.getpid() % 10**8}"  # as this coordinator's lease is called: another one's is not its
+LEASE_WITH_NUMBER, LEASE_WITH_TOKEN = 2, 4  # values: name, number of the connection, address, token
 MOVERS = frozenset(["CIL", "TRK", "STT", "FHM", "RST", "CMEAS", "INI", "INITZY", "COO", "SCN"])
 
 
@@ -99,6 +100,8 @@ class RangerLink:
         self._heard_at = 0.0
         self._was_ready, self._patience = False, self.settings.probe_every
         self._lit_here = self._left = self._dark = False
+        self._token: str | None = None  # of the lease, while it is this coordinator's
+        self._leaseless = False  # the ranger does not know LEASE: everybody commands it
 
     @property
     def connected(self) -> bool:
@@ -166,9 +169,11 @@ class RangerLink:
             return why
         self.state = "connected"
         self._event_log.standing("lost", None, over=f"{self.ranger} is connected")
+        renewing = asyncio.ensure_future(self._renew(client))
         try:
             return await self._supervise(client)
         finally:
+            renewing.cancel()
             client.close()
             self._client = None
 
@@ -249,6 +254,11 @@ class RangerLink:
 
     async def _light(self) -> None:
         """The laser on; where that is refused, from inside the instrument; else it stays dark, and fires nothing."""
+        if self._left:  # it has been switched off for good
+            return
+        if self.status & StatusWord.LATCHED:
+            self._dark = True
+            return
         reply = await self._ask(Request("PS", ("1",)), PATIENCE)
         if reply.ok is False and self._shooter.aimed != 0 and await self._shooter.park():
             reply = await self._ask(Request("PS", ("1",)), PATIENCE)
@@ -291,33 +301,67 @@ class RangerLink:
     async def _take_lease(self) -> None:
         """Take the lease that a ranger's commands need. Raises Refused: somebody else has it.
 
-        One that does not know the word has none, and takes commands from everybody.
+        One that does not know the word has none, and takes commands from everybody. What has the token of before, as
+        after a cut that the ranger has not noticed, is this coordinator's still; a name says nothing.
         """
+        if self._token is not None and (await self._ask(self._renewal(self._token), PATIENCE)).ok is True:
+            return
+        self._token = None
         held = await self._ask(Request("LEASE"), PATIENCE)
+        self._leaseless = held.command == "UNKNOWN"
         if held.ok is not True:
             return
-        if held.values[:1] not in (("none",), (HOLDER,)):
-            raise Refused("leased", f"{held.values[0]} commands it (expected LEASE none of who has it)")
-        await self._ask(Request("LEASE", (HOLDER,)), PATIENCE)
+        if held.values[:1] != ("none",):
+            raise Refused("leased", f"{_holder(held)} commands it (expected LEASE none of who has it)")
+        taken = await self._ask(Request("LEASE", (HOLDER,)), PATIENCE)
+        self._token = taken.values[-1] if taken.ok is True and len(taken.values) == LEASE_WITH_TOKEN else None
         self._event_log.standing("leased", None, over=f"{self.ranger} is the coordinator's again")
 
+    def _renewal(self, token: str) -> Request:
+        return Request("LEASE", (HOLDER, token))
+
+    async def _renew(self, client: ZyClient) -> None:
+        """Renew the lease again and again, whatever else is waited for; until cancelled."""
+        while not client.closed.done():
+            await asyncio.sleep(self.settings.renew_every)
+            if self._token is not None:
+                reply = await self._ask(self._renewal(self._token), self.settings.renew_every)
+                if reply.ok is False and reply.ticks is not None:
+                    self._lease_lost("somebody else", "none")
+
     async def _give_back(self) -> None:
-        """Who is not asked to measure commands nothing: others may, or after a while laser and motors go off."""
-        held = await self._ask(Request("LEASE"), PATIENCE)
-        if held.ok is True and held.values[:1] == (HOLDER,):
-            await self._ask(Request("LEASE", ("none",)), PATIENCE)
+        """Dark, and free: who is not asked to measure commands nothing."""
+        if self._token is None:
+            return
+        await self._darkened(self.settings.move_timeout)
+        if self._token is not None and (await self._ask(Request("LEASE", ("none",)), PATIENCE)).ok is True:
+            self._token = None
 
     def _lease_heard(self, reply: Reply) -> None:
-        """Somebody took the lease, or gave it back."""
-        if self.wanted != "measure" or reply.ok is not True:
+        """Somebody took the lease, or it is free; who takes it is not told so again."""
+        if reply.ok is True:
+            self._lease_lost(_holder(reply), reply.values[0] if reply.values else "none")
+
+    def _lease_lost(self, who: str, name: str) -> None:
+        self._token = None
+        if self.wanted != "measure":
             return
-        who = reply.values[0] if reply.values else "none"
-        if who not in ("none", HOLDER) and self.state in ("ready", "preparing"):
+        if name != "none" and self.state in ("ready", "preparing"):
             self._event_log.standing("leased", f"{self.ranger}: {who} took the lease: nothing is sent that it needs")
-        if who != HOLDER and self.state == "ready":
+        if self.state == "ready":
             self.state, self._shooter.aimed = "connected", None
-        if who == "none":
+        if name == "none":
             self._doubt.set()
+
+    def _latch_heard(self, reply: Reply) -> None:
+        """A dark order from outside the lease, or its end."""
+        if reply.values[:1] == ("none",):
+            over = f"{self.ranger}: the dark order is {' '.join(reply.values[1:]) or 'cleared'}"
+            self._event_log.standing("darkened", None, over=over)
+            self._doubt.set()
+            return
+        text = f"{self.ranger}: no {'; '.join(reply.values)[:160]} (expected UNLATCH at the ranger, by a person)"
+        self._event_log.standing("darkened", text, "alarm")
 
     def _teach_guard(self) -> None:
         """What the ranger knows already the guard must know, too, to understand CIL n."""
@@ -404,6 +448,8 @@ class RangerLink:
             self._restarted(f"{self.ranger} must be made ready again")
         elif reply.command == "LEASE":
             self._lease_heard(reply)
+        elif reply.command == "LATCH":
+            self._latch_heard(reply)
         elif reply.command in MOVERS:
             self._shooter.aimed = None
         if self._heard_by is not None and reply.command == "CMEAS":
@@ -457,15 +503,26 @@ class RangerLink:
     async def darken(self) -> None:
         """The laser off; it is switched on again when the guard allows it."""
         if self.wanted == "measure":
-            await self._ask(Request("PS", ("0",)), self.settings.move_timeout)
+            await self._darkened(self.settings.move_timeout)
+
+    async def _darkened(self, timeout: float) -> bool:
+        """Say PS 0 where the lease is ours: from outside it would hold against who has it. False: not answered."""
+        if self._token is None and not self._leaseless:
+            return True
+        return (await self._ask(Request("PS", ("0",)), timeout)).ok is True
 
     async def leave(self, timeout: float = 3.0) -> None:
         """Switch off the laser that was switched on here, and close for good."""
         self._left = True
         if self._client is not None and not self._client.closed.done():
-            if self._lit_here and (await self._ask(Request("PS", ("0",)), timeout)).ok is not True:
+            if self._lit_here and not await self._darkened(timeout):
                 self._event_log.tell(
                     "laser-left-on", f"{self.ranger} did not answer PS 0: its laser may shine", "alarm"
                 )
             self._client.close("the coordinator leaves")
         self._lit_here = False
+
+
+def _holder(reply: Reply) -> str:
+    """Name and address of the lease's holder by a ranger's line."""
+    return " at ".join((reply.values[0], reply.values[2])) if len(reply.values) > LEASE_WITH_NUMBER else reply.text

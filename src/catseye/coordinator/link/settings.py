@@ -21,6 +21,7 @@ class LinkSettings:
     first_wait, longest_wait  before a connection is tried again
     growth        of that wait: who was away for long is found again within a third of that time more
     probe_every, probe_timeout  VER asks whether it lives
+    renew_every   the lease is renewed, whatever else is waited for
     slow          round trip beyond which a link is called slow
     clock_limit   how far its clock may be off before it is set
     move_timeout  for CIL: a full turn, settling, and what stands before it
@@ -35,6 +36,7 @@ class LinkSettings:
     growth: float = 1.33
     probe_every: float = 2.0
     probe_timeout: float = 2.0
+    renew_every: float = 5.0
     slow: float = 0.25
     clock_limit: float = 2e-3
     move_timeout: float = 20.0

@@ -140,6 +140,8 @@ def _fhm(z: RangerState, _: int, axis: int) -> Work:
                 f"the search turns the whole way round: {problem}; or search with the laser off: PS 0"
             ) from None
     z.aimed = None
+    if not z.laser_at_boot:  # not homed is dark
+        z.switch_laser(False)
     z.head.find_home(axis)
     text = f"the index of axis {axis} is not found"
     yield from wait_until(z, lambda: z.head.homing(axis) != "searching", HOMING_TIME, what=text)

@@ -4,6 +4,7 @@ from collections.abc import Generator
 from dataclasses import replace
 
 from catseye.errors import InputError
+from catseye.ranger.commands import LONGEST_PAGE
 from catseye.ranger.cubes import GEOMETRY, Cube
 from catseye.ranger.handlers.axes import MOVE_TIME, Handler, refuse_motors_off, settle, start_moves, wait_until
 from catseye.ranger.line import stamp_text as stamp
@@ -41,8 +42,9 @@ def listed(cube: Cube) -> Values:
 
 
 def _coo(z: RangerState, _: int, *values: Value) -> Values | Work:
-    if not values:
-        return _all(z)
+    if len(values) in (0, 2):
+        first, count = values or (0, LONGEST_PAGE)
+        return _page(z, int(first), int(count))
     key, *rest = values
     if not rest:
         return listed(z.cubes.find(key))
@@ -53,11 +55,13 @@ def _coo(z: RangerState, _: int, *values: Value) -> Values | Work:
     return listed(cube)
 
 
-def _all(z: RangerState) -> Work:
-    for number in sorted(z.cubes.by_number):
+def _page(z: RangerState, first: int, count: int) -> Work:
+    """So many cubes from a number on; where there are more, the last line says from where."""
+    numbers = sorted(number for number in z.cubes.by_number if number >= first)
+    for number in numbers[:count]:
         if number in z.cubes.by_number:
             yield listed(z.cubes.by_number[number])
-    return None
+    return ("more", str(numbers[count])) if len(numbers) > count else None
 
 
 def _knd(z: RangerState, _: int, key: Value, kind: str | None = None, value: float = 0.0) -> Values:

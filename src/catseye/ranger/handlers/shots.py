@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from catseye.errors import CatseyeError, InputError
+from catseye.ranger.commands import LONGEST_PAGE
 from catseye.ranger.cubes import Cube, RangerShot
 from catseye.ranger.handlers.axes import Handler, wait_until
 from catseye.ranger.handlers.cubes import illuminate, refuse_unready
@@ -34,10 +35,12 @@ def _sampled(name: str) -> Handler:
 
 
 def _shoot(z: RangerState) -> Generator[int | None, None, None]:
-    owner = z.aimed
+    owner, times_off = z.aimed, z.times_off
     _fire(z)
     z.measured = None
-    z.measured = MeasuredBuffer((yield from _taken(z)), owner)
+    buffer = yield from _taken(z)
+    _refuse_dark(z, times_off)
+    z.measured = MeasuredBuffer(buffer, owner)
 
 
 def _fire(z: RangerState) -> None:
@@ -46,6 +49,12 @@ def _fire(z: RangerState) -> None:
     if not z.head.laser_on():
         raise InputError("the laser is off (expected PS 1 first)")
     z.head.trigger(z.sampling)
+
+
+def _refuse_dark(z: RangerState, times_off: int) -> None:
+    """Raises InputError where the laser has been off since so many times; light that is on again is no help."""
+    if z.times_off != times_off or not z.head.laser_on():
+        raise InputError("the laser went off meanwhile (expected PS 1 first)")
 
 
 def _taken(z: RangerState) -> Generator[int | None, None, Buffer]:
@@ -103,13 +112,18 @@ def _mag(z: RangerState, _: int) -> Values:
     return (f"{_known(z).amplitude:.6g}",)
 
 
-def _seq(z: RangerState, _: int) -> Work:
+def _seq(z: RangerState, _: int, first: int = 1, count: int = LONGEST_PAGE) -> Work:
+    """Cycles from a number on; where there are more, the last line says from where."""
     measured = _computed(z)
     n = measured.buffer.sampling.samples
-    each = detect(measured.buffer.samples.reshape(-1, n), n, measured.buffer.volts_per_code, harmonics=())
-    for k, (amplitude, phase) in enumerate(zip(each.amplitude.tolist(), each.phase.tolist(), strict=True), 1):
+    cycles = measured.buffer.samples.reshape(-1, n)
+    if first > len(cycles):
+        raise InputError(f"cycle {first} is not in a buffer of {len(cycles)} (expected 1 to {len(cycles)})")
+    page = cycles[first - 1 : first - 1 + count]
+    each = detect(page, n, measured.buffer.volts_per_code, harmonics=())
+    for k, (amplitude, phase) in enumerate(zip(each.amplitude.tolist(), each.phase.tolist(), strict=True), first):
         yield str(k), f"{amplitude:.6g}", f"{phase:.7f}"
-    return None
+    return ("more", str(first + count)) if first - 1 + count < len(cycles) else None
 
 
 def _keep(z: RangerState, cube: Cube, measured: MeasuredBuffer) -> RangerShot:
@@ -212,6 +226,8 @@ def _stm(z: RangerState, client: int, key: Value, count: int) -> Values:
 def stream_shots(z: RangerState, stream: Stream) -> Generator[Outgoing | int | None, None, None]:
     """Measure one cube again and again; the next buffer is fired before the last is computed and told."""
 
+    times_off = z.times_off
+
     def fire() -> str | None:
         try:
             _refuse_other(z, z.cubes.find(stream.cube))
@@ -225,6 +241,7 @@ def stream_shots(z: RangerState, stream: Stream) -> Generator[Outgoing | int | N
         if problem is None:
             try:
                 buffer = yield from _taken(z)
+                _refuse_dark(z, times_off)
                 problem = fire() if left else None
                 z.measured = MeasuredBuffer(buffer, stream.cube)
                 yield Outgoing(Reply("CMEAS", True, _measured(z, 2, stream.cube), stream.tid))

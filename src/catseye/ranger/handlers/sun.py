@@ -38,7 +38,7 @@ def watch_sun(z: RangerState) -> list[str]:
     z.in_sun = least < HALF_ANGLE
     if not z.in_sun:
         return []
-    z.head.switch_laser(False)
+    z.switch_laser(False)
     away = _leave_sun(z, suns)
     text = f"the Sun is {least / DEGREE:.1f} deg from the beam (expected {HALF_ANGLE / DEGREE:g}): laser off, {away}"
     return [text] if begun else []

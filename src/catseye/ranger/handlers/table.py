@@ -4,6 +4,8 @@ A handler gives the values of its reply, or is a generator: `None` or a time giv
 reply, what it returns is the last (None: there is none). Refusals are raised, with the state as it was.
 """
 
+import hmac
+import secrets
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +18,22 @@ from catseye.ranger.handlers.shots import SHOTS, scan_rounds, stream_shots
 from catseye.ranger.handlers.sun import SUN, watch_sun
 from catseye.ranger.line import Reply, Request, commands_of_file, nanoseconds_to_ticks, tag_of
 from catseye.ranger.line import stamp_text as stamp
-from catseye.ranger.state import VERSION, RangerState, Values, Work
+from catseye.ranger.state import VERSION, Lease, RangerState, Values, Work
 from catseye.ranger.status import word_text
 
-__all__ = ["HANDLERS", "file_names", "holder_of", "replace_file", "scan_rounds", "stream_shots", "watch_sun"]
+__all__ = [
+    "HANDLERS",
+    "file_names",
+    "holder_of",
+    "latch_of",
+    "replace_file",
+    "scan_rounds",
+    "stream_shots",
+    "watch_sun",
+]
+
+NOT_OF_A_FILE = ("INITZY", "RST", "BYE", "PS", "LEASE", "STOP", "UNLATCH")
+TOKEN_BYTES = 16
 
 
 def _sti(z: RangerState, _: int, ticks: int | None = None) -> Values:
@@ -31,8 +45,10 @@ def _sti(z: RangerState, _: int, ticks: int | None = None) -> Values:
 def _ps(z: RangerState, _: int, on: int | None = None) -> Values:
     if on and z.in_sun:
         raise InputError("the beam looks into the Sun (expected a move away first)")
+    if on and not z.homed and not z.laser_at_boot:
+        raise InputError("not homed: nobody knows where the beam goes (expected FHM 0 and FHM 1 first)")
     if on is not None:
-        z.head.switch_laser(bool(on))
+        z.switch_laser(bool(on))
     return str(int(z.head.laser_on())), *(f"{k} {v:.2f}" for k, v in sorted(z.head.supplies().items()))
 
 
@@ -55,21 +71,46 @@ def _lst(z: RangerState, client: int) -> Values:
     )
 
 
-def _lease(z: RangerState, client: int, name: str | None = None) -> Values:
-    if name is not None and name.lower() == "none":
-        if z.lease is None or z.lease[0] != client:
-            raise InputError(
-                f"the lease is {'free' if z.lease is None else z.lease[1] + chr(39) + 's'} (expected yours)"
-            )
-        z.lease = None
-    elif name is not None:
-        z.lease = client, name
+def _lease(z: RangerState, client: int, name: str | None = None, token: str | None = None) -> Values:
+    if name is None:
+        return holder_of(z)
+    if token is not None:
+        return _renewed(z, client, name, token)
+    if name.lower() != "none":
+        z.lease = Lease(client, name, secrets.token_hex(TOKEN_BYTES), z.peer(client))
+        return *holder_of(z), z.lease.token
+    if z.lease is None or z.lease.client != client:
+        raise InputError(f"the lease is {'free' if z.lease is None else z.lease.name + chr(39) + 's'} (expected yours)")
+    z.lease = None
+    return holder_of(z)
+
+
+def _renewed(z: RangerState, client: int, name: str, token: str) -> Values:
+    """The lease of who shows its token; it goes along to another connection of the same program."""
+    lease = z.lease
+    if lease is None or not hmac.compare_digest(token.encode(), lease.token.encode()):
+        raise InputError("that is not the token of the lease (expected LEASE and a name to take it)")
+    if (lease.client, lease.name) != (client, name):
+        z.lease = Lease(client, name, token, z.peer(client))
     return holder_of(z)
 
 
 def holder_of(z: RangerState) -> Values:
-    """Who has the lease, by name, and whether on the first or the second connection; `none` where nobody has."""
-    return ("none",) if z.lease is None else (z.lease[1], str(z.lease[0] + 1))
+    """Name, connection (1 or 2) and address of who has the lease; `none` where nobody has."""
+    return ("none",) if z.lease is None else (z.lease.name, str(z.lease.client + 1), z.lease.peer)
+
+
+def latch_of(z: RangerState) -> Values:
+    """The dark order that holds: what is off, and who ordered it; `none` where there is none."""
+    return ("none",) if z.latch is None else (z.latch.extent, _commas(z.latch.order))
+
+
+def _unlatch(z: RangerState, client: int, name: str) -> Values:
+    if z.guarded and z.lease is not None and z.lease.client == client:
+        raise InputError("who has the lease cannot clear it (expected another connection, or LEASE none first)")
+    z.set_latch(None)
+    z.cleared_by = f"{name} at {z.peer(client)}"
+    return latch_of(z)
 
 
 def _clr(z: RangerState, client: int) -> Values:
@@ -97,7 +138,7 @@ def _initzy(z: RangerState, client: int) -> Work:
     commands = [(name, *each) for name in file_names(z) for each in _commands(z.files / name)]
     for name, line, request in commands:
         where = f"{name} line {line}"
-        if request.command not in COMMANDS or request.command in ("INITZY", "RST", "BYE"):
+        if request.command not in COMMANDS or request.command in NOT_OF_A_FILE:
             raise InputError(f"{where}: {request.command} is no command of an initialisation file")
         try:
             answer = z.work_of(client, request)
@@ -175,6 +216,9 @@ HANDLERS: dict[str, Handler] = {
     "LST": _lst,
     "CLR": _clr,
     "LEASE": _lease,
+    "LATCH": lambda z, _: latch_of(z),
+    "UNLATCH": _unlatch,
+    "STOP": lambda z, _: (),  # the ranger itself stops everything, before it asks for this
     "HLP": _hlp,
     "HELP": _hlp,
     "INITZY": _initzy,

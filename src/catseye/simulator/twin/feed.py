@@ -10,6 +10,7 @@ A station that says nothing at all has no line. `bye` ends a connection, all els
 import asyncio
 import logging
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -19,8 +20,8 @@ from catseye.clock import Clock
 from catseye.constants import DEGREE
 from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import PER_SECOND
-from catseye.ranger.door import USUAL_DOOR, Door, notice_death, opens, refuse_open
-from catseye.ranger.first_line import BLANK, opening_of, peer_of
+from catseye.ranger.door import USUAL_DOOR, Door, notice_death, refuse_open
+from catseye.ranger.entrance import Doorway, Entrance
 from catseye.ranger.line import LONGEST_REQUEST, TICK_NS, Reply, format_reply, nanoseconds_to_ticks
 from catseye.ranger.network import ConnectionMaker, Listener, Sockets
 from catseye.records.night.live import LiveWeather
@@ -30,7 +31,9 @@ WEATHER_EVERY = 10.0  # s
 POSTURES_A_SECOND = 10
 MOST_CLIENTS = 32
 MOST_UNSENT = 2**20  # bytes that a client does not take: an hour and a half of lines
+MOST_LINES = 64  # of what a client says at once: the others are not looked at
 VERSION = "1"
+WORDS = frozenset(["HLP", "HELP", "BYE", "KEY"])  # that a client's first line may begin with
 HELP = "WX and TEL lines come unasked; HLP or HELP says this; BYE closes the connection"
 LOG = logging.getLogger(__name__)
 
@@ -76,8 +79,9 @@ class SiteFeed:
         if weather_every <= 0.0:
             raise InputError(f"weather every {weather_every:g} s (expected more than 0)")
         self.name, self.stations, self.world, self.clock = name, tuple(stations), world, clock
-        self._network: ConnectionMaker = network or Sockets()
+        self._network: ConnectionMaker = network or Sockets(door.tls)
         self.door = door
+        self.gate = Doorway(lambda: f"feed: port {self.port}", door, WORDS, _loop_time)
         self._weather_ns = round(weather_every * PER_SECOND)
         self._listener: Listener | None = None
         self.clients: set[FeedConnection] = set()
@@ -85,7 +89,7 @@ class SiteFeed:
 
     async def start(self, host: str, port: int) -> None:
         """Listen. Raises InputError where the port cannot be had, or would be open to others without a key."""
-        refuse_open("feed", host, self.door.key)
+        refuse_open("feed", host, self.door)
         try:
             self._listener = await self._network.serve(self._joining, host, port)
         except OSError as problem:
@@ -113,6 +117,8 @@ class SiteFeed:
                 next_weather = now - now % self._weather_ns + self._weather_ns
                 self._send(b"".join(self._weather(ticks)))
             self._send(self._posture(ticks))
+            self.gate.check()
+            self._close_idle()
             now = self.clock.now_ns()
             await asyncio.sleep((step - now % step) / PER_SECOND)
 
@@ -133,8 +139,15 @@ class SiteFeed:
 
     def _send(self, data: bytes) -> None:
         for client in tuple(self.clients):
-            if client.admitted:
-                client.write(data)
+            client.write(data)
+
+    def _close_idle(self) -> None:
+        """Close who has not sent a byte for long: a client sends an empty line each minute."""
+        now = _loop_time()
+        for client in tuple(self.clients):
+            if now - client.heard > self.door.idle:
+                client.say(Reply("LINE", False, (f"nothing was said for {self.door.idle:g} s",)))
+                client.close()
 
     def _weather(self, ticks: int) -> list[bytes]:
         lines = []
@@ -163,36 +176,44 @@ class FeedConnection(asyncio.Protocol):
     def __init__(self, feed: SiteFeed):
         self._feed = feed
         self._transport: asyncio.Transport | None = None
+        self._entrance: Entrance | None = None
         self._unread = b""
-        self._opened = False  # its first line was one of the language
-        self.admitted = feed.door.key is None  # it may hear
+        self.heard = _loop_time()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
-        if len(self._feed.clients) >= MOST_CLIENTS:
-            text = f"{MOST_CLIENTS} clients listen already (expected fewer)"
-            ticks = nanoseconds_to_ticks(self._feed.clock.now_ns())
-            transport.write(_line(Reply("CONNECT", False, (text,), 0, ticks)))
-            transport.close()
-            return
         notice_death(transport)
+        self._entrance = Entrance(self._feed.gate, transport, self.say)
+        self._entrance.begin()
+        if self._entrance.admitted:
+            self._join()
+
+    def _join(self) -> None:
+        """Take a place among the clients, where one is free."""
+        if len(self._feed.clients) >= MOST_CLIENTS:
+            self.say(Reply("CONNECT", False, (f"{MOST_CLIENTS} clients listen already (expected fewer)",)))
+            self.close()
+            return
         self._feed.clients.add(self)
-        if self.admitted:
-            self.write(self._feed.greeting())
+        self.write(self._feed.greeting())
 
     def connection_lost(self, exc: Exception | None) -> None:
+        if self._entrance is not None:
+            self._entrance.over()
         self._feed.clients.discard(self)
 
     def data_received(self, data: bytes) -> None:
-        if self._transport is None or self._transport.is_closing():
+        if self._entrance is None or self._transport is None or self._transport.is_closing():
             return
-        if not self._opened and not self._opens(data):
+        self.heard, was_in = _loop_time(), self._entrance.admitted
+        more = self._entrance.take(data)
+        if more is None:
             return
-        if not self.admitted:
-            data = self._admit(data)
-        *lines, rest = (self._unread + data).split(b"\n")
-        words = [line.strip().upper().decode("ascii", "replace") for line in lines]
+        if not was_in:
+            self._join()
+        *lines, rest = (self._unread + more).split(b"\n")
+        words = [line.strip().upper().decode("ascii", "replace") for line in lines[:MOST_LINES]]
         for word in words:
             if word in ("HLP", "HELP"):
                 self.write(self._feed.help_line(word))
@@ -200,36 +221,9 @@ class FeedConnection(asyncio.Protocol):
             self.close()
         self._unread = rest[-LONGEST_REQUEST:]
 
-    def _opens(self, data: bytes) -> bool:
-        """Whether the first line is one of the language; a connection that begins with anything else is closed."""
-        opening, problem = opening_of(self._unread + data)
-        self._opened = opening == "read"
-        if opening == "waiting":
-            self._unread = (self._unread + data).lstrip(BLANK)
-        elif opening != "read" and self._transport is not None:
-            LOG.warning("feed: port %d: %s %s: closed", self._feed.port, peer_of(self._transport), problem)
-            if opening == "foreign":
-                self._transport.abort()
-            else:
-                ticks = nanoseconds_to_ticks(self._feed.clock.now_ns())
-                text = "".join(c if " " <= c <= "~" else "?" for c in problem)
-                self.write(_line(Reply("LINE", False, (text,), 0, ticks)))
-                self.close()
-        return self._opened
-
-    def _admit(self, data: bytes) -> bytes:
-        """Take the first line, which must be the site's key; what came behind it."""
-        line, _, rest = (self._unread + data).lstrip(BLANK).partition(b"\n")
-        self._unread = b""
-        self.admitted = opens(line, self._feed.door.key or "")
-        ticks = nanoseconds_to_ticks(self._feed.clock.now_ns())
-        if self.admitted:
-            self.write(_line(Reply("KEY", True, (), 0, ticks)) + self._feed.greeting())
-            return rest
-        LOG.warning("feed: port %d: %s has not the site's key: closed", self._feed.port, peer_of(self._transport))
-        self.write(_line(Reply("LINE", False, ("the site's key is expected first (KEY and the key)",), 0, ticks)))
-        self.close()
-        return b""
+    def say(self, reply: Reply) -> None:
+        """Send a reply, stamped with this instant."""
+        self.write(_line(replace(reply, ticks=nanoseconds_to_ticks(self._feed.clock.now_ns()))))
 
     def write(self, data: bytes) -> None:
         """Send; who does not take it is cut off."""
@@ -247,3 +241,8 @@ class FeedConnection(asyncio.Protocol):
 
 def _line(reply: Reply) -> bytes:
     return format_reply(reply).encode("ascii") + b"\n"
+
+
+def _loop_time() -> float:
+    """Time of the running loop, s."""
+    return asyncio.get_running_loop().time()

@@ -72,7 +72,7 @@ class TwinSite:
         if unknown:
             raise InputError(f"{unknown[0]} is no ranger of the site (expected one of {', '.join(site.rangers)})")
         self.site, self.faults, self.seconds = site, world_faults, seconds
-        self._heads, self._network = dict(heads), network or Sockets()
+        self._heads, self._network = dict(heads), network or Sockets(door.tls)
         self.addresses: dict[str, Address] = (
             dict.fromkeys(heads, (LOOPBACK, 0, 0))
             if addresses == 0
@@ -110,6 +110,11 @@ class TwinSite:
             await self.stop()
             raise
 
+    def rearm(self) -> None:
+        """Count every dead man's time from now on: the rangers are ready to be commanded."""
+        for one in self.served.values():
+            one.server.rearm()
+
     async def serve(self) -> None:
         """Turn the rangers and apply the faults, until cancelled; `start` first."""
         for one in self.served.values():
@@ -145,6 +150,7 @@ class TwinSite:
             mirror=mirror.zp,
             sun=None if aboard else self._sun,
             turning=aboard,
+            laser_at_boot=self._door.laser_at_boot,
         )
 
     def _write_files(self, ranger: Ranger, places: Mapping[str, RangedPoint]) -> None:

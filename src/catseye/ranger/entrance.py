@@ -1,0 +1,165 @@
+"""The way into a port: first bytes, first word, the site's key; a place is taken only behind it.
+
+Those who are not in yet are few, are not told anything but a nonce, and are closed after a while. A wrong key is
+answered late, and wrong ones are counted in the log once a minute.
+"""
+
+import asyncio
+import hmac
+import logging
+import secrets
+from collections.abc import Callable, Collection
+
+from catseye.errors import InputError
+from catseye.ranger.door import Door, answer_to
+from catseye.ranger.first_line import BLANK, opening_of, peer_of
+from catseye.ranger.line import Reply, Request, parse_request
+
+PATIENCE = 10.0  # s that the key may take
+SLOWED = 1.0  # s until a wrong key is answered
+MOST_PENDING = 16  # connections that are not in yet; the oldest makes room
+COUNTED = 60.0  # s between two lines of the log about wrong keys
+NONCE_BYTES = 16
+LOG = logging.getLogger(__name__)
+
+
+class Doorway:
+    """Shared part of one port's entrances: who is not in yet, and wrong keys.
+
+    name    of the port, for the log: "ZY101: port 5240"
+    door    what it asks
+    words   that a first line may begin with
+    clock   s, never backwards
+    """
+
+    def __init__(self, name: Callable[[], str], door: Door, words: Collection[str], clock: Callable[[], float]):
+        self.name, self.door, self.words, self.clock = name, door, words, clock
+        self._pending: dict[Entrance, float] = {}  # when each is closed, in the order they came
+        self._wrong, self._last_wrong = 0, ""
+        self._counted = float("-inf")
+
+    def wait_for(self, entrance: "Entrance", seconds: float) -> None:
+        """A connection that is not in; it is closed after so long."""
+        self._pending[entrance] = self.clock() + seconds
+        if len(self._pending) > MOST_PENDING:
+            oldest = min(self._pending, key=lambda each: (not each.judged, self._pending[each]))
+            self.forget(oldest)
+            oldest.close()
+
+    def forget(self, entrance: "Entrance") -> None:
+        """A connection is in, or over."""
+        self._pending.pop(entrance, None)
+
+    def wrong_key(self, peer: str) -> None:
+        """Count a wrong key; the first is told at once."""
+        self._wrong, self._last_wrong = self._wrong + 1, peer
+        self.check()
+
+    def check(self) -> None:
+        """Close who took too long, answer wrong keys, tell the log; to be called again and again."""
+        now = self.clock()
+        for entrance, due in list(self._pending.items()):
+            if now >= due:
+                self.forget(entrance)
+                entrance.refuse()
+        if self._wrong and now - self._counted >= COUNTED:
+            LOG.warning("%s: wrong keys: %d, the last of %s", self.name(), self._wrong, self._last_wrong)
+            self._wrong, self._counted = 0, now
+
+
+class Entrance:
+    """One connection's way in.
+
+    say   sends it a reply, which needs a stamp still
+    """
+
+    def __init__(self, gate: Doorway, transport: asyncio.Transport, say: Callable[[Reply], None]):
+        self._gate, self._transport, self._say = gate, transport, say
+        self._nonce = ""
+        self._unread = bytearray()
+        self._open = False  # the first line was read
+        self.admitted = gate.door.key is None
+        self.judged = False  # a wrong key was given
+
+    def begin(self) -> None:
+        """Ask for the key, where one is asked for."""
+        if not self.admitted:
+            self._nonce = secrets.token_hex(NONCE_BYTES)
+            self._gate.wait_for(self, PATIENCE)
+            self._say(Reply("NONCE", True, (self._nonce,)))
+
+    def take(self, data: bytes) -> bytes | None:
+        """Bytes that go on from here; None while the first line is not whole, or where it is refused."""
+        if self._open:
+            return data
+        if self.judged or self._transport.is_closing():
+            return None  # turned away: what else it sends is not looked at
+        self._unread += data
+        opening, problem = opening_of(bytes(self._unread), self._gate.words)
+        if opening == "waiting":
+            self._unread = self._unread.lstrip(BLANK)
+            return None
+        if opening != "read":
+            self._turned_away(problem, answered=opening == "unreadable")
+            return None
+        begun, self._unread = bytes(self._unread), bytearray()
+        if self.admitted:
+            self._open = True
+            return begun
+        line, _, rest = begun.lstrip(BLANK).partition(b"\n")
+        return rest if self._unlocked(line.decode("ascii", "replace").removesuffix("\r")) else None
+
+    def over(self) -> None:
+        """Forget a connection that is gone."""
+        self._gate.forget(self)
+
+    def refuse(self) -> None:
+        """Close: the time for the key is over, or that for a wrong one's answer."""
+        self._refuse(f"the site's key is expected first: KEY and the HMAC-SHA256 of the nonce within {PATIENCE:g} s")
+
+    def close(self) -> None:
+        """Close the connection without a word."""
+        self._transport.abort()
+
+    def _unlocked(self, line: str) -> bool:
+        """Take the first line, which must be KEY and the answer to the nonce."""
+        request = _request(line)
+        if request is None or request.command != "KEY" or len(request.parameters) != 1:
+            self._gate.forget(self)
+            LOG.warning("%s: %s does not give the site's key: closed", self._gate.name(), peer_of(self._transport))
+            self.judged = True
+            self.refuse()
+            return False
+        wanted = answer_to(self._nonce, self._gate.door.key or "")
+        if not hmac.compare_digest(request.parameters[0].lower().encode(), wanted.encode()):
+            self.judged = True
+            self._gate.wait_for(self, SLOWED)
+            self._gate.wrong_key(peer_of(self._transport))
+            return False
+        self._gate.forget(self)
+        self.admitted = self._open = True
+        self._say(Reply("KEY", True))
+        return True
+
+    def _turned_away(self, problem: str, *, answered: bool) -> None:
+        text = "".join(c if " " <= c <= "~" else "?" for c in problem)[:500]
+        LOG.warning("%s: %s %s: closed", self._gate.name(), peer_of(self._transport), text)
+        self._gate.forget(self)
+        self._unread.clear()
+        self.judged = True
+        if answered:
+            self._refuse(text)
+        else:
+            self._transport.abort()
+
+    def _refuse(self, text: str) -> None:
+        if not self._transport.is_closing():
+            self._say(Reply("LINE", False, (text,)))
+            self._transport.close()
+
+
+def _request(line: str) -> Request | None:
+    try:
+        return parse_request(line)
+    except InputError:
+        return None
