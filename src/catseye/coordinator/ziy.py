@@ -31,10 +31,11 @@ from catseye.coordinator.parts import (
     SiteState,
     ticks_now,
 )
+from catseye.coordinator.station_events import StationEvents
 from catseye.errors import CatseyeError, InputError
 from catseye.ranger.initialisation import commands_of_ranger
 from catseye.ranger.line import Reply, Request
-from catseye.records.night.live import Happening, LivePosture, LiveWeather
+from catseye.records.night.live import Happening, LivePosture
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.live.live import EpochAnswer, Live
 
@@ -106,14 +107,14 @@ class Coordinator:
         self._live, self._planner, self._guard, self._journal = parts.live, parts.planner, parts.guard, parts.journal
         self.listeners: list[Callable[[Entry], None]] = []
         self._event_log = EventLog("coordinator", clock, self.tell)
-        self._stations: dict[str, EventLog] = {}
+        self._stations = StationEvents(clock, self.tell)
         self.intake = Intake(
             parts.live,
             parts.journal,
             judged=lambda answered: self.firing.judged(answered),
             publish=self._publish,
             event_log=EventLog("journal", clock, self.tell),
-            doubted=self._doubted,
+            doubted=self._stations.read,
             clock=clock,
             solver=parts.solver,
         )
@@ -282,6 +283,7 @@ class Coordinator:
         answer = await self.intake.solve(now)
         if answer is not None:
             self.answer = answer
+            self._stations.solved(answer)
             self.firing.fitted(answer.used, answer.rejected)
 
     # What comes in --------------------------------------------------------------------------------------------------
@@ -297,11 +299,6 @@ class Coordinator:
             self.posture = read
             self._guard.telescope(read)
             self.intake.take(read)
-
-    def _doubted(self, read: LiveWeather, why: str) -> None:
-        """What the reduction thinks of a station's reading."""
-        event_log = self._stations.setdefault(read.station, EventLog(read.station, self.clock, self.tell))
-        event_log.standing("weather-doubted", why or None, over=f"{read.station} is believed again")
 
     def _overheard(self, link: RangerLink, reply: Reply) -> None:
         """Another client's shot, in passive mode."""

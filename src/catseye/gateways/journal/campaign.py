@@ -19,7 +19,7 @@ from pydantic import ValidationError
 
 from catseye.constants import DEGREE
 from catseye.coordinator.journal.check import ChainReport
-from catseye.coordinator.journal.entries import AnsweredShot
+from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
 from catseye.gateways.journal.chain import chain_object, export_verdict
@@ -36,7 +36,7 @@ from catseye.records.night.shot import ShotRow
 from catseye.records.night.weather import WeatherSample
 from catseye.records.site.folder import REFERENCE, SiteFolder, site_files
 from catseye.reduction.epoch.reason import ShotStatus, status_of
-from catseye.reduction.live.weather import StationWatch
+from catseye.reduction.live.weather import StationWatch, suspected
 from catseye.verdict import Verdict
 
 MARGIN = round(WEATHER_MARGIN * TICKS_PER_DAY)  # ticks
@@ -153,16 +153,25 @@ def _readings(
     reader: JournalReader, run: int, span: tuple[int, int] | None, site: SiteFolder, left: LeftOut
 ) -> tuple[list[LiveWeather], dict[tuple[str, int], str]]:
     """Whole readings of the site's stations, in order of time, an hour longer than the span; and why which of them,
-    by station and ticks, the live reduction did not believe: its watch is asked again, in the journal's order."""
+    by station and ticks, does not count: the live reduction's watch is asked again, in the journal's order and with
+    what its epochs suspected, and marks whole stretches."""
     readings: list[LiveWeather] = []
     why: dict[tuple[str, int], str] = {}
-    watch = StationWatch(tuple(station.name for station in site.site.weather_station))
-    for _, entry in reader.events(run, kinds=["weather"]):
-        if isinstance(entry, LiveWeather):
+    watch = StationWatch.of(site)
+    for _, entry in reader.events(run, kinds=["weather", "solutions"]):
+        if isinstance(entry, EpochSolution):
+            watch.judged(suspected(entry.answer))
+        elif isinstance(entry, LiveWeather):
             doubt = watch.add(entry)
             if span is None or span[0] - MARGIN <= entry.ticks < span[1] + MARGIN:
                 readings.append(entry)
-                why |= {(entry.station, entry.ticks): doubt} if doubt else {}
+                by_itself = doubt and not watch.doubting(entry.station)
+                why |= {(entry.station, entry.ticks): doubt} if by_itself else {}
+    for stretch in watch.stretches():
+        for read in readings:
+            inside = stretch.first <= read.ticks and (stretch.last is None or read.ticks <= stretch.last)
+            if read.station == stretch.station and inside:
+                why.setdefault((read.station, read.ticks), stretch.why)
     stations = {station.name for station in site.site.weather_station}
     kept: list[LiveWeather] = []
     latest: dict[str, int] = {}
