@@ -136,6 +136,19 @@ def test_the_verdict_and_the_lines_below_it_count_epochs_alike():
     assert simulation_object(beyond, TwinWords(60635.125), None, **words)["verdict"]["word"] == "doubtful"
 
 
+def test_epochs_that_doubt_themselves_are_no_good_verdict():
+    """As near the truth as they claim, since the claim takes the doubt in."""
+    book, _ = filled()
+    doubted = epoch(2)
+    doubted.answer["doubts"] = ["WX2's thermometer is biased by some +2.5 °C, or the air is of few nights"]
+    book.entry(doubted)
+    words = {"seconds": 60.0, "rangers": 18, "told": 3}
+    told = simulation_object(book, TwinWords(60635.125), None, **words)
+    assert told["verdict"]["word"] == "doubtful"
+    assert "1 of 2 epochs are doubtful: WX2's thermometer" in told["verdict"]["why"]
+    assert [each["doubt"] is None for each in told["epochs"]] == [True, False]
+
+
 def test_a_shot_counts_once_whatever_its_epochs_say_of_it():
     """1 used, 2 overruled by its epoch, 3 blocked and named by it again, 4 of the next epoch, 5 of none yet."""
     book = LiveBook()

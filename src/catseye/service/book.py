@@ -61,7 +61,7 @@ class LiveBook:
         self._good: dict[int, str] = {}  # status by number, of good shots that no epoch has judged yet
         self.events: deque[Happening] = deque(maxlen=KEPT_EVENTS)
         self.troubles = Troubles()
-        self.epochs: deque[dict[str, Any]] = deque(maxlen=KEPT_EPOCHS)  # number, ticks, points, used, rejected
+        self.epochs: deque[dict[str, Any]] = deque(maxlen=KEPT_EPOCHS)  # number, ticks, names, used, rejected, doubt
         self.comparisons: dict[int, EpochComparison] = {}
         self.answer: StoredAnswer = {}  # of the last epoch
 
@@ -122,7 +122,8 @@ class LiveBook:
             "rejected": answer.get("rejected", ()),
         }
         counts = {key: len(each) for key, each in lists.items()}
-        self.epochs.append({"number": answer.get("number"), "ticks": solution.ticks, **counts})
+        doubt = next(iter(answer.get("doubts") or ()), None)
+        self.epochs.append({"number": answer.get("number"), "ticks": solution.ticks, **counts, "doubt": doubt})
         rejected = {int(number): reason for number, reason in (answer.get("rejected") or {}).items()}
         for number, reason in rejected.items():
             status = self._good.pop(number, None)  # one that was bad by itself is counted already
