@@ -9,6 +9,7 @@ from collections.abc import Callable, Coroutine, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
+from catseye.coordinator.condition import ConditionWatch
 from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.feed import FeedClient, FeedSettings, MotionScript, play
 from catseye.coordinator.firing import Firing
@@ -58,7 +59,7 @@ class ZiySettings:
     idle: float = 0.25
     epoch_every: float = 10.0
     grace: float = 0.4
-    leave: float = 3.0
+    leave: float = 1.8
     links: LinkSettings = field(default_factory=LinkSettings)
     feed: FeedSettings = field(default_factory=FeedSettings)
 
@@ -130,6 +131,15 @@ class Coordinator:
             event_log=self._event_log,
             clock=clock,
             allowed=lambda: self.mode == "active" and self.intake.trouble is None and self.host_clock.believed,
+            telescope_known=lambda: self.telescope_known,
+        )
+        self.condition = ConditionWatch(
+            clock,
+            self.links,
+            firing=self.firing,
+            intake=self.intake,
+            mode=lambda: self.mode,
+            clock_believed=lambda: self.host_clock.believed,
             telescope_known=lambda: self.telescope_known,
         )
         self._script = feed if isinstance(feed, MotionScript) else None
@@ -214,7 +224,7 @@ class Coordinator:
         leaving = [asyncio.ensure_future(link.leave(self.settings.leave)) for link in self.links.values()]
         last = [] if self._solving is None else [self._solving]  # an epoch under way may come to its end meanwhile
         if leaving or last:
-            await asyncio.wait([*leaving, *last], timeout=self.settings.leave + 0.5)
+            await asyncio.wait([*leaving, *last], timeout=self.settings.leave + 0.2)
         for each in (*leaving, *last):
             each.cancel()
         for task in self._tasks:
@@ -323,6 +333,7 @@ class Coordinator:
         self.intake.take(happening)
 
     def _publish(self, entry: Entry) -> None:
+        self.condition.entry(entry)
         for listener in self.listeners:
             listener(entry)
 
@@ -337,6 +348,7 @@ class Coordinator:
 
     def leased(self, before: str, now: str) -> None:
         """Note that another of its clients may command it."""
+        self.condition.holder = now
         self._event_log.tell("lease", f"the coordinator's lease goes from {before} to {now}", always=True)
 
     def drop(self, ranger: str) -> None:

@@ -75,7 +75,8 @@ class LiveBook:
         elif isinstance(entry, LivePosture):
             self.posture = entry
         elif isinstance(entry, Happening):
-            self.events.append(entry)
+            if entry.severity != "debug":
+                self.events.append(entry)
             self._finder.heard(entry)
             if entry.severity != "note":
                 self.troubles.add(entry)
@@ -110,7 +111,8 @@ class LiveBook:
     def _solution(self, solution: EpochSolution) -> None:
         compared = None if self._comparison is None else self._comparison.epoch(solution)
         answer = solution.answer
-        self.events.append(epoch_of(solution))
+        if not answer:
+            self.events.append(epoch_of(solution))
         if not answer:
             return
         self.answer = answer

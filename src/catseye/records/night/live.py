@@ -72,7 +72,7 @@ class LivePosture:
     elevation_rate: float = 0.0
 
 
-Severity = Literal["note", "warning", "alarm"]
+Severity = Literal["debug", "note", "warning", "alarm"]
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Happening:
     who        a ranger, a station, "telescope", "coordinator", "journal"
     kind       one word with hyphens that programs compare: "connected", "lost", "blocked", "sun-refused" ...
     text       one line for people: what, the value, the limit, what to do
-    severity   note, warning, alarm
+    severity   debug (routine: a single shot, a single line), note, warning, alarm
     details    values for programs
     """
 
