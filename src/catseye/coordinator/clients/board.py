@@ -83,9 +83,9 @@ class Board:
         asked = len(z.links) - len(z.firing.dropped)
         counts = (f"{ready} of {asked}", str(z.intake.numbered), str(z.intake.acknowledged), str(z.round_number))
         now = z.condition.now()
-        epoch = "none" if now.verdict is None else now.verdict.word
+        epoch = "none" if now.verdict is None else f"{now.epoch} {now.verdict.word}"
         wrong = "; ".join(problem.text for problem in now.problems) or "nothing"
-        site = (now.word, f"{now.epoch} {epoch}", now.clock, now.disk, now.holder, plain(wrong))
+        site = (now.word, epoch, now.clock, now.disk, now.holder, plain(wrong))
         return [(z.mode, *counts, telescope, journal, *site)]
 
     def _rangers(self) -> Rows:
