@@ -4,16 +4,15 @@
     python studies/lasting.py processes FILE.csv [--minutes 60] [--rate 3] [--motion "track 145.3 45"]
     python benchmarks/bench_live.py --seconds 600 --series LATE.csv
     python studies/lasting.py draw MEMORY.csv LATE.csv DIRECTORY
-    python studies/lasting.py draw-processes PROCESSES.csv DIRECTORY
 
 `memory` runs the whole site of Green Bank in virtual time in one process, twin, coordinator, solver and a journal with
 buffers, and writes what the process holds each minute; then the slope of the second half with its u. `draw`
-writes lasting.svg from both tables.
+writes lasting.svg from both tables; the first may be that of `processes`.
 
 `processes` runs the same site as three processes on sockets, twin, coordinator and solver, as `catseye simulate` does,
 on clocks that run `rate` times as fast as the machine's: all loops wait a third as long at 3. It writes what each holds
 every ten virtual seconds, prints each one's slope after the first fifth with its u, and says by how much the loop was
-late: a site that cannot follow its clock would do less than a real one. `draw-processes` writes memory.svg.
+late: a site that cannot follow its clock would do less than a real one.
 
 What it shows. Nothing grows with time: what is kept of shots, epochs, events and paths is bounded. The slope's u takes
 the scatter of neighbours as one (blocks of five minutes), since memory is given back in steps.
@@ -35,7 +34,7 @@ from pathlib import Path
 import numpy as np
 
 from catseye.cli.live.options import site_of
-from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Axes, Figure, mpl, svg
 from catseye.geometry.sky.time_tag import PER_DAY
 from catseye.service.coordinator import LiveCoordinator, Orders
 from catseye.service.rangers import Listening, RangersServed, ServedAt
@@ -227,20 +226,23 @@ def slopes(rows: np.ndarray) -> list[tuple[str, float, float]]:
     return found
 
 
-def draw_processes(path: Path, folder: Path) -> None:
-    """Draw what each process held, less what it held at the end of the first fifth, into memory.svg."""
+def draw_memory(axes: Axes, path: Path) -> None:
+    """Draw what one process held, or each of three, since the end of the first fifth."""
     rows = np.array([[float(value) for value in row.values()] for row in table(path)])
+    if rows.shape[1] == 2:
+        slope, u = slope_of(rows[len(rows) // 2 :])
+        axes.plot(rows[:, 0] / 3600.0, rows[:, 1], color=SERIES[0])
+        axes.set(xlabel="virtual time, h", ylabel="memory, MB", ylim=(0.0, None))
+        axes.set_title(f"second half: {slope:+.1f} ± {u:.1f} MB an hour", loc="left")
+        return
     first = int(np.argmax(rows[:, 0] >= SETTLING * rows[-1, 0]))
-    with mpl().rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 3.2), layout="constrained")
-        axes = figure.subplots()
-        for k, (name, slope, u) in enumerate(slopes(rows), 1):
-            label = f"{name}: {rows[-1, k]:.0f} MB, {slope:+.3f} ± {u:.3f} MB a minute"
-            axes.plot(rows[:, 0] / 60.0, rows[:, k] - rows[first, k], color=SERIES[k - 1], label=label)
-        axes.axvline(rows[first, 0] / 60.0, color=FAINT, lw=0.8)
-        axes.set(xlabel="time of the site, min", ylabel="memory since the line, MB")
-        axes.legend(loc="lower right")
-    (folder / "memory.svg").write_text(svg(figure), encoding="utf-8")
+    for k, (name, slope, u) in enumerate(slopes(rows), 1):
+        label = f"{name}, {rows[-1, k]:.0f} MB: {slope:+.3f} ± {u:.3f}"
+        axes.plot(rows[:, 0] / 60.0, rows[:, k] - rows[first, k], color=SERIES[k - 1], label=label)
+    axes.axvline(rows[first, 0] / 60.0, color=FAINT, lw=0.8)
+    axes.set(xlabel="time of the site, min", ylabel="memory since the line, MB")
+    axes.set_title("MB a minute behind the line", loc="left")
+    axes.legend(loc="upper left", fontsize="x-small")
 
 
 def table(path: Path) -> list[dict[str, str]]:
@@ -249,8 +251,6 @@ def table(path: Path) -> list[dict[str, str]]:
 
 
 def draw(memory: Path, late: Path, folder: Path) -> None:
-    rows = np.array([[float(row["s"]), float(row["MB"])] for row in table(memory)])
-    slope, u = slope_of(rows[len(rows) // 2 :])
     each = table(late)
     at, ms = (np.array([float(row[key]) for row in each if row["kind"] == "shot"]) for key in ("s", "ms"))
     (flushed, flush), (second, stolen) = (
@@ -260,11 +260,9 @@ def draw(memory: Path, late: Path, folder: Path) -> None:
     limit = max(20.0, 3.0 * float(np.percentile(flush, 99)))
     quiet = ms[np.isin(np.ceil(at), np.ceil(second[stolen <= QUIET]))]
     with mpl().rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 3.6), layout="constrained")
-        left, right = figure.subplots(1, 2, width_ratios=(1, 2))
-        left.plot(rows[:, 0] / 3600.0, rows[:, 1], color=SERIES[0])
-        left.set(xlabel="virtual time, h", ylabel="memory, MB", ylim=(0.0, None))
-        left.set_title(f"second half: {slope:+.1f} ± {u:.1f} MB an hour", loc="left")
+        figure = Figure(figsize=(9.0, 3.8), layout="constrained")
+        left, right = figure.subplots(1, 2, width_ratios=(2, 3))
+        draw_memory(left, memory)
         edges = np.arange(0.0, at[-1] + 1.0, 10.0)
         inside = [ms[(at >= a) & (at < a + 10.0)] for a in edges]
         shown = [(a, part) for a, part in zip(edges, inside, strict=True) if len(part) > 100]
@@ -300,9 +298,6 @@ def main() -> None:
     twin.add_argument("began", type=int)
     twin.add_argument("rate", type=float)
     twin.add_argument("motion")
-    of_each = jobs.add_parser("draw-processes")
-    of_each.add_argument("file", type=Path)
-    of_each.add_argument("folder", type=Path)
     drawing = jobs.add_parser("draw")
     for name in ("memory", "late", "folder"):
         drawing.add_argument(name, type=Path)
@@ -313,8 +308,6 @@ def main() -> None:
         remember_processes(options.file, options.minutes, options.rate, options.motion)
     elif options.job == "twin":
         twin_process(options.began, options.rate, options.motion)
-    elif options.job == "draw-processes":
-        draw_processes(options.file, options.folder)
     else:
         draw(options.memory, options.late, options.folder)
 

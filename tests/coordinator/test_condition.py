@@ -7,7 +7,7 @@ from catseye.coordinator.journal.disk import DiskState
 from catseye.coordinator.journal.entries import EpochSolution
 from catseye.coordinator.parts import ticks_now
 from catseye.ranger.status import StatusWord
-from condition_scene import ScenedSite, link
+from coordinator.condition_scene import ScenedSite, link
 
 
 def measuring():

@@ -5,13 +5,13 @@ from types import SimpleNamespace
 
 from catseye.coordinator.station_events import StationEvents
 from catseye.records.night.live import LiveWeather
-from catseye.reduction.live.thermometers import Suspect
+from catseye.reduction.live.thermometers import SuspectedBias
 from catseye.reduction.live.weather import Stretch
 from catseye.simulator.clock.world_clock import ManualClock
 
 
-def answer(doubts=(), returned=(), **suspects):
-    return SimpleNamespace(doubts=doubts, returned=returned, suspects=suspects)
+def answer(doubts=(), returned=(), **biases):
+    return SimpleNamespace(doubts=doubts, returned=returned, biases=biases)
 
 
 def told_of(*answers):
@@ -23,7 +23,7 @@ def told_of(*answers):
 
 
 def test_a_suspicion_is_told_once_and_once_when_it_is_over():
-    biased = answer(WX1=Suspect("biased", 1.65, 0.13), doubts=("WX1's thermometer is biased",))
+    biased = answer(WX1=SuspectedBias("biased", 1.65, 0.13), doubts=("WX1's thermometer is biased",))
     kinds, said = told_of(biased, biased, answer(), answer())
     assert kinds == [
         ("WX1", "weather-biased"),
@@ -36,7 +36,7 @@ def test_a_suspicion_is_told_once_and_once_when_it_is_over():
 
 
 def test_what_nobody_can_tell_apart_is_told_of_each_that_it_may_be():
-    kinds, said = told_of(answer(WX1=Suspect("apart", -2.5, 1.4), WX2=Suspect("apart", 2.5, 1.4)))
+    kinds, said = told_of(answer(WX1=SuspectedBias("apart", -2.5, 1.4), WX2=SuspectedBias("apart", 2.5, 1.4)))
     assert kinds == [("WX1", "weather-apart"), ("WX2", "weather-apart")]
     assert [what.details["offset_c"] for what in said] == [-2.5, 2.5]
 
@@ -44,7 +44,7 @@ def test_what_nobody_can_tell_apart_is_told_of_each_that_it_may_be():
 def test_a_station_that_is_not_believed_is_not_said_to_be_well_because_no_epoch_has_it():
     said = []
     events = StationEvents(ManualClock(60635.0), said.append)
-    events.solved(answer(WX1=Suspect("biased", 1.65, 0.13)))
+    events.solved(answer(WX1=SuspectedBias("biased", 1.65, 0.13)))
     events.read(LiveWeather("WX1", 1, 10.0, 930.0, 50.0), "WX1 reads 10.0 C: not believed")
     events.solved(answer())
     assert [what.kind for what in said] == ["weather-biased", "weather-doubted"]

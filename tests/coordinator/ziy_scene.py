@@ -42,7 +42,7 @@ class Answer:
     rejected: dict = field(default_factory=dict)
     variance_factor: float = 1.1
     doubts: tuple = ()
-    suspects: dict = field(default_factory=dict)
+    biases: dict = field(default_factory=dict)
     returned: tuple = ()
 
 

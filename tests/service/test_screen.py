@@ -11,7 +11,7 @@ from catseye.ranger.status import StatusWord
 from catseye.service.book import LiveBook
 from catseye.service.comparison import EpochComparison
 from catseye.service.screen import ScreenView
-from condition_scene import NAMES, ScenedSite, link
+from coordinator.condition_scene import NAMES, ScenedSite, link
 
 
 def console_of(width, height):

@@ -44,7 +44,7 @@ WRONG: dict[str, Severity] = {  # of a ranger, and how bad it is
 
 
 @dataclass(frozen=True)
-class Problem:
+class StandingProblem:
     """Something that stands, in one line."""
 
     severity: Severity
@@ -68,7 +68,7 @@ class SiteCondition:
     """
 
     word: str
-    problems: tuple[Problem, ...]
+    problems: tuple[StandingProblem, ...]
     rangers: Mapping[str, str]
     troubles: Mapping[str, tuple[str, ...]]
     epoch: int
@@ -176,36 +176,38 @@ class ConditionWatch:
             return "idle"
         return "measures" if good else "last shot failed"
 
-    def _machine(self) -> list[Problem]:
-        """Journal, clock, disk."""
+    def _machine(self) -> list[StandingProblem]:
+        """Problems of journal, clock and disk."""
         found = []
         if self._intake.trouble is not None:
-            found.append(Problem("alarm", f"journal: {self._intake.trouble}: nothing is measured"))
+            found.append(StandingProblem("alarm", f"journal: {self._intake.trouble}: nothing is measured"))
         if not self._clock_believed():
-            found.append(Problem("alarm", "clock: this machine's is in doubt: nothing is fired"))
+            found.append(StandingProblem("alarm", "clock: this machine's is in doubt: nothing is fired"))
         if self.disk is not None and self.disk.seconds < A_DAY:
             severity: Severity = "alarm" if self.disk.seconds < AN_HOUR else "warning"
-            found.append(Problem(severity, f"disk: full in {span_text(self.disk.seconds)}"))
+            found.append(StandingProblem(severity, f"disk: full in {span_text(self.disk.seconds)}"))
         return found
 
-    def _measuring(self) -> list[Problem]:
-        """Mode, telescope, shots, epochs."""
+    def _measuring(self) -> list[StandingProblem]:
+        """Problems of mode, telescope, shots and epochs."""
         found = []
         mode, quiet, unsolved = self._mode(), self._fired_since, self._since(self._solved)
         if mode != "active":
-            found.append(Problem("warning", f"mode {mode}: nothing is fired"))
+            found.append(StandingProblem("warning", f"mode {mode}: nothing is fired"))
         elif quiet > NOTHING_FIRED and not self._starting:
-            found.append(Problem("alarm", f"no shot for {span_text(quiet)}"))
+            found.append(StandingProblem("alarm", f"no shot for {span_text(quiet)}"))
         if not self._telescope_known() and not self._starting:
-            found.append(Problem("alarm", "telescope: no posture: targets on it are not measured"))
+            found.append(StandingProblem("alarm", "telescope: no posture: targets on it are not measured"))
         if self._verdict is not None and self._verdict.word != "good":
             severity: Severity = "alarm" if self._verdict.word == "failed" else "warning"
-            found.append(Problem(severity, f"epoch {self._epoch or 'none'} {self._verdict.word}: {self._verdict.why}"))
+            found.append(
+                StandingProblem(severity, f"epoch {self._epoch or 'none'} {self._verdict.word}: {self._verdict.why}")
+            )
         elif mode == "active" and unsolved > NO_EPOCH and not self._starting:
-            found.append(Problem("alarm", f"no epoch for {span_text(unsolved)}"))
+            found.append(StandingProblem("alarm", f"no epoch for {span_text(unsolved)}"))
         return found
 
-    def _word(self, problems: list[Problem]) -> str:
+    def _word(self, problems: list[StandingProblem]) -> str:
         if self._mode() != "active" or (self._fired_since > NOTHING_FIRED and not self._starting):
             return "stopped"
         worst = {problem.severity for problem in problems}
@@ -215,14 +217,14 @@ class ConditionWatch:
         return "starting" if self._starting else "well"
 
 
-def _of_rangers(rangers: Mapping[str, str], *, starting: bool) -> list[Problem]:
+def _of_rangers(rangers: Mapping[str, str], *, starting: bool) -> list[StandingProblem]:
     """A line for each way in which rangers do not measure; while they start, being made ready is none."""
     found = []
     for word, severity in WRONG.items():
         names = [name for name, each in rangers.items() if each == word]
         if names and not (starting and word in ("not ready", "not connected", "dark", "idle")):
             more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-            found.append(Problem(severity, f"{len(names)} {word}: {', '.join(names[:MOST_NAMES])}{more}"))
+            found.append(StandingProblem(severity, f"{len(names)} {word}: {', '.join(names[:MOST_NAMES])}{more}"))
     return found
 
 

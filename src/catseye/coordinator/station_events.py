@@ -28,8 +28,8 @@ class StationEvents:
         for stretch in answer.returned:
             log = self._log(stretch.station)
             log.tell(RETURNED, stretch.why, "warning", always=True, offset_c=stretch.offset_c)
-        for name in sorted({*self._stations, *answer.suspects}):
-            log, suspect = self._log(name), answer.suspects.get(name)
+        for name in sorted({*self._stations, *answer.biases}):
+            log, suspect = self._log(name), answer.biases.get(name)
             for judgement, kind in JUDGEMENTS.items():
                 if suspect is not None and suspect.judgement == judgement:
                     log.standing(kind, suspect.text(name), offset_c=suspect.offset_c)

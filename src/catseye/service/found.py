@@ -41,7 +41,7 @@ class FoundFault:
 
     @property
     def ends(self) -> float:
-        """Ticks of its end."""
+        """Ticks at which the fault ends; infinite of one that goes on."""
         return self.begins + (self.fault.end - self.fault.start) * TICKS_PER_SECOND
 
     @property

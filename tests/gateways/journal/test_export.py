@@ -455,7 +455,7 @@ def doubted(tmp_path):
 
 def test_a_station_that_was_biased_from_the_start_is_doubted_until_it_returned_and_not_from_then_on(tmp_path):
     """Its true readings were the ones that doubts.csv named: they were doubted at their moment."""
-    entries = with_bias(25, (12, {"number": 1, "suspects": biased("WX1", "biased", 1.8)}))
+    entries = with_bias(25, (12, {"number": 1, "biases": biased("WX1", "biased", 1.8)}))
     done, campaign = exported(tmp_path, entries)
     assert doubted(tmp_path) == [["WX1", stamp(START + SECOND * k)] for k in range(1, 25)]
     assert campaign.weather.temperature_c.max() == 10.4
@@ -463,14 +463,14 @@ def test_a_station_that_was_biased_from_the_start_is_doubted_until_it_returned_a
 
 
 def test_a_station_that_the_ranges_contradict_to_the_end_is_doubted_all_along(tmp_path):
-    entries = with_bias(99, (12, {"number": 1, "suspects": biased("WX1", "biased", 1.8)}))
+    entries = with_bias(99, (12, {"number": 1, "biases": biased("WX1", "biased", 1.8)}))
     _, campaign = exported(tmp_path, entries)
     assert doubted(tmp_path) == [["WX1", stamp(START + SECOND * k)] for k in range(1, 41)]
     assert set(campaign.weather.station) == {"WX2"}
 
 
 def test_of_stations_that_nobody_tells_apart_none_is_left_out(tmp_path):
-    entries = with_bias(99, (12, {"number": 1, "suspects": biased("WX1", "apart", -2.4) | biased("WX2", "apart", 2.4)}))
+    entries = with_bias(99, (12, {"number": 1, "biases": biased("WX1", "apart", -2.4) | biased("WX2", "apart", 2.4)}))
     exported(tmp_path, entries)
     assert not (tmp_path / "out" / "doubts.csv").exists()
 

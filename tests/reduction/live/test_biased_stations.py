@@ -65,16 +65,16 @@ def test_epochs_are_within_their_claim_and_say_that_they_are_doubtful(station, s
     found, _ = night(station, size, epochs=epochs)
     assert all_within(found)
     assert all(station in " ".join(each.answer.doubts) for each in found)
-    offsets = [each.answer.suspects[station].offset_c for each in found]
+    offsets = [each.answer.biases[station].offset_c for each in found]
     assert np.all(np.abs(np.array(offsets) - size) < 0.7), "the air of this night is 0.3 to 0.6 °C off by itself"
 
 
 def test_what_the_ranges_know_is_named_and_what_nobody_knows_is_claimed():
     known, unknown = night("WX1", 2.0, epochs=1)[0][-1], night("WX2", 5.0, epochs=2)[0][0]
-    assert known.answer.suspects["WX1"].judgement == "biased"
-    assert known.answer.suspects["WX1"].u_c < 0.3
-    assert unknown.answer.suspects["WX2"].judgement == "apart"
-    assert "WX1" not in unknown.answer.suspects
+    assert known.answer.biases["WX1"].judgement == "biased"
+    assert known.answer.biases["WX1"].u_c < 0.3
+    assert unknown.answer.biases["WX2"].judgement == "apart"
+    assert "WX1" not in unknown.answer.biases
     assert unknown.u > 1.5 * known.u
     assert unknown.answer.air["WX2"][1] > 5.0
 
@@ -86,7 +86,7 @@ def test_a_true_night_is_not_suspected():
     for k in range(2):
         made.round(k).into(live)
         answer = live.solve(made.ticks(k))
-        assert (answer.doubts, dict(answer.suspects), answer.returned) == ((), {}, ())
+        assert (answer.doubts, dict(answer.biases), answer.returned) == ((), {}, ())
 
 
 @pytest.mark.parametrize(

@@ -87,7 +87,7 @@ class StoredAnswer(TypedDict, total=False):
     notes: list[str]
     jitter_mm: dict[str, float]
     doubts: list[str]
-    suspects: dict[str, dict[str, Json]]
+    biases: dict[str, dict[str, Json]]
     returned: list[dict[str, Json]]
 
 

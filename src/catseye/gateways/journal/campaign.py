@@ -19,7 +19,7 @@ from pydantic import ValidationError
 
 from catseye.constants import DEGREE
 from catseye.coordinator.journal.check import ChainReport
-from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
+from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution, StoredAnswer
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
 from catseye.gateways.journal.chain import chain_object, export_verdict
@@ -36,7 +36,7 @@ from catseye.records.night.shot import ShotRow
 from catseye.records.night.weather import WeatherSample
 from catseye.records.site.folder import REFERENCE, SiteFolder, site_files
 from catseye.reduction.epoch.reason import ShotStatus, status_of
-from catseye.reduction.live.weather import StationWatch, suspected
+from catseye.reduction.live.weather import StationWatch
 from catseye.verdict import Verdict
 
 MARGIN = round(WEATHER_MARGIN * TICKS_PER_DAY)  # ticks
@@ -160,7 +160,7 @@ def _readings(
     watch = StationWatch.of(site)
     for _, entry in reader.events(run, kinds=["weather", "solutions"]):
         if isinstance(entry, EpochSolution):
-            watch.judged(suspected(entry.answer))
+            watch.judged(_suspected(entry.answer))
         elif isinstance(entry, LiveWeather):
             doubt = watch.add(entry)
             if span is None or span[0] - MARGIN <= entry.ticks < span[1] + MARGIN:
@@ -187,6 +187,12 @@ def _readings(
             latest[read.station] = read.ticks
             kept.append(read)
     return kept, why
+
+
+def _suspected(answer: StoredAnswer) -> dict[str, tuple[float, bool]]:
+    """Suspicions of a stored answer, as `StationWatch.judged` takes them; none of one that an older version wrote."""
+    biases = answer.get("biases") or {}
+    return {name: (float(str(b["offset_c"])), b["judgement"] == "biased") for name, b in biases.items()}
 
 
 def _doubts(

@@ -31,7 +31,7 @@ from catseye.reduction.epoch.settling import SettledNetwork, allowed, refuted_pr
 from catseye.reduction.epoch.unknowns import CampaignNetwork, build_network
 from catseye.reduction.live.shots import PhasedShot
 from catseye.reduction.live.state import Carried, from_ground, to_ground, with_unseen
-from catseye.reduction.live.thermometers import Suspect, considering, pull_of, suspects_of
+from catseye.reduction.live.thermometers import SuspectedBias, biases_of, considering, pull_of
 from catseye.reduction.site.motion import CarriedMotion, ground_from
 
 SHARED_BY_AN_EPOCH = (
@@ -52,7 +52,7 @@ class Epoch:
     coordinates   in the ground frame, at the epoch
     carried       all that lasts
     reasons       row of the shots: why it was left out
-    suspects      station: how its thermometer may be biased
+    biases        station: how its thermometer may be biased
     opened        stations whose thermometers' priors were left out
     pulls         parameter of the air: what is doubted of its prior over the prior's variance
     """
@@ -61,7 +61,7 @@ class Epoch:
     coordinates: AdjustedCoordinates
     carried: Carried
     reasons: dict[int, Reason]
-    suspects: dict[str, Suspect] = field(default_factory=dict)
+    biases: dict[str, SuspectedBias] = field(default_factory=dict)
     opened: frozenset[str] = frozenset()
     pulls: dict[Parameter, float] = field(default_factory=dict)
 
@@ -165,8 +165,8 @@ def solve_epoch(
         raise InputError("no shot of this epoch can be used (expected a phase, a reference and a place for one)")
     settled = _judged(network, network_with, resolved.starts, predicted=carried is not None)
     refuted = frozenset(p.of for p in refuted_priors(settled) if p.kind is ParameterKind.THERMOMETER)
-    suspects = suspects_of(settled.network.field, settled.solution, settled.network.layout.air)
-    settled = _claiming(settled, suspects, opened=opened, refuted=refuted)
+    biases = biases_of(settled.network.field, settled.solution, settled.network.layout.air)
+    settled = _claiming(settled, biases, opened=opened, refuted=refuted)
     network, frames = settled.network, frames_at(settled.network, motion)
     solution, coordinates = settled.solution, coordinates_of(settled, resolved=resolved)
     reasons |= resolved.rejected
@@ -187,7 +187,7 @@ def solve_epoch(
         coordinates,
         seen if carried is None else with_unseen(carried, seen),
         reasons,
-        suspects,
+        biases,
         refuted,
         pull_of(network.allowance, network.field),
     )
@@ -216,11 +216,11 @@ def _judged(
 
 
 def _claiming(
-    settled: SettledNetwork, suspects: Mapping[str, Suspect], *, opened: Collection[str], refuted: Collection[str]
+    settled: SettledNetwork, biases: Mapping[str, SuspectedBias], *, opened: Collection[str], refuted: Collection[str]
 ) -> SettledNetwork:
     """An adjustment whose claims take in what is suspected of the thermometers; the refuted are told already."""
     network = settled.network
-    allowance = considering(network.allowance, suspects, network.field, opened=opened, refuted=refuted)
+    allowance = considering(network.allowance, biases, network.field, opened=opened, refuted=refuted)
     return settled._replace(network=replace(network, allowance=allowance))
 
 

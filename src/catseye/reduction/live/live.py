@@ -39,7 +39,7 @@ from catseye.reduction.live.state import (
     with_velocities,
     without,
 )
-from catseye.reduction.live.thermometers import Suspect
+from catseye.reduction.live.thermometers import SuspectedBias
 from catseye.reduction.live.weather import StationWatch, Stretch
 from catseye.reduction.site.bodies import bodies_of, lasting_names
 from catseye.reduction.site.motion import (
@@ -106,7 +106,7 @@ class EpochAnswer:
     notes         for people
     jitter_mm     body: how far its points were at a shot from their mean, as the epoch believed
     doubts        why the answer is not good though it was found, a sentence each; none of a good one
-    suspects      station: how its thermometer may be biased; one that is not believed at all is not in it
+    biases        station: how its thermometer may be biased; one that is not believed at all is not in it
     returned      stretches that turned out since the last epoch to have been biased
     """
 
@@ -129,7 +129,7 @@ class EpochAnswer:
     notes: tuple[str, ...]
     jitter_mm: Mapping[str, float] = field(default_factory=dict)
     doubts: tuple[str, ...] = ()
-    suspects: Mapping[str, Suspect] = field(default_factory=dict)
+    biases: Mapping[str, SuspectedBias] = field(default_factory=dict)
     returned: tuple[Stretch, ...] = ()
 
     def point(self, name: str) -> tuple[Array, Array]:
@@ -409,7 +409,7 @@ class Live:
             (*coordinates.notes, *self.stations.notes()),
             motion.jitter_mm,
             coordinates.doubts,
-            epoch.suspects,
+            epoch.biases,
             self._returned(),
         )
 
@@ -419,13 +419,13 @@ class Live:
         The state itself is less sure by that where the suspicion ends unexplained, and once where the ranges say an
         offset at which its record has pulled so far.
         """
-        named = {n for n, each in epoch.suspects.items() if each.judgement == "biased"}
+        named = {n for n, each in epoch.biases.items() if each.judgement == "biased"}
         pulled = {p: pull for p, pull in epoch.pulls.items() if p.of in named - self._opened - epoch.opened}
         over = {p: pull for p, pull in self._pulls.items() if p not in epoch.pulls and p.of not in self._opened}
         self.carried = widened(epoch.carried, pulled | over)
         self._opened |= named | epoch.opened
         self._pulls = {p: pull for p, pull in epoch.pulls.items() if p not in pulled}
-        self.stations.judged({n: (each.offset_c, n in named) for n, each in epoch.suspects.items()})
+        self.stations.judged({n: (each.offset_c, n in named) for n, each in epoch.biases.items()})
 
     def _start_anew(self, moved: frozenset[str], *, heard: frozenset[str]) -> None:
         """Take stations' doubts into the state where they change.

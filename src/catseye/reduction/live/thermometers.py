@@ -20,7 +20,7 @@ Judgement = Literal["biased", "apart"]
 
 
 @dataclass(frozen=True)
-class Suspect:
+class SuspectedBias:
     """A thermometer that may be biased.
 
     judgement   "biased": the ranges say so; "apart": it is, or the air between the stations is of few nights
@@ -35,7 +35,7 @@ class Suspect:
     def text(self, station: str) -> str:
         """The judgement in one line.
 
-        >>> Suspect("biased", 1.65, 0.13).text("WX1")
+        >>> SuspectedBias("biased", 1.65, 0.13).text("WX1")
         "WX1's thermometer is biased by +1.65 °C (u 0.13 °C), by the ranges: its readings count less that"
         """
         if self.judgement == "biased":
@@ -49,17 +49,17 @@ class Suspect:
         )
 
 
-def suspects_of(air: AirField, solution: LeastSquaresSolution, columns: np.ndarray) -> dict[str, Suspect]:
+def biases_of(air: AirField, solution: LeastSquaresSolution, columns: np.ndarray) -> dict[str, SuspectedBias]:
     """Suspects among the stations of an epoch's air, by name.
 
     columns   of the air's parameters in the solution
     """
     values, u = solution.x[columns], np.sqrt(solution.q.diagonal()[columns])
-    found: dict[str, Suspect] = {}
+    found: dict[str, SuspectedBias] = {}
     sure = [bool(u[i] < UNSURE * air.sigmas[i]) for i in range(len(air.stations))]
     for i, station in enumerate(air.stations):
         if sure[i] and abs(values[i]) > DOUBTED_C * air.sigmas[i]:
-            found[station] = Suspect("biased", float(values[i]), float(u[i]))
+            found[station] = SuspectedBias("biased", float(values[i]), float(u[i]))
     gradient = air.steepest(values)
     if air.profile != BEND.part or STEEPEST_DOWN <= gradient <= STEEPEST_UP:
         return found
@@ -68,13 +68,13 @@ def suspects_of(air: AirField, solution: LeastSquaresSolution, columns: np.ndarr
     for i, station in enumerate(air.stations):
         if not sure[i]:
             off = apart if air.heights[i] > middle else -apart
-            found[station] = Suspect("apart", float(off), float(np.hypot(u[i], apart / np.sqrt(3.0))))
+            found[station] = SuspectedBias("apart", float(off), float(np.hypot(u[i], apart / np.sqrt(3.0))))
     return found
 
 
 def considering(
     told: Allowance,
-    suspects: Mapping[str, Suspect],
+    biases: Mapping[str, SuspectedBias],
     air: AirField,
     *,
     opened: Collection[str] = (),
@@ -87,12 +87,10 @@ def considering(
     refuted   stations whose records this very adjustment left out, and says so
     """
     sigmas = dict(zip(air.stations, air.sigmas, strict=False))
-    wide = {
-        n: float(np.hypot(sigmas[n], each.offset_c)) for n, each in suspects.items() if n not in {*opened, *refuted}
-    }
+    wide = {n: float(np.hypot(sigmas[n], each.offset_c)) for n, each in biases.items() if n not in {*opened, *refuted}}
     held = {p for p in air.parameters[: len(air.stations)] if p.of in wide}
-    texts = tuple(each.text(n) for n, each in suspects.items() if each.judgement == "biased" and n not in refuted)
-    named = tuple(f"{n}'s thermometer" for n in suspects)
+    texts = tuple(each.text(n) for n, each in biases.items() if each.judgement == "biased" and n not in refuted)
+    named = tuple(f"{n}'s thermometer" for n in biases)
     others = tuple(text for text in told.texts if not text.startswith(named))
     return replace(told, held=told.held | held, thermometers=wide, texts=(*others, *texts))
 

@@ -4,7 +4,6 @@ import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -286,12 +285,6 @@ class StationWatch:
         lately = [c for s in self._others(station) if (c := _change(s, read.ticks)) is not None]
         changes = since or lately
         return float(np.median(changes)) if changes else 0.0
-
-
-def suspected(answer: Mapping[str, Any]) -> dict[str, tuple[float, bool]]:
-    """Suspicions of a stored answer, as `StationWatch.judged` takes them; none of one that an older version wrote."""
-    suspects = answer.get("suspects") or {}
-    return {name: (float(s["offset_c"]), s["judgement"] == "biased") for name, s in suspects.items()}
 
 
 def _beyond(difference: float, rise: float, spare: float) -> float:
