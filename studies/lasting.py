@@ -30,11 +30,12 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from catseye.cli.live.options import site_of
-from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Axes, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
 from catseye.geometry.sky.time_tag import PER_DAY
 from catseye.service.coordinator import LiveCoordinator, Orders
 from catseye.service.rangers import Listening, RangersServed, ServedAt
@@ -226,7 +227,7 @@ def slopes(rows: np.ndarray) -> list[tuple[str, float, float]]:
     return found
 
 
-def draw_memory(axes: Axes, path: Path) -> None:
+def draw_memory(axes: Any, path: Path) -> None:
     """Draw what one process held, or each of three, since the end of the first fifth."""
     rows = np.array([[float(value) for value in row.values()] for row in table(path)])
     if rows.shape[1] == 2:
