@@ -260,7 +260,7 @@ def draw(memory: Path, late: Path, folder: Path) -> None:
     )
     limit = max(20.0, 3.0 * float(np.percentile(flush, 99)))
     quiet = ms[np.isin(np.ceil(at), np.ceil(second[stolen <= QUIET]))]
-    with mpl().rc_context(STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9.0, 3.8), layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=(2, 3))
         draw_memory(left, memory)
