@@ -153,9 +153,13 @@ def twin_process(began: int, rate: float, motion: str) -> None:
 
 
 def resident(pid: int | None) -> float:
-    """MB that a process holds, NaN of one that is gone."""
+    """MB of its own that a process holds, NaN of one that is gone.
+
+    Pages of libraries' files are left out: the system takes and gives them as it likes.
+    """
     try:
-        return int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1]) * PAGE / 1e6
+        _, whole, shared, *_ = Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()
+        return (int(whole) - int(shared)) * PAGE / 1e6
     except (OSError, ValueError):
         return float("nan")
 
