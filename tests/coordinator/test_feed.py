@@ -148,6 +148,36 @@ def test_stamps_that_are_old_or_not_of_now_are_not_used():
     run(story)
 
 
+def test_a_telescope_whose_feed_is_still_to_come_is_no_alarm_in_the_first_half_minute():
+    async def story():
+        async with Fed() as fed:
+            await asyncio.sleep(29.0)
+            assert "telescope-silent" not in fed.kinds()
+            assert not fed.client.telescope_known
+            await until(lambda: "telescope-silent" in fed.kinds(), 3.0)
+
+    run(story)
+
+
+def test_a_loop_that_was_held_up_reads_first_what_came_meanwhile():
+    async def story():
+        async with Fed() as fed:
+            say("TEL 1, 10, 20, 0, 0")
+            await until(lambda: fed.postures)
+            heard = fed.client._heard[""]
+            fed.client._heard[""], fed.client._looked = heard - 5.0, asyncio.get_running_loop().time() - 4.0
+            fed.client.look()
+            assert not fed.kinds()
+            fed.client._looked = asyncio.get_running_loop().time() - 0.5
+            fed.client.look()
+            assert fed.kinds() == ["telescope-silent"]
+            fed.client._looked = asyncio.get_running_loop().time() - 4.0
+            fed.client.look()
+            assert fed.kinds() == ["telescope-silent"], "one that lasts goes on"
+
+    run(story)
+
+
 def test_silence_is_told_after_its_time_and_not_before_and_its_end_too():
     async def story():
         async with Fed() as fed:

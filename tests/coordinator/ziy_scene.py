@@ -41,6 +41,9 @@ class Answer:
     used: tuple = ()
     rejected: dict = field(default_factory=dict)
     variance_factor: float = 1.1
+    doubts: tuple = ()
+    biases: dict = field(default_factory=dict)
+    returned: tuple = ()
 
 
 class ListLive:

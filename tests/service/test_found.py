@@ -47,6 +47,14 @@ def test_every_kind_of_fault_has_signs():
         ("dew ZBM02 10", told(15.0, "coordinator", "weak-return", ranger="ZY101", target="ZBM02"), 5.0),
         ("dew * 10", told(15.0, "coordinator", "weak-return", ranger="ZY101", target="ZBM07"), 5.0),
         ("lying-station WX2 30 90 5", told(33.0, "WX2", "weather-doubted"), 3.0),
+        ("lying-station WX2 30 90 5", told(95.0, "WX2", "weather-doubted"), None),  # its true readings were doubted
+        ("lying-station WX2 0 90 5", told(5.0, "WX2", "weather-apart", offset_c=5.6), 5.0),
+        ("lying-station WX2 0 90 5", told(5.0, "WX2", "weather-biased", offset_c=-5.0), None),  # the other way
+        ("lying-station WX2 0 90 5", told(5.0, "WX2", "weather-biased", offset_c=0.9), None),  # of another size
+        ("lying-station WX2 0 90 5", told(115.0, "WX2", "weather-returned", offset_c=4.6), 115.0),
+        ("lying-station WX2 0 90 5", told(5.0, "WX1", "weather-apart", offset_c=5.6), None),  # another
+        ("dead-ranger ZY104 40 60", told(130.0, "ZY104", "lost"), None),  # long after
+        ("wrong-target ZY104 40", told(50.0, "coordinator", "line-suspended", ranger="ZY104"), None),
         ("silent-telescope telescope 5", told(8.0, "telescope", "telescope-silent"), 3.0),
     ],
 )
@@ -76,3 +84,12 @@ def test_the_first_sign_counts_and_people_and_programs_are_told_of_both_kinds():
     assert [each["kind"] for each in found] == ["lost", None, None]
     assert found[0]["after_s"] == pytest.approx(0.4, abs=1e-3)
     assert found[0]["text"] == "ZY104: lost was seen"
+
+
+def test_one_happening_is_a_sign_of_one_fault_the_most_exact():
+    finder = FaultFinder(["dew * 10", "blocked-beam ZY103 10"], START)
+    for seconds in (12.0, 25.0):
+        finder.heard(told(seconds, "coordinator", "blocked", ranger="ZY103", target="ZBM05"))
+    assert [each.by is None for each in finder.found] == [True, False]
+    finder.heard(told(30.0, "coordinator", "weak-return", ranger="ZY101", target="ZBM05"))
+    assert [each.after for each in finder.found] == pytest.approx([20.0, 2.0], abs=1e-3)

@@ -1,12 +1,14 @@
 """The log of a living command."""
 
 import json
+import logging
+import warnings
 
 import pytest
 
 from catseye.coordinator.journal.entries import EpochSolution
 from catseye.records.night.live import Happening, LiveWeather
-from catseye.service.logs import LiveLog
+from catseye.service.logs import LiveLog, logging_to
 from catseye.simulator.clock.world_clock import ManualClock
 
 ALARM = Happening(5288963344910, "ZY105", "hung", "VER was not\nanswered", "alarm", {"seconds": float("nan")})
@@ -54,3 +56,43 @@ def test_an_epoch_is_a_line_and_one_that_gave_nothing_a_warning():
     good, empty, _ = lines(EpochSolution(0, answer), EpochSolution(0, {}))
     assert good.endswith("epoch 3: 2 points from 3 shots, 1 not used, variance factor 0.50")
     assert "warning" in empty
+
+
+def test_routine_is_for_programs_alone():
+    """85 % of a night's lines were warnings about single shots."""
+    routine = Happening(5288963344910, "coordinator", "weak-return", "ZY110 TR07-B: 4 % of usual", "debug")
+    assert len(lines(routine)) == 1, "what is told here is the child's end"
+    assert json.loads(lines(routine, json=True)[0])["severity"] == "debug"
+
+
+def test_a_doubtful_epoch_says_so_in_its_line():
+    answer = {"number": 3, "names": ["A"], "used": [1], "rejected": {}, "doubts": ["WX2's thermometer is biased"]}
+    told, _ = lines(EpochSolution(0, answer))
+    assert told.endswith("0 not used; doubtful: WX2's thermometer is biased")
+
+
+def test_what_python_itself_logs_or_warns_of_is_a_line_like_any_other():
+    """A port that turns a browser away said so as bare text between lines of JSON."""
+    found = []
+    log = LiveLog(found.append, clock=ManualClock(52889.0), json=True)
+    with logging_to(log):
+        logging.getLogger("catseye.ranger.server").warning("port %d: closed", 24120)
+        logging.getLogger("asyncio").error("Exception in callback")
+        with warnings.catch_warnings():
+            warnings.simplefilter("always")
+            warnings.warn("old", DeprecationWarning, stacklevel=1)
+        try:
+            raise ValueError("ours")
+        except ValueError:
+            logging.getLogger("x").exception("it broke")
+    logging.getLogger("catseye.ranger.server").debug("not any more")
+    rows = [json.loads(line) for line in found]
+    assert [(row["who"], row["severity"]) for row in rows] == [
+        ("server", "warning"),
+        ("asyncio", "alarm"),
+        ("warnings", "warning"),
+        ("x", "alarm"),
+    ]
+    assert rows[0]["text"] == "port 24120: closed"
+    assert rows[3]["text"].endswith("ValueError: ours")
+    assert all(row["time_utc"] == "2003-09-07T00:00:00.00Z" for row in rows)

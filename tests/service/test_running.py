@@ -7,7 +7,9 @@ import threading
 
 import pytest
 
-from catseye.service.running import NUMBERS, FastLoop, LiveRun
+from catseye.coordinator.ziy import ZiySettings
+from catseye.service.child import LONGEST_LEAVE
+from catseye.service.running import LONGEST_END, NUMBERS, FastLoop, LiveRun
 
 
 def handlers():
@@ -62,3 +64,10 @@ def test_an_hour_of_virtual_time_takes_none_and_threads_may_have_worked():
         return await asyncio.to_thread(lambda: 3), asyncio.get_running_loop().time()
 
     assert LiveRun(work, loop_factory=FastLoop).result() == (3, 3600.0)
+
+
+def test_all_that_ends_in_order_does_so_before_force_and_force_within_five_seconds():
+    """Each wait of a command's end has its share: rangers, the journal's thread, the child."""
+    order = ZiySettings().leave + 0.2 + LONGEST_LEAVE
+    assert order + 0.8 <= LONGEST_END
+    assert LONGEST_END + 1.0 <= 5.0

@@ -56,9 +56,17 @@ class EventLog:
             details["unsaid"] = float(before.unsaid)
         self._said.pop((kind, about), None)
         self._said[kind, about] = _Said(now)
-        if len(self._said) > MOST_KINDS:
-            del self._said[next(iter(self._said))]
+        self._forget(now)
         self._tell(Happening(now, self.who, kind, text, severity, details))
+
+    def _forget(self, now: int) -> None:
+        """Forget what keeps nothing back any more: the oldest, as far as their quiet time is over."""
+        while self._said:
+            key, oldest = next(iter(self._said.items()))
+            over = now - oldest.ticks >= self._quiet and not oldest.unsaid
+            if not over and len(self._said) <= MOST_KINDS:
+                return
+            del self._said[key]
 
     def standing(
         self, kind: str, text: str | None, severity: Severity = "warning", *, over: str = "", **details: float | str

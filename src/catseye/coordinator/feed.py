@@ -32,6 +32,8 @@ from catseye.records.night.live import TICKS_PER_DAY, LivePosture, LiveWeather
 REAL = re.compile(r"[+-]?[0-9]{1,9}(\.[0-9]{0,20})?([eE][+-]?[0-9]{1,2})?")
 STATION = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,15}")
 LOOK = 0.5  # s between two looks for silence
+START_UP = 30.0  # s before a telescope that has said nothing yet is missed: its feed may start later
+HELD_UP = 1.5  # s between two looks, by which the loop itself was late: what came meanwhile is read first
 SKEW = 5.0  # s that a reading's stamp may be from now
 MOST_STATIONS = 64
 WEATHER_LIMITS = ((-90.0, 90.0), (300.0, 1200.0), (0.0, 110.0))  # deg C, hPa, %: beyond is no reading
@@ -80,6 +82,7 @@ class FeedClient:
         self._heard: dict[str, float] = {}  # loop's time of the last good line, by station; "" is the telescope
         self._stamps: dict[str, int] = {}
         self._began: float | None = None
+        self._looked: float | None = None
 
     @property
     def telescope_known(self) -> bool:
@@ -143,8 +146,11 @@ class FeedClient:
         now, limit = asyncio.get_running_loop().time(), self._settings.telescope_silent
         began = now if self._began is None else self._began
         silent = now - self._heard.get("", began)
-        text = f"no posture for {limit:g} s: tracking stops, fixed targets go on" if silent > limit else None
-        self._telescope.standing("telescope-silent", text, "alarm", over="the telescope tells its posture again")
+        held_up, self._looked = now - (self._looked or now) > HELD_UP, now
+        missed = silent > (limit if "" in self._heard else START_UP)
+        text = f"no posture for {limit:g} s: tracking stops, fixed targets go on" if missed else None
+        if not held_up:
+            self._telescope.standing("telescope-silent", text, "alarm", over="the telescope tells its posture again")
         limit = self._settings.weather_silent
         for name, event_log in self._stations.items():
             silent = now - self._heard.get(name, began)

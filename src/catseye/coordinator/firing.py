@@ -113,7 +113,7 @@ class Firing:
         elif answered.status in OF_THE_LINE:
             line = f"{shot.ranger} {shot.target}"
             text = f"{line}: {answered.text or answered.status}"
-            self._event_log.tell(answered.status, text, "warning", about=line, ranger=shot.ranger, target=shot.target)
+            self._event_log.tell(answered.status, text, "debug", about=line, ranger=shot.ranger, target=shot.target)
             self._line_failed(shot.ranger, shot.target, answered.status)
 
     def fitted(self, used: Iterable[int], rejected: Mapping[int, Reason]) -> None:
@@ -217,14 +217,14 @@ class Firing:
         if shot.amplitude < WEAK * level:
             line, share = f"{shot.ranger} {shot.target}", 100.0 * shot.amplitude / level
             text = f"{line}: return {shot.amplitude:.3f} V, {share:.0f} % of usual: dew, or partly in the way"
-            self._event_log.tell("weak-return", text, "warning", about=line, ranger=shot.ranger, target=shot.target)
+            self._event_log.tell("weak-return", text, "debug", about=line, ranger=shot.ranger, target=shot.target)
 
     def _line_failed(self, ranger: str, target: str, how: str, records: Suspensions | None = None) -> None:
         rest = (records or self.suspensions).failed(ranger, target, ticks_now(self._clock))
         if rest is not None:
             line = f"{ranger} {target}"
             text = f"{line} is {how} again and again: left alone for {rest:g} s"
-            self._event_log.tell("line-suspended", text, "warning", about=line, ranger=ranger, target=target)
+            self._event_log.tell("line-suspended", text, about=line, ranger=ranger, target=target)
 
     def _aim(self, ranger: str, target: str) -> PlannedShot:
         """A shot as soon as it can be, on where the target is predicted; on the feed arm, where the records have it."""

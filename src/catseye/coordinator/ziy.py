@@ -10,6 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 
+from catseye.coordinator.condition import ConditionWatch
 from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.feed import FeedClient, FeedSettings, MotionScript, play
 from catseye.coordinator.firing import Firing
@@ -32,10 +33,11 @@ from catseye.coordinator.parts import (
     SiteState,
     ticks_now,
 )
+from catseye.coordinator.station_events import StationEvents
 from catseye.errors import CatseyeError, InputError
 from catseye.ranger.initialisation import commands_of_ranger
 from catseye.ranger.line import Reply, Request
-from catseye.records.night.live import Happening, LivePosture, LiveWeather
+from catseye.records.night.live import Happening, LivePosture
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.live.live import EpochAnswer, Live
 
@@ -58,7 +60,7 @@ class ZiySettings:
     idle: float = 0.25
     epoch_every: float = 10.0
     grace: float = 0.4
-    leave: float = 3.0
+    leave: float = 1.8
     links: LinkSettings = field(default_factory=LinkSettings)
     feed: FeedSettings = field(default_factory=FeedSettings)
 
@@ -107,14 +109,14 @@ class Coordinator:
         self._live, self._planner, self._guard, self._journal = parts.live, parts.planner, parts.guard, parts.journal
         self.listeners: list[Callable[[Entry], None]] = []
         self._event_log = EventLog("coordinator", clock, self.tell)
-        self._stations: dict[str, EventLog] = {}
+        self._stations = StationEvents(clock, self.tell)
         self.intake = Intake(
             parts.live,
             parts.journal,
             judged=lambda answered: self.firing.judged(answered),
             publish=self._publish,
             event_log=EventLog("journal", clock, self.tell),
-            doubted=self._doubted,
+            doubted=self._stations.read,
             clock=clock,
             solver=parts.solver,
         )
@@ -131,6 +133,15 @@ class Coordinator:
             event_log=self._event_log,
             clock=clock,
             allowed=lambda: self.mode == "active" and self.intake.trouble is None and self.host_clock.believed,
+            telescope_known=lambda: self.telescope_known,
+        )
+        self.condition = ConditionWatch(
+            clock,
+            self.links,
+            firing=self.firing,
+            intake=self.intake,
+            mode=lambda: self.mode,
+            clock_believed=lambda: self.host_clock.believed,
             telescope_known=lambda: self.telescope_known,
         )
         self._script = feed if isinstance(feed, MotionScript) else None
@@ -215,7 +226,7 @@ class Coordinator:
         leaving = [asyncio.ensure_future(link.leave(self.settings.leave)) for link in self.links.values()]
         last = [] if self._solving is None else [self._solving]  # an epoch under way may come to its end meanwhile
         if leaving or last:
-            await asyncio.wait([*leaving, *last], timeout=self.settings.leave + 0.5)
+            await asyncio.wait([*leaving, *last], timeout=self.settings.leave + 0.2)
         for each in (*leaving, *last):
             each.cancel()
         for task in self._tasks:
@@ -292,6 +303,7 @@ class Coordinator:
         answer = await self.intake.solve(now)
         if answer is not None:
             self.answer = answer
+            self._stations.solved(answer)
             self.firing.fitted(answer.used, answer.rejected)
 
     # What comes in --------------------------------------------------------------------------------------------------
@@ -307,11 +319,6 @@ class Coordinator:
             self.posture = read
             self._guard.telescope(read)
             self.intake.take(read)
-
-    def _doubted(self, read: LiveWeather, why: str) -> None:
-        """What the reduction thinks of a station's reading."""
-        event_log = self._stations.setdefault(read.station, EventLog(read.station, self.clock, self.tell))
-        event_log.standing("weather-doubted", why or None, over=f"{read.station} is believed again")
 
     def _overheard(self, link: RangerLink, reply: Reply) -> None:
         """Another client's shot, in passive mode."""
@@ -336,6 +343,7 @@ class Coordinator:
         self.intake.take(happening)
 
     def _publish(self, entry: Entry) -> None:
+        self.condition.entry(entry)
         for listener in self.listeners:
             listener(entry)
 
@@ -350,6 +358,7 @@ class Coordinator:
 
     def leased(self, before: str, now: str) -> None:
         """Note that another of its clients may command it."""
+        self.condition.holder = now
         self._event_log.tell("lease", f"the coordinator's lease goes from {before} to {now}", always=True)
 
     def drop(self, ranger: str) -> None:

@@ -61,7 +61,7 @@ class LiveBook:
         self._good: dict[int, str] = {}  # status by number, of good shots that no epoch has judged yet
         self.events: deque[Happening] = deque(maxlen=KEPT_EVENTS)
         self.troubles = Troubles()
-        self.epochs: deque[dict[str, Any]] = deque(maxlen=KEPT_EPOCHS)  # number, ticks, points, used, rejected
+        self.epochs: deque[dict[str, Any]] = deque(maxlen=KEPT_EPOCHS)  # number, ticks, names, used, rejected, doubt
         self.comparisons: dict[int, EpochComparison] = {}
         self.answer: StoredAnswer = {}  # of the last epoch
 
@@ -75,7 +75,8 @@ class LiveBook:
         elif isinstance(entry, LivePosture):
             self.posture = entry
         elif isinstance(entry, Happening):
-            self.events.append(entry)
+            if entry.severity != "debug":
+                self.events.append(entry)
             self._finder.heard(entry)
             if entry.severity != "note":
                 self.troubles.add(entry)
@@ -110,7 +111,8 @@ class LiveBook:
     def _solution(self, solution: EpochSolution) -> None:
         compared = None if self._comparison is None else self._comparison.epoch(solution)
         answer = solution.answer
-        self.events.append(epoch_of(solution))
+        if not answer:
+            self.events.append(epoch_of(solution))
         if not answer:
             return
         self.answer = answer
@@ -122,7 +124,8 @@ class LiveBook:
             "rejected": answer.get("rejected", ()),
         }
         counts = {key: len(each) for key, each in lists.items()}
-        self.epochs.append({"number": answer.get("number"), "ticks": solution.ticks, **counts})
+        doubt = next(iter(answer.get("doubts") or ()), None)
+        self.epochs.append({"number": answer.get("number"), "ticks": solution.ticks, **counts, "doubt": doubt})
         rejected = {int(number): reason for number, reason in (answer.get("rejected") or {}).items()}
         for number, reason in rejected.items():
             status = self._good.pop(number, None)  # one that was bad by itself is counted already

@@ -16,7 +16,7 @@ from catseye.gateways.writers.interruption import undone_when_interrupted
 
 PROGRAM = (sys.executable, "-P", "-m", "catseye")
 LONGEST_START = 120.0  # s until the child says that it listens: the first time its kernels are compiled
-LONGEST_LEAVE = 2.0  # s from SIGTERM until it is killed
+LONGEST_LEAVE = 1.0  # s from SIGTERM until it is killed: its keeper has to be gone within five
 FIRST_WAIT, LONGEST_WAIT, LIVED = 1.0, 30.0, 60.0  # s before it is started again, longer each time unless it lived
 Heard = Callable[[str], None]
 

@@ -267,7 +267,7 @@ class LiveCoordinator:
             if path is None:  # a server sees to its own
                 return
             with suppress(OSError):  # a journal that is gone tells so itself
-                watch.look(path.absolute().parent, loop.time())
+                self.ziy.condition.disk = watch.look(path.absolute().parent, loop.time())
             await asyncio.sleep(DISK_EVERY)
 
     @property

@@ -1,7 +1,9 @@
 """The log of a living command: a line for each happening and each epoch, for people or for programs."""
 
 import json
-from collections.abc import Callable
+import logging
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from catseye.coordinator.journal.entries import EpochSolution
@@ -10,7 +12,7 @@ from catseye.gateways.writers.objects import plain
 from catseye.geometry.sky.time_tag import MJD_EPOCH
 from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, Happening
 
-COLOURS = {"note": "", "warning": "\x1b[33m", "alarm": "\x1b[1;31m"}
+COLOURS = {"debug": "", "note": "", "warning": "\x1b[33m", "alarm": "\x1b[1;31m"}
 PLAIN = "\x1b[0m"
 
 
@@ -18,10 +20,9 @@ class LiveLog:
     """Lines about what happens.
 
     write    takes a line without its end
-    json     one JSON object a line: time_utc, mjd, severity, who, kind, text, details
+    json     one JSON object a line: time_utc, mjd, severity, who, kind, text, details; else routine is left out
     colour   warnings yellow, alarms red
     clock    for what has no time of its own
-    least    severities that are left out: "note" leaves out nothing
     """
 
     def __init__(self, write: Callable[[str], None], *, clock: Clock, json: bool = False, colour: bool = False):
@@ -39,7 +40,7 @@ class LiveLog:
         self.happened(Happening(ticks_now(self._clock), who, kind, text, severity))
 
     def happened(self, what: Happening) -> None:
-        """Log one happening as a line."""
+        """Log one happening as a line; people are spared the routine."""
         if self._json:
             row = {
                 "time_utc": time_text(what.ticks),
@@ -51,6 +52,8 @@ class LiveLog:
                 "details": plain(what.details),
             }
             self._write(json.dumps(row, allow_nan=False, ensure_ascii=True))
+            return
+        if what.severity == "debug":
             return
         colour = COLOURS[what.severity] if self._colour else ""
         line = f"{time_text(what.ticks)}  {what.severity:<7}  {what.who:<11}  {one_line(what.text)}"
@@ -66,10 +69,38 @@ def epoch_of(solution: EpochSolution) -> Happening:
         f"epoch {answer.get('number')}: {len(answer.get('names', ()))} points from {len(answer.get('used', ()))} shots"
         f", {len(answer.get('rejected', ()))} not used"
     )
-    factor = answer.get("variance_factor")
-    return Happening(
-        solution.ticks, "reduction", "epoch", text if factor is None else f"{text}, variance factor {factor:.2f}"
-    )
+    factor, doubts = answer.get("variance_factor"), answer.get("doubts")
+    text = text if factor is None else f"{text}, variance factor {factor:.2f}"
+    text = f"{text}; doubtful: {doubts[0]}" if doubts else text  # "epoch-doubtful" warns of it, once
+    return Happening(solution.ticks, "reduction", "epoch", text)
+
+
+class LogHandler(logging.Handler):
+    """What Python's own logging is told, as lines of a log: warnings of ports, of libraries, of the event loop."""
+
+    def __init__(self, log: LiveLog):
+        super().__init__()
+        self._log = log
+
+    def emit(self, record: logging.LogRecord) -> None:
+        severity = "alarm" if record.levelno >= logging.ERROR else "warning"
+        severity = severity if record.levelno >= logging.WARNING else "debug"
+        who = record.name.rpartition(".")[2] or "python"
+        text = self.format(record) if record.exc_info else record.getMessage()
+        self._log.tell(who, "log", text, severity)
+
+
+@contextmanager
+def logging_to(log: LiveLog) -> Iterator[None]:
+    """Take Python's own logging and warnings into a log for a while."""
+    handler, root = LogHandler(log), logging.getLogger()
+    root.addHandler(handler)
+    logging.captureWarnings(True)
+    try:
+        yield
+    finally:
+        logging.captureWarnings(False)
+        root.removeHandler(handler)
 
 
 def time_text(ticks: int) -> str:

@@ -24,7 +24,7 @@ OFFSETS = (
 
 
 def simulation_verdict(book: LiveBook) -> Verdict:
-    """Whether the site's epochs are as far from the truth as they claim."""
+    """Verdict on a simulation: epochs as near the truth as they claim, and good by their own judgement."""
     if not book.epochs:
         return Verdict("failed", "no epoch was solved: the time was too short (expected half a minute at least)")
     compared = list(book.comparisons.values())
@@ -33,6 +33,10 @@ def simulation_verdict(book: LiveBook) -> Verdict:
     beyond = sum(each.chi2 > each.band[1] for each in compared)
     if beyond > len(compared) // 10:
         return Verdict("doubtful", f"{beyond} of {len(compared)} epochs are farther from the truth than they claim")
+    doubted = [row for row in book.epochs if row["doubt"]]
+    if len(doubted) > len(book.epochs) // 10:
+        text = f"{len(doubted)} of {len(book.epochs)} epochs are doubtful: {doubted[-1]['doubt']}"
+        return Verdict("doubtful", text)
     return Verdict("good", f"{len(compared) - beyond} of {len(compared)} epochs are as near the truth as they claim")
 
 
@@ -91,6 +95,7 @@ def epoch_object(row: dict[str, Any], compared: EpochComparison | None) -> dict[
         "points": row["names"],
         "shots": row["used"],
         "rejected": row["rejected"],
+        "doubt": row["doubt"],
     }
     if compared is None:
         return epoch
@@ -185,7 +190,7 @@ def summary(
         passages.append(("Noticed", "; ".join(noticed) + "."))
     if world.faults:
         missed = [each.text for each in book.faults if each.by is None and each.begins <= book.ticks]
-        none = f"; not noticed: {', '.join(missed)}" if missed else ", each that began was noticed"
+        none = f"; not noticed: {', '.join(missed)}" if missed else ", each that began was noticed for what it is"
         passages.append(("Faults", "on command: " + "; ".join(world.faults) + none + "."))
     passages.append(
         (

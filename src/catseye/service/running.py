@@ -11,7 +11,7 @@ from typing import Any, Generic, TypeVar
 from catseye.simulator.clock.virtual_time import VirtualLoop
 
 T = TypeVar("T")
-LONGEST_END = 4.5  # s from the signal until the process is gone: the contract allows five
+LONGEST_END = 4.0  # s from the signal until the process leaves by force: gone within five, ten others beside
 NUMBERS = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -29,7 +29,7 @@ class LiveRun(Generic[T]):
     work           makes the coroutine; a signal cancels it, once
     loop_factory   of the loop; asyncio's own if None
 
-    The first signal cancels; a second one, or 4.5 s, leave at once in the way that `gateways.writers.interruption` has.
+    The first signal cancels; a second one, or 4 s, leave at once in the way that `gateways.writers.interruption` has.
     """
 
     def __init__(

@@ -1,5 +1,10 @@
-"""What is seen of a simulated site while it runs: a screen on a terminal, plain lines elsewhere, or nothing."""
+"""Views of a running site: a screen on a terminal of 80 x 24 or more, plain lines elsewhere, or nothing.
 
+The screen is read at three in the morning: what is wrong stands first, all rangers have a character at least, and
+nothing that lasts is pushed off by what comes.
+"""
+
+import asyncio
 import math
 import os
 import sys
@@ -9,8 +14,9 @@ from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Any
 
 from catseye.constants import DEGREE
-from catseye.coordinator.firing import OF_THE_LINE
+from catseye.coordinator.condition import SIGNS, WRONG, SiteCondition
 from catseye.coordinator.journal.entries import EpochSolution
+from catseye.coordinator.parts import ticks_now
 from catseye.gateways.writers.interruption import undone_when_interrupted
 from catseye.records.night.live import Happening
 from catseye.service.book import GOOD, LiveBook
@@ -20,13 +26,26 @@ from catseye.service.objects import beam_lines, epoch_line
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
     from rich.table import Table
+    from rich.text import Text
 
     from catseye.service.coordinator import LiveCoordinator
 
 EVERY = 0.25  # s between two pictures
-NARROW = 138  # columns: below, the right half goes beneath the left
+AT_LEAST = 1.0  # s in which there is a new one, also where nothing becomes durable
+NARROW = 138  # columns: below, one thing stands beneath the other
+TALL = 34  # lines from which the wide one has room
+LEAST_WIDTH, LEAST_HEIGHT = 60, 20
+MOST_PROBLEMS, LAST_EVENTS = 4, 5
+WORDS = {
+    "starting": "bold",
+    "well": "bold green",
+    "impaired": "bold yellow",
+    "alarm": "bold white on red",
+    "stopped": "bold white on red",
+}
+TOLD = ("warning", "alarm")
 EPOCHS, EVENTS = 7, 9  # shown
-STYLES = {"note": "", "warning": "yellow", "alarm": "bold red"}
+STYLES = {"debug": "dim", "note": "", "warning": "yellow", "alarm": "bold red"}
 
 
 class SilentView:
@@ -67,7 +86,7 @@ class LinesView(SilentView):
             latest = self._book.latest
             if latest is not None and latest.number == entry.answer.get("number"):
                 self._say(f"{time_text(entry.ticks)}  {epoch_line(latest)}")
-        elif isinstance(entry, Happening) and entry.severity != "note" and entry.kind not in OF_THE_LINE:
+        elif isinstance(entry, Happening) and entry.severity in TOLD:
             self._say(f"{time_text(entry.ticks)}  {entry.severity}: {one_line(entry.text)}")
         for each in self._book.faults if self._book is not None else ():
             if each.by is not None and each.text not in self._found:
@@ -90,6 +109,7 @@ class ScreenView(SilentView):
         self._book: LiveBook | None = None
         self._running: LiveCoordinator | None = None
         self._next = 0.0
+        self._timer: asyncio.TimerHandle | None = None
 
     def tell(self, text: str) -> None:
         if self._live is None:
@@ -102,6 +122,12 @@ class ScreenView(SilentView):
         self._live = Live(console=self._console, auto_refresh=False, redirect_stdout=False, redirect_stderr=False)
         self._stack.enter_context(undone_when_interrupted(_show_cursor))
         self._stack.enter_context(self._live)
+        self._timer = asyncio.get_running_loop().call_later(AT_LEAST, self._tick)
+
+    def _tick(self) -> None:
+        """A new picture, whether anything came or not: where nothing comes, that has to be seen."""
+        self.entry(None)
+        self._timer = asyncio.get_running_loop().call_later(AT_LEAST, self._tick)
 
     def entry(self, entry: Any) -> None:
         now = time.monotonic()
@@ -110,6 +136,8 @@ class ScreenView(SilentView):
             self._live.update(self.picture(), refresh=True)
 
     def end(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
         if self._live is not None:
             self._live.update(self.picture(), refresh=True)
         self._stack.close()
@@ -119,46 +147,110 @@ class ScreenView(SilentView):
         """All of it, for the console's width and height."""
         from rich.console import Group
         from rich.table import Table
-
-        rangers, side = self._rangers(), Group(self._epochs(), self._beam(), self._events())
-        if self._console.width < NARROW:
-            return Group(self._header(), self._epochs(), self._beam(), rangers)
-        both = Table.grid(padding=(0, 2), expand=True)
-        both.add_column()
-        both.add_column(ratio=1)
-        both.add_row(rangers, side)
-        return Group(self._header(), both)
-
-    def _header(self) -> "RenderableType":
         from rich.text import Text
 
-        book, ziy = self._book, self._running.ziy if self._running is not None else None
-        if book is None or ziy is None:
+        if self._book is None or self._running is None:
             return Text("")
-        posture = book.posture
-        text = Text(f"{ziy.site.site.campaign.name}", style="bold")
-        if posture is not None:
-            azimuth, elevation = posture.azimuth / DEGREE, posture.elevation / DEGREE
-            text.append(
-                f"   {time_text(posture.ticks)}   telescope {azimuth:8.4f}° {elevation:7.4f}°", style="not bold"
-            )
-        ready = sum(link.state == "ready" for link in ziy.links.values())
-        asked = len(ziy.links) - len(ziy.firing.dropped)
-        text.append(
-            f"   {ziy.mode}, round {ziy.round_number}, {ready} of {asked} rangers ready, {book.acknowledged} shots",
-            style="not bold",
-        )
-        return text
+        condition = self._running.ziy.condition.now()
+        width = max(self._console.width, LEAST_WIDTH)
+        height = max(self._console.height, LEAST_HEIGHT) - 1  # the cursor's line
+        top = [*self._head(condition), *_problem_lines(condition), *self._state_lines(condition, width)]
+        if width >= NARROW and height >= TALL:
+            both = Table.grid(padding=(0, 2), expand=True)
+            both.add_column()
+            both.add_column(ratio=1)
+            both.add_row(self._rangers(condition), Group(self._epochs(), self._beam(), self._events(EVENTS)))
+            return Group(*_cut(top, width), both)
+        more, table = [*self._truth_lines(), *self._fault_lines()], len(self._running.ziy.links) + 3
+        tall = height >= len(top) + table + LAST_EVENTS + len(more)
+        lines = top if tall else [*top, *ranger_lines(condition, width)]
+        left = height - len(lines) - table * tall - LAST_EVENTS
+        lines = [*lines, *more[: max(left, 0)]]
+        events = self._event_lines(LAST_EVENTS + max(min(left - len(more), EVENTS - LAST_EVENTS), 0))
+        parts: list[RenderableType] = [*_cut(lines, width)]
+        return Group(*parts, *([self._rangers(condition)] if tall else []), *_cut(events, width))
 
-    def _rangers(self) -> "Table":
+    def _head(self, condition: SiteCondition) -> "list[Text]":
+        """Site, time, telescope; then the site's state in a word."""
+        from rich.text import Text
+
+        assert self._book is not None
+        assert self._running is not None
+        book, ziy = self._book, self._running.ziy
+        first = Text(f"{ziy.site.site.campaign.name}", style="bold")
+        first.append(f"  {time_text(ticks_now(ziy.clock))[:19]}Z", style="not bold")
+        if book.posture is not None:
+            azimuth, elevation = book.posture.azimuth / DEGREE, book.posture.elevation / DEGREE
+            first.append(f"  telescope {azimuth:.4f}° {elevation:.4f}°", style="not bold")
+        second = Text(f" {condition.word.upper()} ", style=WORDS[condition.word])
+        asked = len(ziy.links) - len(ziy.firing.dropped)
+        second.append(
+            f"  {ziy.mode}, round {ziy.round_number}, {condition.measuring} of {asked} rangers measure, "
+            f"{book.acknowledged} shots",
+            style="not bold default on default",
+        )
+        return [first, second]
+
+    def _state_lines(self, condition: SiteCondition, width: int) -> "list[Text]":
+        """Last epoch, and what everything hangs on."""
+        from rich.text import Text
+
+        verdict = condition.verdict
+        good = verdict is None or verdict.word == "good"
+        told = "none yet" if verdict is None else f"{condition.epoch} {verdict.word}" + f": {verdict.why}" * good
+        epoch = Text(f"epoch    {one_line(told)}", style="" if good else "yellow")
+        parts = (("clock", condition.clock), ("disk", condition.disk), ("journal", condition.journal))
+        line = Text()
+        for name, text in (*parts, ("lease", condition.holder)):
+            line.append(f"{name} ", style="dim")
+            bad = name in ("clock", "journal") and text != "well"
+            line.append(f"{one_line(text)[: width // 3]}   ", style="bold red" if bad else "")
+        return [epoch, line]
+
+    def _truth_lines(self) -> "list[Text]":
+        """The last epoch beside a simulation's truth, and the beam."""
+        from rich.text import Text
+
+        latest = None if self._book is None else self._book.latest
+        if latest is None:
+            return []
+        low, high = latest.band
+        text = (
+            f"truth    {latest.points} points, off {latest.rms_mm:.3f} mm rms, u {latest.mean_u_mm:.3f}, "
+            f"chi² {latest.chi2:.2f} ({low:.2f}-{high:.2f})"
+        )
+        return [Text(text, style="" if latest.chi2 <= high else "red"), *(Text(line) for line in beam_lines(latest))]
+
+    def _fault_lines(self) -> "list[Text]":
+        """Faults on command, and what named them."""
+        from rich.text import Text
+
+        if self._book is None:
+            return []
+        now = self._book.ticks
+        return [
+            Text(one_line(each.line(now)), style="" if each.by is not None else "yellow") for each in self._book.faults
+        ]
+
+    def _event_lines(self, count: int) -> "list[Text]":
+        """The last events that are no routine."""
+        from rich.text import Text
+
+        return [
+            Text(f"{time_text(event.ticks)[11:19]} {one_line(event.text)}", style=STYLES[event.severity])
+            for event in list(self._book.events if self._book is not None else ())[-count:]
+        ]
+
+    def _rangers(self, condition: SiteCondition) -> "Table":
         table = _table("ranger", "state", "target", ">range (m)", ">u (mm)", ">shots")
         book, ziy = self._book, self._running.ziy if self._running is not None else None
         if book is None or ziy is None:
             return table
         for name, link in ziy.links.items():
             last = book.last.get(name)
-            state = "dropped" if name in ziy.firing.dropped else " ".join(link.troubles) or link.state
-            style = "" if state == "ready" else "yellow"
+            word = condition.rangers[name]
+            state = f"{word}: {' '.join(link.troubles)}" if link.troubles else word
+            style = "" if word not in WRONG else ("bold red" if WRONG[word] == "alarm" else "yellow")
             if last is None:
                 table.add_row(name, state, "", "", "", str(book.shots[name]), style=style)
                 continue
@@ -194,17 +286,51 @@ class ScreenView(SilentView):
         lines = [] if latest is None else list(beam_lines(latest))
         return Text("\n".join(lines) or "beam: known after the reference epoch", style="" if lines else "dim")
 
-    def _events(self) -> "RenderableType":
+    def _events(self, count: int) -> "RenderableType":
         from rich.text import Text
 
-        text = Text("\n", no_wrap=True, overflow="ellipsis")
-        for each in self._book.faults if self._book is not None else ():
-            line = f"{one_line(each.line(self._book.ticks if self._book is not None else 0))}\n"
-            text.append(line, style="" if each.by is not None else "yellow")
-        for event in list(self._book.events if self._book is not None else ())[-EVENTS:]:
-            line = f"{time_text(event.ticks)[11:19]} {one_line(event.text)}\n"
-            text.append(line, style=STYLES[event.severity])
-        return text
+        lines = [*self._fault_lines(), *self._event_lines(count)]
+        return Text("\n", no_wrap=True, overflow="ellipsis").join([Text(""), *lines])
+
+
+def _problem_lines(condition: SiteCondition) -> "list[Text]":
+    """What is wrong, alarms first; of many the first, and how many more there are."""
+    from rich.text import Text
+
+    lines = [
+        Text(f"{problem.severity:<8} {one_line(problem.text)}", style=STYLES[problem.severity])
+        for problem in condition.problems
+    ]
+    if len(lines) > MOST_PROBLEMS:
+        rest = len(lines) - MOST_PROBLEMS + 1
+        lines = [*lines[: MOST_PROBLEMS - 1], Text(f"{'':<8} and {rest} more (ask STATUS)", style="yellow")]
+    return lines or [Text("nothing is wrong", style="dim")]
+
+
+def ranger_lines(condition: SiteCondition, width: int) -> "list[Text]":
+    """All rangers, a character each behind their names, and what the characters mean that are there."""
+    from rich.text import Text
+
+    longest = max((len(name) for name in condition.rangers), default=0)
+    a_row = max(1, width // (longest + 3))
+    lines, names = [], list(condition.rangers)
+    for k in range(0, len(names), a_row):
+        line = Text()
+        for name in names[k : k + a_row]:
+            word = condition.rangers[name]
+            style = "" if word not in WRONG else ("bold red" if WRONG[word] == "alarm" else "yellow")
+            line.append(f"{name:<{longest}} {SIGNS[word]} ", style=style)
+        lines.append(line)
+    there = [word for word in SIGNS if word in condition.rangers.values()]
+    return [*lines, Text("   ".join(f"{SIGNS[word]} {word}" for word in there), style="dim")]
+
+
+def _cut(lines: "list[Text]", width: int) -> "list[Text]":
+    """Each line no longer than the console is wide."""
+    for line in lines:
+        line.no_wrap, line.overflow = True, "ellipsis"
+        line.truncate(width, overflow="ellipsis")
+    return lines
 
 
 def _table(*columns: str) -> "Table":

@@ -6,12 +6,14 @@ and gives way to everything else (`nice`). Should it die, the epoch is solved he
 
 import asyncio
 import copyreg
+import ctypes
 import io
 import os
 import pickle
 import subprocess
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
 from typing import Any, BinaryIO
@@ -34,6 +36,7 @@ class SolverProcess:
         self._site = site
         self._process: subprocess.Popen[bytes] | None = None
         self._changing, self._ended = threading.Lock(), False
+        self._asking = ThreadPoolExecutor(1, "solver")  # one: each thread would keep the largest answer's memory
 
     @property
     def pid(self) -> int | None:
@@ -55,7 +58,7 @@ class SolverProcess:
         """What `job.solve()` gives, from the process; where that died, from here."""
         loop = asyncio.get_running_loop()
         try:
-            return await loop.run_in_executor(None, partial(self._asked, job))
+            return await loop.run_in_executor(self._asking, partial(self._asked, job))
         except (EOFError, OSError):
             self._discard()
             await loop.run_in_executor(None, self.start)
@@ -66,6 +69,7 @@ class SolverProcess:
         with self._changing:
             self._ended = True
         self._discard()
+        self._asking.shutdown(wait=False, cancel_futures=True)
 
     def _discard(self) -> None:
         process, self._process = self._process, None
@@ -84,6 +88,7 @@ class SolverProcess:
             raise EOFError("no process")
         _send(process.stdin, dumped(job, self._site))
         answer = loaded(_received(process.stdout), self._site)
+        give_back()
         if isinstance(answer, BaseException):
             raise answer
         return answer
@@ -142,8 +147,16 @@ def serve() -> None:
             except Exception as problem:  # noqa: BLE001 - a mistake of ours: the coordinator's to raise
                 answer = problem
             _send(answers, dumped(answer, site))
+            del message, answer
+            give_back()
     except (EOFError, OSError):
         return
+
+
+def give_back() -> None:
+    """Give memory that is free back to the system, where the C library can: an epoch takes tens of MB for a second."""
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _send(pipe: Any, message: bytes) -> None:

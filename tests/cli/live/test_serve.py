@@ -3,10 +3,13 @@
 import json
 import os
 import signal
+import subprocess
+import sys
+import time
 
 import pytest
 
-from cli.living_scene import ended, processes_with, small_site, started
+from cli.living_scene import SOON, ended, processes_with, small_site, started
 
 
 def free_base():
@@ -54,6 +57,28 @@ def test_a_twin_that_dies_comes_back_and_the_end_is_clean(tmp_path, number, stat
     left = [path.name for path in tmp_path.iterdir()]
     assert "site.db" in left
     assert "site.db.writer" not in left
+
+
+@pytest.mark.slow
+def test_a_site_ends_within_five_seconds_beside_ten_busy_processes(tmp_path):
+    """5.2 s, and by force, before its waits had shares; ten processes on two cores are a load of 10."""
+    words = ["serve", small_site(), "--twin", "--port-base", free_base(), "--port", "0", "--log-json"]
+    words += ["--start", "60635.125", "--journal", tmp_path / "site.db"]
+    busy = []
+    with started(*words, home=tmp_path) as process:
+        read_until(process, "epoch")
+        try:
+            busy += [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(10)]
+            time.sleep(3.0)  # the machine's scheduler is what is tested
+            began = time.monotonic()
+            process.send_signal(signal.SIGTERM)
+            process.communicate(timeout=30.0)
+            assert time.monotonic() - began < SOON
+        finally:
+            for each in busy:
+                each.kill()
+                each.wait()
+    assert processes_with(str(tmp_path)) == []
 
 
 def parent_of(pid):

@@ -74,7 +74,10 @@ def test_a_person_on_nc_can_ask_and_is_answered_in_lines():
             bodies = [line.split("\t")[2] for line in nc.got.decode().splitlines()]
             assert bodies[0] == "HELLO This is ZIY gbt ver. 1"
             assert bodies[1] == f"CONNECT 1, {site.server.port}"
-            assert bodies[2] == "STATUS 1, hold, 0 of 2, 0, 0, 0, known, well"
+            assert bodies[2] == (
+                "STATUS 1, hold, 0 of 2, 0, 0, 0, known, well, stopped, none, well, none, nobody, "
+                "mode hold: nothing is fired"
+            )
             assert bodies[3].removeprefix("HLP 1, ").split() == list(HELP)
             assert bodies[4].startswith("HLP 1, SAMPLER name | SAMPLER name; n, ")
             assert bodies[5].startswith("HELP 1, SAMPLER name | SAMPLER name; n, ")

@@ -430,6 +430,51 @@ def test_what_live_did_not_believe_goes_along(tmp_path):
     assert "named in doubts.csv as not believed by the epochs: 1 of the shots" in done.notes
 
 
+def biased(station, judgement, offset_c):
+    return {station: {"judgement": judgement, "offset_c": offset_c, "u_c": 0.2}}
+
+
+def with_bias(last, *answers):
+    """Forty readings of both stations; WX1 reads 2 °C too much until the one before `last`."""
+    entries = []
+    for k in range(1, 41):
+        lie = 2.0 * (k < last)
+        entries += [
+            full_shot(k),
+            LiveWeather("WX1", START + SECOND * k, 10.0 + lie, 930.1, 70.0),
+            LiveWeather("WX2", START + SECOND * k, 10.4, 930.1, 70.0),
+        ]
+        entries += [EpochSolution(START + SECOND * k, answer) for at, answer in answers if at == k]
+    return entries
+
+
+def doubted(tmp_path):
+    rows = (tmp_path / "out" / "doubts.csv").read_text().splitlines()[1:]
+    return [row.split(",")[1:3] for row in rows]
+
+
+def test_a_station_that_was_biased_from_the_start_is_doubted_until_it_returned_and_not_from_then_on(tmp_path):
+    """Its true readings were the ones that doubts.csv named: they were doubted at their moment."""
+    entries = with_bias(25, (12, {"number": 1, "biases": biased("WX1", "biased", 1.8)}))
+    done, campaign = exported(tmp_path, entries)
+    assert doubted(tmp_path) == [["WX1", stamp(START + SECOND * k)] for k in range(1, 25)]
+    assert campaign.weather.temperature_c.max() == 10.4
+    assert "its thermometer was biased by +1.8 °C until then" in done.notes[0]
+
+
+def test_a_station_that_the_ranges_contradict_to_the_end_is_doubted_all_along(tmp_path):
+    entries = with_bias(99, (12, {"number": 1, "biases": biased("WX1", "biased", 1.8)}))
+    _, campaign = exported(tmp_path, entries)
+    assert doubted(tmp_path) == [["WX1", stamp(START + SECOND * k)] for k in range(1, 41)]
+    assert set(campaign.weather.station) == {"WX2"}
+
+
+def test_of_stations_that_nobody_tells_apart_none_is_left_out(tmp_path):
+    entries = with_bias(99, (12, {"number": 1, "biases": biased("WX1", "apart", -2.4) | biased("WX2", "apart", 2.4)}))
+    exported(tmp_path, entries)
+    assert not (tmp_path / "out" / "doubts.csv").exists()
+
+
 def test_how_far_the_telescope_shook_goes_along(tmp_path):
     """A row an epoch and body, as the epoch believed it; what no epoch of the span says is not there."""
     entries = campaign_entries()

@@ -176,3 +176,85 @@ def test_what_was_stamped_later_is_forgotten_when_the_clock_is_set_back():
     assert watch.add(read("WX2", 605.0)) == ""
     assert watch.add(read("WX1", 605.0)) == ""  # its jump has not been
     assert {w.ticks for w in watch.believed(ticks(610.0))} == {*map(ticks, np.arange(0.0, 600.0, 10.0)), ticks(605.0)}
+
+
+def at_heights(**heights):
+    return StationWatch(tuple(heights), heights)
+
+
+def test_of_three_stations_the_one_that_the_others_contradict_is_not_believed_from_its_first_reading():
+    watch = at_heights(WX1=800.0, WX2=850.0, WX3=805.0)
+    said = fed(watch, STEPS, WX1=lambda t: 10.0, WX2=lambda t: 10.2, WX3=lambda t: 14.0)
+    assert not any(said["WX1"] + said["WX2"])
+    assert "beyond what air can be between it and WX1 and WX2, which agree with each other" in said["WX3"][-1]
+    assert speaking(watch, 890.0) == {"WX1", "WX2"}
+    [stretch] = watch.stretches()
+    assert (stretch.station, stretch.first, stretch.last) == ("WX3", ticks(0.0), None)
+
+
+def test_an_inversion_of_three_stations_is_no_lie():
+    watch = at_heights(WX1=800.0, WX2=850.0, WX3=805.0)
+    said = fed(watch, STEPS, WX1=lambda t: 10.0, WX2=lambda t: 12.0, WX3=lambda t: 10.4)
+    assert not any(said["WX1"] + said["WX2"] + said["WX3"])
+
+
+def test_a_station_that_agrees_with_the_others_again_is_believed_from_then_on():
+    watch = at_heights(WX1=800.0, WX2=850.0, WX3=805.0)
+    fed(watch, STEPS, WX1=lambda t: 10.0, WX2=lambda t: 10.2, WX3=lambda t: 14.0 if t < 400 else 10.1)
+    assert speaking(watch, 890.0) == {"WX1", "WX2", "WX3"}
+    assert {w.temperature_c for w in watch.believed(ticks(890.0)) if w.station == "WX3"} == {10.1}
+    assert watch.moved() == {"WX3"}
+    assert watch.moved() == frozenset()
+    [stretch] = watch.stretches()
+    assert (stretch.first, stretch.last) == (ticks(0.0), ticks(400.0) - 1)
+
+
+@pytest.mark.parametrize("size", [2.0, -2.0, 0.9, 5.0])
+def test_a_step_that_takes_a_suspected_bias_away_is_its_end(size):
+    watch = StationWatch(("WX1", "WX2"))
+    fed(watch, STEPS[:60], WX1=lambda t: 10.0 + size, WX2=lambda t: 10.0)
+    watch.judged({"WX1": (size + 0.2, True)})
+    said = fed(watch, STEPS[60:], WX1=lambda t: 10.0, WX2=lambda t: 10.0)["WX1"]
+    assert not any(said[2:]), "from the third reading on"
+    assert {w.temperature_c for w in watch.believed(ticks(890.0))} == {10.0}
+    [stretch] = watch.stretches()
+    assert (stretch.first, stretch.last) == (ticks(0.0), ticks(600.0) - 1)
+    assert stretch.offset_c == size + 0.2
+    assert watch.moved() == {"WX1"}
+
+
+def test_a_slow_change_by_as_much_is_no_return():
+    """An inversion that breaks up in ten minutes takes away what the stations were apart by."""
+    watch = StationWatch(("WX1", "WX2"))
+    fed(watch, STEPS[:60], WX1=lambda t: 10.0, WX2=lambda t: 12.5)
+    watch.judged({"WX2": (2.5, False)})
+    after = np.arange(600.0, 1800.0, 10.0)
+    fed(watch, after, WX1=lambda t: 10.0, WX2=lambda t: 12.5 - 2.5 * min((t - 600.0) / 600.0, 1.0))
+    assert watch.stretches() == ()
+
+
+def test_a_small_lie_is_not_believed_because_time_passes():
+    """2 °C more than before for five minutes: after 250 s the watch took them for the air's own change."""
+    watch = StationWatch(("WX1", "WX2"))
+    said = fed(watch, STEPS, WX1=lambda t: 10.0, WX2=lambda t: 12.0 if 300 <= t < 700 else 10.0)
+    assert [bool(s) for s in said["WX2"]] == [300 <= t < 700 for t in STEPS]
+    [stretch] = watch.stretches()
+    assert (stretch.first, stretch.last) == (ticks(300.0), ticks(700.0) - 1)
+
+
+def test_a_level_that_is_believed_in_the_end_has_a_new_offset():
+    watch = StationWatch(("WX1", "WX2"))
+    fed(watch, np.arange(0.0, 3000.0, 10.0), WX1=lambda t: 10.0, WX2=lambda t: 12.0 if t >= 300 else 10.0)
+    assert speaking(watch, 2990.0) == {"WX1", "WX2"}
+    assert {w.temperature_c for w in watch.believed(ticks(2990.0)) if w.station == "WX2"} == {12.0}
+    assert watch.moved() == {"WX2"}
+
+
+def test_readings_of_a_station_that_the_ranges_contradict_are_a_stretch_that_lasts():
+    watch = StationWatch(("WX1", "WX2"))
+    fed(watch, STEPS, WX1=lambda t: 12.0, WX2=lambda t: 10.0)
+    watch.judged({"WX1": (1.7, True)})
+    [stretch] = watch.stretches()
+    assert (stretch.station, stretch.first, stretch.last, stretch.offset_c) == ("WX1", ticks(0.0), None, 1.7)
+    watch.judged({"WX1": (1.7, False)})
+    assert watch.stretches() == ()

@@ -139,6 +139,28 @@ def test_old_readings_are_forgotten_and_new_ones_kept():
     np.testing.assert_allclose(followed.at(mjd(t))[0], 1e-4 * t, rtol=0, atol=1e-9)
 
 
+def test_older_readings_are_thinned_out_and_those_of_five_minutes_are_whole():
+    """Ten a second for an hour are 36 000; a shot comes within two minutes, and is as exact as before."""
+    whole, seconds = PostureTrack(), np.arange(0.0, 1200.0, 0.1)
+    for s in seconds:
+        whole.add(LivePosture(ticks(s), 1e-4 * s, 0.5 + 1e-5 * s, 1e-4, 1e-5))
+    assert len(whole) < 3000 + 750 + 900 + 10
+    late = mjd(np.linspace(900.0, 1199.0, 997))
+    whole_late = track(seconds[8900:], lambda t: 1e-4 * t, lambda t: 0.5 + 1e-5 * t, lambda t: (1e-4, 1e-5))
+    np.testing.assert_allclose(whole.at(late)[1], whole_late.at(late)[1], rtol=0, atol=1e-8)  # stamps have steps
+    early = mjd(np.linspace(1.0, 800.0, 997))
+    assert whole.age(early).max() <= 0.55, "so old a reference shot has its posture still"
+    np.testing.assert_allclose(whole.at(early)[0], 1e-4 * np.linspace(1.0, 800.0, 997), rtol=0, atol=1e-6)
+
+
+def test_a_late_reading_is_thinned_out_like_the_others():
+    made = PostureTrack()
+    for s in [*np.arange(0.0, 900.0, 0.1), *np.arange(100.05, 200.0, 0.1), *np.arange(900.0, 1300.0, 0.1)]:
+        made.add(LivePosture(ticks(s), 1e-4 * s, 0.5, 1e-4, 0.0))
+    assert len(made) < 3750 + 1000 + 20
+    assert made.latest.ticks == ticks(1299.9)
+
+
 def test_readings_between_two_times_stay_as_they_were():
     times = np.arange(0.0, 100.0, 0.5)
     followed = track(times, lambda t: 1e-3 * t**2 % (2 * np.pi), lambda t: 0.5, lambda t: (2e-3 * t, 0.0))

@@ -176,11 +176,19 @@ def orders_of(*, drop: list[str] | None, **given: Any) -> "Orders":
 
 
 def leave(run: "LiveRun[Any]", *, terminated: int = 143) -> None:
-    """After a signal: 130 for Ctrl-C, and what a command's termination means. Returns where there was none."""
+    """After a signal: 130 for Ctrl-C, and what a command's termination means. Returns where there was none.
+
+    All is closed by then: the interpreter's own end, a second on a busy machine, is left out.
+    """
+    import os
     import signal
+    from contextlib import suppress
 
     if run.signal:
-        raise SystemExit(130 if run.signal == signal.SIGINT else terminated)
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError, ValueError, AttributeError):
+                stream.flush()
+        os._exit(130 if run.signal == signal.SIGINT else terminated)
 
 
 def say_now(text: str) -> None:

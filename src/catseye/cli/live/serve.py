@@ -7,7 +7,7 @@ import typer
 from catseye.cli.commands import Quiet, app
 from catseye.cli.live.groups import CoordinatorOptions, TwinOptions
 from catseye.cli.live.options import Site, site_of
-from catseye.cli.live.ziy import LogJson, run_coordinator
+from catseye.cli.live.ziy import LogJson, Screen, Told, run_coordinator
 from catseye.cli.option_groups import grouped
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ def serve(
     simulated: TwinOptions,
     asked: CoordinatorOptions,
     log_json: LogJson = False,
+    screen: Screen = False,
     quiet: Quiet = False,
 ) -> None:
     """Run a site until it is told to end (SIGTERM: status 0): children are started again, everything is logged."""
@@ -53,7 +54,6 @@ def serve(
         peers,
         offset=world.offset if twin else 0.0,
         seed=simulated.seed if twin else None,
-        log_json=log_json,
-        quiet=quiet,
+        told=Told(log_json, screen, quiet),
         beside=children if twin else None,
     )

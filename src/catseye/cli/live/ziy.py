@@ -1,6 +1,7 @@
 """The command of the coordinator."""
 
 import sys
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from catseye.service.logs import LiveLog
 
 LogJson = Annotated[bool, typer.Option("--log-json", help="The log as one JSON object a line.")]
+Screen = Annotated[bool, typer.Option("--screen", help="A screen for an operator instead of the log; 80 x 24 or more.")]
 
 
 @app.command(
@@ -34,12 +36,28 @@ def ziy(
         float, typer.Option("--clock-offset-s", callback=within(-1e11, 1e11, " s"), help="As the twin's.")
     ] = 0.0,
     log_json: LogJson = False,
+    screen: Screen = False,
     quiet: Quiet = False,
 ) -> None:
     """Run a site's coordinator until Ctrl-C: plan, shoot, reduce, keep a journal, tell whoever asks."""
     records = site_of(site)
     peers = asked.peers(records)
-    run_coordinator(records, asked.orders(), peers, offset=clock_offset_s, log_json=log_json, quiet=quiet)
+    told = Told(log_json, screen, quiet)
+    run_coordinator(records, asked.orders(), peers, offset=clock_offset_s, told=told)
+
+
+@dataclass(frozen=True)
+class Told:
+    """What a command shows of a running site.
+
+    log_json   the log as JSON
+    screen     a screen instead of the log, where stderr is a terminal
+    quiet      nothing
+    """
+
+    log_json: bool = False
+    screen: bool = False
+    quiet: bool = False
 
 
 def run_coordinator(
@@ -49,26 +67,33 @@ def run_coordinator(
     *,
     offset: float = 0.0,
     seed: int | None = None,
-    log_json: bool = False,
-    quiet: bool = False,
+    told: Told = Told(),
     beside: "Callable[[LiveLog], Coroutine[Any, Any, None]] | None" = None,
 ) -> None:
-    """A coordinator with its log on stderr, until a signal.
+    """Run a coordinator with its log, or its screen, on stderr, until a signal.
 
     peers    rangers and feed
     offset   s, of its clock against this machine's
     seed     of a simulated site, for the journal
+    told     what stderr shows of it
     beside   a coroutine function that runs beside it, told the log: its children
     """
     from catseye.clock import SystemClock
+    from catseye.errors import CatseyeError
+    from catseye.service.book import LiveBook
     from catseye.service.coordinator import LiveCoordinator
-    from catseye.service.logs import LiveLog
+    from catseye.service.logs import LiveLog, logging_to
     from catseye.service.running import LiveRun
+    from catseye.service.screen import ScreenView, SilentView
     from catseye.service.watchdog import live
 
     clock = SystemClock(offset)
-    coloured = not log_json and sys.stderr is not None and sys.stderr.isatty()
-    log = LiveLog(lambda line: None if quiet else tell_people(line), clock=clock, json=log_json, colour=coloured)
+    coloured = not told.log_json and sys.stderr is not None and sys.stderr.isatty()
+    terminal = sys.stderr is not None and sys.stderr.isatty()
+    shown = told.screen and terminal and not told.log_json and not told.quiet
+    silent = told.quiet or shown
+    log = LiveLog(lambda line: None if silent else tell_people(line), clock=clock, json=told.log_json, colour=coloured)
+    view, book = ScreenView() if shown else SilentView(), LiveBook()
 
     ran: list[LiveCoordinator] = []
 
@@ -85,6 +110,9 @@ def run_coordinator(
         )
         ran.append(running)
         running.ziy.listeners.append(log.entry)
+        if shown:
+            running.ziy.listeners += [book.entry, view.entry]
+            view.begin(book, running)
 
         def started() -> None:
             log.tell("coordinator", "listens", f"its clients connect to {orders.host} port {running.server.port}")
@@ -100,10 +128,24 @@ def run_coordinator(
             for part in parts:  # the coordinator first: it switches lasers off at rangers that are there still
                 part.cancel()
                 await asyncio.gather(part, return_exceptions=True)
+            view.end()
 
     run: LiveRun[None] = LiveRun(work)
-    run.result()
-    end = ran[0].journal_end if ran else None
-    if end is not None and not quiet:
-        say_now(f"journal {orders.journal}: {end}")
+    try:
+        with logging_to(log):
+            run.result()
+    except CatseyeError as problem:
+        if not told.log_json:
+            raise
+        log.tell("coordinator", "failed", str(problem), "alarm")
+        raise SystemExit(1) from None
+    if not told.quiet:
+        _say_journal_end(orders, ran)
     leave(run, terminated=0)
+
+
+def _say_journal_end(orders: "Orders", ran: "list[LiveCoordinator]") -> None:
+    """The last head of the journal's chain, on stdout."""
+    end = ran[0].journal_end if ran else None
+    if end is not None:
+        say_now(f"journal {orders.journal}: {end}")

@@ -12,7 +12,11 @@ from catseye.ranger.line import Request
 VERSION = "1"
 Rows = Iterable[tuple[str, ...]]
 HELP = {
-    "STATUS": ("STATUS", "mode; rangers ready; shots numbered; shots acknowledged; round; telescope; journal"),
+    "STATUS": (
+        "STATUS",
+        "mode; rangers ready; shots numbered; shots acknowledged; round; telescope; journal; site; last epoch; clock; "
+        "disk; holder of the lease; what is wrong",
+    ),
     "RANGERS": ("RANGERS", "a line each: name; state; shots; failures in a row; target streamed; last status; trouble"),
     "PARAMETERS": ("PARAMETERS", "a line each: name; value; value that waits; legal values"),
     "SET": ("SET name, value", "check a parameter's value and keep it until START"),
@@ -83,7 +87,11 @@ class Board:
         journal = plain(z.intake.trouble or "well")
         asked = len(z.links) - len(z.firing.dropped)
         counts = (f"{ready} of {asked}", str(z.intake.numbered), str(z.intake.acknowledged), str(z.round_number))
-        return [(z.mode, *counts, telescope, journal)]
+        now = z.condition.now()
+        epoch = "none" if now.verdict is None else f"{now.epoch} {now.verdict.word}"
+        wrong = "; ".join(problem.text for problem in now.problems) or "nothing"
+        site = (now.word, epoch, now.clock, now.disk, now.holder, plain(wrong))
+        return [(z.mode, *counts, telescope, journal, *site)]
 
     def _rangers(self) -> Rows:
         z = self._ziy

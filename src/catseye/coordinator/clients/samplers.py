@@ -54,7 +54,7 @@ def rows_of(entry: Entry) -> Iterable[tuple[str, Row]]:
     elif isinstance(entry, LiveWeather):
         values = (_number(v) for v in (entry.temperature_c, entry.pressure_hpa, entry.humidity_percent))
         yield "WEATHER", (_stamp(entry.ticks), plain(entry.station), *values)
-    elif isinstance(entry, Happening):
+    elif isinstance(entry, Happening) and entry.severity != "debug":
         yield "EVENTS", (_stamp(entry.ticks), entry.severity, plain(entry.who), plain(entry.kind), plain(entry.text))
     elif isinstance(entry, EpochSolution):
         yield from _of_solution(entry)

@@ -87,6 +87,9 @@ class StoredAnswer(TypedDict, total=False):
     pose: dict[str, Json] | None
     notes: list[str]
     jitter_mm: dict[str, float]
+    doubts: list[str]
+    biases: dict[str, dict[str, Json]]
+    returned: list[dict[str, Json]]
 
 
 @dataclass(frozen=True, eq=False)

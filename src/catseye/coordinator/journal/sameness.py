@@ -15,6 +15,7 @@ from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
 from catseye.reduction.epoch.reason import status_of
 
 NOTES, REJECTED, POSE, MISSING = "notes", "rejected", "pose", "missing"  # keys of a stored answer, and of its pose
+DOUBTS, RETURNED = "doubts", "returned"  # sentences
 SOLVED = "solved or not"  # parts that are no keys of the answer
 TICKS = "ticks asked for"
 COVARIANCE = "covariance"
@@ -84,7 +85,7 @@ def _numbers(shot: AnsweredShot) -> tuple[str, ...]:
 
 def _without_texts(answer: Mapping[str, object]) -> dict[str, object]:
     """An answer's keys with reason codes in place of reasons; notes and why a pose is missing are left out."""
-    kept = {key: value for key, value in answer.items() if key != NOTES}
+    kept = {key: value for key, value in answer.items() if key not in (NOTES, DOUBTS, RETURNED)}
     rejected, pose = kept.get(REJECTED), kept.get(POSE)
     if isinstance(rejected, Mapping):
         kept[REJECTED] = {number: _code(line) for number, line in rejected.items()}

@@ -19,7 +19,7 @@ from pydantic import ValidationError
 
 from catseye.constants import DEGREE
 from catseye.coordinator.journal.check import ChainReport
-from catseye.coordinator.journal.entries import AnsweredShot
+from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution, StoredAnswer
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
 from catseye.gateways.journal.chain import chain_object, export_verdict
@@ -153,16 +153,25 @@ def _readings(
     reader: JournalReader, run: int, span: tuple[int, int] | None, site: SiteFolder, left: LeftOut
 ) -> tuple[list[LiveWeather], dict[tuple[str, int], str]]:
     """Whole readings of the site's stations, in order of time, an hour longer than the span; and why which of them,
-    by station and ticks, the live reduction did not believe: its watch is asked again, in the journal's order."""
+    by station and ticks, does not count: the live reduction's watch is asked again, in the journal's order and with
+    what its epochs suspected, and marks whole stretches."""
     readings: list[LiveWeather] = []
     why: dict[tuple[str, int], str] = {}
-    watch = StationWatch(tuple(station.name for station in site.site.weather_station))
-    for _, entry in reader.events(run, kinds=["weather"]):
-        if isinstance(entry, LiveWeather):
+    watch = StationWatch.of(site)
+    for _, entry in reader.events(run, kinds=["weather", "solutions"]):
+        if isinstance(entry, EpochSolution):
+            watch.judged(_suspected(entry.answer))
+        elif isinstance(entry, LiveWeather):
             doubt = watch.add(entry)
             if span is None or span[0] - MARGIN <= entry.ticks < span[1] + MARGIN:
                 readings.append(entry)
-                why |= {(entry.station, entry.ticks): doubt} if doubt else {}
+                by_itself = doubt and not watch.doubting(entry.station)
+                why |= {(entry.station, entry.ticks): doubt} if by_itself else {}
+    for stretch in watch.stretches():
+        for read in readings:
+            inside = stretch.first <= read.ticks and (stretch.last is None or read.ticks <= stretch.last)
+            if read.station == stretch.station and inside:
+                why.setdefault((read.station, read.ticks), stretch.why)
     stations = {station.name for station in site.site.weather_station}
     kept: list[LiveWeather] = []
     latest: dict[str, int] = {}
@@ -178,6 +187,12 @@ def _readings(
             latest[read.station] = read.ticks
             kept.append(read)
     return kept, why
+
+
+def _suspected(answer: StoredAnswer) -> dict[str, tuple[float, bool]]:
+    """Suspicions of a stored answer, as `StationWatch.judged` takes them; none of one that an older version wrote."""
+    biases = answer.get("biases") or {}
+    return {name: (float(str(b["offset_c"])), b["judgement"] == "biased") for name, b in biases.items()}
 
 
 def _doubts(

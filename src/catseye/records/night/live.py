@@ -50,7 +50,7 @@ class LiveShot:
         return self.ticks / TICKS_PER_DAY + 0.5 * self.duration / 86_400.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class LiveWeather:
     """One reading of a weather station; a sensor that said nothing is NaN."""
 
@@ -61,7 +61,7 @@ class LiveWeather:
     humidity_percent: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class LivePosture:
     """Where the telescope says it is: azimuth clockwise from north and elevation, rad, and their rates, rad/s."""
 
@@ -72,10 +72,10 @@ class LivePosture:
     elevation_rate: float = 0.0
 
 
-Severity = Literal["note", "warning", "alarm"]
+Severity = Literal["debug", "note", "warning", "alarm"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Happening:
     """Something that a person or an analyst should know.
 
@@ -83,7 +83,7 @@ class Happening:
     who        a ranger, a station, "telescope", "coordinator", "journal"
     kind       one word with hyphens that programs compare: "connected", "lost", "blocked", "sun-refused" ...
     text       one line for people: what, the value, the limit, what to do
-    severity   note, warning, alarm
+    severity   debug (routine: a single shot, a single line), note, warning, alarm
     details    values for programs
     """
 

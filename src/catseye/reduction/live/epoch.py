@@ -5,8 +5,8 @@ the telescope had carried them, and what earlier epochs know takes the place of 
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -27,10 +27,11 @@ from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import Phases, follow_electronics
 from catseye.reduction.epoch.reason import Reason
 from catseye.reduction.epoch.settings import ReductionSettings
-from catseye.reduction.epoch.settling import SettledNetwork, allowed, settle_network
+from catseye.reduction.epoch.settling import SettledNetwork, allowed, refuted_priors, settle_network
 from catseye.reduction.epoch.unknowns import CampaignNetwork, build_network
 from catseye.reduction.live.shots import PhasedShot
 from catseye.reduction.live.state import Carried, from_ground, to_ground, with_unseen
+from catseye.reduction.live.thermometers import SuspectedBias, biases_of, considering, pull_of
 from catseye.reduction.site.motion import CarriedMotion, ground_from
 
 SHARED_BY_AN_EPOCH = (
@@ -51,12 +52,18 @@ class Epoch:
     coordinates   in the ground frame, at the epoch
     carried       all that lasts
     reasons       row of the shots: why it was left out
+    biases        station: how its thermometer may be biased
+    opened        stations whose thermometers' priors were left out
+    pulls         parameter of the air: what is doubted of its prior over the prior's variance
     """
 
     rows: tuple[PhasedShot, ...]
     coordinates: AdjustedCoordinates
     carried: Carried
     reasons: dict[int, Reason]
+    biases: dict[str, SuspectedBias] = field(default_factory=dict)
+    opened: frozenset[str] = frozenset()
+    pulls: dict[Parameter, float] = field(default_factory=dict)
 
 
 def observed_site(
@@ -115,6 +122,7 @@ def solve_epoch(
     carried: Carried | None,
     lasting: Sequence[str],
     ticks: int,
+    opened: Collection[str] = (),
 ) -> Epoch:
     """Everything that the shots of an epoch and what was carried to it say.
 
@@ -125,6 +133,7 @@ def solve_epoch(
     carried    prior at this very instant, None for the first epoch
     lasting    rangers and targets that stay in the state
     ticks      the epoch
+    opened     stations whose thermometers' records pull the carried state no more
 
     Raises InputError where no shot can be used and EstimationError where the adjustment finds no answer.
     """
@@ -155,6 +164,9 @@ def solve_epoch(
     if not network.rangers:
         raise InputError("no shot of this epoch can be used (expected a phase, a reference and a place for one)")
     settled = _judged(network, network_with, resolved.starts, predicted=carried is not None)
+    refuted = frozenset(p.of for p in refuted_priors(settled) if p.kind is ParameterKind.THERMOMETER)
+    biases = biases_of(settled.network.field, settled.solution, settled.network.layout.air)
+    settled = _claiming(settled, biases, opened=opened, refuted=refuted)
     network, frames = settled.network, frames_at(settled.network, motion)
     solution, coordinates = settled.solution, coordinates_of(settled, resolved=resolved)
     reasons |= resolved.rejected
@@ -170,7 +182,15 @@ def solve_epoch(
         ticks=ticks,
         elevation=float(motion.track.at(motion.epoch)[1]),
     )
-    return Epoch(tuple(rows), coordinates, seen if carried is None else with_unseen(carried, seen), reasons)
+    return Epoch(
+        tuple(rows),
+        coordinates,
+        seen if carried is None else with_unseen(carried, seen),
+        reasons,
+        biases,
+        refuted,
+        pull_of(network.allowance, network.field),
+    )
 
 
 def _judged(
@@ -182,15 +202,26 @@ def _judged(
 ) -> SettledNetwork:
     """The adjustment, its explanations judged; once more where something has to be allowed for.
 
-    Once: what a second adjustment would ask for, the next epoch asks for again. Doubts of the stations are told and not
-    taken in: an epoch hardly knows a gradient, and what was carried on knows their offsets from hours.
+    Once: what a second adjustment would ask for, the next epoch asks for again. Doubts of the stations are told and
+    claimed (`_claiming`), and not taken in: an epoch hardly knows a gradient, and what was carried on knows their
+    offsets from hours.
     """
     settled = settle_network(network, starts, keep=SETTLED, predicted=predicted)
-    allowance = replace(allowed(settled), thermometers={}, profile=0.0)
-    if allowance.same(settled.network.allowance):
-        return settled._replace(network=replace(settled.network, allowance=allowance))
-    network = network_with(allowance).with_strength(settled.network.strength)
-    return settle_network(network, starts, keep=SETTLED, predicted=predicted)
+    told = allowed(settled)
+    asked = replace(told, thermometers={}, profile=0.0)
+    if not asked.same(settled.network.allowance):
+        network = network_with(asked).with_strength(settled.network.strength)
+        settled = settle_network(network, starts, keep=SETTLED, predicted=predicted)
+    return settled._replace(network=replace(settled.network, allowance=replace(asked, profile=told.profile)))
+
+
+def _claiming(
+    settled: SettledNetwork, biases: Mapping[str, SuspectedBias], *, opened: Collection[str], refuted: Collection[str]
+) -> SettledNetwork:
+    """An adjustment whose claims take in what is suspected of the thermometers; the refuted are told already."""
+    network = settled.network
+    allowance = considering(network.allowance, biases, network.field, opened=opened, refuted=refuted)
+    return settled._replace(network=replace(network, allowance=allowance))
 
 
 def frames_at(network: CampaignNetwork, motion: CarriedMotion) -> dict[str, Transform]:

@@ -29,8 +29,18 @@ from catseye.reduction.live.jitter import Jitter
 from catseye.reduction.live.pose import LivePose, live_pose
 from catseye.reduction.live.repeats import joined_repeats
 from catseye.reduction.live.shots import PhasedShot, RangerNow, ShotAnswer, SolvedLine, answer, phased
-from catseye.reduction.live.state import USUAL, Carried, Loosening, carried_on, with_reference, with_velocities
-from catseye.reduction.live.weather import StationWatch
+from catseye.reduction.live.state import (
+    USUAL,
+    Carried,
+    Loosening,
+    carried_on,
+    widened,
+    with_reference,
+    with_velocities,
+    without,
+)
+from catseye.reduction.live.thermometers import SuspectedBias
+from catseye.reduction.live.weather import StationWatch, Stretch
 from catseye.reduction.site.bodies import bodies_of, lasting_names
 from catseye.reduction.site.motion import (
     LONGEST_GAP,
@@ -95,6 +105,9 @@ class EpochAnswer:
     pose          of dish and feed since the reference epoch
     notes         for people
     jitter_mm     body: how far its points were at a shot from their mean, as the epoch believed
+    doubts        why the answer is not good though it was found, a sentence each; none of a good one
+    biases        station: how its thermometer may be biased; one that is not believed at all is not in it
+    returned      stretches that turned out since the last epoch to have been biased
     """
 
     number: int
@@ -115,6 +128,9 @@ class EpochAnswer:
     pose: LivePose | None
     notes: tuple[str, ...]
     jitter_mm: Mapping[str, float] = field(default_factory=dict)
+    doubts: tuple[str, ...] = ()
+    biases: Mapping[str, SuspectedBias] = field(default_factory=dict)
+    returned: tuple[Stretch, ...] = ()
 
     def point(self, name: str) -> tuple[Array, Array]:
         """(3,) m and its covariance (3, 3).
@@ -142,6 +158,7 @@ class EpochJob:
     lasting: tuple[str, ...]
     ticks: int
     rules: ReductionSettings
+    opened: frozenset[str] = frozenset()
 
     def solve(self) -> Epoch | str:
         """The epoch, or why there is none."""
@@ -160,6 +177,7 @@ class EpochJob:
                     carried=self.carried,
                     lasting=self.lasting,
                     ticks=self.ticks,
+                    opened=self.opened,
                 )
             except CatseyeError as problem:
                 return str(problem)
@@ -181,7 +199,10 @@ class Live:
         self.bodies = bodies_of(site, self.frames)
         self.lasting = lasting_names(site)
         self.track = PostureTrack()
-        self.stations = StationWatch(tuple(s.name for s in site.site.weather_station))
+        self.stations = StationWatch.of(site)
+        self._opened: frozenset[str] = frozenset()  # stations whose thermometers' records pull the state no more
+        self._pulls: dict[Parameter, float] = {}  # of the last epoch
+        self._told: set[Stretch] = set()
         self.jitter = Jitter(self.settings.jitter_mm)
         self.rangers = {name: RangerNow() for name in site.rangers}
         self.carried: Carried | None = None
@@ -316,10 +337,21 @@ class Live:
         )
         known = {name for r in rows for name in (r.shot.ranger, r.shot.target)} & self._own.keys()
         places = {name: self._own[name] for name in sorted(known)}
+        self._start_anew(self.stations.moved(), heard=frozenset(read.station for read in weather))
         carried = self._carried_to(ticks, elevation)
-        rules = self.settings.reduction
         return EpochJob(
-            rows, weather, motion, places, self._index, azimuth, elevation, carried, self.lasting, ticks, rules
+            rows,
+            weather,
+            motion,
+            places,
+            self._index,
+            azimuth,
+            elevation,
+            carried,
+            self.lasting,
+            ticks,
+            self.settings.reduction,
+            self._opened,
         )
 
     def take_in(self, job: "EpochJob", epoch: "Epoch | str") -> EpochAnswer | None:
@@ -346,6 +378,7 @@ class Live:
         self.number += 1
         self.jitter.learn(coordinates.ranges, self.bodies)
         self.carried, self.last_ticks = epoch.carried, epoch.carried.ticks
+        self._suspect(epoch)
         frames = frames_of_points(motion, coordinates.points)
         for name, x in zip(coordinates.points, coordinates.x, strict=True):
             self._own[name] = frames[name].inverse().points(x) if name in frames else np.array(x)
@@ -359,7 +392,7 @@ class Live:
             self.set_reference()
         pose = None
         if self.number >= self.settings.reference_after:
-            pose = live_pose(self.carried, self.bodies, self.site)
+            pose = live_pose(widened(self.carried, epoch.pulls), self.bodies, self.site)
         rows = epoch.rows
         used = [n for k, on in zip(ranges.shot, ranges.used, strict=True) if on for n in rows[int(k)].numbers]
         why = dict(epoch.reasons)
@@ -387,7 +420,48 @@ class Live:
             pose,
             (*coordinates.notes, *self.stations.notes()),
             motion.jitter_mm,
+            coordinates.doubts,
+            epoch.biases,
+            self._returned(),
         )
+
+    def _suspect(self, epoch: Epoch) -> None:
+        """Take in what an epoch suspects of the thermometers.
+
+        The state itself is less sure by that where the suspicion ends unexplained, and once where the ranges say an
+        offset at which its record has pulled so far.
+        """
+        named = {n for n, each in epoch.biases.items() if each.judgement == "biased"}
+        pulled = {p: pull for p, pull in epoch.pulls.items() if p.of in named - self._opened - epoch.opened}
+        over = {p: pull for p, pull in self._pulls.items() if p not in epoch.pulls and p.of not in self._opened}
+        self.carried = widened(epoch.carried, pulled | over)
+        self._opened |= named | epoch.opened
+        self._pulls = {p: pull for p, pull in epoch.pulls.items() if p not in pulled}
+        self.stations.judged({n: (each.offset_c, n in named) for n, each in epoch.biases.items()})
+
+    def _start_anew(self, moved: frozenset[str], *, heard: frozenset[str]) -> None:
+        """Take stations' doubts into the state where they change.
+
+        moved   stations that read at another level: their offsets are forgotten
+        heard   stations that are believed now: without a suspected one nothing tells of the doubt any more
+        """
+        if self.carried is None:
+            return
+        of = {Parameter(ParameterKind.THERMOMETER, name) for name in moved}
+        left = {p for p in self._pulls if p.kind is ParameterKind.THERMOMETER and p.of not in heard}
+        if not of and not left:
+            return
+        taken = {p: v for p, v in self._pulls.items() if p in of | left or p.kind is not ParameterKind.THERMOMETER}
+        known = {p for p in self.carried.parameters if p in of}
+        self.carried = without(widened(self.carried, taken), known)
+        self._pulls = {p: pull for p, pull in self._pulls.items() if p not in taken}
+        self._opened -= moved
+
+    def _returned(self) -> tuple[Stretch, ...]:
+        """Stretches of a bias that have ended since this was asked last."""
+        ended = {s for s in self.stations.stretches() if s.last is not None and math.isfinite(s.offset_c)}
+        new, self._told = ended - self._told, ended
+        return tuple(sorted(new, key=lambda stretch: (stretch.station, stretch.first)))
 
     def _unready(self, weather: Sequence[LiveWeather]) -> str:
         if not any(not r.reason for r in self._pending):

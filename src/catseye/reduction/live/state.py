@@ -160,6 +160,21 @@ def without(carried: Carried, parameters: set[Parameter]) -> Carried:
     return replace(carried, parameters=kept, x=carried.x[at], covariance=carried.covariance[np.ix_(at, at)])
 
 
+def widened(carried: Carried, pulls: Mapping[Parameter, float]) -> Carried:
+    """The state, less sure by what some parameters' priors may be off by.
+
+    pulls   parameter: its prior's doubt over the prior's variance
+
+    Source: consider parameters, [SCHMIDT66]: P + R R', a column P_ob d / s^2 of R for each.
+    """
+    at = {parameter: i for i, parameter in enumerate(carried.parameters)}
+    columns = [(at[parameter], pull) for parameter, pull in pulls.items() if parameter in at]
+    if not columns:
+        return carried
+    reach = np.stack([pull * carried.covariance[:, i] for i, pull in columns], axis=1)
+    return replace(carried, covariance=carried.covariance + reach @ reach.T)
+
+
 def with_reference(carried: Carried, points: Sequence[str]) -> Carried:
     """The state with a copy of some points as they are now, to which later epochs compare; fully correlated."""
     copies = point_parameters(ParameterKind.REFERENCE_PLACE, points)

@@ -21,6 +21,8 @@ from catseye.records.site.folder import SiteFolder
 
 Array = NDArray[np.float64]
 KEPT = 3600.0  # s of postures that are kept
+WHOLE = 300.0  # s of which all are kept: a shot comes within two minutes
+THINNED = 1.0  # s between those that are older: only the age of a reference shot's posture is asked of them
 LONGEST_GAP = 2.0  # s between readings, or after the last, over which rates are trusted
 GROUND, ALIDADE, REFLECTOR = "ground", "alidade", "reflector"
 
@@ -33,11 +35,12 @@ class PostureTrack:
         self._reads: dict[int, LivePosture] = {}
         self._table = np.empty((5, 0))  # s from the first, angles, rates; columns beyond the readings are room
         self._turns, self._filled = 0, 0  # of azimuth before the last column; columns
+        self._thin = 0  # readings before this one are thinned out
 
     def add(self, read: LivePosture) -> None:
-        """One more reading; a second one of an instant replaces the first. Old ones are forgotten."""
+        """One more reading; a second one of an instant replaces the first. Old ones are thinned out and forgotten."""
         if self._ticks and read.ticks <= self._ticks[-1]:
-            self._filled = 0
+            self._filled, self._thin = 0, 0
         if read.ticks not in self._reads:
             insort(self._ticks, read.ticks)
         self._reads[read.ticks] = read
@@ -46,7 +49,22 @@ class PostureTrack:
             for gone in self._ticks[:first]:
                 del self._reads[gone]
             del self._ticks[:first]
-            self._filled = 0
+            self._filled, self._thin = 0, 0
+        self._thin_out()
+
+    def _thin_out(self) -> None:
+        """Forget most of the readings that are older than `WHOLE`, a block at a time."""
+        if not self._ticks or self._ticks[-1] - self._ticks[self._thin] < 1.25 * WHOLE / TICK_SECONDS:
+            return
+        end = bisect_right(self._ticks, self._ticks[-1] - round(WHOLE / TICK_SECONDS))
+        kept = [self._ticks[self._thin]]
+        for ticks in self._ticks[self._thin + 1 : end]:
+            if ticks - kept[-1] < round(THINNED / TICK_SECONDS) and ticks != self._ticks[end - 1]:
+                del self._reads[ticks]
+            else:
+                kept.append(ticks)
+        self._ticks[self._thin : end] = kept
+        self._thin, self._filled = self._thin + len(kept) - 1, 0
 
     def forget_after(self, ticks: int) -> None:
         """Forget what was stamped later: the clock was set back."""

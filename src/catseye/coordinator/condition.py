@@ -1,0 +1,236 @@
+"""Condition of a site in one look, for an operator's screen and for STATUS: what is wrong first, then who measures."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from catseye.coordinator.firing import GOOD, Firing
+from catseye.coordinator.intake import Intake
+from catseye.coordinator.journal.disk import A_DAY, AN_HOUR, DiskState, span_text
+from catseye.coordinator.journal.entries import AnsweredShot, Entry, EpochSolution
+from catseye.coordinator.link.ranger import RangerLink
+from catseye.coordinator.modes import Mode
+from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, ticks_now
+from catseye.ranger.status import StatusWord
+from catseye.records.night.live import Severity
+from catseye.verdict import Verdict
+
+START_UP = 120.0  # s in which rangers are made ready and the first round is planned
+NOTHING_FIRED = 45.0  # s: some rounds
+IDLE = 120.0  # s without a shot, when a ranger counts as idle
+NO_EPOCH = 90.0  # s without a solution
+MOST_NAMES = 3
+SIGNS = {  # a character each, for where there is no room
+    "measures": "+",
+    "last shot failed": "b",
+    "idle": ".",
+    "dark": "D",
+    "suspended": "s",
+    "another's": "L",
+    "not ready": "p",
+    "not connected": "x",
+    "trouble": "!",
+    "left out": "o",
+}
+WRONG: dict[str, Severity] = {  # of a ranger, and how bad it is
+    "idle": "warning",
+    "dark": "alarm",
+    "suspended": "warning",
+    "another's": "warning",
+    "not ready": "warning",
+    "not connected": "alarm",
+    "trouble": "warning",
+    "left out": "warning",
+}
+
+
+@dataclass(frozen=True)
+class StandingProblem:
+    """Something that stands, in one line."""
+
+    severity: Severity
+    text: str
+
+
+@dataclass(frozen=True)
+class SiteCondition:
+    """A site at one instant.
+
+    word       "starting", "well", "impaired", "alarm", or "stopped" where nothing is fired
+    problems   alarms first
+    rangers    name: a word of `SIGNS`
+    troubles   name: what lasts with a ranger, kinds of happenings
+    epoch      number of the last epoch, 0 before the first
+    verdict    on the last epoch; None before the first
+    clock      "well" or what is wrong
+    disk       of the journal: what is left; "none" without one
+    journal    "well" or what is wrong
+    holder     who may command the coordinator, "nobody"
+    """
+
+    word: str
+    problems: tuple[StandingProblem, ...]
+    rangers: Mapping[str, str]
+    troubles: Mapping[str, tuple[str, ...]]
+    epoch: int
+    verdict: Verdict | None
+    clock: str
+    disk: str
+    journal: str
+    holder: str
+
+    @property
+    def measuring(self) -> int:
+        """How many rangers measure."""
+        return sum(word in ("measures", "last shot failed") for word in self.rangers.values())
+
+
+class ConditionWatch:
+    """What decides a site's condition; fed with what is durable.
+
+    mode              of the coordinator
+    clock_believed    whether the host's clock is
+    telescope_known   whether its posture is fresh
+
+    `disk` and `holder` are set by those who know them.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        links: Mapping[str, RangerLink],
+        *,
+        firing: Firing,
+        intake: Intake,
+        mode: Callable[[], Mode],
+        clock_believed: Callable[[], bool],
+        telescope_known: Callable[[], bool],
+    ):
+        self._clock, self._links, self._firing, self._intake = clock, links, firing, intake
+        self._mode, self._clock_believed, self._telescope_known = mode, clock_believed, telescope_known
+        self._began = ticks_now(clock)
+        self._last: dict[str, tuple[int, bool]] = {}  # of each ranger's last shot: ticks of now, whether it was good
+        self._epoch, self._solved = 0, self._began
+        self._verdict: Verdict | None = None
+        self.disk: DiskState | None = None
+        self.holder = "nobody"
+
+    def entry(self, entry: Entry) -> None:
+        """Take in what is durable."""
+        if isinstance(entry, AnsweredShot):
+            self._last[entry.shot.ranger] = ticks_now(self._clock), entry.status in GOOD
+        elif isinstance(entry, EpochSolution):
+            self._verdict = verdict_of(entry)
+            if entry.answer:
+                self._epoch, self._solved = entry.answer.get("number") or 0, ticks_now(self._clock)
+
+    def now(self) -> SiteCondition:
+        """The condition at this instant."""
+        rangers = {name: self._ranger(name, link) for name, link in self._links.items()}
+        problems = [*self._machine(), *self._measuring(), *_of_rangers(rangers, starting=self._starting)]
+        problems.sort(key=lambda each: each.severity != "alarm")
+        return SiteCondition(
+            self._word(problems),
+            tuple(problems),
+            rangers,
+            {name: link.troubles for name, link in self._links.items()},
+            self._epoch,
+            self._verdict,
+            "well" if self._clock_believed() else "in doubt",
+            "none" if self.disk is None else f"{self.disk.free / 1e9:.1f} GB free",
+            self._intake.trouble or "well",
+            self.holder,
+        )
+
+    # Inside ----------------------------------------------------------------------------------------------------------
+
+    def _since(self, ticks: int) -> float:
+        return (ticks_now(self._clock) - ticks) / TICKS_PER_SECOND
+
+    @property
+    def _starting(self) -> bool:
+        return not self._last and self._since(self._began) < START_UP
+
+    @property
+    def _fired_since(self) -> float:
+        """s since the last shot, or since the start."""
+        return self._since(max((ticks for ticks, _ in self._last.values()), default=self._began))
+
+    def _ranger(self, name: str, link: RangerLink) -> str:
+        dark = bool(link.status & StatusWord.LASER_OFF) or "dark" in link.troubles
+        if name in self._firing.dropped:
+            return "left out"
+        if not link.connected:
+            return "not connected"
+        if "leased" in link.troubles:
+            return "another's"
+        if dark and link.state != "preparing" and link.wanted == "measure":
+            return "dark"
+        if link.wanted == "measure" and link.state != "ready":
+            return "not ready"
+        if self._firing.suspensions.resting(name, "", ticks_now(self._clock)):
+            return "suspended"
+        if link.troubles:
+            return "trouble"
+        ticks, good = self._last.get(name, (self._began, True))
+        if self._since(ticks) > IDLE or (name not in self._last and self._mode() != "active"):
+            return "idle"
+        return "measures" if good else "last shot failed"
+
+    def _machine(self) -> list[StandingProblem]:
+        """Problems of journal, clock and disk."""
+        found = []
+        if self._intake.trouble is not None:
+            found.append(StandingProblem("alarm", f"journal: {self._intake.trouble}: nothing is measured"))
+        if not self._clock_believed():
+            found.append(StandingProblem("alarm", "clock: this machine's is in doubt: nothing is fired"))
+        if self.disk is not None and self.disk.seconds < A_DAY:
+            severity: Severity = "alarm" if self.disk.seconds < AN_HOUR else "warning"
+            found.append(StandingProblem(severity, f"disk: full in {span_text(self.disk.seconds)}"))
+        return found
+
+    def _measuring(self) -> list[StandingProblem]:
+        """Problems of mode, telescope, shots and epochs."""
+        found = []
+        mode, quiet, unsolved = self._mode(), self._fired_since, self._since(self._solved)
+        if mode != "active":
+            found.append(StandingProblem("warning", f"mode {mode}: nothing is fired"))
+        elif quiet > NOTHING_FIRED and not self._starting:
+            found.append(StandingProblem("alarm", f"no shot for {span_text(quiet)}"))
+        if not self._telescope_known() and not self._starting:
+            found.append(StandingProblem("alarm", "telescope: no posture: targets on it are not measured"))
+        if self._verdict is not None and self._verdict.word != "good":
+            severity: Severity = "alarm" if self._verdict.word == "failed" else "warning"
+            found.append(
+                StandingProblem(severity, f"epoch {self._epoch or 'none'} {self._verdict.word}: {self._verdict.why}")
+            )
+        elif mode == "active" and unsolved > NO_EPOCH and not self._starting:
+            found.append(StandingProblem("alarm", f"no epoch for {span_text(unsolved)}"))
+        return found
+
+    def _word(self, problems: list[StandingProblem]) -> str:
+        if self._mode() != "active" or (self._fired_since > NOTHING_FIRED and not self._starting):
+            return "stopped"
+        worst = {problem.severity for problem in problems}
+        for severity, word in (("alarm", "alarm"), ("warning", "impaired")):
+            if severity in worst:
+                return word
+        return "starting" if self._starting else "well"
+
+
+def _of_rangers(rangers: Mapping[str, str], *, starting: bool) -> list[StandingProblem]:
+    """A line for each way in which rangers do not measure; while they start, being made ready is none."""
+    found = []
+    for word, severity in WRONG.items():
+        names = [name for name, each in rangers.items() if each == word]
+        if names and not (starting and word in ("not ready", "not connected", "dark", "idle")):
+            more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+            found.append(StandingProblem(severity, f"{len(names)} {word}: {', '.join(names[:MOST_NAMES])}{more}"))
+    return found
+
+
+def verdict_of(solution: EpochSolution) -> Verdict:
+    """Verdict on an epoch: failed where nothing was solved, doubtful by its own doubts, else good."""
+    if not solution.answer:
+        return Verdict("failed", "nothing could be solved")
+    points, doubts = len(solution.answer.get("names") or ()), solution.answer.get("doubts") or ()
+    return Verdict("good", f"{points} points").hearing(doubts)

@@ -1,0 +1,42 @@
+"""Events about the weather stations: readings that are not believed, thermometers that an epoch suspects."""
+
+from catseye.coordinator.event_log import EventLog
+from catseye.coordinator.parts import Clock, Tell
+from catseye.records.night.live import LiveWeather
+from catseye.reduction.live.live import EpochAnswer
+
+DOUBTED, BIASED, APART = "weather-doubted", "weather-biased", "weather-apart"
+RETURNED = "weather-returned"
+JUDGEMENTS = {"biased": BIASED, "apart": APART}
+
+
+class StationEvents:
+    """What is told of each station, once when it begins and once when it is over."""
+
+    def __init__(self, clock: Clock, tell: Tell):
+        self._clock, self._tell = clock, tell
+        self._stations: dict[str, EventLog] = {}
+        self._reduction = EventLog("reduction", clock, tell)
+
+    def read(self, reading: LiveWeather, doubt: str) -> None:
+        """Tell whether a reading is believed; `doubt` says why not, "" where it is."""
+        over = f"{reading.station} is believed again"
+        self._log(reading.station).standing(DOUBTED, doubt or None, over=over)
+
+    def solved(self, answer: EpochAnswer) -> None:
+        """Tell what an epoch suspects, and whether it is good."""
+        for stretch in answer.returned:
+            log = self._log(stretch.station)
+            log.tell(RETURNED, stretch.why, "warning", always=True, offset_c=stretch.offset_c)
+        for name in sorted({*self._stations, *answer.biases}):
+            log, suspect = self._log(name), answer.biases.get(name)
+            for judgement, kind in JUDGEMENTS.items():
+                if suspect is not None and suspect.judgement == judgement:
+                    log.standing(kind, suspect.text(name), offset_c=suspect.offset_c)
+                elif DOUBTED not in log.standings:  # one that is not in the epoch is not suspected by it
+                    log.standing(kind, None, over=f"{name}'s thermometer is not suspected any more")
+        doubt = answer.doubts[0] if answer.doubts else None
+        self._reduction.standing("epoch-doubtful", doubt, over="epochs are good again")
+
+    def _log(self, station: str) -> EventLog:
+        return self._stations.setdefault(station, EventLog(station, self._clock, self._tell))

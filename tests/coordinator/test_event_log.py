@@ -1,0 +1,27 @@
+"""Events: counted while they are quiet, and forgotten when they keep nothing back."""
+
+from catseye.coordinator.event_log import EventLog
+from catseye.simulator.clock.world_clock import ManualClock
+
+
+def test_what_keeps_nothing_back_is_forgotten():
+    """A line's kinds were kept for the whole night: a coordinator of 18 rangers and 2400 targets has many."""
+    clock, said = ManualClock(61000.0), []
+    log = EventLog("coordinator", clock, said.append)
+    for k in range(1000):
+        log.tell("blocked", f"line {k}", about=f"line {k}")
+        clock.advance(1.0)
+    assert len(log._said) <= 11
+    assert len(said) == 1000
+
+
+def test_what_was_kept_back_is_told_with_the_next_one_however_late():
+    clock, said = ManualClock(61000.0), []
+    log = EventLog("coordinator", clock, said.append)
+    for _ in range(3):
+        log.tell("blocked", "a line", about="a line")
+    for k in range(100):
+        clock.advance(1.0)
+        log.tell("blocked", f"line {k}", about=f"line {k}")
+    log.tell("blocked", "a line", about="a line")
+    assert said[-1].details["unsaid"] == 2.0
