@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
 
     from catseye.records.site.folder import SiteFolder
-    from catseye.service.coordinator import Orders, Peers
+    from catseye.service.coordinator import LiveCoordinator, Orders, Peers
     from catseye.service.logs import LiveLog
 
 LogJson = Annotated[bool, typer.Option("--log-json", help="The log as one JSON object a line.")]
