@@ -3,10 +3,11 @@
 Where a ranger has a folder of its own, the order is a file in it: a program that is started again reads it.
 """
 
-from contextlib import suppress
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 
+LOG = logging.getLogger(__name__)
 FILE = "LATCH"
 LIGHTING = frozenset(["PS", "CMEAS", "TRG", "SCN", "STM"])
 MOVING = frozenset(["AXIS", "STT", "FHM", "CIL", "CMEAS", "TRK", "SCN"])
@@ -59,9 +60,11 @@ def store_latch(folder: Path | None, latch: Latch | None) -> None:
     if folder is None:
         return
     path, new = folder / FILE, folder / f".{FILE}.new"
-    with suppress(OSError):
+    try:
         if latch is None:
             path.unlink(missing_ok=True)
             return
         new.write_text(f"{latch.extent}\n{latch.order}\n", "ascii")
         new.replace(path)
+    except OSError as problem:
+        LOG.warning("%s: the order holds until this program ends only: %s", path, problem)

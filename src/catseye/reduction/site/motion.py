@@ -72,7 +72,7 @@ class PostureTrack:
         for gone in self._ticks[first:]:
             del self._reads[gone]
         del self._ticks[first:]
-        self._filled = 0
+        self._filled, self._thin = 0, 0
 
     @classmethod
     def of(cls, reads: Sequence[LivePosture]) -> "PostureTrack":
