@@ -179,7 +179,7 @@ async def by_hand(child: LoadChild, path: Path, name: str, seconds: float, *, as
 
 @dataclass(frozen=True)
 class DarkResult:
-    """Of dark orders to rangers that all fire: how many, ms until answered, % within the limit."""
+    """Dark orders to rangers that all fire: count, ms until answered, % within the limit."""
 
     tries: int
     p50_ms: float
@@ -256,7 +256,7 @@ class FiringRanger:
 
 
 async def dark_orders(child: LoadChild, tries: int) -> DarkResult:
-    """How soon rangers that all fire are dark, one after another."""
+    """Time until rangers that all fire are dark, one after another."""
     rangers = [FiringRanger(at) for at in child.addresses.values()]
     late: list[float] = []
     rng = np.random.default_rng(40)

@@ -80,12 +80,12 @@ class SiteCondition:
 
     @property
     def measuring(self) -> int:
-        """How many rangers measure."""
+        """Number of rangers that measure."""
         return sum(word in ("measures", "last shot failed") for word in self.rangers.values())
 
 
 class ConditionWatch:
-    """What decides a site's condition; fed with what is durable.
+    """Judge of a site's condition, fed with durable entries.
 
     mode              of the coordinator
     clock_believed    whether the host's clock is

@@ -11,7 +11,7 @@ JUDGEMENTS = {"biased": BIASED, "apart": APART}
 
 
 class StationEvents:
-    """What is told of each station, once when it begins and once when it is over."""
+    """Events of each station: one when a doubt begins, one when it is over."""
 
     def __init__(self, clock: Clock, tell: Tell):
         self._clock, self._tell = clock, tell

@@ -95,7 +95,7 @@ def _exactness(each: FoundFault) -> int:
 
 
 def _names(what: Happening, each: FoundFault) -> bool:
-    """Whether a happening is a sign of a fault, about whom it touches, while it lasted or soon after."""
+    """True for an event that names a fault and its victim, while it lasted or soon after."""
     whom, _, part = each.fault.whom.partition(":")
     late = LATE * TICKS_PER_SECOND
     if what.kind not in SIGNS[each.fault.kind] or not each.begins <= what.ticks <= each.ends + late:
@@ -110,7 +110,7 @@ def _names(what: Happening, each: FoundFault) -> bool:
 
 
 def _says_the_bias(what: Happening, each: FoundFault) -> bool:
-    """Whether a doubt is of the fault: readings doubted after its end are true, an offset has its sign and size."""
+    """True for a doubt about the fault's own readings, with its sign and size."""
     if what.kind == DOUBTED:
         return what.ticks < each.ends
     offset = float(what.details.get("offset_c", "nan"))

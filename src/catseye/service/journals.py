@@ -147,7 +147,7 @@ def _copy(source: Path, new: Path, progress: Progress) -> None:
 
 
 def _sync(path: Path) -> None:
-    """What was written to a file, or a folder's names, is on the disk."""
+    """Flush a file, or a folder's names, to the disk."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -168,7 +168,7 @@ def _forget_dead(copy: Path) -> None:
 
 @dataclass(frozen=True)
 class ExportOutcome:
-    """What was exported of a run.
+    """Counts of one exported run.
 
     run      its number
     chain    what checking said
@@ -253,7 +253,7 @@ def _readable(
 
 
 def _sound(journal: str) -> bool:
-    """Whether the database can read a journal, in all its files: what is wrong with it is wrong in its rows."""
+    """True where the database can read a journal in all its files."""
     try:
         with JournalReader(journal) as reader:
             for run in reader.runs():

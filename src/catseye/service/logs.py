@@ -76,7 +76,7 @@ def epoch_of(solution: EpochSolution) -> Happening:
 
 
 class LogHandler(logging.Handler):
-    """What Python's own logging is told, as lines of a log: warnings of ports, of libraries, of the event loop."""
+    """Route Python's logging into a site's log: warnings of ports, libraries and the event loop."""
 
     def __init__(self, log: LiveLog):
         super().__init__()

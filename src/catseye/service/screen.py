@@ -294,7 +294,7 @@ class ScreenView(SilentView):
 
 
 def _problem_lines(condition: SiteCondition) -> "list[Text]":
-    """What is wrong, alarms first; of many the first, and how many more there are."""
+    """Lines of the problems, alarms first; the first of many, and the number of the rest."""
     from rich.text import Text
 
     lines = [

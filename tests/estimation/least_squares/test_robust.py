@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.estimation.least_squares.adjustment import CONVERGED, adjust
-from catseye.estimation.least_squares.conflict import LocalConflict
+from catseye.estimation.least_squares.conflict import LocalConflict, MeetingLines, contradicted, search
 from catseye.estimation.least_squares.robust import OutlierSearch, adjust_robustly
 from catseye.estimation.observations.kinds import Distances, Linear
 from draws import examples
@@ -169,12 +169,24 @@ def test_four_ranges_of_which_one_is_wrong_end_without_an_answer_not_with_a_wron
     assert "P5" in status
 
 
+def from_agreement(field, **search):
+    """The search begun where all ranges agree, as a later pass begins: nothing stands out there."""
+    everything = [np.ones(len(g.observed), dtype=bool) for g in field.groups()]
+    agreed = adjust(field.x0, field.groups(), free=field.free).require_converged()
+    assert all(np.all(np.abs(f.residual) < 3.0 * f.sigma) for f in agreed.fits[:3])
+    removable = [on & (k < 3) for k, on in enumerate(everything)]
+    outliers = OutlierSearch(field.points, **search)
+    return adjust_robustly(
+        agreed.x, field.groups(), removable, outliers=outliers, free=field.free, active=everything
+    ).require_converged()
+
+
 @pytest.mark.parametrize("station", range(3))
 def test_of_three_ranges_the_one_that_the_typed_place_contradicts_is_left_out(station):
     """Three ranges agree on any place; 0.6 m of one of them is twenty sigmas of a typed place."""
     field = Field(4, targets=3, stations=STATIONS[[0, 1, 3]], prior=0.03)
     field.observed[station][1] += 0.6
-    solution = field.adjusted().require_converged()
+    solution = from_agreement(field)
     assert field.left_out(solution) == {(station, 1)}
     error = (solution.x - field.true)[12:15]
     assert np.all(np.abs(error) < 4.0 * np.sqrt(np.diag(solution.covariance))[12:15])
@@ -189,23 +201,41 @@ def test_a_typed_place_that_no_one_range_explains_leaves_all_of_them():
     )  # a column for each range's error
     away = np.sum(directions / np.linalg.norm(directions, axis=0), axis=1)  # as far from one as from another
     field.prior[0].observed[np.argsort(columns)[3:6]] += 0.5 * away / np.linalg.norm(away)
-    assert field.left_out(field.adjusted().require_converged()) == set()
+    assert field.left_out(from_agreement(field)) == set()
 
 
-def test_a_typed_place_on_a_body_that_many_know_is_known_of_the_point():
-    """Typed places share three parameters of how their body stands: 30 m off, and known by forty points."""
-    field = Field(5, targets=40, stations=STATIONS[[0, 1, 3]])
+def test_of_two_ranges_that_explain_a_typed_place_as_well_neither_is_left_out():
+    """Two stations side by side: an error of either moves the point the same way."""
+    beside = np.array([STATIONS[0], STATIONS[0] + [0.0, 5.0, 0.0], STATIONS[3] + [0.0, 60.0, 0.0]])
+    field = Field(4, targets=3, stations=beside, prior=0.03)
+    field.observed[0][1] += 0.02
+    everything = [np.ones(len(g.observed), dtype=bool) for g in field.groups()]
+    agreed = adjust(field.x0, field.groups(), free=field.free).require_converged()
+    meeting = MeetingLines.of(field.groups(), agreed, [on & (k < 3) for k, on in enumerate(everything)], ())
+    assert [p[0] for p in contradicted(field.points, meeting)] == [field.points[1][0]]
+    local, wrong = search(field.points[1], meeting)
+    assert wrong
+    assert len(wrong) == 1
+    assert not local.decisive(wrong, 9.0)
+    assert field.left_out(from_agreement(field)) == set()
+
+
+def typed_on_a_body(seed=5, shift=(30.0, -20.0, 10.0)):
+    """Forty points whose typed places share three parameters of how their body stands, 30 m off."""
+    field = Field(seed, targets=40, stations=STATIONS[[0, 1, 3]])
     body = len(field.x0) + np.arange(3)
-    shift = np.array([30.0, -20.0, 10.0])
     places = field.true[9:].reshape(-1, 3) + np.random.default_rng(6).normal(0.0, 0.03, (40, 3)) - shift
     columns = np.stack([np.arange(9, 9 + 120), np.tile(body, 40)], axis=1)
     field.prior = [Linear("typed", places.ravel(), np.full(120, 0.03**2), columns, np.tile([1.0, -1.0], (120, 1)))]
     field.x0, field.free = np.append(field.x0, np.zeros(3)), np.append(field.free, [True] * 3)
+    return field, body.tolist()
+
+
+def test_a_typed_place_on_a_body_that_many_know_is_known_of_the_point():
+    field, body = typed_on_a_body()
     field.observed[1][7] += 0.6
-    removable = [np.ones(40, dtype=bool)] * 3 + [np.zeros(120, dtype=bool)]
-    outliers = OutlierSearch(field.points, settled=body.tolist())
-    solution = adjust_robustly(field.x0, field.groups(), removable, outliers=outliers, free=field.free)
-    assert field.left_out(solution.require_converged()) == {(1, 7)}
+    assert field.left_out(from_agreement(field, settled=body)) == {(1, 7)}
+    assert field.left_out(from_agreement(field)) == set()  # as long as the body is a parameter like others
 
 
 def test_advice_decides_between_four_ranges_and_takes_no_part_in_the_answer():

@@ -48,7 +48,7 @@ def ziy(
 
 @dataclass(frozen=True)
 class Told:
-    """What a command shows of a running site.
+    """Choice of what a command shows of a running site.
 
     log_json   the log as JSON
     screen     a screen instead of the log, where stderr is a terminal

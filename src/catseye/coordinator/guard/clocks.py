@@ -39,7 +39,7 @@ SEE = "(see to its time service)"
 
 @dataclass(frozen=True)
 class ClockVote:
-    """What the rangers' clocks with a time signal say of the count, s.
+    """Interval vote of the rangers' clocks on the count, s.
 
     rangers      that were heard
     of_one_mind  whose bounds overlap: the most that do
@@ -55,11 +55,11 @@ class ClockVote:
 
     @property
     def counts(self) -> bool:
-        """Whether enough rangers are of one mind to decide."""
+        """True where enough rangers agree to decide."""
         return self.of_one_mind >= LEAST_VOTES and 2 * self.of_one_mind > self.rangers
 
     def allows(self, offset: float) -> bool:
-        """Whether a time so many s ahead of the count may be right."""
+        """True where a time this many s ahead of the count may be right."""
         return self.low - AGREE <= offset <= self.high + AGREE
 
     def __str__(self) -> str:
@@ -166,7 +166,7 @@ class HostClock:
         self._looked = ticks_now(self._clock)
 
     def may_set(self, link: RangerLink) -> bool:
-        """Whether a ranger's clock may be set by this machine's.
+        """Permission to set a ranger's clock by this machine's.
 
         One with a time signal only where most rangers agree with the count, or a machine that starts with a wrong clock
         would set them one by one before they outvote it.
@@ -311,7 +311,7 @@ class HostClock:
         self._event_log.standing("host-clock-off", off, "alarm", over=over, offset_s=offset)
 
     def _vote(self) -> ClockVote:
-        """Of the rangers with a time signal whose offset is fresh, and of behind the last jump."""
+        """Vote of the rangers with a time signal and a fresh offset, measured after the last jump."""
         now = ticks_now(self._clock)
         return ClockVote.of(
             (link.clock_offset, link.clock_error)

@@ -175,7 +175,7 @@ def _before_chains(reader: JournalReader, report: ChainReport, heads: Sequence[H
 
 
 def _tables_there(reader: JournalReader, report: ChainReport) -> bool:
-    """Whether all tables are there; one that was taken away is a problem."""
+    """True where all tables are there; a missing one is a problem."""
     missing = sorted(set(METADATA.tables) - reader.tables)
     for name in missing:
         report.wrong(0, f"table {name!r} is missing (expected in a journal of version {reader.version})")
@@ -236,7 +236,7 @@ def _numbers(reader: JournalReader, report: ChainReport) -> int:
 
 
 def held_by(reader: JournalReader, run: int, head: Head) -> bool:
-    """Whether a run, in any of its files, has the link that a head tells."""
+    """True where a run, in any of its files, has the link of a head."""
     for part in reader.parts(run):
         if CHAIN.name not in part.tables:
             continue

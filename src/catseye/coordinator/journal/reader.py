@@ -168,7 +168,7 @@ class JournalReader:
 
     @property
     def most_events(self) -> int:
-        """How many events this file can hold at most: each has a link, of 32 bytes and its row's head."""
+        """Largest number of events that this file can hold: each has a link of 32 bytes and its row's header."""
         return MOST_WHOLE if self._where.path is None else bytes_of(self._where) // LINK_BYTES
 
     def _own_last(self, run: int) -> int:

@@ -54,7 +54,7 @@ class _Damaged(Exception):
 
 @dataclass
 class Recovery:
-    """What was recovered.
+    """Contents recovered from a damaged journal.
 
     rows    by table
     lost    cells that could not be read, or belong to no table

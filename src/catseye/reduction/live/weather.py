@@ -159,7 +159,7 @@ class StationWatch:
         return tuple(found)
 
     def doubting(self, name: str) -> bool:
-        """Whether a station is not believed now."""
+        """True while a station is not believed."""
         return name in self._stations and self._stations[name].doubted_since is not None
 
     def believed(self, ticks: int) -> list[LiveWeather]:
@@ -234,7 +234,7 @@ class StationWatch:
         self._moved.add(station.name)
 
     def _undoes(self, read: LiveWeather, before: LiveWeather | None, station: _Station) -> bool:
-        """Whether a reading is where a station without its suspected bias would be, and came there in one step."""
+        """True where a reading has left the suspected bias in one step."""
         own, offset = _median(station), station.bias[0]
         if math.isnan(own) or math.isnan(offset) or before is None:
             return False
@@ -290,7 +290,7 @@ class StationWatch:
         return [s for s in self._stations.values() if s is not station]
 
     def _seen(self, read: LiveWeather, station: _Station) -> bool:
-        """Whether another station can say how the air has changed."""
+        """True where another station has seen how the air changed."""
         return any(_change(s, read.ticks) is not None for s in self._others(station))
 
     def _by_others(self, read: LiveWeather, station: _Station) -> float:
