@@ -25,3 +25,27 @@ def test_what_was_kept_back_is_told_with_the_next_one_however_late():
         log.tell("blocked", f"line {k}", about=f"line {k}")
     log.tell("blocked", "a line", about="a line")
     assert said[-1].details["unsaid"] == 2.0
+
+
+def test_one_that_was_kept_back_does_not_keep_those_behind_it():
+    clock, said = ManualClock(61000.0), []
+    log = EventLog("coordinator", clock, said.append)
+    for k in range(1000):
+        for _ in range(1 + (k % 100 == 0)):
+            log.tell("blocked", f"line {k}", about=f"line {k}")
+        clock.advance(1.0)
+    assert len(log._said) <= 11 + 10
+    log.tell("blocked", "line 0", about="line 0")
+    assert said[-1].details["unsaid"] == 1.0
+
+
+def test_a_clock_that_was_set_back_does_not_stop_the_forgetting():
+    clock, said = ManualClock(61000.0), []
+    log = EventLog("coordinator", clock, said.append)
+    for k in range(100):
+        log.tell("blocked", f"line {k}", about=f"line {k}")
+    clock.advance(-3600.0)
+    for k in range(100, 1000):
+        log.tell("blocked", f"line {k}", about=f"line {k}")
+        clock.advance(1.0)
+    assert len(log._said) <= 11

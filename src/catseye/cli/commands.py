@@ -207,7 +207,7 @@ def _reduced(campaign: Path, out: Path | None, air_model: str, quiet: bool) -> "
     try:
         from catseye.api.night import reduce as reduced
         from catseye.api.result import save
-        from catseye.cli.memory import give_back
+        from catseye.memory import give_back
         from catseye.processors import free_threads
 
         night = reduced(campaign, air_model=air_model, progress=progress)

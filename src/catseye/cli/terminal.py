@@ -40,7 +40,7 @@ def attempt(command: Callable[[], None]) -> int:
         complain(str(problem))
         return 1
     except (MemoryError, ImportError) as problem:
-        from catseye.cli.memory import lacks_memory, out_of_memory
+        from catseye.memory import lacks_memory, out_of_memory
 
         if not lacks_memory(problem):
             raise

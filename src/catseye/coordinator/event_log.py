@@ -60,13 +60,18 @@ class EventLog:
         self._tell(Happening(now, self.who, kind, text, severity, details))
 
     def _forget(self, now: int) -> None:
-        """Forget what keeps nothing back any more: the oldest, as far as their quiet time is over."""
-        while self._said:
+        """Forget what keeps nothing back any more: two of the oldest, since each time one comes.
+
+        One that was kept back stands behind the others until its kind is told again.
+        """
+        for _ in range(2):
             key, oldest = next(iter(self._said.items()))
-            over = now - oldest.ticks >= self._quiet and not oldest.unsaid
-            if not over and len(self._said) <= MOST_KINDS:
+            full = len(self._said) > MOST_KINDS
+            if 0 <= now - oldest.ticks < self._quiet and not full:
                 return
             del self._said[key]
+            if oldest.unsaid and not full:
+                self._said[key] = oldest
 
     def standing(
         self, kind: str, text: str | None, severity: Severity = "warning", *, over: str = "", **details: float | str

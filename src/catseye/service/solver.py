@@ -6,7 +6,6 @@ and gives way to everything else (`nice`). Should it die, the epoch is solved he
 
 import asyncio
 import copyreg
-import ctypes
 import io
 import os
 import pickle
@@ -18,6 +17,7 @@ from contextlib import suppress
 from functools import partial
 from typing import Any, BinaryIO
 
+from catseye.memory import give_back
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.live.live import EpochJob
 
@@ -151,12 +151,6 @@ def serve() -> None:
             give_back()
     except (EOFError, OSError):
         return
-
-
-def give_back() -> None:
-    """Give memory that is free back to the system, where the C library can: an epoch takes tens of MB for a second."""
-    with suppress(OSError, AttributeError):
-        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _send(pipe: Any, message: bytes) -> None:

@@ -1,4 +1,4 @@
-"""One line for a run that has too little memory: how much more it asked for, and what it had."""
+"""Memory of a process: freed pages returned to the system, and one line for a run that has too little."""
 
 import ctypes
 import math

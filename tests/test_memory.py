@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from catseye.cli.memory import lacks_memory, memory_of_a_killed, out_of_memory
+from catseye.memory import lacks_memory, memory_of_a_killed, out_of_memory
 from catseye.cli.terminal import attempt
 from process_scene import ends_with_us
 
