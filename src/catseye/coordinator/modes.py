@@ -25,7 +25,7 @@ def mode_of(text: str) -> Mode:
     raise InputError(f"mode {text[:20]!a} (expected active, passive or hold)")
 
 
-@dataclass
+@dataclass(slots=True)
 class _Record:
     failures: int = 0
     rest: float = FIRST_REST

@@ -90,7 +90,7 @@ class PhasedShot:
         return self.repeats or (self.shot.number,)
 
 
-@dataclass
+@dataclass(slots=True)
 class SolvedLine:
     """What a line's last epoch made of its range: optical path = index (distance + added), m."""
 
