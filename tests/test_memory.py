@@ -9,8 +9,8 @@ import sys
 import numpy as np
 import pytest
 
-from catseye.memory import lacks_memory, memory_of_a_killed, out_of_memory
 from catseye.cli.terminal import attempt
+from catseye.memory import lacks_memory, memory_of_a_killed, out_of_memory
 from process_scene import ends_with_us
 
 GIB = 2**30
@@ -69,6 +69,14 @@ def limited(mebibytes, *words, code="from catseye.cli.main import run; run()"):
         preexec_fn=limit,
         timeout=120,
     )
+
+
+def test_llvmlite_that_finds_no_room_is_memory_only_under_a_limit(monkeypatch):
+    problem = OSError("Could not find/load shared object file 'libllvmlite.so' from resource location")
+    for soft, short in ((900 << 20, True), (resource.RLIM_INFINITY, False)):
+        monkeypatch.setattr(resource, "getrlimit", lambda which, soft=soft: (soft, soft))
+        assert lacks_memory(problem) is short
+    assert not lacks_memory(FileNotFoundError("night.csv"))
 
 
 @pytest.mark.parametrize("mebibytes", [100, 160, pytest.param(220, marks=pytest.mark.slow), 330])

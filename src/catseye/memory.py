@@ -7,6 +7,7 @@ from contextlib import suppress
 
 GIB = 2.0**30
 UNLOADED = ("failed to map segment", "cannot allocate memory", "Cannot allocate memory")  # the loader's words
+UNFOUND = "load shared object file"  # llvmlite's, whose file is missing or did not fit
 ADVICE = "expected a machine or a limit with more; fewer shots or points at once need less"
 
 
@@ -16,12 +17,14 @@ def give_back() -> None:
         ctypes.CDLL(None).malloc_trim(0)
 
 
-def lacks_memory(problem: MemoryError | ImportError) -> bool:
+def lacks_memory(problem: MemoryError | ImportError | OSError) -> bool:
     """True for an error of memory, and for a library that did not fit into it."""
-    return isinstance(problem, MemoryError) or any(words in str(problem) for words in UNLOADED)
+    text = str(problem)
+    unfit = any(words in text for words in UNLOADED) or (UNFOUND in text and bool(_limit()))
+    return isinstance(problem, MemoryError) or unfit
 
 
-def out_of_memory(problem: MemoryError | ImportError) -> str:
+def out_of_memory(problem: MemoryError | ImportError | OSError) -> str:
     """One line: the memory asked for, where the error says it, and the memory in use.
 
     >>> out_of_memory(MemoryError()).partition(" (limit")[0].partition(" with")[0]

@@ -109,7 +109,7 @@ def _woken_by_signals() -> int:
 
 
 def _complain_of(name: str, memory: int) -> None:
-    from catseye.memory import memory_of_a_killed
     from catseye.cli.terminal import complain
+    from catseye.memory import memory_of_a_killed
 
     complain(memory_of_a_killed(name, memory))

@@ -39,15 +39,15 @@ def attempt(command: Callable[[], None]) -> int:
     except CatseyeError as problem:
         complain(str(problem))
         return 1
-    except (MemoryError, ImportError) as problem:
+    except (MemoryError, ImportError, OSError) as problem:
         from catseye.memory import lacks_memory, out_of_memory
 
-        if not lacks_memory(problem):
+        if lacks_memory(problem):
+            complain(out_of_memory(problem))
+        elif isinstance(problem, OSError):
+            complain(f"{problem.filename or 'input or output'}: {problem.strerror or problem}")
+        else:
             raise
-        complain(out_of_memory(problem))
-        return 1
-    except OSError as problem:
-        complain(f"{problem.filename or 'input or output'}: {problem.strerror or problem}")
         return 1
     return 0
 

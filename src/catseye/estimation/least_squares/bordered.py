@@ -24,7 +24,7 @@ from catseye.processors import in_parts, on_threads, threads
 
 WIDE = 1000  # parameters of the border from which one more core is worth waking
 SAME = 2e-6  # relative change of a row up to which an earlier elimination serves; tests take differences of such
-ROUGH = 1e-5  # the same where tests good to a thousandth will do, of what others check
+ROUGH = 1e-4  # the same where tests w good to a hundredth will do, of what others check
 NEAR = 1e-2  # and for a step, which is refined
 MOST_CHANGED = 400  # rows that came or went since, beyond which a new elimination is quicker
 DENSE = 30  # columns from which rows of a matrix are multiplied as one
