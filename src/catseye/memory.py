@@ -8,6 +8,7 @@ from contextlib import suppress
 GIB = 2.0**30
 UNLOADED = ("failed to map segment", "cannot allocate memory", "Cannot allocate memory")  # the loader's words
 UNFOUND = "load shared object file"  # llvmlite's, whose file is missing or did not fit
+WORKSPACE = 96 * 2**20  # bytes: 32 MiB a library and thread of OpenBLAS, and what they are called with
 ADVICE = "expected a machine or a limit with more; fewer shots or points at once need less"
 
 
@@ -15,6 +16,25 @@ def give_back() -> None:
     """Return freed memory to the system, before a step that needs much of it; glibc keeps what lies in pieces."""
     with suppress(OSError, AttributeError):
         ctypes.CDLL(None).malloc_trim(0)
+
+
+def reserve_workspace() -> None:
+    """Let both BLAS libraries take their workspace at once, where the address space is limited.
+
+    OpenBLAS repeats an mmap that fails for ever: a run that came to it with no room left would never end.
+
+    Raises MemoryError: no room even now.
+    """
+    soft, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if soft == resource.RLIM_INFINITY:
+        return
+    import numpy as np
+    import scipy.linalg
+
+    if soft - _in_use() < WORKSPACE:
+        raise MemoryError
+    scipy.linalg.cholesky(np.eye(300))
+    np.ones((900, 900)) @ np.ones((900, 900))
 
 
 def lacks_memory(problem: MemoryError | ImportError | OSError) -> bool:

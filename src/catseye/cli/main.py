@@ -38,5 +38,8 @@ def stopped(number: int, frame: FrameType | None = None) -> None:
 
 def _main() -> None:
     from catseye.cli.commands import main  # under `finish`: what fails while it is imported is one line, too
+    from catseye.memory import reserve_workspace
 
+    if sys.argv[1:2] and not sys.argv[1].startswith("-"):
+        reserve_workspace()
     main()
