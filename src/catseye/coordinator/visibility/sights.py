@@ -13,7 +13,7 @@ from catseye.records.site.solids import Solids
 from catseye.reduction.steering.visibility import RangeLimits, Retroreflectors, Sight, Visibility, frames_at, visibility
 
 STEP = 0.5 * DEGREE  # of azimuth and elevation, within which the answer is kept
-KEPT = 64  # answers
+KEPT = 8  # answers; one takes some ms, and a telescope that tracks does not come back
 
 
 @dataclass(frozen=True, eq=False)
