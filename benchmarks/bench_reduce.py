@@ -227,7 +227,7 @@ def one_step(campaign, reduction) -> dict[str, float]:
     return {"step": ours, "splu": time.perf_counter() - before}
 
 
-WHOLE, NEXT = (2209, 0.43), (5000, 2.15)  # prisms, and how often each is shot again: 20 000 and 100 000 shots
+WHOLE, NEXT = (2209, 0.43, 8.0), (5000, 2.15, 4.8)  # prisms, how often each is shot again, s between two shots
 
 
 def used(arguments: list[str]) -> tuple[float, float, float, str]:
@@ -246,13 +246,13 @@ def used(arguments: list[str]) -> tuple[float, float, float, str]:
     return usage.ru_utime + usage.ru_stime, wall, usage.ru_maxrss / 1e6, why
 
 
-def files_and_page(prisms: int, again: float) -> None:
+def files_and_page(prisms: int, again: float, interval_s: float) -> None:
     """Commands on a whole dish: the answer alone, the answer with every file and the page, then pose and surface."""
     from catseye.api.night import night
 
     with tempfile.TemporaryDirectory() as directory:
         place, out = Path(directory) / "night", Path(directory) / "out"
-        night(place, dish_prisms=prisms, again=again, nature=0.0)
+        night(place, dish_prisms=prisms, again=again, interval_s=interval_s, nature=0.0)
         shots = len(read_campaign(place).shots.shot)
         sys.stdout.write(f"Commands of {prisms} prisms, {shots} shots      processor       wall     memory\n")
         used(["reduce", str(EXAMPLE), "--json"])  # kernels compiled
