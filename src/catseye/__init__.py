@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from catseye.api.laboratory import baseline, calibrate, triplet
     from catseye.api.living import replay, simulate
     from catseye.api.network import adjust, compare, locate, plan
-    from catseye.api.night import explain, reduce
+    from catseye.api.night import explain, night, reduce
+    from catseye.api.optics import beam, glass, link, safety
     from catseye.api.reading import examples, load
     from catseye.api.result import save, show
     from catseye.api.steering import point, track
@@ -30,6 +31,7 @@ FACE = {  # file of catseye.api -> what of it is catseye's
     "living": ("replay", "simulate"),
     "network": ("adjust", "compare", "locate", "plan"),
     "night": ("explain", "night", "reduce"),
+    "optics": ("beam", "glass", "link", "safety"),
     "reading": ("examples", "load"),
     "result": ("save", "show"),
     "steering": ("point", "track"),
@@ -47,10 +49,13 @@ __all__ = [
     "adjust",
     "air",
     "baseline",
+    "beam",
     "calibrate",
     "compare",
     "examples",
     "explain",
+    "glass",
+    "link",
     "load",
     "locate",
     "night",
@@ -60,6 +65,7 @@ __all__ = [
     "reduce",
     "refractometer",
     "replay",
+    "safety",
     "save",
     "show",
     "simulate",

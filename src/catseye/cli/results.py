@@ -1,7 +1,7 @@
 """How commands end: a result told to people or programs, written where asked, and the exit status it deserves."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,12 +20,14 @@ def tell(
     json: bool,
     quiet: bool = False,
     strict: bool = False,
+    sentences: bool = True,
     rows: Iterable[str] = (),
     under: str = "",
     written: Sequence[tuple[str, object]] = (),
 ) -> None:
     """Say a result: its JSON, or verdict, sentences and rows; then leave with 1 where `strict` asks for it.
 
+    sentences   False where the rows say all of them
     rows      lines for people only, which follow the sentences
     under     or follow the passage of this title
     written   title and what was written under it; None: nothing was
@@ -36,9 +38,9 @@ def tell(
         say(json_line(result.to_object()))
     elif not quiet:
         say(wrapped("Verdict", result.verdict.text))
-        for passage in result.passages():
+        for passage in result.passages() if sentences else ():
             say(wrapped(passage.title, passage.text))
-            if passage.title == under:
+            if under and passage.title == under:
                 say("\n".join(rows))
         if not under:
             say("\n".join(rows))
@@ -46,12 +48,6 @@ def tell(
             if what is not None:
                 say(wrapped(title, str(what)))
     judge(result.verdict, strict=strict)
-
-
-def say_verdict(answer: "Mapping[str, Any]") -> None:
-    """Say the verdict of an answer that is an object already."""
-    word, why = answer["verdict"]["word"], answer["verdict"]["why"]
-    say(wrapped("Verdict", f"{word.capitalize()}: {why}."))
 
 
 def judge(verdict: "Verdict", *, strict: bool) -> None:

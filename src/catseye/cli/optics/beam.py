@@ -7,8 +7,7 @@ from typing import Annotated
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
-from catseye.cli.results import say_verdict
-from catseye.cli.terminal import say
+from catseye.cli.results import tell
 
 
 def _distance(value: float | None) -> float | None:
@@ -35,23 +34,15 @@ def beam(
     quiet: Quiet = False,
 ) -> None:
     """A laser beam through lenses, mirrors and a retroreflector to the detector: sizes, clipping, power."""
-    from catseye.gateways.optics.beam_figures import beam_object, lines, read_beam, write_beam
-    from catseye.gateways.writers.objects import json_line
-    from catseye.gateways.writers.output import refuse_output, whole_directory
+    from catseye.api.optics import beam as beam_of
+    from catseye.api.result import save
+    from catseye.gateways.writers.output import refuse_output
 
     if out is not None:
         refuse_output(out, file)
-    beam_path, hashes = read_beam(file, distance_m)
+    result = beam_of(file, distance_m=distance_m)
+    written: tuple[str, ...] = ()
     if out is not None:
-        with whole_directory(out, file) as directory:
-            write_beam(beam_path, directory, hashes)
-    if json:
-        say(json_line(beam_object(beam_path)))
-        return
-    if quiet:
-        return
-    say_verdict(beam_object(beam_path))
-    for line in lines(beam_path):
-        say(line)
-    if out is not None:
-        say(f"written to {out}/: beam.csv, returned.csv, beam.json, beam.svg, provenance.json")
+        save(result, out)
+        written = (f"written to {out}/: beam.csv, returned.csv, beam.json, beam.svg, provenance.json",)
+    tell(result, json=json, quiet=quiet, sentences=False, rows=(*result.rows(), *written))

@@ -6,8 +6,7 @@ from typing import Annotated
 import typer
 
 from catseye.cli.commands import Json, app
-from catseye.cli.results import say_verdict
-from catseye.cli.terminal import say, wrapped
+from catseye.cli.results import tell
 
 
 def _height(value: float) -> float:
@@ -31,13 +30,6 @@ def glass(
     json: Json = False,
 ) -> None:
     """Index of a glass, its slopes, what a prism of it does to a range, and what a wrong glass costs."""
-    from catseye.gateways.optics.glass_objects import glass_object, glass_rows, table_object, table_rows
-    from catseye.gateways.writers.objects import json_line
+    from catseye.api.optics import glass as glass_of
 
-    answer = table_object() if name is None else glass_object(name, wavelength_um, temperature_c, height_mm=height_mm)
-    if json:
-        say(json_line(answer))
-        return
-    say_verdict(answer)
-    for title, text in table_rows() if name is None else glass_rows(answer):
-        say(wrapped(title, text))
+    tell(glass_of(name, wavelength_um=wavelength_um, temperature_c=temperature_c, height_mm=height_mm), json=json)

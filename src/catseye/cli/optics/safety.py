@@ -5,8 +5,8 @@ from typing import Annotated
 import typer
 
 from catseye.cli.commands import Json, app
-from catseye.cli.results import say_verdict
-from catseye.cli.terminal import say, wrapped
+from catseye.cli.results import tell
+from catseye.cli.terminal import wrapped
 from catseye.cli.vocabularies import EDITIONS, one_of
 
 
@@ -49,30 +49,23 @@ def safety(  # noqa: PLR0913 - its options are its command line
     json: Json = False,
 ) -> None:
     """Laser safety of a beam: limits of exposure, class with reasons, hazard distances."""
-    from catseye.gateways.optics.safety_objects import Question, safety_object, safety_passages, safety_table
-    from catseye.gateways.writers.objects import json_line
-    from catseye.optics.safety.hazard import LaserBeam
+    from catseye.api.optics import safety as safety_of
 
     if scan_period_s is not None and scan_rad_per_s is None:
         raise typer.BadParameter("needs --scan-rad-per-s.", param_hint="'--scan-period-s'")
-    answer = safety_object(
-        Question(
-            LaserBeam(power_mw * 1e-3, wavelength_um, diameter_mm * 1e-3, divergence_mrad * 1e-3, waist_distance),
-            edition=edition,
-            duration=duration_s,
-            aided=aided,
-            subtense=subtense_mrad * 1e-3,
-            scan=scan_rad_per_s,
-            period=scan_period_s,
-            reflector_distance=reflector_distance,
-            reflector_diameter=reflector_diameter_mm * 1e-3,
-        )
+    result = safety_of(
+        power_mw,
+        wavelength_um,
+        diameter_mm,
+        divergence_mrad,
+        waist_distance=waist_distance,
+        duration_s=duration_s,
+        aided=aided,
+        scan_rad_per_s=scan_rad_per_s,
+        scan_period_s=scan_period_s,
+        reflector_distance=reflector_distance,
+        reflector_diameter_mm=reflector_diameter_mm,
+        subtense_mrad=subtense_mrad,
+        edition=edition,
     )
-    if json:
-        say(json_line(answer))
-        return
-    say_verdict(answer)
-    for title, text in safety_passages(answer):
-        say(wrapped(title, text))
-    say("\n" + safety_table(answer) + "\n")
-    say(wrapped("Note", answer["notice"]))
+    tell(result, json=json, rows=("", *result.rows(), "", wrapped("Note", result.values["notice"])))

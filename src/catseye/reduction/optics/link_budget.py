@@ -11,6 +11,9 @@ from catseye.optics.receiver import noise_density, signal_current, u_phase
 from catseye.optics.retroreflector.prism import clear_share
 from catseye.reduction.optics.link import Link, LinkReflector
 from catseye.signal.systematics.leakage import worst_range_error
+from catseye.verdict import Verdict
+
+NOISY = 1e-3  # m, noise of a range beyond which a link is doubtful
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,15 @@ class LinkBudget:
     crosstalk_range: float
     noise_shares: dict[str, float]
     clipped: bool
+
+    @property
+    def verdict(self) -> Verdict:
+        """Good where the return fits the converter and the noise of a range stays below a millimetre."""
+        if self.clipped:
+            return Verdict("doubtful", "the return is more than the converter takes: it clips")
+        if self.u_range > NOISY:
+            return Verdict("doubtful", f"the range's noise is {1e3 * self.u_range:.2g} mm")
+        return Verdict("good", f"a return of {self.amplitude_volt:.3g} V, noise of a range below 1 mm")
 
 
 def link_budget(
