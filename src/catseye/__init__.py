@@ -11,7 +11,7 @@ Its functions are those of the files in `catseye.api`, loaded when they are firs
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from catseye.errors import CatseyeError, EstimationError, FrameError, InputError, ValidityError
+from catseye.errors import ArgumentError, CatseyeError, EstimationError, FrameError, InputError, ValidityError
 from catseye.version import __version__
 
 if TYPE_CHECKING:
@@ -40,6 +40,7 @@ FACE = {  # file of catseye.api -> what of it is catseye's
 }
 
 __all__ = [
+    "ArgumentError",
     "CatseyeError",
     "EstimationError",
     "FrameError",

@@ -2,6 +2,7 @@
 
 CatseyeError
 ├── InputError        a file, table or record that cannot be used
+│   └── ArgumentError arguments of a call that do not fit together
 ├── ValidityError     a value outside the range where a formula holds
 ├── FrameError        transforms or points whose frames do not join
 └── EstimationError   an adjustment that gave no answer, raised only when the answer is required
@@ -16,6 +17,17 @@ class CatseyeError(Exception):
 
 class InputError(CatseyeError):
     """A file, table or record that cannot be used."""
+
+
+class ArgumentError(InputError):
+    """Arguments of a call that do not fit together; the command line names its options and exits with 2.
+
+    names   of the arguments that the text names
+    """
+
+    def __init__(self, text: str, *names: str) -> None:
+        super().__init__(text)
+        self.names = names
 
 
 class ValidityError(CatseyeError, ValueError):

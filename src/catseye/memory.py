@@ -8,7 +8,7 @@ from contextlib import suppress
 GIB = 2.0**30
 UNLOADED = ("failed to map segment", "cannot allocate memory", "Cannot allocate memory")  # the loader's words
 UNFOUND = "load shared object file"  # llvmlite's, whose file is missing or did not fit
-WORKSPACE = 96 * 2**20  # bytes: 32 MiB a library and thread of OpenBLAS, and what they are called with
+WORKSPACE = 200 * 2**20  # bytes: 32 MiB a library and thread of OpenBLAS, the libraries themselves, their arguments
 ADVICE = "expected a machine or a limit with more; fewer shots or points at once need less"
 
 
@@ -28,11 +28,11 @@ def reserve_workspace() -> None:
     soft, _ = resource.getrlimit(resource.RLIMIT_AS)
     if soft == resource.RLIM_INFINITY:
         return
+    if soft - _in_use() < WORKSPACE:
+        raise MemoryError
     import numpy as np
     import scipy.linalg
 
-    if soft - _in_use() < WORKSPACE:
-        raise MemoryError
     scipy.linalg.cholesky(np.eye(300))
     np.ones((900, 900)) @ np.ones((900, 900))
 

@@ -39,6 +39,13 @@ OTHER = {  # unit of ours -> another unit, and what one of ours is in it, by han
     "arcsec": ("mas", 1e3),
     "deg / s": ("arcmin / s", 60.0),
     "s": ("min", 1.0 / 60.0),
+    "mrad": ("rad", 1e-3),
+    "rad / s": ("mrad / s", 1e3),
+    "m / s2": ("mm / s2", 1e3),
+    "mW": ("W", 1e-3),
+    "uW": ("mW", 1e-3),
+    "V": ("mV", 1e3),
+    "mmHg": ("hPa", 1.33322387415),
     "min": ("s", 60.0),
     "GHz": ("MHz", 1e3),
     "": ("percent", 100.0),
@@ -100,7 +107,7 @@ def test_the_unit_declared_is_the_one_of_the_name(function, argument, unit):
     if said is not None:
         assert (unit.unit, unit.difference) == (said.unit, said.difference)
     else:
-        assert unit.unit in ("", "m", "min")  # no ending: metres, or a pure number; `minutes` says it whole
+        assert unit.unit in ("", "m", "s", "m / s2", "min")  # no ending: SI, or a pure number; `minutes` says it whole
 
 
 def arguments(function, argument, value):

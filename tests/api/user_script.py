@@ -23,7 +23,7 @@ def user_script() -> None:
     assert_type(shot.u_range, float | None)
     shot.u  # type: ignore[attr-defined]  # noqa: B018
 
-    catseye.air(20.0, 933.0)  # type: ignore[call-arg]
+    catseye.air()  # type: ignore[call-arg]
     catseye.reduced  # type: ignore[attr-defined]  # noqa: B018
 
     assert_type(catseye.simulate(minutes=1.0).seconds, float)

@@ -178,13 +178,13 @@ def link(
     incidence_deg: Annotated[Any, In("deg", one=True)] = 0.0,
     offset_mm: Annotated[Any, In("mm", one=True)] = 0.0,
     power_mw: Annotated[Any, In("mW", one=True)] = Link.power * 1e3,
-    depth: float = Link.depth,
+    depth: Annotated[Any, In("", one=True)] = Link.depth,
     waist_mm: Annotated[Any, In("mm", one=True)] = Link.waist * 1e3,
     receiver_mm: Annotated[Any, In("mm", one=True)] = Link.receiver * 1e3,
-    transmission: float = Link.transmission,
+    transmission: Annotated[Any, In("", one=True)] = Link.transmission,
     aperture_mm: Annotated[Any, In("mm", one=True)] = LinkReflector.aperture * 1e3,
     height_mm: Annotated[Any, In("mm", one=True)] = LinkReflector.height * 1e3,
-    index: float = LinkReflector.index,
+    index: Annotated[Any, In("", one=True)] = LinkReflector.index,
     duration: Annotated[Any, In("s", one=True)] = Link.duration,
     blocked_noise_volt: Annotated[Any, In("V", one=True)] = Link.blocked_noise_volt,
     background_uw: Annotated[Any, In("uW", one=True)] = 0.0,
@@ -393,7 +393,7 @@ class BeamResult(Result):
         return dict(self.hashes)
 
     def sources(self) -> tuple[Path, ...]:
-        """The file that was read."""
+        """The beam's file, which `save` must not write over."""
         return (self.source,)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:

@@ -39,6 +39,8 @@ UNITS_OF_NAMES = {  # ending of a name -> its unit as astropy spells it; the lon
     "_deg": "deg",
     "_arcsec": "arcsec",
     "_rad": "rad",
+    "_mrad": "mrad",
+    "_rad_per_s": "rad / s",
     "_s": "s",
     "_hz": "Hz",
     "_khz": "kHz",
@@ -47,7 +49,9 @@ UNITS_OF_NAMES = {  # ending of a name -> its unit as astropy spells it; the lon
     "_db": "dB",
     "_mjd": "mjd",
     "_mw": "mW",
+    "_uw": "uW",
     "_v": "V",
+    "_volt": "V",
 }
 SPELLINGS = {  # as files and other programs write units, in lower case; some of them are others in astropy ("mb", "C")
     "deg_C": ("degc", "deg_c", "c", "celsius", "°c", "degree_celsius", "degrees_celsius", "degree celsius", "oc"),

@@ -12,6 +12,7 @@ from catseye.api.reading import place_of
 from catseye.api.result import Progress, Result, quantities
 from catseye.api.units import In, with_units
 from catseye.atmosphere.index.model import IndexSensitivity
+from catseye.errors import ArgumentError
 
 if TYPE_CHECKING:
     from astropy.table import QTable
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from catseye.atmosphere.index.air import AirState
     from catseye.atmosphere.sound.model import SoundSensitivity
     from catseye.atmosphere.sound.speed import Sound
+    from catseye.atmosphere.weather.condensation import Condensation
     from catseye.gateways.writers.passage import Passage
     from catseye.reduction.air.refractometer_calibration import PathCalibration
 
@@ -38,6 +40,7 @@ class AirResult(Result):
     formula_uncertainty          the formula's own part
     model                        name of the formula
     uncertainty_of               inputs whose uncertainty the standard uncertainty has
+    condensation                 on a surface in this air; None: no surface was given
     """
 
     temperature_c: Any
@@ -55,20 +58,30 @@ class AirResult(Result):
     model: str
     state: "AirState"
     uncertainty_of: tuple[str, ...]
+    condensation: "Condensation | None" = None
 
     def passages(self) -> "Sequence[Passage]":
-        """The index, its uncertainty and its slopes."""
+        """The index, its uncertainty and its slopes; dew or frost on the surface."""
         from catseye.gateways.air.objects import air_passages
+        from catseye.gateways.writers.passage import Passage
 
-        return air_passages(self.to_object())
+        surface = () if self.condensation is None else (Passage("surface", self.condensation.lines()[0]),)
+        return [*air_passages(self.to_object()), *surface]
 
     def to_object(self) -> dict[str, Any]:
         """As `catseye air --json`."""
         from catseye.gateways.air.objects import air_object
 
-        return air_object(
-            self.state, self.wavelength_um, self.standard_uncertainty, verdict=self.verdict, stated=self.uncertainty_of
+        answer = air_object(
+            self.state,
+            self.wavelength_um,
+            self.standard_uncertainty,
+            verdict=self.verdict,
+            stated=self.uncertainty_of,
+            u_formula=self.formula_uncertainty,
         )
+        surface = {} if self.condensation is None else {"condensation": self.condensation._asdict()}
+        return {**answer, **surface}
 
     def tables(self) -> "dict[str, QTable]":
         """One table, a row for each state."""
@@ -91,60 +104,142 @@ class AirResult(Result):
 @with_units
 def air(
     temperature_c: Annotated[Any, In("deg_C")],
-    pressure_hpa: Annotated[Any, In("hPa")],
-    humidity_percent: Annotated[Any, In("percent")],
+    pressure_hpa: Annotated[Any, In("hPa")] = None,
+    humidity_percent: Annotated[Any, In("percent")] = None,
     *,
+    dew_point_c: Annotated[Any, In("deg_C")] = None,
+    frost_point_c: Annotated[Any, In("deg_C")] = None,
+    wet_bulb_c: Annotated[Any, In("deg_C")] = None,
+    ice_bulb_c: Annotated[Any, In("deg_C")] = None,
+    vapour_pressure_hpa: Annotated[Any, In("hPa")] = None,
+    barometer_mmhg: Annotated[Any, In("mmHg")] = None,
+    mercury_c: Annotated[Any, In("deg_C")] = None,
+    gravity: Annotated[Any, In("m / s2")] = None,
+    latitude_deg: Annotated[Any, In("deg")] = None,
+    elevation_m: Annotated[Any, In("m")] = None,
+    above_barometer_m: Annotated[Any, In("m")] = 0.0,
     wavelength_um: Annotated[Any, In("um")] = 0.780,
     model: str = "ciddor_hill1999",
     co2_ppm: Annotated[Any, In("ppm")] = 450.0,
     u_temperature_c: Annotated[Any, In("deg_C", difference=True)] = 0.0,
     u_pressure_hpa: Annotated[Any, In("hPa")] = 0.0,
+    u_barometer_mmhg: Annotated[Any, In("mmHg")] = 0.0,
+    u_mercury_c: Annotated[Any, In("deg_C", difference=True)] = 0.0,
     u_humidity_percent: Annotated[Any, In("percent")] = 0.0,
+    u_dew_point_c: Annotated[Any, In("deg_C", difference=True)] = 0.0,
+    u_wet_bulb_c: Annotated[Any, In("deg_C", difference=True)] = 0.0,
+    u_vapour_pressure_hpa: Annotated[Any, In("hPa")] = 0.0,
     u_co2_ppm: Annotated[Any, In("ppm")] = 0.0,
+    surface_c: Annotated[Any, In("deg_C")] = None,
+    u_surface_c: Annotated[Any, In("deg_C", difference=True)] = 0.0,
 ) -> AirResult:
-    """Index of air, with sensitivities and uncertainty.
+    """Index of air from any instruments, with sensitivities and uncertainty.
 
-    temperature_c      air temperature, °C; as the next two a number or an array, broadcast together
-    pressure_hpa       total pressure, hPa
-    humidity_percent   relative humidity over liquid water, %
+    temperature_c      air temperature, °C; as all others a number or an array, broadcast together
+    pressure_hpa       total pressure, hPa; or a mercury barometer:
+    barometer_mmhg, mercury_c   mercury as read, mm, and its temperature, °C, with
+    gravity            there, m/s², or latitude_deg (degrees) and elevation_m (m above the sea)
+    above_barometer_m  height of this air above the barometer, m
+    humidity_percent   relative humidity over liquid water, %; or one of
+    dew_point_c, frost_point_c, wet_bulb_c, ice_bulb_c   of a mirror, or of a psychrometer with water or ice, °C
+    vapour_pressure_hpa   partial pressure of the vapour, hPa
     wavelength_um      of the carrier in vacuum, µm
     model              ciddor_hill1999, rueger1990, iag1999_closed or barrell_sears1963
     co2_ppm            carbon dioxide, ppm, where the model has it
     u_...              standard uncertainties of the inputs; with none the result's is the formula's alone
+    surface_c          temperature of a retroreflector, °C: will it dew or frost over?
 
-    Raises ValidityError where a value is outside the range of the formula.
-    Source: the model's own file in `catseye.atmosphere.index`.
+    Raises ValidityError: a value outside the range of the formula; ArgumentError: arguments that do not fit together.
+    Source: the model's own file in `catseye.atmosphere.index`; `catseye.reduction.air.routes` for the instruments.
 
     >>> round(float(air(20.0, 933.0, 50.0).group_index), 9)
     1.000253319
     """
-    from catseye.atmosphere.index.air import air as state_of
     from catseye.gateways.air.objects import air_verdict, stated_inputs
+    from catseye.reduction.air.routes import (
+        IndexFormula,
+        air_by,
+        formula_uncertainty,
+        moisture_of,
+        pressure_of,
+        surface_of,
+    )
 
-    state = state_of(
-        temperature_c, pressure_hpa, humidity_percent, wavelength_um=wavelength_um, model=model, co2_ppm=co2_ppm
+    moisture = moisture_of(
+        {
+            "humidity_percent": humidity_percent,
+            "dew_point_c": dew_point_c,
+            "frost_point_c": frost_point_c,
+            "wet_bulb_c": wet_bulb_c,
+            "ice_bulb_c": ice_bulb_c,
+            "vapour_pressure_hpa": vapour_pressure_hpa,
+        },
+        {
+            "u_humidity_percent": u_humidity_percent,
+            "u_dew_point_c": u_dew_point_c,
+            "u_wet_bulb_c": u_wet_bulb_c,
+            "u_vapour_pressure_hpa": u_vapour_pressure_hpa,
+        },
     )
-    u = state.combined_uncertainty(u_temperature_c, u_pressure_hpa, u_humidity_percent, u_co2_ppm=u_co2_ppm)
+    if surface_c is None and np.any(np.asarray(u_surface_c) > 0.0):
+        raise ArgumentError("u_surface_c belongs to surface_c", "u_surface_c", "surface_c")
+    pressure = pressure_of(
+        pressure_hpa,
+        barometer_mmhg,
+        mercury_c=mercury_c,
+        gravity=gravity,
+        latitude_deg=latitude_deg,
+        elevation_m=elevation_m,
+        u_pressure_hpa=u_pressure_hpa,
+        u_barometer_mmhg=u_barometer_mmhg,
+        u_mercury_c=u_mercury_c,
+    )
     stated = stated_inputs(
-        temperature=u_temperature_c, pressure=u_pressure_hpa, humidity=u_humidity_percent, carbon_dioxide=u_co2_ppm
+        temperature=u_temperature_c,
+        pressure=max(np.max(u_pressure_hpa), np.max(u_barometer_mmhg), np.max(u_mercury_c)),
+        humidity=moisture.u,
+        carbon_dioxide=u_co2_ppm,
     )
+    formula = IndexFormula(wavelength_um=wavelength_um, model=model, co2_ppm=co2_ppm)
+    state, u = air_by(
+        temperature_c,
+        pressure.value,
+        moisture,
+        above_barometer=above_barometer_m,
+        u_temperature_c=u_temperature_c,
+        u_pressure_hpa=pressure.u,
+        u_co2_ppm=u_co2_ppm,
+        formula=formula,
+    )
+    condensation = None
+    if surface_c is not None:
+        u_weather = {"u_temperature_c": u_temperature_c, "u_pressure_hpa": pressure.u}
+        condensation = surface_of(state, moisture, surface_c, u_surface_c=u_surface_c, **u_weather)
     return AirResult(
-        air_verdict(state, u, stated),
-        state.temperature_c,
-        state.pressure_hpa,
-        state.humidity_percent,
-        wavelength_um,
-        state.group_index,
-        state.phase_index,
-        state.vapour_pressure_hpa,
-        state.dew_point_c,
-        state.group_wavelength,
-        state.sensitivity,
-        u,
-        state.standard_uncertainty,
-        model,
-        state,
-        stated,
+        verdict=air_verdict(state, u, stated),
+        temperature_c=state.temperature_c,
+        pressure_hpa=state.pressure_hpa,
+        humidity_percent=state.humidity_percent,
+        wavelength_um=wavelength_um,
+        group_index=state.group_index,
+        phase_index=state.phase_index,
+        vapour_pressure_hpa=state.vapour_pressure_hpa,
+        dew_point_c=state.dew_point_c,
+        group_wavelength=state.group_wavelength,
+        sensitivity=state.sensitivity,
+        standard_uncertainty=u,
+        formula_uncertainty=formula_uncertainty(
+            temperature_c,
+            pressure.value,
+            moisture,
+            above_barometer=above_barometer_m,
+            u_pressure_hpa=pressure.u_formula,
+            formula=formula,
+        ),
+        model=model,
+        state=state,
+        uncertainty_of=stated,
+        condensation=condensation,
     )
 
 

@@ -1,16 +1,17 @@
 """What people see on a terminal: answers on stdout, progress and one line about a failure on stderr."""
 
 import os
+import re
 import sys
 import textwrap
 import threading
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from types import TracebackType
 
-from catseye.errors import CatseyeError
+from catseye.errors import ArgumentError, CatseyeError
 
 WIDTH = 100  # columns; longer lines are hard to read
 INTERVAL = 0.1  # s between two refreshes of the progress line
@@ -36,6 +37,9 @@ def attempt(command: Callable[[], None]) -> int:
         command()
     except SystemExit as leaving:
         return leaving.code if isinstance(leaving.code, int) else 0
+    except ArgumentError as problem:
+        complain(by_options(str(problem), problem.names))
+        return 2
     except CatseyeError as problem:
         complain(str(problem))
         return 1
@@ -50,6 +54,17 @@ def attempt(command: Callable[[], None]) -> int:
             raise
         return 1
     return 0
+
+
+def by_options(text: str, names: Iterable[str]) -> str:
+    """A text with the options of a command in place of the arguments of its call.
+
+    >>> by_options("give pressure_hpa or barometer_mmhg", ["pressure_hpa", "barometer_mmhg"])
+    'give --pressure-hpa or --barometer-mmhg'
+    """
+    for name in names:
+        text = re.sub(rf"\b{name}\b", f"--{name.replace('_', '-')}", text)
+    return text
 
 
 def say(text: str) -> None:

@@ -176,3 +176,29 @@ def test_what_cannot_be_is_one_line_and_status_1(catseye, arguments, said):
 def test_what_was_asked_wrongly_is_status_2(catseye, arguments):
     status, out, _ = catseye(*arguments)
     assert (status, out) == (2, "")
+
+
+def test_python_takes_every_instrument_of_the_command(catseye):
+    """The command is one call: the same object, and arrays for the same instruments."""
+    import catseye as face
+
+    words = "--temperature-c 20 --wet-bulb-c 14 --barometer-mmhg 700 --mercury-c 20 --latitude-deg 38.45"
+    status, out, _ = catseye("air", *words.split(), "--elevation-m", 797.3, "--surface-c", 5, "--json")
+    result = face.air(
+        20.0,
+        wet_bulb_c=14.0,
+        barometer_mmhg=700.0,
+        mercury_c=20.0,
+        latitude_deg=38.45,
+        elevation_m=797.3,
+        surface_c=5.0,
+    )
+    assert status == 0
+    assert json.loads(out)["group_index"] == result.group_index
+    assert json.loads(out)["condensation"]["deposit"] == str(result.condensation.deposit)
+    both = face.air([20.0, 10.0], 933.0, dew_point_c=[9.0, 4.0], u_dew_point_c=0.2)
+    assert both.group_index.shape == both.standard_uncertainty.shape == (2,)
+    with pytest.raises(face.ArgumentError, match=r"^pressure: give pressure_hpa or barometer_mmhg, not both$"):
+        face.air(20.0, 933.0, 50.0, barometer_mmhg=700.0)
+    with pytest.raises(face.ArgumentError, match="u_dew_point_c does not belong to humidity_percent"):
+        face.air(20.0, 933.0, 50.0, u_dew_point_c=0.2)

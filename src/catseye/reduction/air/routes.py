@@ -3,8 +3,9 @@
 Each way that the notes name ends in the same answer, with the uncertainty that its instruments give it.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +15,7 @@ from catseye.atmosphere.index.air import MODELS, AirState, air, air_of_vapour, g
 from catseye.atmosphere.limit import ValidInterval
 from catseye.atmosphere.weather import barometer, humidity
 from catseye.atmosphere.weather.condensation import Condensation, CondensationSpread, condensation
+from catseye.errors import ArgumentError
 
 Hygrometer = Literal[
     "humidity_percent", "dew_point_c", "frost_point_c", "wet_bulb_c", "ice_bulb_c", "vapour_pressure_hpa"
@@ -26,7 +28,14 @@ HYGROMETERS: tuple[Hygrometer, ...] = (
     "ice_bulb_c",
     "vapour_pressure_hpa",
 )
+PRESSURES = ("pressure_hpa", "barometer_mmhg")
 ABOVE = ValidInterval("height above the barometer", "m", -1000.0, 1000.0, "air of one temperature")
+UNCERTAINTY_OF: Mapping[str, tuple[Hygrometer, ...]] = {  # argument -> readings whose uncertainty it is
+    "u_humidity_percent": ("humidity_percent",),
+    "u_dew_point_c": ("dew_point_c", "frost_point_c"),
+    "u_wet_bulb_c": ("wet_bulb_c", "ice_bulb_c"),
+    "u_vapour_pressure_hpa": ("vapour_pressure_hpa",),
+}
 U_STANDARD_GRAVITY = 0.02  # m/s²: gravity at stations from 9.78 to 9.83 stands for 9.80665
 U_LAPSE = 0.0065  # °C/m, of air taken to be of one temperature: as much as the standard air's falls
 
@@ -44,6 +53,97 @@ class Moisture:
     kind: Hygrometer
     value: ArrayLike
     u: ArrayLike = 0.0
+
+
+def moisture_of(readings: Mapping[Hygrometer, ArrayLike | None], uncertainties: Mapping[str, ArrayLike]) -> Moisture:
+    """The one reading of humidity among several arguments, with its uncertainty.
+
+    readings        value by kind, None where there is none
+    uncertainties   by the names in `UNCERTAINTY_OF`; 0 where there is none
+
+    Raises ArgumentError: no reading, several, or an uncertainty of another.
+
+    >>> moisture_of({"dew_point_c": 9.3}, {"u_dew_point_c": 0.2})
+    Moisture(kind='dew_point_c', value=9.3, u=0.2)
+    """
+    kinds = [kind for kind in HYGROMETERS if readings.get(kind) is not None]
+    if len(kinds) != 1:
+        several = ", not several" if kinds else ""
+        raise ArgumentError(f"humidity: give one of {', '.join(HYGROMETERS)}{several}", *HYGROMETERS)
+    kind = kinds[0]
+    value = readings[kind]
+    assert value is not None  # of the one kind that has a reading
+    for name, u in uncertainties.items():
+        if kind not in UNCERTAINTY_OF[name] and np.any(np.asarray(u, dtype=float) > 0.0):
+            raise ArgumentError(f"{name} does not belong to {kind}", name, kind)
+    own = next(name for name, of in UNCERTAINTY_OF.items() if kind in of)
+    return Moisture(kind, value, uncertainties.get(own, 0.0))
+
+
+@dataclass(frozen=True)
+class Pressure:
+    """Pressure at the barometer, hPa.
+
+    value       total pressure
+    u           its standard uncertainty
+    u_formula   part of it that exact readings leave
+    """
+
+    value: ArrayLike
+    u: ArrayLike = 0.0
+    u_formula: ArrayLike = 0.0
+
+
+def pressure_of(  # noqa: PLR0913 - an instrument with all that corrects it
+    pressure_hpa: ArrayLike | None,
+    barometer_mmhg: ArrayLike | None,
+    *,
+    mercury_c: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    latitude_deg: ArrayLike | None = None,
+    elevation_m: ArrayLike | None = None,
+    u_pressure_hpa: ArrayLike = 0.0,
+    u_barometer_mmhg: ArrayLike = 0.0,
+    u_mercury_c: ArrayLike = 0.0,
+) -> Pressure:
+    """The pressure, as read or by a mercury barometer with everything that turns it into one.
+
+    pressure_hpa                 total pressure, hPa; or None and
+    barometer_mmhg, mercury_c    mercury as read, mm, and its temperature, °C, with
+    gravity                      m/s², or None and both of
+    latitude_deg, elevation_m    degrees, m above the sea
+    u_...                        standard uncertainties
+
+    Raises ArgumentError: arguments that do not fit together.
+    """
+    if (pressure_hpa is None) == (barometer_mmhg is None):
+        raise ArgumentError("pressure: give pressure_hpa or barometer_mmhg, not both", "pressure_hpa", "barometer_mmhg")
+    of_mercury = {
+        "mercury_c": mercury_c,
+        "gravity": gravity,
+        "latitude_deg": latitude_deg,
+        "elevation_m": elevation_m,
+    }
+    if barometer_mmhg is None:
+        for name, value in of_mercury.items():
+            if value is not None:
+                raise ArgumentError(f"{name} belongs to barometer_mmhg, not to pressure_hpa", name, *PRESSURES)
+        for name, u in (("u_barometer_mmhg", u_barometer_mmhg), ("u_mercury_c", u_mercury_c)):
+            if np.any(np.asarray(u, dtype=float) > 0.0):
+                raise ArgumentError(f"{name} belongs to barometer_mmhg, not to pressure_hpa", name, *PRESSURES)
+        assert pressure_hpa is not None
+        return Pressure(pressure_hpa, u_pressure_hpa)
+    place = [latitude_deg is not None, elevation_m is not None]
+    if mercury_c is None or not (all(place) if gravity is None else not any(place)):
+        raise ArgumentError(
+            "barometer_mmhg needs mercury_c, and gravity or both latitude_deg and elevation_m", *of_mercury, *PRESSURES
+        )
+    latitude = None if latitude_deg is None else np.radians(latitude_deg)
+    where: dict[str, Any] = {"gravity": gravity, "latitude": latitude, "elevation": elevation_m}
+    read_so = {"u_reading_mmhg": u_barometer_mmhg, "u_mercury_c": u_mercury_c}
+    value, u = station_pressure(barometer_mmhg, mercury_c, **where, **read_so)
+    u_formula = station_pressure(barometer_mmhg, mercury_c, **where)[1]
+    return Pressure(value, np.hypot(u_pressure_hpa, u), u_formula)
 
 
 @dataclass(frozen=True)
