@@ -153,6 +153,15 @@ def test_a_table_that_was_taken_away_hides_no_altered_shot_from_an_export(night,
     assert exported(str(path), tmp_path / "out", "csv", damaged=True, progress=quiet).rows["shots"] == left
 
 
+@pytest.mark.parametrize("script", ["DROP TABLE chain", "DELETE FROM chain WHERE run = 2"])
+def test_an_export_without_a_chain_says_that_nothing_vouches_for_it(night, tmp_path, script):
+    path, _ = night
+    found = exported(str(altered(path, script)), tmp_path / "out", "csv", damaged=True, progress=quiet)
+    assert found.rows["shots"] == 20  # nothing was left out
+    assert found.verdict.word == "doubtful"
+    assert found.verdict.why.startswith("nothing vouches for any of it: ")
+
+
 def test_a_chain_and_a_version_that_were_taken_away_are_shown_by_any_head(night):
     path, (_, last) = night
     altered(path, "UPDATE journal SET version = 1; DROP TABLE chain; DROP TABLE parts")
