@@ -206,6 +206,30 @@ def test_a_stamped_dark_order_waits_for_its_time_and_needs_the_lease():
     assert not told.head.laser_on()
 
 
+def test_no_stamp_clears_a_dark_order_that_is_still_to_come():
+    """Attack: UNLATCH with a stamp of a second later, as often as one likes, and no order held for longer."""
+    told = leased()
+    at = stamp_text(told.ranger.now_ticks() + 1000)
+    assert "for now" in said(told, OTHER, f"2000\t{at}\tUNLATCH robot")["UNLATCH"].text
+    assert said(told, OTHER, "PS 0")["LATCH"].ok
+    told.turns(40)
+    assert told.ranger.latch is not None
+    late = stamp_text(told.ranger.now_ticks() - 1)
+    assert told.say(f"2000\t{late}\tUNLATCH bob", client=OTHER)[0].ok  # late is at once
+    assert told.ranger.latch is None
+
+
+@pytest.mark.parametrize("words", ["LEASE eve", "LEASE none"])
+def test_a_lease_is_taken_or_given_back_now_and_not_by_a_stamp_to_come(words):
+    told = leased()
+    at = stamp_text(told.ranger.now_ticks() + 1000)
+    client = HOLDER if words.endswith("none") else OTHER
+    reply = said(told, client, f"2000\t{at}\t{words}")["LEASE"]
+    assert not reply.ok
+    told.turns(40)
+    assert told.ranger.lease.name == "anna"
+
+
 # What lights, and what does not -------------------------------------------------------------------------------------
 
 

@@ -7,7 +7,8 @@ import subprocess
 import pytest
 
 from catseye.errors import InputError
-from catseye.ranger.door import answer_to, key_of, triviality
+from catseye.ranger.door import Door, answer_to, key_of, triviality
+from catseye.ranger.entrance import MOST_PENDING, Doorway, Entrance
 from catseye.ranger.network import is_here
 
 KEY = "a-key-of-the-site"
@@ -76,3 +77,35 @@ def test_the_answer_to_a_nonce_is_what_openssl_says():
 def test_what_is_here():
     assert all(map(is_here, ("127.0.0.1", "127.9.9.9", "::1", "localhost", "unix:/run/catseye")))
     assert not any(map(is_here, ("0.0.0.0", "::", "10.0.0.1", "example.org", "")))
+
+
+class Peer:
+    """A connection from an address, as far as an entrance asks."""
+
+    def __init__(self, host, port):
+        self.peer, self.gone = (host, port), False
+
+    def get_extra_info(self, name):
+        return self.peer if name == "peername" else None
+
+    def is_closing(self):
+        return self.gone
+
+    def abort(self):
+        self.gone = True
+
+
+def test_an_address_that_opens_many_connections_keeps_no_other_address_out():
+    """Attack: with a way of 0.2 s to the port, 17 strangers a way closed whoever was about to prove the key."""
+    gate = Doorway(lambda: "ZY101: port 5240", Door(key=KEY), {"KEY"}, lambda: 0.0)
+    peers = [Peer("10.0.0.9", 1000 + k) for k in range(200)]
+    peers.insert(3, Peer("10.0.0.2", 7))
+    said, entrances = [], []
+    for peer in peers:
+        entrances.append(Entrance(gate, peer, said.append))
+        entrances[-1].begin()
+    assert [peer.gone for peer in peers if peer.peer[0] == "10.0.0.2"] == [False]
+    assert sum(not peer.gone for peer in peers) == MOST_PENDING
+    assert peers[-1].gone is False  # the oldest of the others made room
+    entrances[3].take(f"KEY {answer_to(said[3].values[0], KEY)}\n".encode())
+    assert entrances[3].admitted

@@ -17,7 +17,7 @@ from catseye.coordinator.journal.writer import Journal
 from catseye.errors import InputError
 from catseye.gateways.journal.chain import chain_verdict
 from catseye.records.night.live import LiveShot
-from catseye.service.journals import checked, copied
+from catseye.service.journals import checked, copied, exported
 from catseye.simulator.clock.world_clock import ManualClock
 from cli.living_scene import RUN, SOON, recorded
 from journal_scene import MOST_WAIT, START, scene_answer, scene_entries, scene_run
@@ -133,6 +133,33 @@ def test_a_chain_that_was_taken_away_is_no_older_catseye(night, script, words):
     assert found.word == "failed"
     assert words in found.why
     assert "\n" not in found.why
+
+
+@pytest.mark.parametrize(
+    ("taken", "left"),
+    [
+        ("DROP TABLE texts", 18),
+        ("DROP TABLE parts", 18),
+        ("ALTER TABLE weather RENAME TO w; CREATE VIEW weather AS SELECT * FROM w", 18),
+    ],
+)
+def test_a_table_that_was_taken_away_hides_no_altered_shot_from_an_export(night, tmp_path, taken, left):
+    """Two of twenty shots are altered; what contradicts its link is left out, whatever else is missing."""
+    path, _ = night
+    altered(path, f"UPDATE shots SET range_m = range_m + 1 WHERE run = 2 AND number IN (3, 7); {taken}")
+    reports, _ = checked(str(path), 2, (), None, progress=quiet)
+    assert "is missing" in reports[0].problems[0]
+    assert sum("is not what was written" in text for text in reports[0].problems) == 2
+    assert exported(str(path), tmp_path / "out", "csv", damaged=True, progress=quiet).rows["shots"] == left
+
+
+@pytest.mark.parametrize("script", ["DROP TABLE chain", "DELETE FROM chain WHERE run = 2"])
+def test_an_export_without_a_chain_says_that_nothing_vouches_for_it(night, tmp_path, script):
+    path, _ = night
+    found = exported(str(altered(path, script)), tmp_path / "out", "csv", damaged=True, progress=quiet)
+    assert found.rows["shots"] == 20  # nothing was left out
+    assert found.verdict.word == "doubtful"
+    assert found.verdict.why.startswith("nothing vouches for any of it: ")
 
 
 def test_a_chain_and_a_version_that_were_taken_away_are_shown_by_any_head(night):

@@ -8,6 +8,7 @@ import asyncio
 import hmac
 import logging
 import secrets
+from collections import Counter
 from collections.abc import Callable, Collection
 
 from catseye.errors import InputError
@@ -17,7 +18,7 @@ from catseye.ranger.line import Reply, Request, parse_request
 
 PATIENCE = 10.0  # s that the key may take
 SLOWED = 1.0  # s until a wrong key is answered
-MOST_PENDING = 16  # connections that are not in yet; the oldest makes room
+MOST_PENDING = 16  # connections that are not in yet; the oldest of the address with most of them makes room
 COUNTED = 60.0  # s between two lines of the log about wrong keys
 NONCE_BYTES = 16
 LOG = logging.getLogger(__name__)
@@ -42,9 +43,10 @@ class Doorway:
         """A connection that is not in; it is closed after so long."""
         self._pending[entrance] = self.clock() + seconds
         if len(self._pending) > MOST_PENDING:
-            oldest = min(self._pending, key=lambda each: (not each.judged, self._pending[each]))
-            self.forget(oldest)
-            oldest.close()
+            hosts = Counter(each.host for each in self._pending)  # who opens many makes room for who opens one
+            first = min(self._pending, key=lambda each: (not each.judged, -hosts[each.host], self._pending[each]))
+            self.forget(first)
+            first.close()
 
     def forget(self, entrance: "Entrance") -> None:
         """A connection is in, or over."""
@@ -80,6 +82,7 @@ class Entrance:
         self._open = False  # the first line was read
         self.admitted = gate.door.key is None
         self.judged = False  # a wrong key was given
+        self.host = peer_of(transport).partition(" port ")[0]
 
     def begin(self) -> None:
         """Ask for the key, where one is asked for."""

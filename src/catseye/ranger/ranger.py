@@ -33,6 +33,7 @@ WATCH_NS = 100_000_000  # the head's own changes
 UNHEARD_NS = PER_SECOND  # the same where nobody listens
 SLOW_NS = 20_000_000  # a long answer that waits for its reader
 LIVE_NS = 50_000_000  # an interlock, while there is light or an amplifier is on
+BY_HAND = frozenset(["LEASE", "UNLATCH"])  # a person's word of now: no stamp to come
 OF_A_SHOT = frozenset(["TRG", "MPC", "RAD", "MAG", "SEQ", "CMEAS", "BUF"])
 WATCHED = (
     ("ACP", "0"),
@@ -106,6 +107,8 @@ class Ranger(RangerState):
         due = request.ticks is None or request.ticks * TICK_NS <= self.now_ns()
         if stops(request) and due:
             return self._stop(client, request)
+        if request.command in BY_HAND and not due:
+            return [self._refused(request, "it is for now (expected it without a stamp)", client)]
         if request.command == "LEASE" and self._leases_at_once(client, request):
             return self._leased(client, request)
         stranger = self._stranger(client, request)

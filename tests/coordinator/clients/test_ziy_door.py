@@ -5,7 +5,7 @@ import logging
 
 import pytest
 
-from catseye.coordinator.clients.server import LINES_A_SLICE, MOST_CLIENTS, ZiyServer
+from catseye.coordinator.clients.server import LINES_A_SLICE, MOST_CLIENTS, MUTE, ZiyServer
 from catseye.ranger.door import Door, answer_to
 from catseye.ranger.entrance import MOST_PENDING, PATIENCE, SLOWED
 from catseye.records.night.live import LivePosture
@@ -50,6 +50,28 @@ def test_peers_without_the_key_take_no_place_and_are_few():
             assert all(each.gone for each in strangers)
             assert b"LINE 0, the site's key is expected first" in strangers[-1].got
             assert (await client.ask("STATUS")).ok
+
+    run(story)
+
+
+def test_clients_that_never_say_a_line_keep_nobody_out():
+    """Attack: 64 sockets that said nothing kept an operator out for an hour."""
+
+    async def story():
+        async with Served(mode="hold", ready=False) as site:
+            reader = await site.raw()
+            reader.transport.write(b"SUBSCRIBE\n")
+            mute = [await site.raw() for _ in range(MOST_CLIENTS - 1)]
+            await asyncio.sleep(1.0)
+            late = await site.raw()
+            await asyncio.sleep(0.1)
+            assert b"CONNECT 0" in late.got
+            await asyncio.sleep(MUTE)
+            client = await site.client()
+            assert (await client.ask("STATUS")).ok
+            assert not reader.gone
+            assert sum(each.gone for each in mute) == 1
+            assert b"and another wants this place" in next(each for each in mute if each.gone).got
 
     run(story)
 

@@ -358,6 +358,19 @@ def test_a_database_with_other_tables_is_refused(server):
         opened(url)
 
 
+@pytest.mark.parametrize("does", ["SELECT RAISE(IGNORE)", "UPDATE shots SET range_m = 0"])
+def test_a_file_with_triggers_is_refused(tmp_path, does):
+    """Attack: a trigger ignored each shot, and its future said that it was durable."""
+    with opened(tmp_path / "j.db") as journal:
+        journal.append(scene_shot(1)).result(MOST_WAIT)
+    connection = sqlite3.connect(tmp_path / "j.db")
+    connection.execute(f"CREATE TRIGGER t BEFORE INSERT ON shots BEGIN {does}; END")
+    connection.commit()
+    connection.close()
+    with pytest.raises(InputError, match="has a trigger, 't', which catseye never makes"):
+        opened(tmp_path / "j.db")
+
+
 def test_an_older_journal_is_carried_to_this_version(tmp_path, monkeypatch):
     from catseye.coordinator.journal import tables as journal_tables
 

@@ -34,6 +34,7 @@ LINES_A_SECOND = 200.0
 MOST_AT_ONCE = 400.0  # lines
 MOST_UNSENT = 2**20  # bytes
 MOST_CLIENTS = 64
+MUTE = 10.0  # s, after which a client that never said a line gives its place to another
 AGAIN = 0.1  # s until a client that came too fast is read on
 LINES_A_SLICE, SLICE_EVERY = 32, 0.005  # of a long answer; s between two
 LOOK = 0.5  # s between two looks for silent clients
@@ -64,6 +65,7 @@ class Client(asyncio.Protocol):
         self.name = ""  # under which it has the lease
         self.token = ""  # of that lease
         self.heard = self._since = asyncio.get_running_loop().time()
+        self.spoke = False  # it has said a line
         self._left = MOST_AT_ONCE
         self._timer: asyncio.TimerHandle | None = None
 
@@ -96,6 +98,7 @@ class Client(asyncio.Protocol):
         more = self._entrance.take(data)
         if more is None:
             return
+        self.spoke = True
         if not was_in:
             self.server.joined(self)
         self._unread += more
@@ -238,7 +241,9 @@ class ZiyServer:
         return ticks_now(self.coordinator.clock)
 
     def joined(self, client: Client) -> None:
-        """Greet; one too many is turned away."""
+        """Greet; one too many has the place of a client that never said a line, or is turned away."""
+        if len(self.clients) >= MOST_CLIENTS:
+            self._give_up_mute()
         if len(self.clients) >= MOST_CLIENTS:
             client.tell(0, f"CONNECT 0, {MOST_CLIENTS} clients are connected (expected fewer)")
             if client.transport is not None:
@@ -246,6 +251,17 @@ class ZiyServer:
             return
         self.clients.add(client)
         self.greet(client)
+
+    def _give_up_mute(self) -> None:
+        """Close the client that has been there longest without ever saying a line."""
+        mute = [each for each in self.clients if not each.spoke and _loop_time() - each.heard >= MUTE]
+        if not mute:
+            return
+        first = min(mute, key=lambda each: each.heard)
+        first.tell(0, f"LINE 0, nothing was said for {MUTE:g} s, and another wants this place")
+        if first.transport is not None:
+            first.transport.close()
+        self.left(first)
 
     def greet(self, client: Client) -> None:
         """Who this is, and that the client is connected."""

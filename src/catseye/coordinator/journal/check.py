@@ -134,7 +134,7 @@ def check_run(
     if reader.version < FIRST_CHAINED:
         _before_chains(reader, report, heads)
         return report
-    if not _tables_there(reader, report):
+    if not _chain_there(reader, report):
         return report
     first, stored, last = _of_the_run(reader, report)
     if first is None and not (last and _count(reader, run)):
@@ -174,13 +174,18 @@ def _before_chains(reader: JournalReader, report: ChainReport, heads: Sequence[H
     _unheld(report, heads)
 
 
-def _tables_there(reader: JournalReader, report: ChainReport) -> bool:
-    """True where all tables are there; a missing one is a problem."""
+def _chain_there(reader: JournalReader, report: ChainReport) -> bool:
+    """True where there are links to hold the rest against; each missing table is a problem."""
     missing = sorted(set(METADATA.tables) - reader.tables)
     for name in missing:
         report.wrong(0, f"table {name!r} is missing (expected in a journal of version {reader.version})")
     report.chained = CHAIN.name not in missing
-    return not missing
+    return report.chained
+
+
+def _there(reader: JournalReader) -> list[JournalTable]:
+    """Tables of events and links that are there: what the others hold is checked though one was taken away."""
+    return [table for table in (*STORED, CHAIN) if table.name in reader.tables]
 
 
 def _without_chain(reader: JournalReader, report: ChainReport, heads: Sequence[Head]) -> None:
@@ -214,7 +219,7 @@ def _numbers(reader: JournalReader, report: ChainReport) -> int:
     Text, bytes, a number below the first, or far above the last.
     """
     most = min(MOST_WHOLE, max(0, _begin(reader, report.run)) + reader.most_events)
-    for table in (*STORED, CHAIN):
+    for table in _there(reader):
         seq, least = table.c.seq, 0 if table is CHAIN else 1
         try:
             with reader.reading() as connection:
@@ -299,7 +304,7 @@ def _of_the_run(reader: JournalReader, report: ChainReport) -> tuple[bytes | Non
             if row is not None:
                 report.uuid, report.ended_ticks = str(row.uuid), row.ended_ticks
             first = connection.scalar(select(CHAIN.c.link).where(CHAIN.c.run == report.run, CHAIN.c.seq == 0))
-            last = _last_stored(connection, report.run)
+            last = max(highest_seq(connection, table, report.run) for table in _there(reader))
             stored = run_link(connection, report.run)
             _integrity(connection, report)
     except InputError as problem:
@@ -315,10 +320,6 @@ def _integrity(connection: Connection, report: ChainReport) -> None:
             report.wrong(0, f"the file is damaged: {' '.join(str(said).split())[:160]}")
 
 
-def _last_stored(connection: Connection, run: int) -> int:
-    return max(highest_seq(connection, table, run) for table in (*STORED, CHAIN))
-
-
 def _count(reader: JournalReader, run: int) -> int:
     try:
         with reader.reading() as connection:
@@ -329,6 +330,8 @@ def _count(reader: JournalReader, run: int) -> int:
 
 def _files(reader: JournalReader, report: ChainReport) -> None:
     """The texts of a run's files against their hashes."""
+    if not reader.tables.issuperset((RUN_FILES.name, TEXTS.name)):
+        return  # which has been told
     wanted = (
         select(RUN_FILES.c.path, RUN_FILES.c.sha256, TEXTS.c.text)
         .join(TEXTS, RUN_FILES.c.sha256 == TEXTS.c.sha256, isouter=True)
@@ -362,7 +365,7 @@ def _next(reader: JournalReader, run: int, after: int) -> int:
     """The first number behind one that any row has; the one behind it where that cannot be read."""
     try:
         with reader.reading() as connection:
-            return next_seq(connection, (*STORED, CHAIN), run, after)
+            return next_seq(connection, _there(reader), run, after)
     except InputError:
         return after + 1
 
@@ -396,8 +399,8 @@ def _piece(reader: JournalReader, run: int, after: int, upto: int) -> list[tuple
             return [dict(row) for row in connection.execute(wanted).mappings()]
 
         links = {_seq(row): row for row in read(CHAIN)}
-        for table in STORED:
-            for row in read(table):
+        for table in _there(reader):
+            for row in read(table) if table is not CHAIN else ():
                 rows.setdefault(_seq(row), []).append((table, row))
     found = []
     for seq in sorted(set(links) | set(rows)):

@@ -14,6 +14,7 @@ from catseye.coordinator.journal.entries import Run, plain
 from catseye.coordinator.journal.place import JournalAddress, reading_engine, writing_engine
 from catseye.coordinator.journal.tables import CHAIN, PARTS, RUN_FILES, RUNS, TEXTS, create_or_carry, version_of
 from catseye.coordinator.parts import Clock, ticks_now
+from catseye.errors import InputError
 from catseye.version import __version__
 
 OURS = 4_276_994  # of the server's advisory locks: two hosts may begin at once
@@ -62,10 +63,19 @@ def begin(place: JournalAddress, run: Run, clock: Clock, *, buffers: bool) -> tu
 
 
 def _look_first(place: JournalAddress) -> None:
-    """A file of others' is refused before it is opened for writing, which would change its header."""
+    """A file of others' is refused before it is opened for writing, which would change its header.
+
+    So is one with triggers: they could alter what is written, or drop it, though it is said to be durable.
+    """
     if place.path is not None and place.path.exists() and place.path.stat().st_size:
         with reading_engine(place).connect() as connection:
             version_of(connection, place.shown)
+            name = connection.exec_driver_sql("SELECT name FROM sqlite_master WHERE type = 'trigger'").scalar()
+            if name is not None:
+                raise InputError(
+                    f"journal {place.shown}: has a trigger, {str(name)[:40]!a}, which catseye never makes (expected "
+                    "another file)"
+                )
 
 
 def go_on(old: Connection, place: JournalAddress, run: int, *, seq: int, link: bytes, follows: str) -> None:

@@ -55,9 +55,11 @@ def export_verdict(chain: ChainReport | None, rows: int, doubts: Sequence[str] =
     rows     how many were written
     doubts   notes that speak against the export
     """
-    altered = (
-        [f"exported without {chain.count} events that are not as they were written"] if chain and chain.count else []
-    )
+    altered = []
+    if chain and chain.count and not chain.chained:
+        altered = [f"nothing vouches for any of it: {chain.problems[0]}"]
+    elif chain and chain.count:
+        altered = [f"exported without {chain.count} events that are not as they were written"]
     return Verdict("good", f"{rows} rows written").hearing([*altered, *doubts])
 
 
