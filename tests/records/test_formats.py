@@ -112,7 +112,7 @@ def test_an_unknown_version_is_refused_with_the_known_ones(tmp_path, version):
     shown = version.replace('"', "'").replace("true", "True")
     with pytest.raises(InputError) as refusal:
         read_record(tmp_path / "M.toml", Mirror)
-    expected = "expected 1 or 'catseye-mirror-1', the versions known here"
+    expected = "expected 1 or 'catseye-mirror-1', the supported versions"
     assert str(refusal.value) == f"M.toml: format = {shown} ({expected})"
 
 

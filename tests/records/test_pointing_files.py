@@ -43,8 +43,8 @@ def test_a_model_survives_its_file(tmp_path):
         (('"HZCZ"]', '"IA"]'), "twice"),
         (("[-14.18, 680.72]", "[-14.18]"), "has 1 values"),
         (("[[4.0, 0.5], [0.5, 9.0]]", "[[4.0, 0.5]]"), "expected 2 of 2"),
-        (("[[4.0, 0.5], [0.5, 9.0]]", "[[4.0, 0.5], [0.6, 9.0]]"), "no covariance"),
-        (("[[4.0, 0.5], [0.5, 9.0]]", "[[4.0, 7.0], [7.0, 9.0]]"), "no covariance"),
+        (("[[4.0, 0.5], [0.5, 9.0]]", "[[4.0, 0.5], [0.6, 9.0]]"), "not a covariance"),
+        (("[[4.0, 0.5], [0.5, 9.0]]", "[[4.0, 7.0], [7.0, 9.0]]"), "not a covariance"),
         (("[[4.0, 0.5], [0.5, 9.0]]", "[[-4.0, 0.0], [0.0, 9.0]]"), "variance -4"),
         (("series-1", "series-9"), "catseye-pointing-series-1"),
         (("680.72]", "680720.0]"), "expected"),
@@ -80,7 +80,7 @@ def test_tilts_are_read(tmp_path):
         (("90.0", "900.0"), "azimuth_deg"),
         (("1.5", "15000"), "tilt_x_arcsec"),
         (("0.2", "0"), "u_arcsec = '0'"),
-        (("u_arcsec", "u"), "column 'u' is not known"),
+        (("u_arcsec", "u"), "column 'u' is unknown"),
     ],
 )
 def test_bad_tilts_are_refused(tmp_path, change, said):

@@ -74,7 +74,7 @@ def test_a_sheet_elsewhere_is_named(files, tmp_path):
         ("range_m\n0.1\n", "t.csv: line 2, range_m = 0.1 (expected 0.5 to 100)"),
         ("range_m\n2500\n", "t.csv: line 2, range_m = 2500 looks like millimetres (expected 0.5 to 100)"),
         ("range_m,temperature_c\n1,293.15\n", "temperature_c = 293.15 looks like kelvin (expected -40 to 60)"),
-        ("range_mm\n1\n", "t.csv: line 1, column 'range_mm' is not known (expected the header range_m, perhaps who,"),
+        ("range_mm\n1\n", "t.csv: line 1, column 'range_mm' is unknown (expected the header range_m, optionally who,"),
         ("who\na\n", "t.csv: line 1, column 'range_m' is missing"),
         ("range_m,left_out\n1,bad\n", "t.csv: every reading has a reason in 'left_out' (expected some without)"),
         ("range_m,mjd_utc\n1,2461280.5\n", "mjd_utc = 2461280.5 (expected 40000 to 100000)"),
@@ -94,7 +94,7 @@ def test_a_bad_table_is_refused_in_one_line(files, table, said):
         (('by = "someone"', 'by = ""'), "t.toml: by = ''"),
         (
             ('kind = "thing"', 'kind = "leakage"'),
-            "kind = 'leakage' is a sheet of another calibration (expected 'thing')",
+            "kind = 'leakage' is the sheet of another calibration (expected 'thing')",
         ),
         (("2027-09-01", "2026-09-01"), "valid_until = 2026-09-01 is not after measured_on = 2026-09-01"),
         (('report = "L1"', 'report = "L1"\nlevel = 0.95'), "level = 0.95 is not a small probability"),

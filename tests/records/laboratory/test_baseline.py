@@ -63,7 +63,7 @@ def test_dry_air_at_freezing_is_legal(tmp_path):
         ("20.4011", "-20.4011", "slope_distance = '-20.4011'"),
         ("20.4011", "nan", "slope_distance = 'nan' (expected a finite number)"),
         ("0.235,0.24,20.4011", "235,0.24,20.4011", "height_of_instrument = '235' (expected -5 to 5 m)"),
-        ("slope_distance", "slope", "line 1, column 'slope' is not known"),
+        ("slope_distance", "slope", "line 1, column 'slope' is unknown"),
         (",humidity", "", "column 'humidity' is missing"),
         ("46.2\n", "46.2,1\n", "fields"),
     ],

@@ -97,19 +97,19 @@ BAD_POINTS = {
     "free": ("held", "points.csv: line 5, role = 'held' (expected free or fixed or datum)"),
     "point,": (
         "name,",
-        "points.csv: line 1, column 'name' is not known (expected the header point,x,y,z, perhaps role,u_x,u_y,u_z)",
+        "points.csv: line 1, column 'name' is unknown (expected the header point,x,y,z, optionally role,u_x,u_y,u_z)",
     ),
     ",role": (
         ",x",
-        "points.csv: line 1, column 'x' is there 2 times (expected the header point,x,y,z, perhaps role,u_x,u_y,u_z)",
+        "points.csv: line 1, column 'x' occurs 2 times (expected the header point,x,y,z, optionally role,u_x,u_y,u_z)",
     ),
 }
-HEADER = "(expected the header from,to,distance, perhaps sigma)"
+HEADER = "(expected the header from,to,distance, optionally sigma)"
 BAD_RANGES = {
     "S2,T1": (
         "S2,TT1",
         "ranges.csv: line 3, to = 'TT1' is not in points.csv "
-        "(expected perhaps 'T1'; an unknown point has 3 ranges at least)",
+        "(expected perhaps 'T1'; an unknown point needs at least 3 ranges)",
     ),
     "S3,T1": ("T1,T1", "ranges.csv: line 4, to = 'T1' (expected another point than from)"),
     "94.8683298": ("-94.8", "ranges.csv: line 3, distance = '-94.8' (expected above 0 m)"),
@@ -117,16 +117,16 @@ BAD_RANGES = {
     "S1,T1,70": ("S1,T1,7_0", "ranges.csv: line 2, distance = '7_0.7106781' (expected a finite number)"),
     "83.6660027,0.0001": (
         "83.6660027,0",
-        "ranges.csv: line 4, sigma = '0' (expected above 0 m: nothing is measured without error)",
+        "ranges.csv: line 4, sigma = '0' (expected above 0 m: no measurement is exact)",
     ),
     ",sigma": (
         ",u",
-        f"ranges.csv: line 1, column 'u' is not known {HEADER}",
+        f"ranges.csv: line 1, column 'u' is unknown {HEADER}",
     ),
     "S1,T1,70.7106781,0.0001\n": ("\n", "ranges.csv: line 2, 1 fields = '' (expected 4)"),
     "\nS1": (
         ",\nS1",
-        f"ranges.csv: line 1, column '' is not known {HEADER}",
+        f"ranges.csv: line 1, column '' is unknown {HEADER}",
     ),
 }
 
@@ -240,5 +240,5 @@ def test_a_claim_serves_ranges_without_a_sigma(tmp_path):
     assert np.sqrt(read_network(own, sigma_ppm=2.0).groups[0].covariance) == pytest.approx(2e-6 * group.observed)
     with pytest.raises(InputError, match=r"--sigma-mm = -1 \(expected 0 to 100000\)"):
         read_network(own, sigma_mm=-1.0)
-    with pytest.raises(InputError, match="says every uncertainty itself"):
+    with pytest.raises(InputError, match="contains all uncertainties"):
         read_network(EXAMPLES / "feed-arm.toml", sigma_mm=1.0)

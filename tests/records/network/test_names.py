@@ -100,7 +100,7 @@ def test_every_invalid_key_is_named(tmp_path):
     assert all(key in str(refused.value) for key in ("'x_mm'", "'colour'", "'fixd'", "perhaps fixed"))
     path = folder(tmp_path, "P", "P")
     (path / "ranges.csv").write_text("from,to,distance,sigma,who,when\nS1,P,1,1,a,b\n", encoding="utf-8")
-    with pytest.raises(InputError, match="'who', 'when' are not known"):
+    with pytest.raises(InputError, match="'who', 'when' are unknown"):
         read_network(path)
 
 

@@ -108,7 +108,7 @@ def test_default_standard_errors_come_from_the_comment_and_nowhere_else():
         read("C 1 0 0 0 ! ! !\nA 1-2-3 45-00-00")
     wanted = "(expected standard errors in the lines, or above them the comment '# catseye: angle_arcsec = ...')"
     missing = "Angle (1 observation, first line 3)"
-    assert str(refusal.value) == f"n.dat: leaves to the project options, which are not in it: {missing} {wanted}"
+    assert str(refusal.value) == f"n.dat: has no values for the project options: {missing} {wanted}"
 
 
 def test_all_standard_errors_that_are_missing_are_asked_for_at_once_in_the_words_of_the_program():
@@ -236,7 +236,7 @@ REFUSED = {
     "D 1-2 ten 1": "D: 'ten' (expected a number)",
     "D 1-2 -10 1": "slope_distance '1' to '2' = -10 m (expected above 0)",
     "D 1-1 10 1": "slope_distance '1' to '1' joins a point with itself (expected points that differ)",
-    "D 1-2 10 0": "slope_distance '1' to '2' has the sigma 0 (expected above 0: nothing is measured without error)",
+    "D 1-2 10 0": "slope_distance '1' to '2' has the sigma 0 (expected above 0: no measurement is exact)",
     "D 1-2": "D: 0 values (expected slope distance)",
     "D 1-2 10 1 2 3": "D: 3 standard errors '1 2 3' (expected none or 1, then perhaps HI/HT)",
     "M 1-2-3 10-00-00 5 90-00-00 1 2": "M: 2 standard errors '1 2' (expected none or 3, then perhaps HI/HT)",

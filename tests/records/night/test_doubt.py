@@ -49,7 +49,7 @@ def test_a_reading_that_was_not_believed_counts_as_one_that_is_not_there(folder,
     assert np.array_equal(told.coordinates.x, untold.coordinates.x)
     assert np.array_equal(told.coordinates.covariance, untold.coordinates.covariance)
     assert told.notes[0] == (
-        "WX2 was not believed while it was measured (WX2 reads 16.2 C, +5.0 C off): 20 of its readings are left out, "
+        "WX2 was rejected during the measurement (WX2 reads 16.2 C, +5.0 C off): 20 of its readings are left out, "
         "by doubts.csv"
     )
     assert told.notes[1:] == untold.notes
@@ -61,7 +61,7 @@ def test_a_station_without_a_believed_reading_for_long_counts_for_nothing(folder
     campaign = judged(folder, [f"weather,{row[1]},{row[0]},it lies" for row in lies])
     assert [station.name for station in campaign.site.weather_station] == ["WX2"]
     assert set(campaign.weather.station) == {"WX2"}
-    assert campaign.doubt_notes[0].endswith("the whole station is left out, by doubts.csv")
+    assert campaign.doubt_notes[0].endswith("the station is left out, by doubts.csv")
     assert reduce_epoch(campaign).coordinates.variance_factor < 1.3
 
 

@@ -66,8 +66,8 @@ def test_chunks_that_say_other_things_are_passed_over():
     ("raw", "said"),
     [
         (b"RIFFxxxxAVI ", "expected a RIFF WAVE file"),
-        (wav_bytes(CODES, 16_000)[:-10], "is cut off: 2990 of 3000 bytes"),
-        (wav_bytes(CODES, 16_000)[:30], "is cut off"),
+        (wav_bytes(CODES, 16_000)[:-10], "is truncated: 2990 of 3000 bytes"),
+        (wav_bytes(CODES, 16_000)[:30], "is truncated"),
         (wav_bytes(CODES, 16_000)[:36], "has no samples"),
         (wav_bytes(CODES[:, :0], 16_000), "0 samples"),
         (
@@ -103,7 +103,7 @@ def test_a_table_of_travel_times_may_have_gaps_and_weather(tmp_path, sheet):
     [
         ("", "empty"),
         ("left,right\n1,2\n", "neither a WAVE file nor a table"),
-        ("ab,extra\n1,2\n", "'extra' is not known"),
+        ("ab,extra\n1,2\n", "'extra' is unknown"),
         ("ab,ba\n1,two\n", "line 2, ba = 'two'"),
         ("loop\n1\n", "no channel 'ab' or 'ba'"),
         ("mjd_utc,time_ba_s\n61365.1,0.2\n", "'time_ab_s' is missing"),
@@ -129,7 +129,7 @@ def changed(tmp_path, before, after):
 @pytest.mark.parametrize(
     ("before", "after", "said"),
     [
-        ('target = "ZEG41040L"', 'target = "ZY103"', "is the ranger, too"),
+        ('target = "ZEG41040L"', 'target = "ZY103"', "is also the ranger"),
         ("length_m = 62.417", "length_m = 62417.0", "length_m = 62417.0"),
         ("interval_s = 0.3\n", "", "interval_s is missing"),
         ('["ab", "ba", "loop"]', '["ab", "ab"]', "names 'ab' 2 times"),
