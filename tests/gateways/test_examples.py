@@ -55,7 +55,7 @@ def test_examples_are_found_by_name(tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"^site = 'vla' is not bundled \(expected gbt\)$"):
         bundled_site("vla")
     for name in ("", "..", "../sites", "/etc", "nothing"):
-        with pytest.raises(InputError, match=r"^example .* is not there"):
+        with pytest.raises(InputError, match=r"^example .* not found"):
             examples.example(name)
 
 
@@ -80,7 +80,7 @@ def test_every_listed_example_is_there_and_can_be_copied(tmp_path):
     assert (tmp_path / "mine/night-01/frames.npy").stat().st_size == (
         ROOT / "examples/night-01/frames.npy"
     ).stat().st_size
-    with pytest.raises(InputError, match="is there and not empty"):
+    with pytest.raises(InputError, match="exists and is not empty"):
         examples.copy_example("", tmp_path / "mine")
 
 

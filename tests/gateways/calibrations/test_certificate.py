@@ -112,12 +112,12 @@ def test_odd_names_survive_toml(made):
     ("change", "said"),
     [
         (lambda d: d["covariance"]["matrix"][0].__setitem__(1, 1.0), "is not symmetric"),
-        (lambda d: d["covariance"]["matrix"][0].__setitem__(0, 1.0), "does not hold the squares of u"),
+        (lambda d: d["covariance"]["matrix"][0].__setitem__(0, 1.0), "does not have the squares of u"),
         (lambda d: d["covariance"]["matrix"].pop(), "is not 2 by 2, as there are 2 quantities"),
         (lambda d: d["covariance"]["order"].reverse(), "(expected ['leakage_amplitude_volt', 'leakage_phase_rad']"),
         (lambda d: d["readings"]["rows"][3].pop(), "readings.rows, row 4 has 7 cells (expected 8)"),
         (lambda d: d.pop("by"), "by is missing"),
-        (lambda d: d.__setitem__("format", "catseye-calibration-2"), "the versions known here"),
+        (lambda d: d.__setitem__("format", "catseye-calibration-2"), "the supported versions"),
         (lambda d: d.__setitem__("extra", 1), "extra = 1 is not a known key"),
     ],
 )

@@ -145,7 +145,7 @@ def test_a_full_record_leaves_nothing_blank(full, kind):
 def test_what_a_record_lacks_stays_blank_and_is_counted(full, kind, key):
     report = full(kind, lambda text: re.sub(f"{key} = .*\n", "", text))
     assert [entry.key for entry in report.missing] == [key]
-    assert f"1 field not in the record and left blank: {report.missing[0].name}." in field_report(report, WHEN)
+    assert f"1 field missing in the record and left blank: {report.missing[0].name}." in field_report(report, WHEN)
     assert report_object(report, None)["missing"] == [key]
 
 

@@ -114,7 +114,7 @@ def test_the_story_gives_the_numbers(reduction):
     assert "759 shots" in told["The night"]
     assert f"{len(reduction.rejected)} were rejected" in told["The shots"]
     assert f"{reduction.coordinates.refractivity_ppm:.2f}" in told["The air"]
-    assert f"{reduction.coordinates.variance_factor:.2f}" in told["The trust"]
+    assert f"{reduction.coordinates.variance_factor:.2f}" in told["Reliability"]
 
 
 @pytest.mark.parametrize(

@@ -364,7 +364,7 @@ def test_a_night_that_went_through_a_journal_is_the_same_night(tmp_path, night_0
         done = export_campaign(reader, tmp_path / "out", run=1)
     again = read_campaign(tmp_path / "out")
     assert (done.shots, done.readings, done.left_out) == (len(shots), len(night.weather), {})
-    assert done.notes == ("no posture was journalled in the span: azimuth and elevation are site.toml's",)
+    assert done.notes == ("no posture in the journal for the span: azimuth and elevation are site.toml's",)
     order = np.argsort(again.shots.shot)
     assert np.array_equal(again.shots.shot[order], np.sort(shots.shot))
     first = np.argsort(shots.shot)
@@ -426,8 +426,8 @@ def test_what_live_did_not_believe_goes_along(tmp_path):
     assert len(campaign.weather) == 70
     assert campaign.weather.temperature_c.max() == 10.4
     assert len((tmp_path / "out" / "weather.csv").read_text().splitlines()) == 81  # the record itself is whole
-    assert [note.split(" was not believed")[0] for note in done.notes[:1]] == ["WX2"]
-    assert "named in doubts.csv as not believed by the epochs: 1 of the shots" in done.notes
+    assert [note.split(" was rejected")[0] for note in done.notes[:1]] == ["WX2"]
+    assert "named in doubts.csv as rejected by the epochs: 1 of the shots" in done.notes
 
 
 def biased(station, judgement, offset_c):
@@ -521,7 +521,7 @@ def test_where_no_station_was_believed_the_readings_go_as_they_are(tmp_path):
     done, campaign = exported(tmp_path, entries, span=(START, START + SECOND * 60))
     assert len(campaign.weather) == 11
     assert not (tmp_path / "out" / "doubts.csv").exists()
-    assert "no weather station was believed throughout: all readings are exported as they are" in done.notes
+    assert "no weather station was trusted throughout: all readings are exported unmarked" in done.notes
     assert done.shots == 8
 
 
@@ -645,4 +645,4 @@ def test_a_station_that_never_spoke_is_left_out_of_the_site(tmp_path):
     entries = [e for e in campaign_entries() if not (isinstance(e, LiveWeather) and e.station == "WX1")]
     done, campaign = exported(tmp_path, entries)
     assert [station.name for station in campaign.site.weather_station] == ["WX2"]
-    assert done.notes == ("weather stations that said nothing were left out of site.toml: WX1",)
+    assert done.notes == ("weather stations without readings were left out of site.toml: WX1",)

@@ -28,7 +28,7 @@ def test_sizes_stand_in_their_unit_and_in_u_with_the_place():
         ),
         (
             "Ranges",
-            "moved by 1.0e-11 mm rms, at most 2.0e-11 mm (ZY1 to A, behind the last epoch), of 2 compared; "
+            "moved by 1.0e-11 mm rms, at most 2.0e-11 mm (ZY1 to A, after the last epoch), of 2 compared; "
             "no u is stored.",
         ),
     ]

@@ -583,7 +583,7 @@ def test_what_moved_is_told_in_the_axes_of_the_file(compared):
     plain = compared.second.x[j] - compared.first.x[i]  # A and B are held in both epochs: one datum
     assert point["difference"] == pytest.approx(plain, abs=1e-9)
     said = {p.title: p.text for p in comparison_passages(compared)}
-    assert "Q,2" in said["What moved"]
+    assert "Q,2" in said["Movements"]
     assert f"dx {1e3 * point['displacement'][0]:+.3f}" in said["Q,2"]
     rows = {row["point"]: row for row in read_csv(displacements_csv(compared))}
     assert float(rows["Q,2"]["dx_mm"]) == pytest.approx(1e3 * point["displacement"][0], abs=1e-6)
@@ -629,7 +629,7 @@ def test_every_column_of_the_coordinates_has_the_unit_of_its_name(found):
         **{f"semi_axis_{k + 1}_mm": lambda i, k=k: found.ellipsoid.semi_axes[i, k] for k in range(3)},
         "fixed": lambda i: "x y z" if network.points.fixed[i].all() else "",
         "datum": lambda i: "",
-        "observations": lambda i: found.seen[i],
+        "observations": lambda i: found.observation_counts[i],
     }
     largest = np.linalg.eigvalsh(found.covariance)[:, -1] ** 0.5
     np.testing.assert_allclose(np.max(found.ellipsoid.semi_axes, axis=1), largest, rtol=1e-6)  # m, of the ellipsoid

@@ -23,8 +23,8 @@ def aberration():
 
 def test_the_figures_are_well_formed_and_the_same_again(returned, aberration):
     for drawn, words in (
-        (returned[0], ("hollow cube", "between two edges", "silvered", "appendix B", "What returns")),
-        (aberration[0], ("R2 96.49 mm, as it is", "power of the beam", "at 120 m", "Deviation")),
+        (returned[0], ("hollow cube", "between two edges", "silvered", "appendix B", "Returned light")),
+        (aberration[0], ("R2 96.49 mm, actual", "beam power", "at 120 m", "Deviation")),
     ):
         ElementTree.fromstring(drawn)
         assert all(word in drawn for word in words)

@@ -112,7 +112,7 @@ def test_the_points_lie_where_the_distances_say(found):
 def test_the_text_has_a_line_for_every_symbol_and_a_column_for_every_placement(found):
     lines = text_sheet(found, "TR99.toml").splitlines()
     for symbol in (*UNIT, *PLATE_SYMBOLS, *PLACEMENT):
-        mine = [line for line in lines if line.startswith(f"{symbol.shown:<14}")]
+        mine = [line for line in lines if line.startswith(f"{symbol.label:<14}")]
         assert mine, symbol.name
         values = symbol_values(symbol, found)
         shown = [cell(symbol, value) for value in values]
@@ -125,7 +125,7 @@ def test_the_page_stands_alone_and_tells_the_same(found):
     text = Text(page)
     words = " ".join(text.words)
     for symbol in (*UNIT, *PLATE_SYMBOLS, *PLACEMENT):
-        assert symbol.shown in text.words, symbol.name
+        assert symbol.label in text.words, symbol.name
         assert cell(symbol, symbol_values(symbol, found)[0]) in text.words, symbol.name
     assert "ab" * 32 in words
     assert "-0.0230 mm" in words
