@@ -50,7 +50,7 @@ def test_a_model_survives_its_file(tmp_path):
         (("680.72]", "680720.0]"), "expected"),
     ],
 )
-def test_a_model_that_cannot_be_meant_is_refused(tmp_path, change, said):
+def test_implausible_model_is_refused(tmp_path, change, said):
     (tmp_path / "m.toml").write_text(MODEL.replace(*change))
     with pytest.raises(InputError, match=said):
         read_record(tmp_path / "m.toml", PointingModel)
@@ -125,7 +125,7 @@ def test_points_of_a_reduction_are_read_with_their_posture(tmp_path):
         ({"points": {"A": {"x": 0, "y": 0, "z": "0"}, "B": {"x": 0, "y": 0, "z": 0}}}, r"points\['A'\].z"),
     ],
 )
-def test_points_that_cannot_be_used_are_refused(tmp_path, change, said):
+def test_invalid_points_are_refused(tmp_path, change, said):
     with pytest.raises(InputError, match=said):
         read_solved_points(written(tmp_path, **change))
 

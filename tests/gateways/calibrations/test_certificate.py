@@ -54,7 +54,7 @@ def test_a_record_reads_back_as_it_was(made, tmp_path, kind):
 
 
 @pytest.mark.parametrize("kind", ["reference-distance", "leakage", "leakage-lit", "linearity", "amplitude-to-phase"])
-def test_what_is_to_be_copied_fits_the_ranger_s_record(made, kind):
+def test_values_to_copy_fit_the_rangers_record(made, kind):
     sheet = tomllib.loads((EXAMPLES.parent / "night-01" / "mirrors" / "ZP101.toml").read_text(encoding="utf-8"))
     copied = Mirror.model_validate({**sheet, **made(kind).record})
     for key, value in made(kind).record.items():
@@ -90,7 +90,7 @@ def test_a_page_shows_every_quantity_test_and_line_to_sign(made, kind):
     assert certificate(found, WHEN) == text
 
 
-def test_a_certificate_escapes_what_people_write(made):
+def test_certificate_escapes_user_text(made):
     found = made("leakage")
     odd = dataclasses.replace(found, title="<b>", provenance={**found.provenance, "by": '<script>"&'})
     text = certificate(odd, WHEN)
@@ -145,6 +145,6 @@ def test_rounding_keeps_two_digits_of_u():
     assert rounded(1.0, float("nan")) == ("1", "unknown")
 
 
-def test_lengths_in_a_table_show_what_their_residuals_show():
+def test_lengths_have_the_digits_of_their_residuals():
     assert _cell(24003.09162, _form("distance_mm")) == "24003.09162"
     assert _cell(24.00309162, _form("distance_m")) == "24.0030916"

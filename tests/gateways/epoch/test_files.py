@@ -95,7 +95,7 @@ def flat(value, name=""):
         (7, "expected"),
     ],
 )
-def test_a_file_that_is_not_beside_it_is_refused(written, tmp_path, name, said):
+def test_invalid_covariance_file_is_refused(written, tmp_path, name, said):
     told = json.loads((written / "coordinates.json").read_text())
     (tmp_path / "coordinates.json").write_text(json.dumps({**told, "covariance_file": name}))
     with pytest.raises(InputError, match=said):
@@ -146,7 +146,7 @@ class Asked:
         return self._counted("carried", *given)
 
 
-def test_the_points_rows_are_multiplied_out_once(tmp_path, monkeypatch):
+def test_rows_of_the_points_are_computed_once(tmp_path, monkeypatch):
     """For the matrix in its file, the page's three fits of the dish and its pose."""
     whole = reduction_of_example()
     points = whole.coordinates.joint
@@ -163,7 +163,7 @@ def test_the_points_rows_are_multiplied_out_once(tmp_path, monkeypatch):
     assert all(done <= of for _, done, of in told)
 
 
-def test_the_page_says_where_the_matrix_is_and_what_is_drawn_as_dots(written, tmp_path, monkeypatch):
+def test_page_names_the_matrix_file_and_dots(written, tmp_path, monkeypatch):
     page = (written / "report.html").read_text()
     assert "the full matrix in covariance.fits" in page
     assert "All points with the outline of its 1σ ellipsoid" in page

@@ -47,7 +47,7 @@ def test_the_same_move_gives_the_same_figure(trace, plain):
     assert move_figure(trace, target=400.0) == plain
 
 
-def test_step_responses_stand_beside_linear_theory(trace):
+def test_step_responses_are_compared_with_linear_theory(trace):
     drawn = texts(step_figure({"one": trace, "two": trace}, target=50.0, linear={"one": np.linspace(0.0, 50.0, 700)}))
     for words in ("one", "two", "Step of 50 counts", "Final error"):
         assert words in drawn

@@ -132,7 +132,7 @@ def test_hours_count_from_the_first_reading(files):
 
 
 @pytest.mark.parametrize("name", ["EDM 7", "Leica TM50 / 2", "Messgerät Süd"])
-def test_an_instrument_has_the_name_that_people_call_it(files, name):
+def test_instrument_name_is_free_text(files, name):
     sheet = SHEET.replace('instrument = "ZP1"', f'instrument = "{name}"')
     assert read_readings(files("range_m\n1\n2\n", sheet), LAYOUT).sheet.instrument == name
     with pytest.raises(InputError, match="instrument"):

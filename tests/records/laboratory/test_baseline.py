@@ -12,7 +12,7 @@ TS30 = ROOT / "examples" / "baselines" / "busselton" / "ts30-baseline-observatio
 RELEASED = VECTORS / "baseline-1.toml"
 
 
-def test_the_real_table_is_read_whole():
+def test_real_table_is_read_completely():
     seen = read_observations(TS30)
     assert len(seen) == 127
     assert seen.names == ("1", "2", "3", "4", "5", "6")

@@ -49,7 +49,7 @@ def test_a_folder_of_three_stations_puts_the_target_where_geometry_does(tmp_path
     assert np.allclose(solve(network).x[3], (30.0, 40.0, 50.0), atol=1e-6, rtol=0)
 
 
-def test_the_established_ranging_network_is_read_whole():
+def test_established_ranging_network_is_read_completely():
     network = read_network(VECTORS / "ranging-18x500")
     assert len(network.points.names) == 518
     assert network.points.datum.sum() == 54
@@ -145,7 +145,7 @@ def test_a_bad_range_is_named_with_its_line(tmp_path, old):
     assert refusal_of(folder(tmp_path, ranges=RANGES.replace(old, new, 1))) == expected
 
 
-def test_what_is_not_there_or_empty_is_said(tmp_path):
+def test_missing_or_empty_input_is_reported(tmp_path):
     (tmp_path / "points.csv").write_text(POINTS)
     assert refusal_of(tmp_path) == f"ranges.csv: missing in {tmp_path}"
     (tmp_path / "ranges.csv").write_text("\n")
@@ -179,7 +179,7 @@ def test_every_number_written_is_the_number_read(rows, quoted):
     assert table.numbers("sigma").tolist() == [row[2] for row in rows]
 
 
-def test_the_examples_are_read_and_fit_what_they_claim(solve):
+def test_examples_are_read_and_fit_their_claims(solve):
     files = {"feed-arm.toml", "ground-ring", "template", "total-station.gkf", "total-station.dat"}
     assert {path.name for path in EXAMPLES.iterdir()} == files
     for file in files - {"template"}:  # which has points without a place

@@ -285,7 +285,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("text", REFUSED)
-def test_a_file_that_is_no_network_is_refused_in_one_line(text):
+def test_file_without_network_is_refused_in_one_line(text):
     with pytest.raises(InputError) as refusal:
         gama_network(text.encode(), "n.gkf")
     assert str(refusal.value) == REFUSED[text]
@@ -341,7 +341,7 @@ REFUSED_INSIDE = {
 
 
 @pytest.mark.parametrize("inside", REFUSED_INSIDE)
-def test_what_cannot_be_used_is_named_with_its_line(inside):
+def test_invalid_input_is_named_with_its_line(inside):
     with pytest.raises(InputError) as refusal:
         small(inside)
     assert str(refusal.value) == f"n.gkf: line 3, {REFUSED_INSIDE[inside]}"

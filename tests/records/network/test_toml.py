@@ -105,7 +105,7 @@ def test_a_table_beside_the_file_is_read_by_its_lines(tmp_path):
     assert network.places == (("r.csv line 2", "r.csv line 3"),)
 
 
-def test_a_correlated_set_has_the_covariance_that_its_correlation_says(tmp_path):
+def test_correlated_set_has_the_covariance_of_its_correlation(tmp_path):
     network = read(
         tmp_path,
         """[[correlated]]
@@ -192,7 +192,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("text", REFUSED)
-def test_what_cannot_be_used_is_named_with_its_table(tmp_path, text):
+def test_invalid_input_is_named_with_its_table(tmp_path, text):
     with pytest.raises(InputError) as refusal:
         read(tmp_path, text)
     assert str(refusal.value) == f"n.toml: {REFUSED[text]}"

@@ -18,7 +18,7 @@ def read(tmp_path, text):
     return read_structural_model(path)
 
 
-def test_the_example_is_what_its_program_writes_and_comes_back_the_same(tmp_path):
+def test_example_equals_its_programs_output_and_round_trips(tmp_path):
     model = read_structural_model(EXAMPLE)
     assert structural_model_toml(model) == TEXT
     assert read(tmp_path, structural_model_toml(model)) == model
@@ -77,7 +77,7 @@ def test_a_table_of_wrong_shape_or_knots_is_refused(tmp_path):
     ("row", "message"),
     [("[1.0, 0.0]", "expected 12 by 12"), ("skew", "not symmetric"), ("negative", "negative eigenvalue")],
 )
-def test_a_covariance_that_is_none_is_refused(tmp_path, row, message):
+def test_invalid_covariance_is_refused(tmp_path, row, message):
     rows = [[1.0 if i == j else 0.0 for j in range(12)] for i in range(12)]
     if row == "skew":
         rows[0][1] = 0.5
