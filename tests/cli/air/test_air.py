@@ -111,7 +111,7 @@ def test_no_way_to_the_index_counts_sensors_that_were_not_given(catseye, way, it
     one = asked(catseye, *bare, "--u-temperature-c", 0.1)
     assert one["uncertainty_of"] == ["temperature"]
     assert one["formula_uncertainty"] == found["formula_uncertainty"]
-    assert "that of temperature; not given: pressure, humidity" in one["verdict"]["why"]
+    assert "the formula and temperature; not given: pressure, humidity" in one["verdict"]["why"]
     every = ("--u-temperature-c", 0.1, "--u-pressure-hpa", 0.1, its_u)
     assert "includes the formula and the sensors" in asked(catseye, *bare, *every)["verdict"]["why"]
 

@@ -114,7 +114,7 @@ def test_folders_alone_have_a_posture_and_no_temperature(catseye, nights):
     ("arguments", "status", "expected"),
     [
         ([], 2, "--points"),
-        (["--points", "ZEG*"], 1, "there is no epoch"),
+        (["--points", "ZEG*"], 1, "no epoch found"),
         (["missing", "--points", "ZEG*"], 1, "missing: missing"),
         (["NIGHTS", "--points", "X*"], 1, "no epoch has a point 'X*' (they have ZEG1"),
         (["NIGHTS", "--points", "ZEG*", "--pivot", "1,2"], 2, "not x,y,z"),
