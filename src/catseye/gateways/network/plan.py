@@ -74,7 +74,7 @@ def plan_verdict(plan_findings: PlanFindings) -> Verdict:
         return Verdict("failed", findings.solution.status)
     alone = int(np.isinf(plan_findings.worth).sum())
     if alone:
-        return Verdict("doubtful", f"{alone} observations are indispensable: a point is undetermined without one")
+        return Verdict("doubtful", f"{alone} observations are indispensable: losing one leaves a point undetermined")
     unchecked = int(np.sum(~findings.table.checked))
     if unchecked:
         return Verdict("doubtful", f"an error in {unchecked} of {len(findings.table)} observations would not show")
@@ -297,7 +297,7 @@ def _cards(plan_findings: PlanFindings) -> list[str]:
             findings.names[plan_findings.weakest[0]] if len(plan_findings.weakest) else "none",
             f"{quantity(float(plan.weakest.max(initial=0.0)), 'm')} along its longest axis",
         ),
-        card("Indispensable", str(int(np.isinf(plan_findings.worth).sum())), "a point is undetermined without one"),
+        card("Indispensable", str(int(np.isinf(plan_findings.worth).sum())), "losing one leaves a point undetermined"),
         card("Unchecked", str(int(np.sum(~findings.table.checked))), "observations whose error would not show"),
     ]
 
