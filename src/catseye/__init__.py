@@ -1,11 +1,10 @@
-"""Catseye: laser metrology for large telescopes and structures, from raw samples to coordinates with uncertainty.
+"""Laser metrology for large telescopes and structures, from raw samples to coordinates.
 
     >>> import catseye
     >>> round(float(catseye.air(temperature_c=20, pressure_hpa=933, humidity_percent=50).group_index), 9)
     1.000253319
 
-Its functions are those of the files in `catseye.api`, loaded when they are first asked for; its errors those of
-`catseye.errors`.
+Functions are those of `catseye.api`, loaded on first use; errors are those of `catseye.errors`.
 """
 
 from importlib import import_module
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from catseye.api.telescope import pose, surface
     from catseye.api.weather import air, refractometer, sound
 
-FACE = {  # file of catseye.api -> what of it is catseye's
+FACE = {  # file of catseye.api -> its exported names
     "laboratory": ("baseline", "calibrate", "triplet"),
     "living": ("replay", "simulate"),
     "network": ("adjust", "compare", "locate", "plan"),
@@ -77,7 +76,7 @@ __all__ = [
 ]
 
 
-if not TYPE_CHECKING:  # or mypy would let every name pass
+if not TYPE_CHECKING:  # else mypy would accept every name
 
     def __getattr__(name: str) -> Any:
         for file, names in FACE.items():

@@ -1,4 +1,4 @@
-"""`python -m catseye` is `catseye`."""
+"""Entry point of `python -m catseye`."""
 
 from catseye.cli.main import run
 

@@ -1,6 +1,6 @@
-"""The sources that docstrings cite as [KEY]: title, where to find it, which equations are used, which errors it has.
+"""Sources cited as [KEY] in docstrings: title, location, equations used, errata.
 
-A test fails on a citation without an entry here, and on an entry that nothing cites.
+A test fails on a citation without an entry here, and on an uncited entry.
 """
 
 from dataclasses import dataclass
@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Source:
-    """One cited work.
+    """Cited work.
 
     title      authors, title, publication, year
-    locator    DOI, or report number where there is none
-    used       the equations or tables that catseye uses
-    errata     errors found in it, one line each, and what is right
+    locator    DOI, or report number
+    used       equations or tables used
+    errata     errors found in it, with corrections, one line each
     """
 
     title: str

@@ -1,4 +1,4 @@
-"""Clocks: UTC as programs count it, this machine's own UTC beside it, and what the kernel knows of its error."""
+"""Clocks: a steady UTC count, the machine's UTC, and the kernel's error estimate."""
 
 import ctypes
 import sys
@@ -10,24 +10,24 @@ from typing import Protocol
 PER_SECOND = 1_000_000_000
 PER_DAY = 86_400 * PER_SECOND
 UNIX_EPOCH_DAY = 40_587  # MJD of 1970-01-01
-SLEW = 2000  # ns in which a slewed count gains or loses 1 ns: 0.5 ms a second, as kernels slew
-AT_ONCE = 20_000  # ns within which UTC and the steady counter are read as one instant
-TRIES = 8  # to read them so; then the closest pair counts
+SLEW = 2000  # ns in which a slewed count gains or loses 1 ns: 0.5 ms per second, as in kernels
+READ_WINDOW = 20_000  # ns within which UTC and the steady counter count as read together
+TRIES = 8  # attempts; then the closest pair is used
 
 
 class Clock(Protocol):
-    """A clock that tells the true UTC of a world."""
+    """Clock that gives the true UTC of a world."""
 
     def now_ns(self) -> int:
-        """Nanoseconds since MJD 0; backwards only where `SystemClock.correct` says so."""
+        """Nanoseconds since MJD 0; decreasing only by `SystemClock.correct`."""
         ...
 
 
 class SystemClock:
-    """UTC read once from this machine and counted on with its steady counter, so that no stamp jumps by itself.
+    """UTC read once from this machine and continued with its steady counter, so that stamps do not jump.
 
-    Two processes agree to a ms. What becomes of the machine's UTC meanwhile is `departure`; the count follows it only
-    when `slew` or `correct` is called.
+    Two processes agree to a ms. `departure` is the difference from the machine's UTC; the count follows it only by
+    `slew` or `correct`.
 
     offset      s, added to UTC: a night at noon
     realtime    ns since 1970, CLOCK_REALTIME
@@ -43,55 +43,55 @@ class SystemClock:
     ):
         self.offset = offset
         self._realtime, self._monotonic = realtime, monotonic
-        self._course = (self._machine_zero(), 0, 0)  # count at counter 0; a slew's start on the counter, and its ns
+        self._course = (self._machine_zero(), 0, 0)  # count at counter 0; counter at a slew's start, and its ns
 
     def now_ns(self) -> int:
         """Nanoseconds since MJD 0."""
         return self._count(self._monotonic())
 
     def departure(self) -> float:
-        """Seconds by which the machine's UTC is ahead of this count."""
+        """Lead of the machine's UTC over this count, s."""
         zero = self._machine_zero()
         counter = self._monotonic()
         return (zero + counter - self._count(counter)) / PER_SECOND
 
     def slew(self) -> None:
-        """Bring the count to the machine's UTC by 0.5 ms a second, never backwards."""
+        """Bring the count to the machine's UTC by 0.5 ms per second, never backwards."""
         zero = self._machine_zero()
         counter = self._monotonic()
-        here = self._count(counter) - counter
-        self._course = (here, counter, zero - here)
+        base = self._count(counter) - counter
+        self._course = (base, counter, zero - base)
 
     def correct(self) -> float:
-        """Take over the machine's UTC at once; seconds that the count gained."""
+        """Set the count to the machine's UTC at once; seconds gained."""
         gained = self.departure()
         self._course = (self._machine_zero(), 0, 0)
         return gained
 
     @staticmethod
     def starting_at(mjd: float) -> "SystemClock":
-        """A clock that reads an MJD now."""
-        now = UNIX_EPOCH_DAY + time.time_ns() / PER_DAY
-        return SystemClock((mjd - now) * (PER_DAY / PER_SECOND))
+        """Clock that reads an MJD now."""
+        today = UNIX_EPOCH_DAY + time.time_ns() / PER_DAY
+        return SystemClock((mjd - today) * (PER_DAY / PER_SECOND))
 
     def _count(self, counter: int) -> int:
         zero, since, slew = self._course
-        done = min(abs(slew), max(0, counter - since) // SLEW)
-        return zero + counter + (done if slew > 0 else -done)
+        applied = min(abs(slew), max(0, counter - since) // SLEW)
+        return zero + counter + (applied if slew > 0 else -applied)
 
     def _machine_zero(self) -> int:
-        """The machine's UTC, ns since MJD 0 with the offset, when the counter was 0."""
+        """UTC of the machine, ns since MJD 0 with the offset, at counter 0."""
         closest, zero = -1, 0
         for _ in range(TRIES):
             before, realtime, after = self._monotonic(), self._realtime(), self._monotonic()
             if closest < 0 or after - before < closest:
                 closest, zero = after - before, realtime - (before + after) // 2
-            if closest <= AT_ONCE:
+            if closest <= READ_WINDOW:
                 break
         return UNIX_EPOCH_DAY * PER_DAY + zero + round(self.offset * PER_SECOND)
 
 
-# The kernel's word -------------------------------------------------------------------------------------------------
+# Kernel state ----------------------------------------------------------------------------------------------------
 
 FAILED, ERROR = -1, 5  # of adjtimex: refused; TIME_ERROR, not synchronised
 PLL, PPS_TIME, FLL, UNSYNCHRONISED, NANOSECONDS = 0x0001, 0x0004, 0x0008, 0x0040, 0x2000  # STA_... of <sys/timex.h>
@@ -99,7 +99,7 @@ MICROSECOND = 1e-6  # s
 
 
 class Timex(ctypes.Structure):
-    """The kernel's `struct timex` (adjtimex(2)); offset in us, or ns where STA_NANO is set, errors in us."""
+    """Structure `struct timex` of adjtimex(2); offset in us, or ns if STA_NANO is set, errors in us."""
 
     _fields_ = (
         ("modes", ctypes.c_uint),
@@ -116,12 +116,12 @@ class Timex(ctypes.Structure):
 
 @dataclass(frozen=True)
 class KernelSync:
-    """A synchronised kernel's word on its UTC, in s.
+    """Kernel's estimate of its UTC error when synchronised, s.
 
-    source   "PPS"; "NTP", by the kernel's own loop; "PTP or NTP", by a program that steers the kernel from outside
-    offset   last of the kernel's loop
-    error    estimated
-    most     bound of the error, which grows until the next correction
+    source   "PPS"; "NTP", by the kernel's own loop; "PTP or NTP", by an external program
+    offset   last offset of the kernel's loop
+    error    estimated error
+    most     bound of the error, growing until the next correction
     """
 
     source: str
@@ -131,25 +131,25 @@ class KernelSync:
 
 
 def kernel_sync(adjtimex: Callable[[Timex], int] | None = None) -> KernelSync | None:
-    """The kernel's synchronisation, asked without changing it.
+    """Synchronisation of the kernel, read without changing it.
 
-    None where it is unknown: no adjtimex, not allowed, or not synchronised, as in containers, where the host may be.
+    None if unknown: no adjtimex, no permission, or not synchronised, as in containers, even if the host is.
 
-    adjtimex   takes a `Timex` and gives the clock's state; the C library's if None
+    adjtimex   function from a `Timex` to the clock's state; the C library's if None
     """
     ask = adjtimex or _adjtimex()
-    told = Timex()
-    state = FAILED if ask is None else ask(told)
-    if state in (FAILED, ERROR) or told.status & UNSYNCHRONISED:
+    timex = Timex()
+    state = FAILED if ask is None else ask(timex)
+    if state in (FAILED, ERROR) or timex.status & UNSYNCHRONISED:
         return None
-    source = "PPS" if told.status & PPS_TIME else "NTP" if told.status & (PLL | FLL) else "PTP or NTP"
-    unit = 1.0 / PER_SECOND if told.status & NANOSECONDS else MICROSECOND
-    return KernelSync(source, told.offset * unit, told.esterror * MICROSECOND, told.maxerror * MICROSECOND)
+    source = "PPS" if timex.status & PPS_TIME else "NTP" if timex.status & (PLL | FLL) else "PTP or NTP"
+    unit = 1.0 / PER_SECOND if timex.status & NANOSECONDS else MICROSECOND
+    return KernelSync(source, timex.offset * unit, timex.esterror * MICROSECOND, timex.maxerror * MICROSECOND)
 
 
 def _adjtimex() -> Callable[[Timex], int] | None:
-    """The C library's, None where it has none."""
+    """adjtimex of the C library; None if it has none."""
     if sys.platform != "linux":
         return None
     call = getattr(ctypes.CDLL(None), "adjtimex", None)
-    return None if call is None else lambda told: int(call(ctypes.byref(told)))
+    return None if call is None else lambda timex: int(call(ctypes.byref(timex)))

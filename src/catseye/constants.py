@@ -1,4 +1,4 @@
-"""Constants of nature and of convention, each with its unit and source."""
+"""Constants of nature and of convention, with units and sources."""
 
 import math
 

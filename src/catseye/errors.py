@@ -1,22 +1,22 @@
-"""What can go wrong, as a tree. Each error's text is one line: what, where, the value, the limit, what to do.
+"""Error classes. Each error's text is one line: what, where, value, limit, what to do.
 
 CatseyeError
 ├── InputError        a file, table or record that cannot be used
-│   └── ArgumentError arguments of a call that do not fit together
-├── ValidityError     a value outside the range where a formula holds
-├── FrameError        transforms or points whose frames do not join
-└── EstimationError   an adjustment that gave no answer, raised only when the answer is required
+│   └── ArgumentError arguments that do not fit together
+├── ValidityError     a value outside the range of validity of a formula
+├── FrameError        transforms or points with mismatched frames
+└── EstimationError   an adjustment without a result, raised only when the result is required
 """
 
 from typing import Any
 
 
 class CatseyeError(Exception):
-    """Anything that catseye refuses; the command line prints its one line and exits with 1."""
+    """Base class of catseye's errors; the command line prints one line and exits with 1."""
 
 
 class InputError(CatseyeError):
-    """A file, table or record that cannot be used."""
+    """File, table or record that cannot be used."""
 
 
 class ArgumentError(InputError):
@@ -31,9 +31,9 @@ class ArgumentError(InputError):
 
 
 class ValidityError(CatseyeError, ValueError):
-    """A value outside the range where a formula holds.
+    """Value outside the range of validity of a formula.
 
-    mask   bool array of the shape of the argument that was refused, True where it is outside; None for a single value
+    mask   bool array of the argument's shape, True where it is outside; None for a single value
     """
 
     def __init__(self, text: str, mask: Any = None) -> None:
@@ -42,8 +42,8 @@ class ValidityError(CatseyeError, ValueError):
 
 
 class FrameError(CatseyeError, ValueError):
-    """Transforms or points whose frames do not join."""
+    """Transforms or points with mismatched frames."""
 
 
 class EstimationError(CatseyeError):
-    """An adjustment that gave no answer, raised only when the answer is required."""
+    """Adjustment without a result, raised only when the result is required."""

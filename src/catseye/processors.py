@@ -1,7 +1,7 @@
-"""How many threads linear algebra may have: what the user says, else what is free of the cores that we may use.
+"""Number of threads for linear algebra: the user's choice, or the free cores.
 
-Threads of a BLAS pool wait for each other in busy loops: two of them on cores that others use too need more time than
-one, the same work taken. Large factorisations ask each time; small ones have one thread.
+Threads of a BLAS pool wait for each other in busy loops: two of them on shared cores are slower than one. Large
+factorisations ask each time; small ones have one thread.
 """
 
 import math
@@ -16,16 +16,16 @@ from typing import TypeVar
 
 from threadpoolctl import threadpool_info, threadpool_limits
 
-VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")  # the first that is set counts, as for OpenBLAS
-SPARE = 0.3  # of a core that may be missing for one more thread: the clock ticks of an idle system
-FEW = 200  # rows or blocks that are done before a thread has started
-SHORTEST = 0.5  # s over which load is measured: /proc/stat counts in hundredths
+VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")  # the first one set applies, as in OpenBLAS
+SPARE = 0.3  # share of a core that an additional thread may lack: the clock ticks of an idle system
+FEW = 200  # rows or blocks processed before a thread has started
+SHORTEST = 0.5  # s, least time between load measurements: /proc/stat has steps of 0.01 s
 
 Result = TypeVar("Result")
 
 
 def said(environment: Mapping[str, str]) -> int | None:
-    """The number of threads that a user's environment asks for; None of none.
+    """Number of threads in a user's environment; None if not set.
 
     >>> said({"OPENBLAS_NUM_THREADS": "2", "OMP_NUM_THREADS": "1"}), said({"OMP_NUM_THREADS": "x"})
     (2, None)
@@ -37,26 +37,26 @@ def said(environment: Mapping[str, str]) -> int | None:
     return None
 
 
-_asked: ContextVar[int | None] = ContextVar("asked", default=None)  # by --threads
+_requested: ContextVar[int | None] = ContextVar("asked", default=None)  # by --threads
 _pool: ContextVar[int | None] = ContextVar("pool", default=None)  # size of the pool outside `one_thread`
 
 
 def threads() -> int:
-    """Threads for a large matrix, now: what was asked for, else as many as there are cores free, at least one.
+    """Threads for a large matrix now: the requested number, or the free cores, at least one.
 
-    A pool that whoever calls has made smaller stays so.
+    A pool that the caller has made smaller is not enlarged.
     """
-    asked = _asked.get()
-    if asked is None:
-        asked = said(os.environ)
-    if asked is None:
-        asked = max(1, math.floor(LOAD.free() + SPARE))
+    count = _requested.get()
+    if count is None:
+        count = said(os.environ)
+    if count is None:
+        count = max(1, math.floor(LOAD.free() + SPARE))
     pool = _pool.get()
-    return asked if pool is None or _asked.get() is not None else min(asked, pool)
+    return count if pool is None or _requested.get() is not None else min(count, pool)
 
 
 def on_threads(work: Callable[[int, int], Result]) -> list[Result]:
-    """Answers of work(part, parts), each part on a thread of its own; for kernels that release the interpreter."""
+    """Results of work(part, parts), each part on its own thread; for kernels that release the GIL."""
     parts = threads()
     if parts == 1:
         return [work(0, 1)]
@@ -65,7 +65,7 @@ def on_threads(work: Callable[[int, int], Result]) -> list[Result]:
 
 
 def in_parts(count: int, work: Callable[[int, int], Result], *, least: int = FEW) -> list[Result]:
-    """Answers of work(low, high) over 0 to count in as many parts as there are threads; below `least` in one."""
+    """Results of work(low, high) over 0 to count in one part per thread; one part below `least`."""
     if count < least:
         return [work(0, count)]
     return on_threads(lambda part, parts: work(part * count // parts, (part + 1) * count // parts))
@@ -73,8 +73,8 @@ def in_parts(count: int, work: Callable[[int, int], Result], *, least: int = FEW
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Small matrices inside: spinning pools make them many times slower. `threads` still says what large ones get."""
-    sizes = [each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"]
+    """Use one thread for small matrices, where pools are many times slower."""
+    sizes = [pool_info["num_threads"] for pool_info in threadpool_info() if pool_info["user_api"] == "blas"]
     before = _pool.set(_pool.get() or max(sizes, default=None))
     try:
         with threadpool_limits(limits=1, user_api="blas"):
@@ -85,23 +85,23 @@ def one_thread() -> Iterator[None]:
 
 @contextmanager
 def free_threads() -> Iterator[None]:
-    """Large matrices inside: a pool of `threads()`, never more than it was."""
-    sizes = [each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"]
+    """Use a pool of `threads()` for large matrices, never larger than before."""
+    sizes = [pool_info["num_threads"] for pool_info in threadpool_info() if pool_info["user_api"] == "blas"]
     with threadpool_limits(limits=min([threads(), *sizes]), user_api="blas"):
         yield
 
 
 @contextmanager
 def at_most(count: int) -> Iterator[None]:
-    """So many threads inside, whatever else is said; libraries that are loaded inside begin with so many."""
+    """Limit the number of threads inside, also of libraries loaded there."""
     before = {name: os.environ.get(name) for name in VARIABLES}
     os.environ.update(dict.fromkeys(VARIABLES, str(count)))
-    token = _asked.set(count)
+    token = _requested.set(count)
     try:
         with threadpool_limits(limits=count, user_api="blas"):
             yield
     finally:
-        _asked.reset(token)
+        _requested.reset(token)
         for name, value in before.items():
             if value is None:
                 del os.environ[name]
@@ -110,17 +110,17 @@ def at_most(count: int) -> Iterator[None]:
 
 
 def allowed() -> tuple[set[int], float]:
-    """Cores that this process may use, and how many of them at once by its control group."""
+    """Cores that this process may use, and the number at once by its control group."""
     cores = set(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else set(range(os.cpu_count() or 1))
     share = float(len(cores))
     with suppress(OSError, ValueError):
         quota, period = Path("/sys/fs/cgroup/cpu.max").read_text(encoding="ascii").split()
-        share = min(share, float(quota) / float(period))  # "max" is no number: no limit
+        share = min(share, float(quota) / float(period))  # "max" means no limit
     return cores, share
 
 
 def idle_of(stat: str, cores: set[int]) -> float:
-    """Seconds that some cores were idle since the system's start.
+    """Idle time of some cores since the system's start, s.
 
     stat   text of /proc/stat
 
@@ -138,33 +138,33 @@ def idle_of(stat: str, cores: set[int]) -> float:
 
 
 class Load:
-    """How many cores were free since it was last asked: idle, or used by this process itself."""
+    """Number of cores free since the last call: idle, or used by this process."""
 
     def __init__(self) -> None:
         self._last = self._now()
         self._free: float | None = None
 
     def free(self) -> float:
-        """Cores that others left to this process, of those that it may use."""
+        """Cores available to this process, of those that it may use."""
         cores, share = allowed()
-        since, now = self._last, self._now()
-        if since is None or now is None:
+        since, current = self._last, self._now()
+        if since is None or current is None:
             return self._by_average(cores, share)
-        passed = now[0] - since[0]
+        passed = current[0] - since[0]
         if passed >= SHORTEST:
-            self._last, self._free = now, (now[1] - since[1] + now[2] - since[2]) / passed
+            self._last, self._free = current, (current[1] - since[1] + current[2] - since[2]) / passed
         return min(share, self._by_average(cores, share) if self._free is None else self._free)
 
     @staticmethod
     def _by_average(cores: set[int], share: float) -> float:
-        """Before anything was measured, and where the system does not say: by the load of the last minute."""
+        """Free cores by the load of the last minute, without a measurement."""
         with suppress(OSError, AttributeError):
             return max(0.0, min(share, len(cores) * (1.0 - os.getloadavg()[0] / (os.cpu_count() or 1))))
         return share
 
     @staticmethod
     def _now() -> tuple[float, float, float] | None:
-        """Time, idle time of our cores and our own processor time, s."""
+        """Time, idle time of the allowed cores and processor time of this process, s."""
         with suppress(OSError):
             stat = Path("/proc/stat").read_text(encoding="ascii")
             return time.monotonic(), idle_of(stat, allowed()[0]), time.process_time()

@@ -1,4 +1,4 @@
-"""One word on a result and why, and how it passes from a result to what rests on it."""
+"""Verdict on a result, with its reason, and its propagation to dependent results."""
 
 from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple, Optional
@@ -10,9 +10,9 @@ ORDER: tuple[Word, ...] = ("good", "doubtful", "failed")  # from the best to the
 class Verdict(NamedTuple):
     """Judgement of a result.
 
-    word   "good"; "doubtful": an answer that something speaks against or nothing checks; "failed": no answer, or one
-           that its own tests reject
-    why    one sentence without its full stop, beginning in lower case
+    word   "good"; "doubtful": a result with an objection or without a check; "failed": no result, or one rejected
+           by its own tests
+    why    one sentence without full stop, in lower case
     """
 
     word: Word
@@ -20,7 +20,7 @@ class Verdict(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The verdict as a line.
+        """Verdict as a line.
 
         >>> Verdict("doubtful", "nothing was measured twice").text
         'Doubtful: nothing was measured twice.'
@@ -28,13 +28,13 @@ class Verdict(NamedTuple):
         return f"{self.word.capitalize()}: {self.why}."
 
     def to_object(self) -> dict[str, str]:
-        """As `verdict` in every `--json`."""
+        """Object for `verdict` in every `--json`."""
         return {"word": self.word, "why": self.why}
 
     def hearing(self, doubts: Sequence[str]) -> "Verdict":
-        """The same, doubtful where it was good and a note says that something is wrong.
+        """Verdict made doubtful if it was good and there are doubts.
 
-        doubts   notes that speak against the result; others are not for a verdict
+        doubts   notes that question the result; no others
 
         >>> Verdict("good", "all fits").hearing(["WX2's thermometer is biased."]).text
         "Doubtful: WX2's thermometer is biased."
@@ -42,9 +42,9 @@ class Verdict(NamedTuple):
         return Verdict("doubtful", doubts[0].rstrip(".")) if doubts and self.word == "good" else self
 
     def resting_on(self, sources: Mapping[str, Optional["Verdict"]]) -> "Verdict":
-        """The same, or the worst of its sources: a result is no better than what it rests on.
+        """Verdict limited by its sources: a result is no better than its inputs.
 
-        sources   verdict of each result that was read, by its name; None: it has none
+        sources   verdict of each input result, by name; None if it has none
 
         >>> Verdict("good", "all fits").resting_on({"night-07": Verdict("failed", "it did not settle")}).text
         'Failed: it rests on night-07, which failed: it did not settle.'
@@ -54,13 +54,13 @@ class Verdict(NamedTuple):
         if not name or ORDER.index(judged[name].word) <= ORDER.index(self.word):
             return self
         word, why = judged[name]
-        others = sum(verdict.word == word for verdict in judged.values()) - 1
-        more = f" (and {others} more)" if others else ""
+        further = sum(verdict.word == word for verdict in judged.values()) - 1
+        more = f" (and {further} more)" if further else ""
         return Verdict(word, f"it rests on {name}, which {'failed' if word == 'failed' else f'is {word}'}: {why}{more}")
 
 
 def worst(verdicts: Sequence[Verdict]) -> Verdict:
-    """The worst of several, the first of equals; good of none.
+    """Worst of several verdicts, the first of equals; good for none.
 
     >>> worst([Verdict("good", "a"), Verdict("failed", "b"), Verdict("doubtful", "c")]).why
     'b'

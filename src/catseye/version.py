@@ -1,3 +1,3 @@
-"""The version, in one place that every layer may import."""
+"""Version, in a module that every layer may import."""
 
 __version__ = "0.2.0"

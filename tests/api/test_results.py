@@ -35,8 +35,8 @@ def test_air_has_the_shape_of_its_inputs():
     assert answer.group_index.shape == answer.standard_uncertainty.shape == (2, 3)
     assert len(answer.to_table()) == 6
     assert str(answer.to_table()["temperature"].unit) == "deg_C"
-    assert "until the sensors' are given" not in answer.verdict.why
-    assert "until the sensors' are given" in catseye.air(20.0, 933.0, 50.0).verdict.why
+    assert "of the formula only" not in answer.verdict.why
+    assert "of the formula only" in catseye.air(20.0, 933.0, 50.0).verdict.why
     with pytest.raises(catseye.ValidityError, match="temperature"):
         catseye.air(200.0, 933.0, 50.0)
 

@@ -173,7 +173,7 @@ def test_files_appear_whole_and_only_where_catseye_may_write(catseye, tmp_path):
     before = record.stat().st_mtime_ns
     status, out, err = catseye(*arguments)
     assert (status, out) == (1, "")
-    assert "exists and is not catseye's" in err
+    assert "exists and is not a catseye file" in err
     assert len(err.splitlines()) == 1
     assert record.stat().st_mtime_ns == before  # neither is begun
     assert sorted(path.name for path in tmp_path.iterdir()) == ["c.html", "r.toml"]

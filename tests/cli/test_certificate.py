@@ -55,7 +55,7 @@ def test_people_are_told_what_stayed_blank_and_our_page_may_be_replaced(catseye,
     page.write_text("somebody's", encoding="utf-8")
     status, out, err = catseye("certificate", "monument", ZY3, "--out", page)
     assert (status, out) == (1, "")
-    assert "exists and is not catseye's" in err
+    assert "exists and is not a catseye file" in err
     assert page.read_text(encoding="utf-8") == "somebody's"
 
 

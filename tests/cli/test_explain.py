@@ -73,6 +73,6 @@ def test_a_page_replaces_its_like_and_nothing_else(catseye, tmp_path):
     other.write_text("mine")
     status, _, err = catseye("explain", NIGHT, 3, "--page", other, "--monte-carlo", 0)
     assert status == 1
-    assert "not catseye's" in err
+    assert "not a catseye file" in err
     assert other.read_text() == "mine"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["mine.html", "shot.html"]

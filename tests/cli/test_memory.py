@@ -42,7 +42,7 @@ def test_an_array_is_told_by_its_size(capfd):
 
 
 def test_an_error_that_does_not_say_the_size_says_what_was_in_use():
-    assert re.match(r"out of memory with [0-9.]+ GiB in use.*: more than that is needed", out_of_memory(MemoryError()))
+    assert re.match(r"out of memory with [0-9.]+ GiB in use.*: more is needed", out_of_memory(MemoryError()))
     assert memory_of_a_killed("SIGKILL", 3 * GIB).startswith("ended by SIGKILL with 3.0 GiB in use")
 
 

@@ -70,7 +70,7 @@ def test_a_move_that_takes_for_ever_is_refused(catseye, tmp_path):
         ([*SKY, "--from=1", "--to=2,3", "--out", "a.svg"], 2, "is not AZIMUTH,ELEVATION in counts"),
         (["servo", "--counts", "0", "--out", "a.svg"], 2, "greater than or equal to 1"),
         (["servo", "--mirror", ZP3, "--out", "a.svg"], 1, "fkp_0 is missing"),
-        (["servo", "--out", ROOT / "docs" / "night-01.svg"], 1, "exists and is not catseye's"),
+        (["servo", "--out", ROOT / "docs" / "night-01.svg"], 1, "exists and is not a catseye file"),
         (["servo", "--out", ROOT], 1, "is a directory"),
     ],
 )

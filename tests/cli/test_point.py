@@ -79,7 +79,7 @@ def test_a_coord_dat_gives_what_the_same_points_give(catseye, tmp_path):
         ("# a\n1 2 three\n", "coord.dat: line 2, '1 2 three': 'three' is not a number (expected x y z in mm)"),
         ("1 2 nan\n", "'nan' is not a number"),
         ("1 2 3e9\n", "3e9 mm (expected -1e7 to 1e7)"),
-        ("# only\n", "coord.dat: holds no point"),
+        ("# only\n", "coord.dat: has no points"),
         ("", "coord.dat: holds 0 bytes and no text: empty"),
     ],
 )

@@ -135,7 +135,7 @@ def test_the_blank_form(catseye, tmp_path):
     other.write_text("mine", encoding="utf-8")
     status, _, complaint = catseye("--blank", other)
     assert status == 1
-    assert "exists and is not catseye's" in complaint
+    assert "exists and is not a catseye file" in complaint
     assert other.read_text(encoding="utf-8") == "mine"
 
 

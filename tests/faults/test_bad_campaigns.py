@@ -246,7 +246,7 @@ DAMAGES: dict[str, tuple[Damage, str]] = {
     "unknown key": (
         swap(MIRROR, "d0_mm", "d0_m"),
         "mirrors/ZP103.toml: d0_m = 180.534 is not a known key (expected perhaps d0_mm); "
-        "invalid or missing, too: d0_mm",
+        "also invalid or missing: d0_mm",
     ),
     "stray key": (swap(MIRROR, "zp =", "qqqq = 1\nzp ="), "qqqq = 1 is not a known key (expected no such key)"),
     "key with a line feed": (
@@ -289,7 +289,7 @@ DAMAGES: dict[str, tuple[Damage, str]] = {
     "station given twice": (swap("site.toml", '"WX2"', '"WX1"'), "weather_station 'WX1' is given twice"),
     "next version": (
         swap(MIRROR, "zp =", "format = 2\nzp ="),
-        "mirrors/ZP103.toml: format = 2 (expected 1 or 'catseye-mirror-1', the versions known here)",
+        "mirrors/ZP103.toml: format = 2 (expected 1 or 'catseye-mirror-1', the supported versions)",
     ),
     "bad date": (swap(MIRROR, "zp =", 'measured_on = "May"\nzp ='), "measured_on = 'May' (expected a date)"),
     # names
@@ -312,7 +312,7 @@ DAMAGES: dict[str, tuple[Damage, str]] = {
     ),
     "target called as a fixed point": (
         swap("targets.toml", '"DP001"', '"ZY101-F"'),
-        "targets.toml: target = 'ZY101-F' is a name taken by monuments/ZY101.toml (expected each name once)",
+        "targets.toml: target = 'ZY101-F' is a name taken by monuments/ZY101.toml (expected unique names)",
     ),
     "target called ZRG": (swap("targets.toml", '"DP001"', '"ZRG"'), "target = 'ZRG' is a name taken by the internal"),
     # what belongs together
@@ -373,7 +373,7 @@ DAMAGES: dict[str, tuple[Damage, str]] = {
     ),
     "two shots of a ranger at once": (
         set_cell("shots.csv", 2, "mjd_utc", "52889.125342761"),
-        "shots.csv: row 2, mjd_utc = 52889.125342761 is the time of ZY116's last shot too",
+        "shots.csv: row 2, mjd_utc = 52889.125342761 is also the time of ZY116's last shot",
     ),
     "another campaign's start": (
         set_key("site.toml", "start_mjd_utc", "52899.0"),
@@ -429,11 +429,11 @@ DAMAGES: dict[str, tuple[Damage, str]] = {
     ),
     "double column": (
         swap("shots.csv", ",cycles,", ",shot,"),
-        "shots.csv: header, column 'shot' is there 2 times",
+        "shots.csv: header, column 'shot' occurs 2 times",
     ),
     "unknown column": (
         swap("weather.csv", "pressure_mb", "pressure_hpa"),
-        "weather.csv: header, column 'pressure_hpa' is not known",
+        "weather.csv: header, column 'pressure_hpa' is unknown",
     ),
     "line feed in a cell": (
         set_cell("shots.csv", 2, "target", '"DP\n001"'),

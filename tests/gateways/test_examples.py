@@ -55,11 +55,11 @@ def test_examples_are_found_by_name(tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"^site = 'vla' is not bundled \(expected gbt\)$"):
         bundled_site("vla")
     for name in ("", "..", "../sites", "/etc", "nothing"):
-        with pytest.raises(InputError, match=r"^example .* is not there"):
+        with pytest.raises(InputError, match=r"^example .* not found"):
             examples.example(name)
 
 
-def test_what_lies_here_goes_before_an_example_unless_it_is_no_site(tmp_path, monkeypatch):
+def test_local_site_takes_precedence_over_an_example(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("night-01").mkdir()
     Path("night-01", "coordinates.json").touch()  # what catseye reduce wrote
@@ -80,11 +80,11 @@ def test_every_listed_example_is_there_and_can_be_copied(tmp_path):
     assert (tmp_path / "mine/night-01/frames.npy").stat().st_size == (
         ROOT / "examples/night-01/frames.npy"
     ).stat().st_size
-    with pytest.raises(InputError, match="is there and not empty"):
+    with pytest.raises(InputError, match="exists and is not empty"):
         examples.copy_example("", tmp_path / "mine")
 
 
-def test_a_disk_that_is_full_is_named_by_its_first_file_and_nothing_is_left(tmp_path):
+def test_full_disk_is_reported_by_the_first_file_without_output(tmp_path):
     import resource
 
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -118,7 +118,7 @@ def test_the_site_holds_all_rangers_triplets_and_prisms(gbt, dish):
     assert gbt.site.campaign.name == "gbt"
 
 
-def test_what_is_not_on_the_dish_is_that_of_night_01(gbt, night_01):
+def test_points_off_the_dish_equal_those_of_night_01(gbt, night_01):
     for name in ("monuments", "mirrors", "triplets", "benchmarks"):
         assert getattr(gbt, name) == getattr(night_01, name)
     still = {name for name in TARGETS_OF_NIGHT if not name.startswith("ZAG")}

@@ -130,4 +130,4 @@ def test_a_surface_without_errors_above_the_noise_says_so_once(tmp_path):
     (half,) = [p.text for p in found.passages() if p.title == "Half path"]
     assert found.verdict.word == "doubtful"
     assert "no error of the surface stands out from the noise" in found.verdict.why
-    assert "not above the measurement's own noise" in half
+    assert "not above the measurement noise" in half

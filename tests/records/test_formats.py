@@ -97,7 +97,7 @@ def test_every_file_kept_here_is_tested():
 
 
 @pytest.mark.parametrize("kind", ["monument", "mirror", "triplet"])
-def test_provenance_is_read_where_given_and_unknown_where_not(kind):
+def test_missing_provenance_is_unknown(kind):
     signed = read_record(FORMATS / f"{kind}-1-signed.toml", RECORDS[f"{kind}-1.toml"])
     unsigned = read_record(FORMATS / f"{kind}-1.toml", RECORDS[f"{kind}-1.toml"])
     keys = ("serial", "measured_on", "valid_until", "by", "report")
@@ -106,17 +106,17 @@ def test_provenance_is_read_where_given_and_unknown_where_not(kind):
 
 
 @pytest.mark.parametrize("version", ["2", '"catseye-mirror-2"', '"catseye-monument-1"', "true", "1.0"])
-def test_an_unknown_version_is_refused_with_the_known_ones(tmp_path, version):
+def test_unknown_version_is_refused_with_the_supported_ones(tmp_path, version):
     text = (FORMATS / "mirror-1.toml").read_text(encoding="utf-8")
     (tmp_path / "M.toml").write_text(f"format = {version}\nnew_key = 1\n{text}", encoding="utf-8")
     shown = version.replace('"', "'").replace("true", "True")
     with pytest.raises(InputError) as refusal:
         read_record(tmp_path / "M.toml", Mirror)
-    expected = "expected 1 or 'catseye-mirror-1', the versions known here"
+    expected = "expected 1 or 'catseye-mirror-1', the supported versions"
     assert str(refusal.value) == f"M.toml: format = {shown} ({expected})"
 
 
-def test_buffers_that_were_let_go_are_read_again():
+def test_released_buffers_are_read_again():
     buffers = read_buffers(Folder(FORMATS), "frames-1.npy")
     before = np.array(buffers)
     let_go(buffers)

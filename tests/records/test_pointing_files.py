@@ -43,14 +43,14 @@ def test_a_model_survives_its_file(tmp_path):
         (('"HZCZ"]', '"IA"]'), "twice"),
         (("[-14.18, 680.72]", "[-14.18]"), "has 1 values"),
         (("[[4.0, 0.5], [0.5, 9.0]]", "[[4.0, 0.5]]"), "expected 2 of 2"),
-        (("[[4.0, 0.5], [0.5, 9.0]]", "[[4.0, 0.5], [0.6, 9.0]]"), "no covariance"),
-        (("[[4.0, 0.5], [0.5, 9.0]]", "[[4.0, 7.0], [7.0, 9.0]]"), "no covariance"),
+        (("[[4.0, 0.5], [0.5, 9.0]]", "[[4.0, 0.5], [0.6, 9.0]]"), "not a covariance"),
+        (("[[4.0, 0.5], [0.5, 9.0]]", "[[4.0, 7.0], [7.0, 9.0]]"), "not a covariance"),
         (("[[4.0, 0.5], [0.5, 9.0]]", "[[-4.0, 0.0], [0.0, 9.0]]"), "variance -4"),
         (("series-1", "series-9"), "catseye-pointing-series-1"),
         (("680.72]", "680720.0]"), "expected"),
     ],
 )
-def test_a_model_that_cannot_be_meant_is_refused(tmp_path, change, said):
+def test_implausible_model_is_refused(tmp_path, change, said):
     (tmp_path / "m.toml").write_text(MODEL.replace(*change))
     with pytest.raises(InputError, match=said):
         read_record(tmp_path / "m.toml", PointingModel)
@@ -80,7 +80,7 @@ def test_tilts_are_read(tmp_path):
         (("90.0", "900.0"), "azimuth_deg"),
         (("1.5", "15000"), "tilt_x_arcsec"),
         (("0.2", "0"), "u_arcsec = '0'"),
-        (("u_arcsec", "u"), "column 'u' is not known"),
+        (("u_arcsec", "u"), "column 'u' is unknown"),
     ],
 )
 def test_bad_tilts_are_refused(tmp_path, change, said):
@@ -125,7 +125,7 @@ def test_points_of_a_reduction_are_read_with_their_posture(tmp_path):
         ({"points": {"A": {"x": 0, "y": 0, "z": "0"}, "B": {"x": 0, "y": 0, "z": 0}}}, r"points\['A'\].z"),
     ],
 )
-def test_points_that_cannot_be_used_are_refused(tmp_path, change, said):
+def test_invalid_points_are_refused(tmp_path, change, said):
     with pytest.raises(InputError, match=said):
         read_solved_points(written(tmp_path, **change))
 

@@ -126,4 +126,4 @@ def test_an_assumed_side_is_a_doubt_where_points_are_held_and_a_convention_in_a_
     assumed = replace(found, solution=replace(found.solution, assumed=("4",)))
     assert verdict(found).word == "good"
     assert verdict(assumed).word == word
-    assert ("which side these points lie" in verdict(assumed).why) == (word == "doubtful")
+    assert ("side on which these points lie" in verdict(assumed).why) == (word == "doubtful")

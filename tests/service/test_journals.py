@@ -69,7 +69,7 @@ def test_a_verdict_says_whether_heads_were_asked_for(night):
     path, (first, last) = night
     assert verdict(path).word == "good"
     assert "checked against no head" in verdict(path).why
-    assert verdict(path, first, last).why.endswith("which has the 2 heads that were told")
+    assert verdict(path, first, last).why.endswith("which contains the 2 given heads")
 
 
 def test_a_last_run_that_was_deleted_whole_is_found_by_its_head_in_one_line(night):
@@ -79,7 +79,7 @@ def test_a_last_run_that_was_deleted_whole_is_found_by_its_head_in_one_line(nigh
     mine = [name for name in tables if name not in ("journal", "texts")]
     altered(path, "".join(f"DELETE FROM {name} WHERE run = 2;" for name in mine))
     assert verdict(path).word == "good"  # nothing in the file can show it, and that is said
-    assert "whose last run was deleted would not show" in verdict(path).why
+    assert "whose last run was deleted, would not be detected" in verdict(path).why
     assert verdict(path, first).word == "good"
     found = verdict(path, first, last)
     assert found.word == "failed"
@@ -103,7 +103,7 @@ def test_behind_each_epoch_the_head_is_told_to_all_who_subscribe_to_events():
     for epoch, (seq, entry), head in zip(epochs, told, heads, strict=True):
         assert epoch <= int(head.partition(":")[0]) < seq
         assert entry.text == f"head {head} of run 1"
-    assert verdict(recorded(), *heads).why.endswith(f"which has the {len(heads)} heads that were told")
+    assert verdict(recorded(), *heads).why.endswith(f"which contains the {len(heads)} given heads")
 
 
 # Chains that were taken away -----------------------------------------------------------------------------------------

@@ -1,1 +1,1 @@
-"""The ways out: results as files, tables, figures and pages, whole or not at all."""
+"""Results as files, tables, figures and pages."""

@@ -1,4 +1,4 @@
-"""What comes with catseye under examples/: found by name, listed, and copied out."""
+"""Examples bundled with catseye: find, list and copy them."""
 
 import shutil
 from pathlib import Path
@@ -7,14 +7,14 @@ from catseye.errors import InputError
 from catseye.gateways.writers.output import new_directory
 from catseye.records.files.refusal import shown
 
-SHORT = {"night-01": "night-01", "gbt": "sites/gbt"}  # names that a user may type without the folder
+SHORT = {"night-01": "night-01", "gbt": "sites/gbt"}  # short names
 SITE_NAMES = ("gbt",)
-MARK = {"night-01": "site.toml", "gbt": "site.toml"}  # what a folder of one's own of that name must hold to be meant
+MARK = {"night-01": "site.toml", "gbt": "site.toml"}  # file by which a local folder of that name counts as a site
 SKIPPED = {"__pycache__"}
 
 
 def examples_directory() -> Path:
-    """Where the examples are: inside the installed package, or beside the sources; or InputError."""
+    """Directory of the examples, in the package or beside the sources; InputError if missing."""
     package = Path(__file__).parents[1]
     for root in (package, package.parents[1]):
         if (root / "examples" / "night-01").is_dir():
@@ -23,36 +23,36 @@ def examples_directory() -> Path:
 
 
 def example_names() -> tuple[str, ...]:
-    """Every example by the name that `example` takes, sorted: files, and folders that are read as one."""
+    """Names of all examples, sorted; a site or a network folder counts as one."""
     root = examples_directory()
-    wholes = [path.parent for path in root.rglob("site.toml")] + [path.parent for path in root.rglob("points.csv")]
+    folders = [path.parent for path in root.rglob("site.toml")] + [path.parent for path in root.rglob("points.csv")]
     files = [
         path
         for path in root.rglob("*")
-        if path.is_file() and not SKIPPED & set(path.parts) and not any(whole in path.parents for whole in wholes)
+        if path.is_file() and not SKIPPED & set(path.parts) and not any(folder in path.parents for folder in folders)
     ]
-    return tuple(sorted(path.relative_to(root).as_posix() for path in [*wholes, *files]))
+    return tuple(sorted(path.relative_to(root).as_posix() for path in [*folders, *files]))
 
 
 def example(name: str) -> Path:
-    """Where an example is; InputError for a name that is none.
+    """Path of an example; InputError for an unknown name.
 
-    name   "night-01", "gbt", or the place under examples/, as networks/feed-arm.toml
+    name   "night-01", "gbt", or the path under examples/, such as networks/feed-arm.toml
     """
     root = examples_directory()
     place = root / SHORT.get(name, name)
     if not name or Path(name).is_absolute() or ".." in Path(name).parts or not place.exists():
-        raise InputError(f"example {shown(name)} is not there (expected one of catseye.examples())")
+        raise InputError(f"example {shown(name)} not found (expected one of catseye.examples())")
     return place
 
 
 def example_campaign() -> Path:
-    """Where the bundled campaign is."""
+    """Path of the bundled campaign."""
     return example("night-01")
 
 
 def bundled_site(name: str) -> Path:
-    """Where a bundled site is; a name that is none of them, or whose files are missing, raises InputError.
+    """Path of a bundled site; InputError for an unknown name or missing files.
 
     name   one of SITE_NAMES
     """
@@ -62,43 +62,43 @@ def bundled_site(name: str) -> Path:
 
 
 def located(path: Path | str, *, output: bool = False) -> Path:
-    """What a user's path means: the path as it stands, or the example of that name where nothing stands there.
+    """Path as given, or the bundled example of that name if nothing exists there.
 
-    path     as the user wrote it. A folder of one's own called night-01 or gbt goes before the bundled one where it is
-             a site's or a campaign's; what a command wrote under that name does not,
-    output   unless what a command wrote is wanted
+    path     as the user wrote it. A local folder night-01 or gbt takes precedence over the bundled one if it is a site
+             or a campaign; a command's output of that name does not,
+    output   unless this is True
 
     >>> located("elsewhere/gbt").as_posix()
     'elsewhere/gbt'
     """
-    given, name = Path(path), str(path)
-    if name in SHORT and not (output and given.exists()):
-        return given if (given / MARK[name]).exists() else example(name)
-    if given.exists() or given.is_absolute():
-        return given
+    local, name = Path(path), str(path)
+    if name in SHORT and not (output and local.exists()):
+        return local if (local / MARK[name]).exists() else example(name)
+    if local.exists() or local.is_absolute():
+        return local
     try:
-        return example(given.as_posix().removeprefix("examples/"))
+        return example(local.as_posix().removeprefix("examples/"))
     except InputError:
-        return given
+        return local
 
 
 def copy_example(name: str, directory: Path) -> int:
-    """Copy a folder of examples, whole or not at all; how many files.
+    """Copy a folder of examples atomically; number of files.
 
     name        as for `example`, or "" for all
     directory   new or empty
 
-    Raises InputError where it holds something or cannot be written.
+    Raises InputError where the directory is not empty or cannot be written.
     """
     root = example(name) if name else examples_directory()
     if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
-        raise InputError(f"{directory}: is there and not empty (expected a new or an empty folder)")
+        raise InputError(f"{directory}: exists and is not empty (expected a new or an empty folder)")
     with new_directory(directory) as fresh:
 
         def copied(source: str, target: str) -> None:
             try:
                 shutil.copy2(source, target)
-            except OSError as problem:  # of which copytree would make a list
+            except OSError as problem:  # copytree would collect these in a list
                 place = directory / Path(target).relative_to(fresh)
                 raise InputError(f"{place}: cannot be written: {problem.strerror or problem}") from problem
 

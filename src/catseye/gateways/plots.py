@@ -1,4 +1,4 @@
-"""What the figures of `catseye plot` show, in sentences for people."""
+"""Summaries of the figures of `catseye plot`, in sentences."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,18 +9,16 @@ Summary = dict[str, Any]
 
 
 def plot_passages(kind: str, summary: Summary) -> list[Passage]:
-    """The numbers behind a figure, told; of a kind without sentences of its own a line each.
+    """Numbers of a figure in sentences; one line per number for a kind without its own text.
 
-    kind      as `catseye plot` calls it
-    summary   what its `--json` gives
+    kind      name in `catseye plot`
+    summary   object of its `--json`
     """
-    return TOLD.get(kind, _each)(summary)
+    return PASSAGES.get(kind, _generic)(summary)
 
 
 def _servo(s: Summary) -> list[Passage]:
-    settled = (
-        "it does not settle" if s["settled_after_s"] is None else f"it has settled after {s['settled_after_s']:.3f} s"
-    )
+    settled = "it does not settle" if s["settled_after_s"] is None else f"it settles after {s['settled_after_s']:.3f} s"
     off = " The motor switched itself off: the error grew beyond its limit." if s["motor_off"] else ""
     return [
         Passage(
@@ -35,18 +33,18 @@ def _servo(s: Summary) -> list[Passage]:
 
 def _air(s: Summary) -> list[Passage]:
     parts = {name: s[f"u_of_{name}_ppm"] for name in ("formula", "temperature", "pressure", "humidity")}
-    given = ", ".join(f"{name} {value:.3f}" for name, value in parts.items() if value)
-    others = "; ".join(f"{name} {value:+.3f}" for name, value in s["other_less_this_ppm"].items())
+    contributions = ", ".join(f"{name} {value:.3f}" for name, value in parts.items() if value)
+    differences = "; ".join(f"{name} {value:+.3f}" for name, value in s["other_less_this_ppm"].items())
     passages = [
         Passage(
             "The air",
             f"group refractivity {s['group_refractivity_ppm']:.3f} ppm by {s['model']}, u "
-            f"{s['u_group_refractivity_ppm']:.3f} ppm: {given} ppm.",
+            f"{s['u_group_refractivity_ppm']:.3f} ppm: {contributions} ppm.",
         ),
-        Passage("The others", f"less this one: {others} ppm."),
+        Passage("Other models", f"minus this one: {differences} ppm."),
     ]
     if s["not_drawn"]:
-        passages.append(Passage("Not drawn", f"{', '.join(map(str, s['not_drawn']))}: outside the limits."))
+        passages.append(Passage("Not drawn", f"{', '.join(map(str, s['not_drawn']))}: outside their limits."))
     return passages
 
 
@@ -55,8 +53,8 @@ def _polarization(s: Summary) -> list[Passage]:
         Passage(
             name,
             f"returns {100 * c['returned']:.1f} % of the light, {_span(c['crossed_least'], c['crossed_most'])} of it "
-            f"across; on the axis far away {100 * c['far_field_axis']:.1f} %, back through splitter and quarter "
-            f"wave {100 * c['through_splitter_and_quarter_wave']:.1f} %.",
+            f"cross-polarized; on the far-field axis {100 * c['far_field_axis']:.1f} %, back through splitter and "
+            f"quarter wave {100 * c['through_splitter_and_quarter_wave']:.1f} %.",
         )
         for name, c in s["corners"].items()
     ]
@@ -68,8 +66,8 @@ def _span(low: float, high: float) -> str:
     return f"{first} %" if first == last else f"{first} to {last} %"
 
 
-def _each(s: Summary) -> list[Passage]:
-    """A line for each number; what is a table in itself has its names before its numbers."""
+def _generic(s: Summary) -> list[Passage]:
+    """One line per number; a nested table lists its names before its numbers."""
     return [
         Passage(key.replace("_", " "), _text(value))
         for key, value in s.items()
@@ -79,12 +77,12 @@ def _each(s: Summary) -> list[Passage]:
 
 def _text(value: Any) -> str:
     if isinstance(value, dict):
-        return "; ".join(f"{str(name).replace('_', ' ')} {_text(each)}" for name, each in value.items())
+        return "; ".join(f"{str(name).replace('_', ' ')} {_text(item)}" for name, item in value.items())
     if isinstance(value, list | tuple):
-        return ", ".join(_text(each) for each in value)
+        return ", ".join(_text(item) for item in value)
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-TOLD: dict[str, Callable[[Summary], list[Passage]]] = {"servo": _servo, "air": _air, "polarization": _polarization}
+PASSAGES: dict[str, Callable[[Summary], list[Passage]]] = {"servo": _servo, "air": _air, "polarization": _polarization}

@@ -1,4 +1,4 @@
-"""What we know, as frozen records read from files.
+"""Frozen records read from files.
 
 `night.campaign.read_campaign` reads a directory, `files.reading.read_record` one file.
 """

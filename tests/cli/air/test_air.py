@@ -106,14 +106,14 @@ def test_no_way_to_the_index_counts_sensors_that_were_not_given(catseye, way, it
     found = asked(catseye, *bare)
     assert found["uncertainty_of"] == []
     assert found["standard_uncertainty"] == found["formula_uncertainty"] >= 5e-8
-    assert "u is the formula's alone until" in found["verdict"]["why"]
-    assert "the formula's alone until" in " ".join(catseye("air", *bare)[1].split("uncertainty")[1].split())
+    assert "u is that of the formula only" in found["verdict"]["why"]
+    assert "that of the formula only" in " ".join(catseye("air", *bare)[1].split("uncertainty")[1].split())
     one = asked(catseye, *bare, "--u-temperature-c", 0.1)
     assert one["uncertainty_of"] == ["temperature"]
     assert one["formula_uncertainty"] == found["formula_uncertainty"]
-    assert "that of temperature; not given: pressure, humidity" in one["verdict"]["why"]
+    assert "the formula and temperature; not given: pressure, humidity" in one["verdict"]["why"]
     every = ("--u-temperature-c", 0.1, "--u-pressure-hpa", 0.1, its_u)
-    assert "the formula's part and the sensors'" in asked(catseye, *bare, *every)["verdict"]["why"]
+    assert "includes the formula and the sensors" in asked(catseye, *bare, *every)["verdict"]["why"]
 
 
 def test_mercury_alone_counts_its_formula_and_no_sensor(catseye):

@@ -56,7 +56,7 @@ def test_the_example_is_calibrated_and_its_jump_and_gap_are_named(catseye, tmp_p
 def test_the_text_says_what_a_person_should_know(catseye):
     status, said, complaint = catseye(EXAMPLE)
     assert (status, complaint) == (0, "")
-    for word in ("Calibration", "The slope", "The length", "mrad a ppm by theory", "a jump of"):
+    for word in ("Calibration", "The slope", "The length", "mrad per ppm in theory", "a jump of"):
         assert word in said
     assert "nan" not in said
     assert catseye(EXAMPLE, "--quiet") == (0, "", "")

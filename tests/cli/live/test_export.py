@@ -65,7 +65,7 @@ def test_a_campaign_is_one_that_can_be_read(catseye, tmp_path):
         (["--to", "csv", "--out", "OUT", "--from", "60636", "--until", "60635"], 1, "is not before --until"),
         (["--to", "csv", "--out", "OUT/a/b"], 1, "is not a directory"),
         (["--to", "csv", "--out", "OUT", "--run", "9"], 1, "run 9 names 0 runs"),
-        (["--to", "campaign", "--out", "OUT", "--until", "60000"], 1, "no whole weather reading"),
+        (["--to", "campaign", "--out", "OUT", "--until", "60000"], 1, "no complete weather reading"),
     ],
 )
 def test_what_cannot_be_exported_is_refused_and_nothing_is_written(catseye, tmp_path, words, status, said):

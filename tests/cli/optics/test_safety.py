@@ -97,13 +97,13 @@ def test_a_low_class_does_not_hide_an_exposure_above_its_limit(catseye):
     pointer = ("safety", "--power-mw", 0.389, "--wavelength-um", 0.65, "--diameter-mm", 1, "--divergence-mrad", 1)
     _, out, _ = catseye(*pointer, "--duration-s", 100)
     assert "1 by iec2014 (ansi2014: 2)" in out
-    assert "class 1, and yet within that distance" in out
+    assert "class 1, but the limit" in out
 
 
 def test_a_focused_beam_says_where_the_hazard_begins(catseye):
     focused = ("safety", "--power-mw", 5, "--wavelength-um", 0.78, "--diameter-mm", 40, "--divergence-mrad", 0.99)
     _, out, _ = catseye(*focused, "--waist-distance", 40)
-    assert "on, about the waist" in out
+    assert "m, around the waist" in out
 
 
 @pytest.mark.parametrize(

@@ -101,7 +101,7 @@ def test_people_are_told_in_words_and_a_table_of_a_layout_serves_as_well(catseye
         ([FOUND, "--instrument", EXAMPLE / "survey.csv"], 1, "survey.csv"),
         ([FOUND, *TOOL, "--layout", "elsewhere"], 1, "elsewhere"),
         ([FOUND, *TOOL, "--as-left", FOUND], 1, "as-found.csv: two inputs have this name"),
-        ([FOUND, *TOOL, "--cmm", EXAMPLE / "nothing"], 1, "is no directory"),
+        ([FOUND, *TOOL, "--cmm", EXAMPLE / "nothing"], 1, "is not a directory"),
         ([FOUND, *TOOL, "--focal-length-m", "nan"], 2, ""),
         ([FOUND, *TOOL, "--out", EXAMPLE], 1, "--out"),
     ],

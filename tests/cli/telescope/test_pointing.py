@@ -115,7 +115,7 @@ def test_the_shipped_inclinometer_alone_gives_all_waves_but_the_first(catseye, t
     assert (status, complained) == (0, "")
     found = json.loads(said)
     assert found["verdict"]["word"] == "good"
-    assert "an inclinometer alone cannot tell from its zero" in found["verdict"]["why"]
+    assert "an inclinometer alone cannot separate from its zero" in found["verdict"]["why"]
     lost = [f"{f} 1A {axis}" for f in ("cos", "sin") for axis in ("east", "north")]
     assert found["undetermined"] == lost
     assert found["inclinometer_zero"] is None

@@ -135,7 +135,7 @@ def test_a_reductions_directory_gives_its_dish_with_full_covariance(catseye, tmp
         (("DP01C,0.0,", "DP01C,x,"), (), "expected a finite number"),
         (("DP01C,0.0,", "DP01C,0.0,1.0,"), (), "6 fields"),
         (("DP01C,0.0,", "DP01C,4000,"), (), "looks like mm"),
-        ((), ("--frame", "ground"), "say --azimuth-deg and --elevation-deg"),
+        ((), ("--frame", "ground"), "give the telescope's --azimuth-deg and --elevation-deg"),
         ((), ("--elevation-deg", 10, "--elevation-deg", 20), "given 2 times for 1 inputs"),
         ((), ("--actuators", "a.txt"), "expected .csv or .fits"),
         ((), ("--positions", "p.csv"), "goes with --actuators only"),
@@ -178,7 +178,7 @@ def test_another_programs_file_is_not_overwritten(catseye, tmp_path):
         (tmp_path / name).write_text("mine")
         status, _, complaint = catseye(source, "--actuators", tmp_path / name)
         assert status == 1
-        assert "exists and is not catseye's" in complaint
+        assert "exists and is not a catseye file" in complaint
         assert (tmp_path / name).read_text() == "mine"
 
 

@@ -25,8 +25,8 @@ def test_every_variable_and_every_model_is_named_in_the_figure(usual):
     for words in (
         *(variable.label for variable in VARIABLES),
         *NAMES.values(),
-        "u of the formula",
-        "u with the inputs'",
+        "u of formula",
+        "u with inputs",
         "group refractivity 253.319 ppm",
         "−0.8921 ppm per °C here",
     ):
@@ -39,7 +39,7 @@ def test_the_same_state_gives_the_same_figure(usual):
     assert air_plot(20.0, 933.0, 50.0, uncertainty=StateUncertainty(0.2, 0.3, 3.0))[0] == usual[0]
 
 
-def test_what_it_tells_is_what_the_models_say(usual):
+def test_summary_agrees_with_the_models(usual):
     told = usual[1]
     assert told["group_refractivity_ppm"] == pytest.approx(1e6 * float(group_refractivity(20.0, 933.0, 50.0)))
     here = air(20.0, 933.0, 50.0)
@@ -62,14 +62,14 @@ def test_another_model_can_be_the_chosen_one_at_zero_degrees_in_dry_air(model):
     drawn, told = air_plot(0.0, 933.0, 0.0, model=model, wavelength_um=0.85)
     assert told["model"] == model
     assert told["u_of_temperature_ppm"] == 0.0
-    assert "u with the inputs'" not in drawn
+    assert "u with inputs" not in drawn
     fixed = re.search(r"fixed at (\d+) ppm in this model", drawn)
     assert (fixed is None) == bool(MODELS[model].co2_slope)
     if fixed:
         assert float(fixed[1]) == MODELS[model].co2_ppm
 
 
-def test_models_that_hold_nowhere_are_named_and_panels_end_where_vapour_leaves_no_room():
+def test_invalid_models_are_named_and_panels_end_at_vapour_saturation():
     drawn, told = air_plot(80.0, 400.0, 30.0)  # saturation is 476 hPa there: 84 % at most
     assert told["not_drawn"] == ["barrell_sears1963", "iag1999_closed", "rueger1990"]
     assert told["other_less_this_ppm"] == {}
@@ -82,7 +82,7 @@ def test_a_state_at_the_end_of_its_limits_is_drawn_to_that_end():
     assert (values[0], values[-1]) == (35.0, 50.0)
 
 
-def test_bands_are_one_u_to_each_side_and_lines_are_other_less_chosen():
+def test_bands_are_plus_minus_u_and_lines_are_other_minus_chosen():
     above, below = Figure().subplots(2, 1)
     state = {"temperature_c": 20.0, "pressure_hpa": 933.0, "humidity_percent": 50.0, "wavelength_um": 0.78}
     names = _draw(above, below, VARIABLES[0], state | {"co2_ppm": 450.0}, "ciddor_hill1999", USUAL)
@@ -113,7 +113,7 @@ def test_bands_are_one_u_to_each_side_and_lines_are_other_less_chosen():
         ({"model": "edlen"}, "air model 'edlen' is unknown"),
     ],
 )
-def test_what_cannot_be_drawn_is_refused_in_one_line(changed, words):
+def test_invalid_states_are_refused_in_one_line(changed, words):
     state = {"temperature_c": 20.0, "pressure_hpa": 933.0, "humidity_percent": 50.0} | changed
     with pytest.raises(ValidityError, match=words):
         air_plot(**state)

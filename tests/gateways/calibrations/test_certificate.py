@@ -54,7 +54,7 @@ def test_a_record_reads_back_as_it_was(made, tmp_path, kind):
 
 
 @pytest.mark.parametrize("kind", ["reference-distance", "leakage", "leakage-lit", "linearity", "amplitude-to-phase"])
-def test_what_is_to_be_copied_fits_the_ranger_s_record(made, kind):
+def test_values_to_copy_fit_the_rangers_record(made, kind):
     sheet = tomllib.loads((EXAMPLES.parent / "night-01" / "mirrors" / "ZP101.toml").read_text(encoding="utf-8"))
     copied = Mirror.model_validate({**sheet, **made(kind).record})
     for key, value in made(kind).record.items():
@@ -90,7 +90,7 @@ def test_a_page_shows_every_quantity_test_and_line_to_sign(made, kind):
     assert certificate(found, WHEN) == text
 
 
-def test_a_certificate_escapes_what_people_write(made):
+def test_certificate_escapes_user_text(made):
     found = made("leakage")
     odd = dataclasses.replace(found, title="<b>", provenance={**found.provenance, "by": '<script>"&'})
     text = certificate(odd, WHEN)
@@ -112,12 +112,12 @@ def test_odd_names_survive_toml(made):
     ("change", "said"),
     [
         (lambda d: d["covariance"]["matrix"][0].__setitem__(1, 1.0), "is not symmetric"),
-        (lambda d: d["covariance"]["matrix"][0].__setitem__(0, 1.0), "does not hold the squares of u"),
+        (lambda d: d["covariance"]["matrix"][0].__setitem__(0, 1.0), "does not have the squares of u"),
         (lambda d: d["covariance"]["matrix"].pop(), "is not 2 by 2, as there are 2 quantities"),
         (lambda d: d["covariance"]["order"].reverse(), "(expected ['leakage_amplitude_volt', 'leakage_phase_rad']"),
         (lambda d: d["readings"]["rows"][3].pop(), "readings.rows, row 4 has 7 cells (expected 8)"),
         (lambda d: d.pop("by"), "by is missing"),
-        (lambda d: d.__setitem__("format", "catseye-calibration-2"), "the versions known here"),
+        (lambda d: d.__setitem__("format", "catseye-calibration-2"), "the supported versions"),
         (lambda d: d.__setitem__("extra", 1), "extra = 1 is not a known key"),
     ],
 )
@@ -145,6 +145,6 @@ def test_rounding_keeps_two_digits_of_u():
     assert rounded(1.0, float("nan")) == ("1", "unknown")
 
 
-def test_lengths_in_a_table_show_what_their_residuals_show():
+def test_lengths_have_the_digits_of_their_residuals():
     assert _cell(24003.09162, _form("distance_mm")) == "24003.09162"
     assert _cell(24.00309162, _form("distance_m")) == "24.0030916"

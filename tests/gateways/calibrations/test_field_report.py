@@ -85,7 +85,7 @@ def test_a_form_has_every_field_of_the_notes_in_their_order(kind, figure):
     assert [field.entry.name for field in blank_report(kind).fields] == figure.split("|")
 
 
-def test_each_field_holds_its_own_value(full):
+def test_every_field_has_its_value(full):
     """All values differ, those of axis 1 by a 2 in front."""
     said = [written_value(f) for f in full("monument").fields[:20]]
     assert "|".join(said) == (
@@ -112,7 +112,7 @@ def test_the_notes_example_gives_the_printed_matrix(kind, path, printed):
     np.testing.assert_array_equal(np.sign(found[seen]), np.sign(printed)[seen])
 
 
-def test_the_notes_examples_say_what_figures_2_6_and_2_7_say():
+def test_notes_examples_agree_with_figures_2_6_and_2_7():
     said = {key: f.value for key, f in by_key(read_report("monument", ZY3)).items()}
     assert [said[k] for k in ("x_mm", "y_mm", "z_mm")] == [5586.2, 20850.0, -5.8]
     assert [said[k] for k in ("alpha1_rad", "alpha2_rad", "alpha3_rad")] == [1.008848, -0.000024, 0.000145]
@@ -125,7 +125,7 @@ def test_the_notes_examples_say_what_figures_2_6_and_2_7_say():
 
 
 @pytest.mark.parametrize("kind", FORMS)
-def test_a_full_record_leaves_nothing_blank(full, kind):
+def test_complete_record_fills_all_fields(full, kind):
     report = full(kind)
     assert report.missing == ()
     text = field_report(report, WHEN)
@@ -142,10 +142,10 @@ def test_a_full_record_leaves_nothing_blank(full, kind):
 
 
 @pytest.mark.parametrize(("kind", "key"), [("monument", "ip_address"), ("mirror", "fkd_1")])
-def test_what_a_record_lacks_stays_blank_and_is_counted(full, kind, key):
+def test_missing_values_are_blank_and_counted(full, kind, key):
     report = full(kind, lambda text: re.sub(f"{key} = .*\n", "", text))
     assert [entry.key for entry in report.missing] == [key]
-    assert f"1 field not in the record and left blank: {report.missing[0].name}." in field_report(report, WHEN)
+    assert f"1 field missing in the record and left blank: {report.missing[0].name}." in field_report(report, WHEN)
     assert report_object(report, None)["missing"] == [key]
 
 
@@ -155,7 +155,7 @@ def test_of_the_notes_examples_eleven_and_twenty_seven_fields_are_unknown():
 
 
 @pytest.mark.parametrize("kind", FORMS)
-def test_the_notes_of_a_record_stand_in_the_reports_notes(full, kind):
+def test_notes_of_a_record_appear_in_the_report(full, kind):
     report = full(kind, lambda text: text + 'notes = "shims <new>\\nsecond line"\n')
     assert '<div class="notes">shims &lt;new&gt;<br>second line</div>' in field_report(report, WHEN)
     assert report_object(report, None)["notes"] == "shims <new>\nsecond line"
@@ -164,7 +164,7 @@ def test_the_notes_of_a_record_stand_in_the_reports_notes(full, kind):
 
 
 @pytest.mark.parametrize("kind", FORMS)
-def test_a_blank_form_has_its_units_and_nothing_else(kind):
+def test_blank_form_has_only_units(kind):
     report = blank_report(kind)
     text = field_report(report, WHEN)
     assert report.missing == ()
@@ -178,7 +178,7 @@ def test_a_blank_form_has_its_units_and_nothing_else(kind):
 
 
 @pytest.mark.parametrize("kind", FORMS)
-def test_a_page_stands_alone_and_its_tags_close(full, kind):
+def test_page_is_self_contained_and_well_formed(full, kind):
     text = field_report(full(kind), WHEN)
     assert "http" not in text.replace("http://www.w3.org/2000/svg", "")
     assert not re.search(r"\b(src|href)=|@import|url\(", text)
@@ -193,7 +193,7 @@ def test_a_page_stands_alone_and_its_tags_close(full, kind):
 
 
 @pytest.mark.parametrize("kind", FORMS)
-def test_what_people_write_is_escaped(full, kind):
+def test_user_text_is_escaped(full, kind):
     text = field_report(full(kind, lambda text: text.replace("M. E.", "<script>&")), WHEN)
     assert "<script>" not in text
     assert "&lt;script&gt;&amp;" in text
@@ -242,7 +242,7 @@ def test_degrees_minutes_seconds_read_back(value):
 
 
 @pytest.mark.parametrize(("value", "said"), [(-5 * ARCSECOND, "-5.0″"), (30 * ARCSECOND, "+30.0″"), (-1e-9, "+0.0″")])
-def test_small_turns_are_also_said_in_seconds_with_their_sign(value, said):
+def test_small_rotations_are_also_in_arc_seconds_with_sign(value, said):
     assert written_aid(ReportField(ReportEntry("α₂", "alpha2_rad", "rad", aid="arcsec"), value)) == said
 
 
@@ -261,7 +261,7 @@ def test_a_matrix_has_one_number_of_decimals_and_no_minus_zero():
     ("turned", "angles", "u"),
     [(gamma, [1.008848, -0.02, 0.03], [5e-4, 3e-4, 1e-4]), (lambda_, [-0.03, 0.05], [2e-4, 4e-4])],
 )
-def test_the_matrix_scatters_as_its_u_says(turned, angles, u):
+def test_matrix_scatter_agrees_with_its_u(turned, angles, u):
     rng = np.random.default_rng(5)
     drawn = turned(*(np.array(angles) + np.array(u) * rng.standard_normal((40_000, len(u)))).T)
     claimed = matrix_uncertainty(turned, np.array(angles), np.array(u))

@@ -69,7 +69,7 @@ def test_the_inputs_of_the_object_give_its_uncertainty_again(explained):
     assert sheets["noise of the target"] == 127.0
 
 
-def test_the_monte_carlo_stands_beside_with_its_draws_and_seed(explained):
+def test_monte_carlo_is_reported_with_draws_and_seed(explained):
     found = told(explained(3))
     beside = found["monte_carlo"]
     assert (beside["draws"], beside["seed"]) == (20_000, 1)
@@ -78,13 +78,13 @@ def test_the_monte_carlo_stands_beside_with_its_draws_and_seed(explained):
     assert beside["agrees"] is True
 
 
-def test_an_interval_that_disagrees_is_said_to(explained):
+def test_disagreeing_interval_is_reported(explained):
     found = explained(3)
     wider = dataclasses.replace(found.scattered, high=found.scattered.high + 3.0 * found.budget.u)
     doubted = dataclasses.replace(found, scattered=wider)
     assert told(doubted)["monte_carlo"]["agrees"] is False
-    assert "believe this one" in text_of(doubted)
-    assert "believe this one" not in text_of(found)
+    assert "use this one" in text_of(doubted)
+    assert "use this one" not in text_of(found)
 
 
 def test_correlated_inputs_are_named(reduction):
@@ -96,7 +96,7 @@ def test_correlated_inputs_are_named(reduction):
     assert "+0.50" in text_of(found)
 
 
-def test_a_shot_without_a_range_says_why_and_what_came_back(explained):
+def test_shot_without_range_gives_reason_and_return(explained):
     blocked, reference = explained(19), explained(1)
     for found in (told(blocked), told(reference)):
         assert found["range"] is None
@@ -104,7 +104,7 @@ def test_a_shot_without_a_range_says_why_and_what_came_back(explained):
         assert found["monte_carlo"] is None
         assert found["amplitude"] > 0.0
     assert "blocked: return 0.0025 V" in text_of(blocked)
-    assert "nothing came back" in text_of(blocked)
+    assert "no return" in text_of(blocked)
     assert "internal cube" in text_of(reference)
     assert budget_lines(blocked) == []
 
@@ -113,10 +113,10 @@ def test_a_rejected_shot_is_explained_with_a_warning(explained):
     found = explained(94)
     text = text_of(found)
     assert "reflected" in text
-    assert "knows nothing of what this shot was rejected for" in text
+    assert "does not include the reason for which this shot was rejected" in text
     assert -5e-3 < found.adjusted.residual < -4.7e-3  # a reflection 5 mm too near, less what the points gave way
     assert f"{-1e6 * found.adjusted.residual:.0f} µm less than between the adjusted points" in text
-    assert text.count("light from elsewhere in the return") == 1
+    assert text.count("stray reflection") == 1
 
 
 def test_the_table_is_sorted_and_adds_up(explained):
@@ -130,7 +130,7 @@ def test_the_table_is_sorted_and_adds_up(explained):
     assert all(len(line) <= 110 for line in lines)
 
 
-def test_the_page_stands_alone_and_names_every_input(explained, reduction):
+def test_page_is_self_contained_and_names_every_input(explained, reduction):
     from datetime import UTC, datetime
 
     found = explained(3)

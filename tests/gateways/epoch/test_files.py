@@ -27,7 +27,7 @@ def written(tmp_path_factory):
     directory = tmp_path_factory.mktemp("many")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(objects_module, "MOST_INSIDE", 100)
-        patch.setattr(files_module, "AT_ONCE", 37)
+        patch.setattr(files_module, "STEP", 37)
         write_reduction(reduction_of_example(), directory)
     return directory
 
@@ -90,12 +90,12 @@ def flat(value, name=""):
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("../covariance.fits", "expected the name of a file beside it"),
-        ("gone.fits", "is no FITS image"),
+        ("../covariance.fits", "expected the name of a file in the same directory"),
+        ("gone.fits", "is not a FITS image"),
         (7, "expected"),
     ],
 )
-def test_a_file_that_is_not_beside_it_is_refused(written, tmp_path, name, said):
+def test_invalid_covariance_file_is_refused(written, tmp_path, name, said):
     told = json.loads((written / "coordinates.json").read_text())
     (tmp_path / "coordinates.json").write_text(json.dumps({**told, "covariance_file": name}))
     with pytest.raises(InputError, match=said):
@@ -146,7 +146,7 @@ class Asked:
         return self._counted("carried", *given)
 
 
-def test_the_points_rows_are_multiplied_out_once(tmp_path, monkeypatch):
+def test_rows_of_the_points_are_computed_once(tmp_path, monkeypatch):
     """For the matrix in its file, the page's three fits of the dish and its pose."""
     whole = reduction_of_example()
     points = whole.coordinates.joint
@@ -159,17 +159,17 @@ def test_the_points_rows_are_multiplied_out_once(tmp_path, monkeypatch):
     said = [what for what, _, _ in told]
     page = said.index("writing report.html")
     assert said[page + 1 : page + 4] == ["page: figure plan", "page: figure elevation", "page: figure feed arm"]
-    assert said[-2] == "page: the dish by each command"
+    assert said[-2] == "page: dish pose by each command"
     assert all(done <= of for _, done, of in told)
 
 
-def test_the_page_says_where_the_matrix_is_and_what_is_drawn_as_dots(written, tmp_path, monkeypatch):
+def test_page_names_the_matrix_file_and_dots(written, tmp_path, monkeypatch):
     page = (written / "report.html").read_text()
     assert "the full matrix in covariance.fits" in page
-    assert "Every point with the outline of its 1σ ellipsoid" in page
+    assert "All points with the outline of its 1σ ellipsoid" in page
     monkeypatch.setattr(figures_module, "CROWD", 20)
     write_reduction(reduction_of_example(), tmp_path)
     page = (tmp_path / "report.html").read_text()
     assert "the full matrix in coordinates.json" in page
-    assert "Prisms of the dish as dots, too many for ellipsoids; every other point with the outline" in page
-    assert "Every point with" not in page
+    assert "Prisms of the dish as dots, too many for ellipsoids; all other points with the outline" in page
+    assert "All points with" not in page

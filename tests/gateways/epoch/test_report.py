@@ -54,7 +54,7 @@ def page(written):
     return (written / "report.html").read_text(encoding="utf-8")
 
 
-def test_it_is_well_formed_and_fetches_nothing(page):
+def test_page_is_well_formed_and_self_contained(page):
     reader = Balance()
     reader.feed(page)
     assert reader.open == []
@@ -102,19 +102,19 @@ def test_names_and_notes_are_escaped(reduction):
 
 
 @pytest.mark.usefixtures("drawn_already")
-def test_without_a_dish_the_rest_is_still_told(reduction):
+def test_report_without_dish_is_complete_otherwise(reduction):
     blind = replace(reduction, surface=None, notes=("no paraboloid: two points",), rejected={})
     text = report(blind, WHEN)
     assert "No pose and no surface" in text
     assert [p.title for p in passages(blind)][3] == "The dish"
 
 
-def test_the_story_gives_the_numbers(reduction):
+def test_passages_contain_the_numbers(reduction):
     told = {p.title: p.text for p in passages(reduction)}
     assert "759 shots" in told["The night"]
     assert f"{len(reduction.rejected)} were rejected" in told["The shots"]
     assert f"{reduction.coordinates.refractivity_ppm:.2f}" in told["The air"]
-    assert f"{reduction.coordinates.variance_factor:.2f}" in told["The trust"]
+    assert f"{reduction.coordinates.variance_factor:.2f}" in told["Reliability"]
 
 
 @pytest.mark.parametrize(

@@ -64,7 +64,7 @@ def test_coordinates_carry_their_covariance(written, reduction):
         assert [float(row[f"u_{axis}_mm"]) for axis in "xyz"] == pytest.approx(u, abs=5.1e-5)
 
 
-def test_kinds_are_told_apart(written):
+def test_kinds_are_distinguished(written):
     kinds = {row["point"]: row["kind"] for row in read(written / "coordinates.csv")}
     assert kinds["ZY101"] == "ground ranger"
     assert kinds["ZY101-F"] == "fixed point"

@@ -14,5 +14,5 @@ def test_a_jitter_of_millimetres_typed_for_tenths_is_doubtful(night_01):
     found = verdict(reduce_epoch(replace(night_01, jitter=shaken)))
     assert found.word == "doubtful"
     assert "52 % less than their uncertainties claim" in found.why
-    assert "another unit" in found.why
+    assert "check the units" in found.why
     assert verdict(reduce_epoch(night_01)).word == "good"

@@ -82,7 +82,7 @@ def test_every_entry_is_a_row_with_its_run_seq_and_exact_time(tables):
     assert silent == ["930.86", "", "", "930.86"]
 
 
-def test_fits_says_the_same_in_units_of_its_own(tables):
+def test_fits_has_the_same_values_in_its_units(tables):
     folder, _, counts, read = tables
     for name, (data, columns, header) in read.items():
         found = rows(folder / "out" / f"{name}.csv")
@@ -110,7 +110,7 @@ def test_fits_says_the_same_in_units_of_its_own(tables):
     assert read["happenings"][0]["TEXT"][0] == "ZY105 lost \\xb5"
 
 
-def test_astropy_takes_the_units_for_what_they_are(tables):
+def test_astropy_interprets_the_units_correctly(tables):
     from astropy.table import QTable
 
     folder, *_ = tables
@@ -119,7 +119,7 @@ def test_astropy_takes_the_units_for_what_they_are(tables):
         assert len(table) > 0
 
 
-def test_coordinates_come_with_the_block_of_the_covariance_that_is_theirs(tables):
+def test_coordinates_have_their_block_of_the_covariance(tables):
     folder, entries, _, read = tables
     found = rows(folder / "out" / "coordinates.csv")
     assert [(r["seq"], r["point"]) for r in found] == [
@@ -263,7 +263,7 @@ def test_runs_span_and_forms_are_chosen(tables, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
 
 
-def test_a_quantity_that_nobody_told_is_an_empty_table(tmp_path):
+def test_quantity_without_entries_is_an_empty_table(tmp_path):
     from astropy.io import fits
 
     written(tmp_path / "j.db", [scene_shot(1)])
@@ -319,7 +319,7 @@ def exported(tmp_path, entries, **more):
     return done, read_campaign(tmp_path / "out")
 
 
-def test_an_export_of_a_telescope_that_jumped_is_doubtful_and_so_is_what_is_read_from_it(tmp_path):
+def test_export_with_jumping_postures_and_its_reduction_are_doubtful(tmp_path):
     done, campaign = exported(tmp_path, campaign_entries())
     assert done.verdict.word == "good"
     assert campaign.verdict == done.verdict
@@ -333,7 +333,7 @@ def test_an_export_of_a_telescope_that_jumped_is_doubtful_and_so_is_what_is_read
     assert document["verdict"] == done.verdict.to_object()
 
 
-def test_a_night_that_went_through_a_journal_is_the_same_night(tmp_path, night_01):
+def test_night_is_unchanged_by_a_journal(tmp_path, night_01):
     """Every sample and reading of the example night; times to the half of a tick that a ZY's stamp has."""
     night, adc = night_01, night_01.site.adc
     shots = night.shots
@@ -364,7 +364,7 @@ def test_a_night_that_went_through_a_journal_is_the_same_night(tmp_path, night_0
         done = export_campaign(reader, tmp_path / "out", run=1)
     again = read_campaign(tmp_path / "out")
     assert (done.shots, done.readings, done.left_out) == (len(shots), len(night.weather), {})
-    assert done.notes == ("no posture was journalled in the span: azimuth and elevation are site.toml's",)
+    assert done.notes == ("no posture in the journal for the span: azimuth and elevation are site.toml's",)
     order = np.argsort(again.shots.shot)
     assert np.array_equal(again.shots.shot[order], np.sort(shots.shot))
     first = np.argsort(shots.shot)
@@ -403,7 +403,7 @@ def test_every_column_of_a_campaign_has_the_unit_of_its_name(tmp_path):
     assert_columns((tmp_path / "out" / "weather.csv").read_text(), told, readings)
 
 
-def test_what_live_did_not_believe_goes_along(tmp_path):
+def test_live_rejections_are_exported(tmp_path):
     """A station that reads 5 °C too much for a while, and what an epoch said of three shots."""
     entries = []
     for k in range(1, 41):
@@ -426,8 +426,8 @@ def test_what_live_did_not_believe_goes_along(tmp_path):
     assert len(campaign.weather) == 70
     assert campaign.weather.temperature_c.max() == 10.4
     assert len((tmp_path / "out" / "weather.csv").read_text().splitlines()) == 81  # the record itself is whole
-    assert [note.split(" was not believed")[0] for note in done.notes[:1]] == ["WX2"]
-    assert "named in doubts.csv as not believed by the epochs: 1 of the shots" in done.notes
+    assert [note.split(" was rejected")[0] for note in done.notes[:1]] == ["WX2"]
+    assert "named in doubts.csv as rejected by the epochs: 1 of the shots" in done.notes
 
 
 def biased(station, judgement, offset_c):
@@ -453,7 +453,7 @@ def doubted(tmp_path):
     return [row.split(",")[1:3] for row in rows]
 
 
-def test_a_station_that_was_biased_from_the_start_is_doubted_until_it_returned_and_not_from_then_on(tmp_path):
+def test_station_biased_from_the_start_is_doubted_until_it_recovers(tmp_path):
     """Its true readings were the ones that doubts.csv named: they were doubted at their moment."""
     entries = with_bias(25, (12, {"number": 1, "biases": biased("WX1", "biased", 1.8)}))
     done, campaign = exported(tmp_path, entries)
@@ -462,14 +462,14 @@ def test_a_station_that_was_biased_from_the_start_is_doubted_until_it_returned_a
     assert "its thermometer was biased by +1.8 °C until then" in done.notes[0]
 
 
-def test_a_station_that_the_ranges_contradict_to_the_end_is_doubted_all_along(tmp_path):
+def test_station_in_contradiction_to_the_end_is_always_doubted(tmp_path):
     entries = with_bias(99, (12, {"number": 1, "biases": biased("WX1", "biased", 1.8)}))
     _, campaign = exported(tmp_path, entries)
     assert doubted(tmp_path) == [["WX1", stamp(START + SECOND * k)] for k in range(1, 41)]
     assert set(campaign.weather.station) == {"WX2"}
 
 
-def test_of_stations_that_nobody_tells_apart_none_is_left_out(tmp_path):
+def test_ambiguous_stations_are_not_excluded(tmp_path):
     entries = with_bias(99, (12, {"number": 1, "biases": biased("WX1", "apart", -2.4) | biased("WX2", "apart", 2.4)}))
     exported(tmp_path, entries)
     assert not (tmp_path / "out" / "doubts.csv").exists()
@@ -491,7 +491,7 @@ def test_how_far_the_telescope_shook_goes_along(tmp_path):
     assert not [note for note in done.notes if "shook" in note]
 
 
-def test_a_journal_whose_epochs_do_not_say_it_has_the_setting_of_the_run(tmp_path):
+def test_jitter_defaults_to_the_setting_of_the_run(tmp_path):
     run = replace(scene_run(), settings={"live": {"jitter_mm": {"arm": 0.2, "alidade": 0.03}}})
     with Journal.open(tmp_path / "j.db", run=run, clock=ManualClock(START / 1e8)) as journal:
         for entry in campaign_entries():
@@ -507,25 +507,25 @@ def test_a_journal_whose_epochs_do_not_say_it_has_the_setting_of_the_run(tmp_pat
     assert read_campaign(tmp_path / "out").jitter.mm(START / 1e8)["arm"] == 0.2
 
 
-def test_a_jitter_that_a_campaign_cannot_hold_is_refused(tmp_path):
+def test_invalid_jitter_is_refused(tmp_path):
     said = EpochSolution(START + SECOND * 2, {"ticks": START + SECOND * 2, "jitter_mm": {"arm": 400.0}})
     with pytest.raises(InputError, match="run 1: jitter_mm of an epoch is invalid"):
         exported(tmp_path, [*campaign_entries(), said])
     assert not (tmp_path / "out").exists()
 
 
-def test_where_no_station_was_believed_the_readings_go_as_they_are(tmp_path):
+def test_readings_are_unmarked_if_no_station_was_trusted(tmp_path):
     entries = [full_shot(k) for k in range(1, 9)]
     entries += [LiveWeather("WX1", START + SECOND * k, 10.0, 930.1, 70.0) for k in (-2700, -2690, -2680)]
     entries += [LiveWeather("WX1", START + SECOND * k, 20.0, 930.1, 70.0) for k in range(1, 9)]
     done, campaign = exported(tmp_path, entries, span=(START, START + SECOND * 60))
     assert len(campaign.weather) == 11
     assert not (tmp_path / "out" / "doubts.csv").exists()
-    assert "no weather station was believed throughout: all readings are exported as they are" in done.notes
+    assert "no weather station was trusted throughout: all readings are exported unmarked" in done.notes
     assert done.shots == 8
 
 
-def test_it_stands_as_the_telescope_stood(tmp_path):
+def test_campaign_posture_is_that_of_the_telescope(tmp_path):
     done, campaign = exported(tmp_path, campaign_entries())
     posture = campaign.site.campaign
     assert posture.start_mjd_utc == (START + SECOND) / TICKS_PER_DAY
@@ -534,7 +534,7 @@ def test_it_stands_as_the_telescope_stood(tmp_path):
     assert (done.shots, done.notes) == (5, ())
 
 
-def test_a_campaign_that_could_not_be_read_does_not_appear(tmp_path):
+def test_unreadable_campaign_is_not_written(tmp_path):
     """A telescope that says it looks into the ground: site.toml may not say so."""
     still = [e for e in campaign_entries() if not isinstance(e, LivePosture)]
     with pytest.raises(InputError, match="elevation_deg"):
@@ -542,7 +542,7 @@ def test_a_campaign_that_could_not_be_read_does_not_appear(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["j.db"]
 
 
-def test_a_telescope_that_moved_is_told(tmp_path):
+def test_moving_telescope_is_reported(tmp_path):
     """Its middle is the posture of site.toml, its readings are postures.csv: encoders' angles and rates in degrees."""
     moved = [LivePosture(START + SECOND * k, 1.0 + 0.01 * k, 0.5 + 0.001 * k, 0.01, 0.001) for k in (1, 2, 5)]
     still = [e for e in campaign_entries() if not isinstance(e, LivePosture)]
@@ -563,7 +563,7 @@ def test_a_telescope_that_moved_is_told(tmp_path):
     assert campaign.jitter is None
 
 
-def test_shots_without_a_posture_of_a_telescope_that_moved_are_left_out(tmp_path):
+def test_shots_without_posture_of_a_moving_telescope_are_excluded(tmp_path):
     """The third is 2.5 s from both readings; how far the arm bent while it climbed is in its jitter."""
     moved = [LivePosture(START + SECOND * k, 1.0 + 0.01 * k, 0.5 + 0.002 * k, 0.01, 0.002) for k in (0, 5)]
     entries = [full_shot(k, ticks=START + SECOND * k) for k in (1, 2, 4, 5)]
@@ -578,7 +578,7 @@ def test_shots_without_a_posture_of_a_telescope_that_moved_are_left_out(tmp_path
     assert campaign.jitter.mm(START / 1e8)["arm"] == pytest.approx(np.hypot(0.3, 0.2 * climbed / np.sqrt(12.0)))
 
 
-def test_what_a_campaign_cannot_hold_is_told_and_left_out(tmp_path):
+def test_unsupported_entries_are_excluded_and_reported(tmp_path):
     whole = campaign_entries()
     last = START + SECOND * 5
     strange = {
@@ -618,14 +618,14 @@ def test_a_part_of_a_run(tmp_path):
     assert done.readings == 5  # the weather an hour around it
 
 
-def test_buffers_of_different_lengths_stand_in_one_array(tmp_path):
+def test_buffers_of_different_lengths_share_one_array(tmp_path):
     short = replace(full_shot(50), cycles=64, samples=full_shot(50).samples[:4096])
     _, campaign = exported(tmp_path, [*campaign_entries(), short])
     assert np.array_equal(campaign.frames[5, :4096], short.samples)
     assert not campaign.frames[5, 4096:].any()
 
 
-def test_numbers_that_are_not_each_once_give_way_to_seq(tmp_path):
+def test_duplicate_shot_numbers_are_replaced_by_seq(tmp_path):
     entries = campaign_entries()
     again = replace(full_shot(2, ranger="ZY106"), number=2)
     done, campaign = exported(tmp_path, [*entries, again])
@@ -634,15 +634,15 @@ def test_numbers_that_are_not_each_once_give_way_to_seq(tmp_path):
 
 
 @pytest.mark.parametrize("kind", [LiveWeather, LiveShot])
-def test_a_run_without_shots_or_weather_is_refused_and_leaves_nothing(tmp_path, kind):
+def test_run_without_shots_or_weather_is_refused_without_output(tmp_path, kind):
     rest = [entry for entry in campaign_entries() if not isinstance(entry, kind)]
     with pytest.raises(InputError, match="run 1 has no"):
         exported(tmp_path, rest)
     assert [path.name for path in tmp_path.iterdir()] == ["j.db"]
 
 
-def test_a_station_that_never_spoke_is_left_out_of_the_site(tmp_path):
+def test_station_without_readings_is_removed_from_the_site(tmp_path):
     entries = [e for e in campaign_entries() if not (isinstance(e, LiveWeather) and e.station == "WX1")]
     done, campaign = exported(tmp_path, entries)
     assert [station.name for station in campaign.site.weather_station] == ["WX2"]
-    assert done.notes == ("weather stations that said nothing were left out of site.toml: WX1",)
+    assert done.notes == ("weather stations without readings were left out of site.toml: WX1",)

@@ -19,7 +19,7 @@ BARE = Movement(
 STILL = Movement(count=2, rms=0.0, largest=Furthest(0.0, "WX1", 1), normalised=2, rms_u=0.0, largest_u=None)
 
 
-def test_sizes_stand_in_their_unit_and_in_u_with_the_place():
+def test_sizes_are_given_in_their_unit_and_in_u_with_the_place():
     assert movement_words({Moving.POINTS: POINTS, Moving.RANGES: BARE, Moving.THERMOMETERS: STILL}) == [
         (
             "Points",
@@ -28,7 +28,7 @@ def test_sizes_stand_in_their_unit_and_in_u_with_the_place():
         ),
         (
             "Ranges",
-            "moved by 1.0e-11 mm rms, at most 2.0e-11 mm (ZY1 to A, behind the last epoch), of 2 compared; "
+            "moved by 1.0e-11 mm rms, at most 2.0e-11 mm (ZY1 to A, after the last epoch), of 2 compared; "
             "no u is stored.",
         ),
     ]

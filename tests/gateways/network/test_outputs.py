@@ -148,14 +148,14 @@ def ranging():
 
 
 @pytest.mark.parametrize("lines", [False, True])
-def test_the_pieces_of_json_make_the_whole_object(found, ranging, floating, lines):
+def test_json_pieces_form_the_complete_object(found, ranging, floating, lines):
     for each in (found, ranging, floating):
         assert read_json(network_json(each, lines=lines)) == network_object(each)
     assert len(list(network_json(ranging))) > len(list(network_json(found)))  # 9000 rows come in pieces
     assert all("\n" not in piece for piece in network_json(found))
 
 
-def test_the_contract_of_adjust_is_kept(found):
+def test_json_of_adjust_has_its_documented_keys(found):
     told = network_object(found)
     assert {"points", "variance_factor", "degrees_of_freedom", "observations", "suspects", "status"} <= told.keys()
     for row in told["observations"]:
@@ -164,7 +164,7 @@ def test_the_contract_of_adjust_is_kept(found):
     assert np.shape(told["points"]["Q,2"]["covariance"]) == (3, 3)
 
 
-def test_coordinates_and_covariances_stand_in_the_axes_of_the_file(found, solution):
+def test_coordinates_and_covariances_are_in_the_axes_of_the_file(found, solution):
     points = network_object(found)["points"]
     row = solution.index["C & D"]
     for name, truth in TRUTH.items():
@@ -265,7 +265,7 @@ def test_covariances_follow_the_coordinates_into_any_axes(solution, name):
     np.testing.assert_allclose(full[at : at + 3, 12], 1e3 * 1e4 / GON * with_turn, rtol=1e-7)
 
 
-def test_observations_stand_in_the_order_of_the_file(found):
+def test_observations_are_in_file_order(found):
     places = [row["place"] for row in network_object(found)["observations"]]
     lines = [int(place.split()[-1]) for place in places]
     assert lines == sorted(lines)
@@ -289,7 +289,7 @@ def test_a_planted_blunder_is_the_first_suspect_with_its_sign_and_size(solution)
     )
 
 
-def test_what_was_left_out_is_named_by_its_number_in_the_file(solution):
+def test_excluded_rows_are_named_by_their_number_in_the_file(solution):
     network = solution.network
     group = next(g for g in network.groups if g.kind == "vector")
     wrong = group.observed.copy()
@@ -311,7 +311,7 @@ def test_what_was_left_out_is_named_by_its_number_in_the_file(solution):
     assert f"x of {found.label(mine['observation']).removeprefix('x of ')}" in said[0].text
 
 
-def test_an_observation_that_nothing_checks_says_so_and_claims_nothing(found):
+def test_unchecked_observation_has_no_statistics(found):
     told = network_object(found)
     far = [row for row in told["observations"] if row["to"] == "far"]
     assert len(far) == 3
@@ -322,7 +322,7 @@ def test_an_observation_that_nothing_checks_says_so_and_claims_nothing(found):
     assert [told["observations"][i] for i in told["unchecked"]] == far
 
 
-def test_without_an_answer_nothing_is_claimed(floating):
+def test_without_a_solution_there_are_no_claims(floating):
     told = network_object(floating)
     assert told["status"].startswith("rank deficient")
     assert told["points"]["Q,2"]["covariance"] == [[None] * 3] * 3
@@ -336,7 +336,7 @@ def test_without_an_answer_nothing_is_claimed(floating):
     assert root[0][0].text == told["status"]
 
 
-def test_the_whole_test_is_about_the_a_priori_value(found):
+def test_global_test_refers_to_the_a_priori_value(found):
     test, degrees = network_object(found)["chi_square"], found.solution.degrees_of_freedom
     assert test["lower"] == pytest.approx(chi2.ppf(0.025, degrees), rel=1e-9)
     assert test["upper"] == pytest.approx(chi2.ppf(0.975, degrees), rel=1e-9)
@@ -344,7 +344,7 @@ def test_the_whole_test_is_about_the_a_priori_value(found):
     assert test["passed"] is (test["lower"] <= test["statistic"] <= test["upper"])
 
 
-def test_the_variance_factor_is_applied_when_asked_and_said(solution, found):
+def test_variance_factor_is_applied_on_request_and_reported(solution, found):
     scaled = findings(solution, scaled=True)
     told, plain = network_object(scaled), network_object(found)
     factor = told["variance_factor"]
@@ -361,7 +361,7 @@ def test_an_unknown_variance_factor_is_not_applied(solution):
         findings(replace(solution, variance_factor=float("nan"), degrees_of_freedom=0.0), scaled=True)
 
 
-def test_tables_say_what_json_says(found):
+def test_tables_agree_with_json(found):
     told = network_object(found)
     for row in read_csv(coordinates_csv(found)):
         point = told["points"][row["point"]]
@@ -567,7 +567,7 @@ def compared(tmp_path_factory, solution):
     return ComparedEpochs(findings(solution), findings(second), moved)
 
 
-def test_what_moved_is_told_in_the_axes_of_the_file(compared):
+def test_movements_are_in_the_axes_of_the_file(compared):
     told = read_json([json.dumps(comparison_object(compared))])
     assert told["moved"] == ["Q,2"]
     point = told["points"]["Q,2"]
@@ -583,7 +583,7 @@ def test_what_moved_is_told_in_the_axes_of_the_file(compared):
     plain = compared.second.x[j] - compared.first.x[i]  # A and B are held in both epochs: one datum
     assert point["difference"] == pytest.approx(plain, abs=1e-9)
     said = {p.title: p.text for p in comparison_passages(compared)}
-    assert "Q,2" in said["What moved"]
+    assert "Q,2" in said["Movements"]
     assert f"dx {1e3 * point['displacement'][0]:+.3f}" in said["Q,2"]
     rows = {row["point"]: row for row in read_csv(displacements_csv(compared))}
     assert float(rows["Q,2"]["dx_mm"]) == pytest.approx(1e3 * point["displacement"][0], abs=1e-6)
@@ -602,7 +602,7 @@ def test_a_coordinate_not_compared_is_unknown_not_zero(compared):
     assert point["length"] == pytest.approx(abs(point["displacement"][2]))
 
 
-def test_the_files_of_two_epochs_stand_beside_each_other(compared, tmp_path):
+def test_files_of_two_epochs_are_in_one_directory(compared, tmp_path):
     write_comparison(compared, tmp_path, {"first.gkf": "0" * 64, "second.gkf": "1" * 64})
     names = {f.name for f in tmp_path.iterdir()}
     assert {"displacements.csv", "comparison.json", "report.html", "epoch-1-coordinates.csv"} <= names
@@ -629,7 +629,7 @@ def test_every_column_of_the_coordinates_has_the_unit_of_its_name(found):
         **{f"semi_axis_{k + 1}_mm": lambda i, k=k: found.ellipsoid.semi_axes[i, k] for k in range(3)},
         "fixed": lambda i: "x y z" if network.points.fixed[i].all() else "",
         "datum": lambda i: "",
-        "observations": lambda i: found.seen[i],
+        "observations": lambda i: found.observation_counts[i],
     }
     largest = np.linalg.eigvalsh(found.covariance)[:, -1] ** 0.5
     np.testing.assert_allclose(np.max(found.ellipsoid.semi_axes, axis=1), largest, rtol=1e-6)  # m, of the ellipsoid

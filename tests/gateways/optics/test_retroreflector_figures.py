@@ -23,15 +23,15 @@ def aberration():
 
 def test_the_figures_are_well_formed_and_the_same_again(returned, aberration):
     for drawn, words in (
-        (returned[0], ("hollow cube", "between two edges", "silvered", "appendix B", "What returns")),
-        (aberration[0], ("R2 96.49 mm, as it is", "power of the beam", "at 120 m", "Deviation")),
+        (returned[0], ("hollow cube", "between two edges", "silvered", "appendix B", "Returned light")),
+        (aberration[0], ("R2 96.49 mm, actual", "beam power", "at 120 m", "Deviation")),
     ):
         ElementTree.fromstring(drawn)
         assert all(word in drawn for word in words)
     assert return_plot()[0] == returned[0]
 
 
-def test_the_return_figure_tells_what_the_formulas_say(returned):
+def test_return_figure_agrees_with_the_formulas(returned):
     told = returned[1]
     half = told["half_of_normal_at_deg"]
     solid = Dimensions().targets()[1]
@@ -49,7 +49,7 @@ def test_the_return_figure_tells_what_the_formulas_say(returned):
     assert difference * 1e6 == pytest.approx(0.43, abs=0.005)
 
 
-def test_the_aberration_figure_tells_what_the_ball_says(aberration):
+def test_aberration_figure_agrees_with_the_ball(aberration):
     told, ball = aberration[1], Dimensions().targets()[2]
     assert told["range_constant"] == ball.range_constant
     assert told["mean_path_change"] == ball.mean_path_change(0.010)

@@ -39,17 +39,17 @@ def test_a_move_has_its_four_panels(trace, plain):
         "Drive, converter steps",
     ):
         assert words in drawn
-    assert "what the profile asks for" in drawn
-    assert "what the profile asks for" not in plain
+    assert "required by the profile" in drawn
+    assert "required by the profile" not in plain
 
 
 def test_the_same_move_gives_the_same_figure(trace, plain):
     assert move_figure(trace, target=400.0) == plain
 
 
-def test_step_responses_stand_beside_linear_theory(trace):
+def test_step_responses_are_compared_with_linear_theory(trace):
     drawn = texts(step_figure({"one": trace, "two": trace}, target=50.0, linear={"one": np.linspace(0.0, 50.0, 700)}))
-    for words in ("one", "two", "Step of 50 counts", "What is left"):
+    for words in ("one", "two", "Step of 50 counts", "Final error"):
         assert words in drawn
     assert drawn.count("stroke-dasharray") > step_figure({"one": trace, "two": trace}, target=50.0).count(
         "stroke-dasharray"

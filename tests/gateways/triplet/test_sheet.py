@@ -112,7 +112,7 @@ def test_the_points_lie_where_the_distances_say(found):
 def test_the_text_has_a_line_for_every_symbol_and_a_column_for_every_placement(found):
     lines = text_sheet(found, "TR99.toml").splitlines()
     for symbol in (*UNIT, *PLATE_SYMBOLS, *PLACEMENT):
-        mine = [line for line in lines if line.startswith(f"{symbol.shown:<14}")]
+        mine = [line for line in lines if line.startswith(f"{symbol.label:<14}")]
         assert mine, symbol.name
         values = symbol_values(symbol, found)
         shown = [cell(symbol, value) for value in values]
@@ -120,12 +120,12 @@ def test_the_text_has_a_line_for_every_symbol_and_a_column_for_every_placement(f
     assert any(line.startswith("H_corr      -0.0230 mm") for line in lines)
 
 
-def test_the_page_stands_alone_and_tells_the_same(found):
+def test_page_is_self_contained_and_has_the_same_values(found):
     page = html_sheet(found, "TR99.toml", datetime(2026, 11, 21, tzinfo=UTC), "ab" * 32)
     text = Text(page)
     words = " ".join(text.words)
     for symbol in (*UNIT, *PLATE_SYMBOLS, *PLACEMENT):
-        assert symbol.shown in text.words, symbol.name
+        assert symbol.label in text.words, symbol.name
         assert cell(symbol, symbol_values(symbol, found)[0]) in text.words, symbol.name
     assert "ab" * 32 in words
     assert "-0.0230 mm" in words
@@ -199,7 +199,7 @@ def test_a_calibration_phase_of_the_flip_is_on_the_sheet():
     assert "Φ_Cal fp" in text_sheet(found, "T.toml")
 
 
-def test_a_unit_without_an_answer_says_unknown():
+def test_unit_without_result_shows_unknown():
     """Three metres away and a metre aside, prisms 100 mm apart that seem 93 mm nearer and farther: no triangle."""
     own = document()["placement"][0] | {"d_toppl_mm": 3000.0, "h_s_mm": 1000.0, "phi_1_rad": 0.318, "phi_2_rad": 0.218}
     found = reduce_triplet(measurement(placement=[own], d12_mm=100.0))

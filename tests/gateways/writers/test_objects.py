@@ -32,7 +32,7 @@ def test_the_reduction_has_every_key_of_the_contract(reduction):
     assert "ZY101-F" in found["points"]
 
 
-def test_the_pose_states_frame_pivot_and_what_it_does_not_see(reduction):
+def test_pose_states_frame_pivot_and_unobserved_components(reduction):
     pose = strict(json_line(reduction_object(reduction)))["pose"]
     assert pose["frame"] == "ground"
     assert len(pose["pivot"]) == 3
@@ -50,7 +50,7 @@ def test_the_covariance_of_all_points_is_written_with_its_order(written, reducti
     assert found["covariance"][row][row] == found["points"]["ZY113"]["covariance"][0][0]
 
 
-def test_a_campaign_without_a_dish_has_a_null_pose_and_says_why(reduction):
+def test_campaign_without_dish_has_null_pose_and_a_reason(reduction):
     blind = replace(reduction, surface=None, notes=("no paraboloid: it needs 5 points, 2 given",))
     assert strict(json_line(reduction_object(blind)))["pose"] is None
     found = strict(json_page(pose_object(blind)))
@@ -58,7 +58,7 @@ def test_a_campaign_without_a_dish_has_a_null_pose_and_says_why(reduction):
     assert "2 given" in found["reason"]
 
 
-def test_numbers_that_are_none_become_null():
+def test_missing_numbers_become_null():
     assert strict(json_line({"a": np.float64("nan"), "b": [math.inf, 1], "c": np.int64(3)})) == {
         "a": None,
         "b": [None, 1],
@@ -76,12 +76,12 @@ def test_provenance_proves_inputs_and_outputs(written, reduction):
         assert hashlib.sha256((written / name).read_bytes()).hexdigest() == digest
 
 
-def test_nothing_written_names_a_place_on_this_machine(written, reduction):
+def test_output_contains_no_local_paths(written, reduction):
     place = str(reduction.campaign.directory.resolve().parent)
     assert not [path.name for path in written.iterdir() if place in path.read_text(encoding="utf-8")]
 
 
-def test_the_air_is_told_with_its_state_and_both_uncertainties():
+def test_air_object_has_its_state_and_both_uncertainties():
     from catseye.atmosphere.index.air import air
 
     state = air(20.0, 933.0, 50.0)
@@ -92,7 +92,7 @@ def test_the_air_is_told_with_its_state_and_both_uncertainties():
     assert told["standard_uncertainty"] == pytest.approx(math.hypot(5e-8, 0.3 * 0.8921e-6), rel=1e-3)
 
 
-def test_benchmarks_are_told_as_refractometers(reduction):
+def test_benchmarks_are_reported_as_refractometers(reduction):
     """Each path's index must agree with the stations' within both uncertainties, as night-01's stations nearly do."""
     told = reduction_object(reduction)["air"]
     assert told["lines_by_sound"] == {}

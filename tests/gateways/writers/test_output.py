@@ -28,14 +28,14 @@ def neighbours(out):
     return sorted(path.name for path in out.parent.iterdir())
 
 
-def test_it_appears_whole(tmp_path, campaign):
+def test_output_appears_complete(tmp_path, campaign):
     write(tmp_path / "out", campaign, "a")
     assert (tmp_path / "out" / "table.csv").read_text() == "a"
     assert neighbours(tmp_path / "out") == ["input", "out"]
 
 
 @pytest.mark.parametrize("failure", [OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()])
-def test_nothing_appears_when_it_fails(tmp_path, campaign, failure):
+def test_no_output_appears_after_a_failure(tmp_path, campaign, failure):
     with pytest.raises((InputError, KeyboardInterrupt)):
         write(tmp_path / "out", campaign, "a", fail=failure)
     assert neighbours(tmp_path / "out") == ["input"]
@@ -70,7 +70,7 @@ def test_a_link_is_followed(tmp_path, campaign):
     assert (tmp_path / "elsewhere" / "table.csv").read_text() == "a"
 
 
-def test_what_catseye_did_not_write_is_not_replaced(tmp_path, campaign):
+def test_foreign_files_are_not_replaced(tmp_path, campaign):
     write(tmp_path / "out", campaign, "a")
     (tmp_path / "out" / "my-notes.txt").write_text("mine")
     with pytest.raises(InputError, match=r"holds 'my-notes\.txt', which catseye did not write"):

@@ -44,7 +44,7 @@ def tables():
     }
 
 
-def test_what_is_read_back_is_the_same_to_the_last_bit(tmp_path):
+def test_samplers_round_trip_is_exact(tmp_path):
     place, given = tmp_path / "s.fits", tables()
     write_samplers(place, given)
     found = read_samplers(place)
@@ -66,7 +66,7 @@ def test_what_is_read_back_is_the_same_to_the_last_bit(tmp_path):
             assert one.tolist() == two.tolist() if one.dtype.kind == "U" else one.tobytes() == two.tobytes()
 
 
-def test_astropy_finds_nothing_to_mend_and_every_unit_has_a_meaning(tmp_path):
+def test_astropy_accepts_the_file_and_all_units(tmp_path):
     from astropy.table import Table
 
     place = tmp_path / "s.fits"
@@ -88,9 +88,9 @@ def test_astropy_finds_nothing_to_mend_and_every_unit_has_a_meaning(tmp_path):
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        ({"columns": {"T": SamplerColumn("degC", [1.0, 2.0])}}, "give K"),
-        ({"columns": {"T": SamplerColumn("metre", [1.0, 2.0])}}, "none of the FITS standard"),
-        ({"columns": {"T": SamplerColumn("m", [1.0])}}, "unlike lengths"),
+        ({"columns": {"T": SamplerColumn("degC", [1.0, 2.0])}}, "use K"),
+        ({"columns": {"T": SamplerColumn("metre", [1.0, 2.0])}}, "not in the FITS standard"),
+        ({"columns": {"T": SamplerColumn("m", [1.0])}}, "different lengths"),
         ({"columns": {"T": SamplerColumn("", ["µ", "a"])}}, "not printable ASCII"),
         ({"columns": {"T": SamplerColumn("", ["a ", "a"])}}, "ends in a blank"),
         ({"columns": {"T": SamplerColumn("", [1j, 2j])}}, "expected rows of numbers"),
@@ -100,22 +100,22 @@ def test_astropy_finds_nothing_to_mend_and_every_unit_has_a_meaning(tmp_path):
         ({"columns": {"MJD": SamplerColumn("d", [1.0, 2.0])}}, "expected another name"),
         ({"columns": {}, "mjd": None}, "no column"),
         ({"mjd": MJD + 2400000.5}, "no Julian Date"),
-        ({"header": {"TTYPE9": 1}}, "none of FITS's own"),
-        ({"name": "other"}, "expected the same"),
+        ({"header": {"TTYPE9": 1}}, "none reserved by FITS"),
+        ({"name": "other"}, "expected its name"),
     ],
 )
-def test_what_fits_cannot_hold_is_refused_with_its_place(change, expected):
+def test_values_invalid_in_fits_are_refused_with_their_place(change, expected):
     given = {"name": "T", "columns": {"X": SamplerColumn("m", [1.0, 2.0])}, "mjd": MJD, **change}
     with pytest.raises(InputError, match=expected):
         sampler_tables({"T": SamplerTable(**given)})
-    with pytest.raises(InputError, match="one table at least"):
+    with pytest.raises(InputError, match="at least one table"):
         sampler_tables({})
 
 
-def test_anothers_file_is_not_lost_and_our_own_is_replaced(tmp_path):
+def test_foreign_file_is_kept_and_own_file_is_replaced(tmp_path):
     place = tmp_path / "s.fits"
     place.write_bytes(b"SIMPLE  =                    T")
-    with pytest.raises(InputError, match="not catseye's"):
+    with pytest.raises(InputError, match="not a catseye file"):
         write_samplers(place, tables())
     assert place.read_bytes() == b"SIMPLE  =                    T"
     place.unlink()
@@ -129,7 +129,7 @@ def test_anothers_file_is_not_lost_and_our_own_is_replaced(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["s.fits"]
 
 
-def test_a_damaged_or_strange_file_is_refused(tmp_path):
+def test_damaged_or_foreign_file_is_refused(tmp_path):
     place = tmp_path / "s.fits"
     content = bytearray(sampler_tables(tables()))
     content[2880 * 4 + 40] ^= 1
@@ -139,7 +139,7 @@ def test_a_damaged_or_strange_file_is_refused(tmp_path):
     with pytest.raises(InputError, match="cannot be read as FITS"):
         read_samplers(place)
     fits.HDUList([fits.PrimaryHDU()]).writeto(tmp_path / "other.fits")
-    with pytest.raises(InputError, match="not a file of catseye's"):
+    with pytest.raises(InputError, match="not a samplers file of catseye"):
         read_samplers(tmp_path / "other.fits")
     with pytest.raises(InputError, match="cannot be read"):
         read_samplers(tmp_path / "missing.fits")

@@ -19,7 +19,7 @@ def test_a_result_is_no_better_than_its_source(own, source):
     assert ("theirs" in found.why and "night" in found.why) == (ORDER.index(source) > ORDER.index(own))
 
 
-def test_notes_that_something_is_wrong_make_good_doubtful_and_no_worse():
+def test_doubts_make_a_good_verdict_doubtful_but_not_failed():
     assert Verdict("good", "all fits").hearing(["it is wrong."]) == ("doubtful", "it is wrong")
     assert Verdict("failed", "no answer").hearing(["it is wrong"]).word == "failed"
     assert Verdict("good", "all fits").hearing([]).word == "good"
@@ -34,7 +34,7 @@ def test_a_written_verdict_comes_back_and_a_damaged_one_is_refused():
             stored_verdict("a.json", {"verdict": damaged})
 
 
-def test_other_programs_provenance_says_nothing(tmp_path):
+def test_foreign_provenance_gives_no_verdict(tmp_path):
     for text in ("not JSON", "[]", '{"format": "theirs", "verdict": 3}'):
         (tmp_path / "provenance.json").write_text(text)
         (tmp_path / "coordinates.json").write_text("{}")
@@ -43,7 +43,7 @@ def test_other_programs_provenance_says_nothing(tmp_path):
         assert verdict_of_table(tmp_path / "t.csv") is None
 
 
-def test_a_table_has_the_verdict_of_the_reduction_that_wrote_it_until_someone_edits_it(tmp_path):
+def test_unedited_table_has_the_verdict_of_its_reduction(tmp_path):
     table = tmp_path / "surface.csv"
     table.write_text("point\n")
     digest = hashlib.sha256(table.read_bytes()).hexdigest()

@@ -74,7 +74,7 @@ def test_a_sheet_elsewhere_is_named(files, tmp_path):
         ("range_m\n0.1\n", "t.csv: line 2, range_m = 0.1 (expected 0.5 to 100)"),
         ("range_m\n2500\n", "t.csv: line 2, range_m = 2500 looks like millimetres (expected 0.5 to 100)"),
         ("range_m,temperature_c\n1,293.15\n", "temperature_c = 293.15 looks like kelvin (expected -40 to 60)"),
-        ("range_mm\n1\n", "t.csv: line 1, column 'range_mm' is not known (expected the header range_m, perhaps who,"),
+        ("range_mm\n1\n", "t.csv: line 1, column 'range_mm' is unknown (expected the header range_m, optionally who,"),
         ("who\na\n", "t.csv: line 1, column 'range_m' is missing"),
         ("range_m,left_out\n1,bad\n", "t.csv: every reading has a reason in 'left_out' (expected some without)"),
         ("range_m,mjd_utc\n1,2461280.5\n", "mjd_utc = 2461280.5 (expected 40000 to 100000)"),
@@ -94,7 +94,7 @@ def test_a_bad_table_is_refused_in_one_line(files, table, said):
         (('by = "someone"', 'by = ""'), "t.toml: by = ''"),
         (
             ('kind = "thing"', 'kind = "leakage"'),
-            "kind = 'leakage' is a sheet of another calibration (expected 'thing')",
+            "kind = 'leakage' is the sheet of another calibration (expected 'thing')",
         ),
         (("2027-09-01", "2026-09-01"), "valid_until = 2026-09-01 is not after measured_on = 2026-09-01"),
         (('report = "L1"', 'report = "L1"\nlevel = 0.95'), "level = 0.95 is not a small probability"),
@@ -132,7 +132,7 @@ def test_hours_count_from_the_first_reading(files):
 
 
 @pytest.mark.parametrize("name", ["EDM 7", "Leica TM50 / 2", "Messgerät Süd"])
-def test_an_instrument_has_the_name_that_people_call_it(files, name):
+def test_instrument_name_is_free_text(files, name):
     sheet = SHEET.replace('instrument = "ZP1"', f'instrument = "{name}"')
     assert read_readings(files("range_m\n1\n2\n", sheet), LAYOUT).sheet.instrument == name
     with pytest.raises(InputError, match="instrument"):

@@ -12,7 +12,7 @@ TS30 = ROOT / "examples" / "baselines" / "busselton" / "ts30-baseline-observatio
 RELEASED = VECTORS / "baseline-1.toml"
 
 
-def test_the_real_table_is_read_whole():
+def test_real_table_is_read_completely():
     seen = read_observations(TS30)
     assert len(seen) == 127
     assert seen.names == ("1", "2", "3", "4", "5", "6")
@@ -63,7 +63,7 @@ def test_dry_air_at_freezing_is_legal(tmp_path):
         ("20.4011", "-20.4011", "slope_distance = '-20.4011'"),
         ("20.4011", "nan", "slope_distance = 'nan' (expected a finite number)"),
         ("0.235,0.24,20.4011", "235,0.24,20.4011", "height_of_instrument = '235' (expected -5 to 5 m)"),
-        ("slope_distance", "slope", "line 1, column 'slope' is not known"),
+        ("slope_distance", "slope", "line 1, column 'slope' is unknown"),
         (",humidity", "", "column 'humidity' is missing"),
         ("46.2\n", "46.2,1\n", "fields"),
     ],

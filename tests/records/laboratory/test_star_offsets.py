@@ -55,7 +55,7 @@ angle = st.tuples(st.floats(0, 360), st.floats(1, 89), st.floats(-0.5, 0.5), st.
 
 
 @given(st.lists(angle, min_size=1, max_size=8), st.floats(-89.9, 89.9))
-def test_what_is_written_is_read_back(rows, latitude):
+def test_written_offsets_are_read_back(rows, latitude):
     table = np.array(rows)
     first = parsed(GOOD, "x")
     made = dataclasses.replace(
@@ -92,7 +92,7 @@ def test_what_is_written_is_read_back(rows, latitude):
         (("SDSS-like pointing data 2011-12-11", "!"), "line|option|latitude|caption"),
     ],
 )
-def test_what_is_not_understood_is_refused_in_one_line(change, said):
+def test_invalid_text_is_refused_in_one_line(change, said):
     text = GOOD.replace(*change)
     assert text != GOOD
     with pytest.raises(InputError, match=said) as refused:
@@ -106,6 +106,6 @@ def test_what_is_not_understood_is_refused_in_one_line(change, said):
     [("! only\n", "comments only"), ("caption\n: ALTAZ\n", "no line with the latitude"),
      ("caption\n: ALTAZ\n38 25 59\nEND\n", "no observations")],
 )  # fmt: skip
-def test_what_is_missing_is_named(text, said):
+def test_missing_parts_are_named(text, said):
     with pytest.raises(InputError, match=said):
         parsed(text, "s.dat")

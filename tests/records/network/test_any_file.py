@@ -49,7 +49,7 @@ def test_a_folder_of_three_stations_puts_the_target_where_geometry_does(tmp_path
     assert np.allclose(solve(network).x[3], (30.0, 40.0, 50.0), atol=1e-6, rtol=0)
 
 
-def test_the_established_ranging_network_is_read_whole():
+def test_established_ranging_network_is_read_completely():
     network = read_network(VECTORS / "ranging-18x500")
     assert len(network.points.names) == 518
     assert network.points.datum.sum() == 54
@@ -97,19 +97,19 @@ BAD_POINTS = {
     "free": ("held", "points.csv: line 5, role = 'held' (expected free or fixed or datum)"),
     "point,": (
         "name,",
-        "points.csv: line 1, column 'name' is not known (expected the header point,x,y,z, perhaps role,u_x,u_y,u_z)",
+        "points.csv: line 1, column 'name' is unknown (expected the header point,x,y,z, optionally role,u_x,u_y,u_z)",
     ),
     ",role": (
         ",x",
-        "points.csv: line 1, column 'x' is there 2 times (expected the header point,x,y,z, perhaps role,u_x,u_y,u_z)",
+        "points.csv: line 1, column 'x' occurs 2 times (expected the header point,x,y,z, optionally role,u_x,u_y,u_z)",
     ),
 }
-HEADER = "(expected the header from,to,distance, perhaps sigma)"
+HEADER = "(expected the header from,to,distance, optionally sigma)"
 BAD_RANGES = {
     "S2,T1": (
         "S2,TT1",
         "ranges.csv: line 3, to = 'TT1' is not in points.csv "
-        "(expected perhaps 'T1'; an unknown point has 3 ranges at least)",
+        "(expected perhaps 'T1'; an unknown point needs at least 3 ranges)",
     ),
     "S3,T1": ("T1,T1", "ranges.csv: line 4, to = 'T1' (expected another point than from)"),
     "94.8683298": ("-94.8", "ranges.csv: line 3, distance = '-94.8' (expected above 0 m)"),
@@ -117,16 +117,16 @@ BAD_RANGES = {
     "S1,T1,70": ("S1,T1,7_0", "ranges.csv: line 2, distance = '7_0.7106781' (expected a finite number)"),
     "83.6660027,0.0001": (
         "83.6660027,0",
-        "ranges.csv: line 4, sigma = '0' (expected above 0 m: nothing is measured without error)",
+        "ranges.csv: line 4, sigma = '0' (expected above 0 m: no measurement is exact)",
     ),
     ",sigma": (
         ",u",
-        f"ranges.csv: line 1, column 'u' is not known {HEADER}",
+        f"ranges.csv: line 1, column 'u' is unknown {HEADER}",
     ),
     "S1,T1,70.7106781,0.0001\n": ("\n", "ranges.csv: line 2, 1 fields = '' (expected 4)"),
     "\nS1": (
         ",\nS1",
-        f"ranges.csv: line 1, column '' is not known {HEADER}",
+        f"ranges.csv: line 1, column '' is unknown {HEADER}",
     ),
 }
 
@@ -145,7 +145,7 @@ def test_a_bad_range_is_named_with_its_line(tmp_path, old):
     assert refusal_of(folder(tmp_path, ranges=RANGES.replace(old, new, 1))) == expected
 
 
-def test_what_is_not_there_or_empty_is_said(tmp_path):
+def test_missing_or_empty_input_is_reported(tmp_path):
     (tmp_path / "points.csv").write_text(POINTS)
     assert refusal_of(tmp_path) == f"ranges.csv: missing in {tmp_path}"
     (tmp_path / "ranges.csv").write_text("\n")
@@ -179,7 +179,7 @@ def test_every_number_written_is_the_number_read(rows, quoted):
     assert table.numbers("sigma").tolist() == [row[2] for row in rows]
 
 
-def test_the_examples_are_read_and_fit_what_they_claim(solve):
+def test_examples_are_read_and_fit_their_claims(solve):
     files = {"feed-arm.toml", "ground-ring", "template", "total-station.gkf", "total-station.dat"}
     assert {path.name for path in EXAMPLES.iterdir()} == files
     for file in files - {"template"}:  # which has points without a place
@@ -240,5 +240,5 @@ def test_a_claim_serves_ranges_without_a_sigma(tmp_path):
     assert np.sqrt(read_network(own, sigma_ppm=2.0).groups[0].covariance) == pytest.approx(2e-6 * group.observed)
     with pytest.raises(InputError, match=r"--sigma-mm = -1 \(expected 0 to 100000\)"):
         read_network(own, sigma_mm=-1.0)
-    with pytest.raises(InputError, match="says every uncertainty itself"):
+    with pytest.raises(InputError, match="contains all uncertainties"):
         read_network(EXAMPLES / "feed-arm.toml", sigma_mm=1.0)

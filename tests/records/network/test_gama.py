@@ -285,7 +285,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("text", REFUSED)
-def test_a_file_that_is_no_network_is_refused_in_one_line(text):
+def test_file_without_network_is_refused_in_one_line(text):
     with pytest.raises(InputError) as refusal:
         gama_network(text.encode(), "n.gkf")
     assert str(refusal.value) == REFUSED[text]
@@ -301,13 +301,13 @@ REFUSED_INSIDE = {
     '<obs from="1"><distance to="3" val="-1"/></obs>': "horizontal_distance '1' to '3' = -1 m (expected above 0)",
     '<obs from="1"><distance to="3" val="nan"/></obs>': "distance: val = 'nan' (expected a number)",
     '<obs from="1"><distance to="3" val="1" stdev="0"/></obs>': (
-        "horizontal_distance '1' to '3' has the sigma 0 (expected above 0: nothing is measured without error)"
+        "horizontal_distance '1' to '3' has the sigma 0 (expected above 0: no measurement is exact)"
     ),
     '<obs from="1"><distance to="3" val="1" weight="2"/></obs>': (
         "distance: weight = '2' is not known (to val from stdev from_dh to_dh extern)"
     ),
     '<obs from="1"><distance val="1"/></obs>': "distance: to is missing (expected to val)",
-    '<obs><distance to="3" val="1"/></obs>': "distance: says not from where (expected from, here or in obs)",
+    '<obs><distance to="3" val="1"/></obs>': "distance: has no station (expected from, here or in obs)",
     '<obs from="1"><sextant to="3"/></obs>': (
         "<sextant> in <obs> is not known (expected direction distance angle s-distance z-angle azimuth cov-mat)"
     ),
@@ -341,7 +341,7 @@ REFUSED_INSIDE = {
 
 
 @pytest.mark.parametrize("inside", REFUSED_INSIDE)
-def test_what_cannot_be_used_is_named_with_its_line(inside):
+def test_invalid_input_is_named_with_its_line(inside):
     with pytest.raises(InputError) as refusal:
         small(inside)
     assert str(refusal.value) == f"n.gkf: line 3, {REFUSED_INSIDE[inside]}"

@@ -17,7 +17,7 @@ NAMES = st.text(st.characters(exclude_categories=("C", "Z")), min_size=1, max_si
 
 
 @given(NAMES)
-def test_a_key_is_the_key_of_itself_and_of_every_way_to_write_it(name):
+def test_key_is_invariant_under_spelling(name):
     assert name_key(name_key(name)) == name_key(name)
     for form in ("NFC", "NFD"):
         assert name_key(f" {unicodedata.normalize(form, name)} ") == name_key(name)
@@ -25,7 +25,7 @@ def test_a_key_is_the_key_of_itself_and_of_every_way_to_write_it(name):
 
 
 @given(st.integers(0, 10**6), st.integers(1, 3))
-def test_decimals_of_a_whole_number_say_nothing_and_others_do(number, zeros):
+def test_zero_decimals_are_ignored_in_names(number, zeros):
     assert name_key(f"{number}.{'0' * zeros}") == str(number)
     assert name_key(f"{number}.{'0' * zeros}1") != str(number)
     assert name_key(f"{number}.10") != name_key(f"{number}.1")
@@ -46,7 +46,7 @@ def folder(tmp_path, first, second):
 
 
 @pytest.mark.parametrize(("first", "second"), WAYS)
-def test_two_ways_to_write_a_name_are_one_point_of_a_folder_and_said_once(tmp_path, first, second):
+def test_two_spellings_of_a_name_are_one_point_and_noted_once(tmp_path, first, second):
     network = read_network(folder(tmp_path, first, second))
     assert network.points.names == ("S1", "S2", "S3", "S4", spelled(first))
     assert len(network.notes) == 1
@@ -77,7 +77,7 @@ def test_two_ways_to_write_a_name_are_one_point_of_our_own_file_and_of_gamas(tmp
 
 
 @pytest.mark.parametrize(("first", "second"), WAYS)
-def test_a_point_that_is_there_in_two_ways_is_there_twice(tmp_path, first, second):
+def test_point_with_two_spellings_is_a_duplicate(tmp_path, first, second):
     path = folder(tmp_path, first, first)
     with (path / "points.csv").open("a", encoding="utf-8") as file:
         file.write(f"{second},12.01,9.01,3.0,free\n")
@@ -85,7 +85,7 @@ def test_a_point_that_is_there_in_two_ways_is_there_twice(tmp_path, first, secon
         read_network(path)
 
 
-def test_names_that_agree_say_nothing(tmp_path):
+def test_consistent_names_give_no_note(tmp_path):
     assert read_network(folder(tmp_path, "P 5", "P 5")).notes == ()
     assert "Q" not in PointIndex(["P", "R"])
 
@@ -100,7 +100,7 @@ def test_every_invalid_key_is_named(tmp_path):
     assert all(key in str(refused.value) for key in ("'x_mm'", "'colour'", "'fixd'", "perhaps fixed"))
     path = folder(tmp_path, "P", "P")
     (path / "ranges.csv").write_text("from,to,distance,sigma,who,when\nS1,P,1,1,a,b\n", encoding="utf-8")
-    with pytest.raises(InputError, match="'who', 'when' are not known"):
+    with pytest.raises(InputError, match="'who', 'when' are unknown"):
         read_network(path)
 
 
@@ -113,7 +113,7 @@ def test_every_invalid_key_is_named(tmp_path):
     ],
     ids=["commas", "decimal-comma", "semicolons"],
 )
-def test_a_table_beside_our_file_reads_what_a_folder_reads(tmp_path, rows):
+def test_table_of_a_toml_file_reads_as_a_folder(tmp_path, rows):
     (tmp_path / "levels.csv").write_text(rows, encoding="utf-8")
     file = tmp_path / "network.toml"
     file.write_text(

@@ -108,10 +108,10 @@ def test_default_standard_errors_come_from_the_comment_and_nowhere_else():
         read("C 1 0 0 0 ! ! !\nA 1-2-3 45-00-00")
     wanted = "(expected standard errors in the lines, or above them the comment '# catseye: angle_arcsec = ...')"
     missing = "Angle (1 observation, first line 3)"
-    assert str(refusal.value) == f"n.dat: leaves to the project options, which are not in it: {missing} {wanted}"
+    assert str(refusal.value) == f"n.dat: has no values for the project options: {missing} {wanted}"
 
 
-def test_all_standard_errors_that_are_missing_are_asked_for_at_once_in_the_words_of_the_program():
+def test_all_missing_standard_errors_are_listed_in_starnet_terms():
     with pytest.raises(InputError) as refusal:
         read("C 1 0 0 0 ! ! !\nC 2 9 0 0 ! ! !\n.INST TS30 tripod\nA 1-2-3 45-00-00\nDV 1-3 9.5 90-00-00\nD 2-3 8.0")
     said = str(refusal.value)
@@ -125,13 +125,13 @@ def test_all_standard_errors_that_are_missing_are_asked_for_at_once_in_the_words
         assert words in said
 
 
-def test_a_claim_from_outside_serves_distances_until_the_file_says_otherwise():
+def test_external_claim_applies_to_distances_until_the_file_changes_it():
     text = "C 1 0 0 0 ! ! !\nC 2 9 0 0 ! ! !\nD 1-3 100.0\n# catseye: distance_mm = 5, distance_ppm = 0.001\nD 2-3 95.0"
     network = starnet_network(text, "n.dat", RangeClaim(1.0, 2.0))
     assert np.sqrt(group(network, "slope_distance").covariance) == pytest.approx([1.2e-3, 5e-3], rel=1e-4)
 
 
-def test_held_and_left_out_observations_are_told_in_the_description():
+def test_held_and_excluded_observations_are_in_the_description():
     network = read(
         "B 1-2 N34-23-45.7E !\nD 1-2 10.5 !\nB 1-3 150-33-44 *\nD 1-3 5 0.1\nV 1-2 90-00-00 ?".replace(" ?", " 1")
     )
@@ -236,7 +236,7 @@ REFUSED = {
     "D 1-2 ten 1": "D: 'ten' (expected a number)",
     "D 1-2 -10 1": "slope_distance '1' to '2' = -10 m (expected above 0)",
     "D 1-1 10 1": "slope_distance '1' to '1' joins a point with itself (expected points that differ)",
-    "D 1-2 10 0": "slope_distance '1' to '2' has the sigma 0 (expected above 0: nothing is measured without error)",
+    "D 1-2 10 0": "slope_distance '1' to '2' has the sigma 0 (expected above 0: no measurement is exact)",
     "D 1-2": "D: 0 values (expected slope distance)",
     "D 1-2 10 1 2 3": "D: 3 standard errors '1 2 3' (expected none or 1, then perhaps HI/HT)",
     "M 1-2-3 10-00-00 5 90-00-00 1 2": "M: 2 standard errors '1 2' (expected none or 3, then perhaps HI/HT)",
@@ -258,14 +258,14 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("lines", REFUSED)
-def test_what_is_not_known_is_named_with_its_line(lines):
+def test_unknown_input_is_named_with_its_line(lines):
     with pytest.raises(InputError) as refusal:
         read(lines)
     number = 2 + lines.count("\n")
     assert str(refusal.value) == f"n.dat: line {number}, {REFUSED[lines]}"
 
 
-def test_a_set_that_never_ends_and_a_file_of_nothing():
+def test_unfinished_set_and_empty_file_are_refused():
     with pytest.raises(InputError, match="ends within the direction set at '1'"):
         read("DB 1\nDN 2 10-00-00 1")
     with pytest.raises(InputError, match="has no points"):

@@ -105,7 +105,7 @@ def test_a_table_beside_the_file_is_read_by_its_lines(tmp_path):
     assert network.places == (("r.csv line 2", "r.csv line 3"),)
 
 
-def test_a_correlated_set_has_the_covariance_that_its_correlation_says(tmp_path):
+def test_correlated_set_has_the_covariance_of_its_correlation(tmp_path):
     network = read(
         tmp_path,
         """[[correlated]]
@@ -136,18 +136,16 @@ def test_a_pose_is_found_from_coordinates_whatever_the_turn(tmp_path, solve):
 SLOPE = '[[observation]]\nkind = "slope_distance"\nfrom = "A"\nto = "B"\n'
 REFUSED = {
     "[[pionts]]": "top, 'pionts' is not a known key here (expected perhaps point)",
-    '[[point]]\nname = "A"': "points 1 row 1, point 'A' is there twice (expected each name once)",
+    '[[point]]\nname = "A"': "points 1 row 1, point 'A' occurs twice (expected unique names)",
     '[[point]]\nname = "D"\nfixed = "x"': "point 1, point 'D', x is fixed and unknown (expected its value)",
     '[[point]]\nname = "D"\nfixed = "east"': "point 1, fixed = 'east' (expected letters of xyz)",
     '[[point]]\nname = "D"\nxyz = [1, 2, 3]': "point 1, 'xyz' is not a known key here (expected perhaps xyz_m)",
     '[[point]]\nname = "D"\nxyz_m = [1, 2]': "point 1, xyz_m = [1, 2] (expected 3 finite numbers)",
     '[[point]]\nname = "D"\nxyz_m = [1, 2, 3]\nu_mm = -1': "point 1, u_mm = -1 (expected 0 or above)",
-    '[[ranger]]\nname = "Z"': "ranger 1, ranger 'Z' is no point (expected the name of one)",
+    '[[ranger]]\nname = "Z"': "ranger 1, ranger 'Z' is not a point (expected the name of one)",
     '[[ranger]]\nname = "A"\nzero = "loose"': ("ranger 1, zero = 'loose' (expected 'free', or a value with its unit)"),
     '[[ranger]]\nname = "A"\nzero = "free"\nu_zero_mm = 1': "ranger 1, is free and has u_zero (expected one of them)",
-    '[[parameter]]\nname = "k"': (
-        "parameter 1, value is missing (expected value_mm, value_ppm, value_arcsec or its like)"
-    ),
+    '[[parameter]]\nname = "k"': ("parameter 1, value is missing (expected value_mm, value_ppm, value_arcsec etc.)"),
     '[[observation]]\nkind = "range"': (
         "observation 1, kind = 'range' (expected slope_distance horizontal_distance distance_difference fixed_distance "
         "height_difference coordinates vector level_plane direction angle azimuth zenith_angle inclination)"
@@ -156,17 +154,17 @@ REFUSED = {
     SLOPE + "u_mm = 1": "observation 1, value is missing (expected value_m, value_mm, value_um)",
     SLOPE + "value_m = nan\nu_mm = 1": "observation 1, value_m = nan (expected a finite number)",
     SLOPE + "value_m = 10\nu_mm = 0": (
-        "observation 1, slope_distance 'A' to 'B' has the sigma 0 (expected above 0: nothing is measured without error)"
+        "observation 1, slope_distance 'A' to 'B' has the sigma 0 (expected above 0: no measurement is exact)"
     ),
     SLOPE + "value_m = -10\nu_mm = 1": "observation 1, slope_distance 'A' to 'B' = -10 m (expected above 0)",
     SLOPE + "value_m = 10\nvalue_mm = 10000\nu_mm = 1": (
-        "observation 1, value_m and value_mm say the same (expected one of them)"
+        "observation 1, value_m and value_mm give the same quantity (expected one of them)"
     ),
     SLOPE + "value_m = 10\nu_mm = 1\nweather = 3": (
         "observation 1, 'weather' is not a known key here (expected no such key)"
     ),
     SLOPE + 'value_m = 10\nu_mm = 1\nrefractivity = "noon"': (
-        "observation 1, refractivity = 'noon' is no parameter (expected the name of a [[parameter]])"
+        "observation 1, refractivity = 'noon' is not a parameter (expected the name of a [[parameter]])"
     ),
     SLOPE.replace('"B"', '"BB"') + "value_m = 10\nu_mm = 1": (
         "observation 1, slope_distance names the point 'BB' (expected perhaps 'B')"
@@ -178,12 +176,12 @@ REFUSED = {
         "observations 1 row 1, ['A'] (expected 2 values)"
     ),
     '[[observations]]\nfrom = "A"\ncolumns = ["from", "to"]\nrows = [["A", "B"]]': (
-        "observations 1, 'from' is there twice (expected each key once)"
+        "observations 1, 'from' occurs twice (expected unique keys)"
     ),
     '[[body]]\nname = "b"\npoint = [{ name = "A", xyz_m = [0, 0, 0], u_mm = 1 }]': (
         "body 1, origin and rotation are missing, and no three points off a line have coordinates (expected one)"
     ),
-    '[[frame]]\nname = "f"\nshape = "s"': "frame 1, shape = 's' is not there (expected the name of a [[shape]])",
+    '[[frame]]\nname = "f"\nshape = "s"': "frame 1, shape = 's' is missing (expected the name of a [[shape]])",
     '[[plane]]\nname = "p"\npoints = ["A", "B"]\nu_mm = 1': (
         "plane 1, normal or centre is missing, and too few points have coordinates (expected both)"
     ),
@@ -194,7 +192,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("text", REFUSED)
-def test_what_cannot_be_used_is_named_with_its_table(tmp_path, text):
+def test_invalid_input_is_named_with_its_table(tmp_path, text):
     with pytest.raises(InputError) as refusal:
         read(tmp_path, text)
     assert str(refusal.value) == f"n.toml: {REFUSED[text]}"

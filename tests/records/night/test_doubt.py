@@ -31,7 +31,7 @@ def judged(folder, lines):
     return read_campaign(folder)
 
 
-def test_a_reading_that_was_not_believed_counts_as_one_that_is_not_there(folder, tmp_path):
+def test_rejected_reading_counts_as_missing(folder, tmp_path):
     """Ten minutes of a station that lies by 5 °C, once named by doubts.csv, once not in weather.csv at all."""
     head, rows = weather_rows(folder)
     own = [row for row in rows if row[1] == "WX2"]
@@ -49,23 +49,23 @@ def test_a_reading_that_was_not_believed_counts_as_one_that_is_not_there(folder,
     assert np.array_equal(told.coordinates.x, untold.coordinates.x)
     assert np.array_equal(told.coordinates.covariance, untold.coordinates.covariance)
     assert told.notes[0] == (
-        "WX2 was not believed while it was measured (WX2 reads 16.2 C, +5.0 C off): 20 of its readings are left out, "
+        "WX2 was rejected during the measurement (WX2 reads 16.2 C, +5.0 C off): 20 of its readings are left out, "
         "by doubts.csv"
     )
     assert told.notes[1:] == untold.notes
 
 
-def test_a_station_without_a_believed_reading_for_long_counts_for_nothing(folder):
+def test_station_without_trusted_readings_for_long_is_excluded(folder):
     _, rows = weather_rows(folder)
     lies = [row for row in rows if row[1] == "WX1"][30:]
     campaign = judged(folder, [f"weather,{row[1]},{row[0]},it lies" for row in lies])
     assert [station.name for station in campaign.site.weather_station] == ["WX2"]
     assert set(campaign.weather.station) == {"WX2"}
-    assert campaign.doubt_notes[0].endswith("the whole station is left out, by doubts.csv")
+    assert campaign.doubt_notes[0].endswith("the station is left out, by doubts.csv")
     assert reduce_epoch(campaign).coordinates.variance_factor < 1.3
 
 
-def test_a_shot_that_was_not_believed_is_left_out_with_what_was_said(folder, night_01, reduced_night_01):
+def test_rejected_shot_is_excluded_with_its_reason(folder, night_01, reduced_night_01):
     used = [k for k, status in enumerate(reduced_night_01.status) if status is ShotStatus.USED][100]
     number, mjd = int(night_01.shots.shot[used]), float(night_01.shots.mjd_utc[used])
     reduction = reduce_epoch(judged(folder, [f"shot,{number},{mjd!r},reflected: 3 mm too long"]))
@@ -100,7 +100,7 @@ def test_one_thing_has_one_verdict_and_some_weather_must_be_left(folder):
 
 
 @pytest.mark.parametrize(("column", "value"), [(2, "59.0"), (2, "-59.5"), (3, "505.0")])
-def test_air_that_cannot_be_is_refused_with_station_file_and_time(folder, column, value):
+def test_impossible_air_is_refused_with_station_file_and_time(folder, column, value):
     """Each reading could be; what the paths make of both stations could not."""
     head, rows = weather_rows(folder)
     for row in rows:

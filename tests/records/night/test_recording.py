@@ -34,7 +34,7 @@ def test_a_wave_file_written_is_read_by_others_and_by_us():
 
 
 @pytest.mark.parametrize("kind", [np.int16, np.int32, np.float32, np.float64])
-def test_what_scipy_writes_is_read(kind):
+def test_files_written_by_scipy_are_read(kind):
     samples = CODES.T.astype(kind)
     stream = io.BytesIO()
     wavfile.write(stream, 44_100, samples)
@@ -56,7 +56,7 @@ def test_24_bits_are_read_with_their_sign():
     assert full_scale == 8_388_607.0
 
 
-def test_chunks_that_say_other_things_are_passed_over():
+def test_other_chunks_are_skipped():
     raw = wav_bytes(CODES, 16_000)
     odd = raw[:12] + b"LIST" + struct.pack("<I", 3) + b"abc\0" + raw[12:]
     assert np.array_equal(wav_samples(odd, "x.wav")[0], CODES)
@@ -66,8 +66,8 @@ def test_chunks_that_say_other_things_are_passed_over():
     ("raw", "said"),
     [
         (b"RIFFxxxxAVI ", "expected a RIFF WAVE file"),
-        (wav_bytes(CODES, 16_000)[:-10], "is cut off: 2990 of 3000 bytes"),
-        (wav_bytes(CODES, 16_000)[:30], "is cut off"),
+        (wav_bytes(CODES, 16_000)[:-10], "is truncated: 2990 of 3000 bytes"),
+        (wav_bytes(CODES, 16_000)[:30], "is truncated"),
         (wav_bytes(CODES, 16_000)[:36], "has no samples"),
         (wav_bytes(CODES[:, :0], 16_000), "0 samples"),
         (
@@ -76,7 +76,7 @@ def test_chunks_that_say_other_things_are_passed_over():
         ),
     ],
 )
-def test_what_is_no_wave_file_is_refused(raw, said):
+def test_other_files_than_wave_are_refused(raw, said):
     with pytest.raises(InputError, match=said):
         wav_samples(raw, "x.wav")
 
@@ -103,7 +103,7 @@ def test_a_table_of_travel_times_may_have_gaps_and_weather(tmp_path, sheet):
     [
         ("", "empty"),
         ("left,right\n1,2\n", "neither a WAVE file nor a table"),
-        ("ab,extra\n1,2\n", "'extra' is not known"),
+        ("ab,extra\n1,2\n", "'extra' is unknown"),
         ("ab,ba\n1,two\n", "line 2, ba = 'two'"),
         ("loop\n1\n", "no channel 'ab' or 'ba'"),
         ("mjd_utc,time_ba_s\n61365.1,0.2\n", "'time_ab_s' is missing"),
@@ -112,7 +112,7 @@ def test_a_table_of_travel_times_may_have_gaps_and_weather(tmp_path, sheet):
         ("mjd_utc,time_ab_s,humidity_percent\n61365.1,0.2,120\n", "humidity_percent = '120'"),
     ],
 )
-def test_what_is_no_table_is_refused(text, said, tmp_path, sheet):
+def test_invalid_table_is_refused(text, said, tmp_path, sheet):
     (tmp_path / "x.csv").write_text(text)
     with pytest.raises(InputError, match=said) as refused:
         read_recording(tmp_path / "x.csv", sheet)
@@ -129,7 +129,7 @@ def changed(tmp_path, before, after):
 @pytest.mark.parametrize(
     ("before", "after", "said"),
     [
-        ('target = "ZEG41040L"', 'target = "ZY103"', "is the ranger, too"),
+        ('target = "ZEG41040L"', 'target = "ZY103"', "is also the ranger"),
         ("length_m = 62.417", "length_m = 62417.0", "length_m = 62417.0"),
         ("interval_s = 0.3\n", "", "interval_s is missing"),
         ('["ab", "ba", "loop"]', '["ab", "ab"]', "names 'ab' 2 times"),
@@ -142,7 +142,7 @@ def changed(tmp_path, before, after):
         ("[signal]", "wind_m_per_s = 1.0\n\n[signal]", "belong together"),
     ],
 )
-def test_a_sheet_that_does_not_hold_together_is_refused(before, after, said, tmp_path):
+def test_inconsistent_sheet_is_refused(before, after, said, tmp_path):
     with pytest.raises(InputError, match=said) as refused:
         read_sheet(changed(tmp_path, before, after))
     assert "\n" not in str(refused.value)

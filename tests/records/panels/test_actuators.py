@@ -26,7 +26,7 @@ def test_positions_are_read_by_name():
         ("actuator,position_mm\nA,1\nA,2\n", "row 2, actuator = 'A' is given twice"),
         ("actuator,position_mm\nA,far\n", "row 1, position_mm = 'far'"),
         ("actuator,position_mm\nA,1001\n", "row 1, position_mm"),
-        ("actuator,position\nA,1\n", "column 'position' is not known"),
+        ("actuator,position\nA,1\n", "column 'position' is unknown"),
     ],
 )
 def test_bad_positions_are_refused(tmp_path, text, said):

@@ -47,7 +47,7 @@ def test_a_layout_survives_its_table(tmp_path):
 @pytest.mark.parametrize(
     ("line", "changed", "told"),
     [
-        (2, lambda c: [c[0], "1", *c[2:]], "place = 1 of panel 'T20P01' is there already"),
+        (2, lambda c: [c[0], "1", *c[2:]], "place = 1 of panel 'T20P01' is a duplicate"),
         (2, lambda c: [*c[:3], "1.5", *c[4:]], "corner"),
         (1, lambda c: [*c[:5], "9000"], "design_offset_um = 9000 "),
         (1, lambda c: ["T99", *c[1:]], "panel 'T99' has places [1]"),
@@ -73,7 +73,7 @@ def test_corners_in_another_order_are_refused(tmp_path):
         row["place"] = {1: 1, 2: 3, 3: 2, 4: 4}[row["place"]]
     path = tmp_path / "layout.csv"
     path.write_text("\n".join([",".join(COLUMNS), *(",".join(map(str, r.values())) for r in rows)]) + "\n")
-    with pytest.raises(InputError, match="no four corners in order round it"):
+    with pytest.raises(InputError, match="lacks four corners in order around it"):
         read_layout(path, 60.0)
 
 
@@ -121,10 +121,10 @@ def test_bad_surveys_and_maps_are_refused(tmp_path):
         read_survey(path, patch())
     maps = tmp_path / "maps"
     maps.mkdir()
-    with pytest.raises(InputError, match="holds no map"):
+    with pytest.raises(InputError, match="has no map"):
         read_maps(maps, patch())
     (maps / "X.csv").write_text("x_mm,y_mm,deviation_um\n")
-    with pytest.raises(InputError, match=r"X.csv: is no map of a panel"):
+    with pytest.raises(InputError, match=r"X.csv: is not a map of a panel"):
         read_maps(maps, patch())
     (maps / "X.csv").rename(maps / "T20P01.csv")
     (maps / "T20P01.csv").write_text("x_mm,y_mm,deviation_um\n" + "".join(f"{k},{2 * k},0\n" for k in range(9)))

@@ -31,7 +31,7 @@ def test_the_example_loads_with_its_defaults():
         ("focal_length_mm = 20.0", "", "focal_length_mm is missing"),
         ("transmission = 0.92", "transmission = 1.92", "transmission = 1.92"),
         ("capacitance_pf = 0.5", "", "go together"),
-        ("offset_um = 10.0", "offset_um = 101.0", "offset_um = 101 is beside the disc"),
+        ("offset_um = 10.0", "offset_um = 101.0", "offset_um = 101 is outside the disc"),
         ("radius_mm = 25.4", "radius = 25.4", "perhaps radius_mm"),
         ('kind = "isolator"', 'kind = "isolater"', "isolater"),
         ("distance_m = 100.0", "distance_m = nan", "distance_m"),

@@ -106,7 +106,7 @@ def test_every_position_survives_the_file_to_the_last_bit(tmp_path_factory, posi
     assert np.array(back.position_mm).tobytes() == np.array(target.position_mm).tobytes()  # the sign of zero too
 
 
-def test_a_site_with_nothing_to_measure_is_a_site(night_01, tmp_path):
+def test_site_without_targets_is_valid(night_01, tmp_path):
     bare = dataclasses.replace(
         read_site(NIGHT), targets={}, triplets={}, benchmarks=(), monuments={}, mirrors=night_01.mirrors
     )
@@ -156,7 +156,7 @@ def test_a_bad_site_is_refused_in_one_line(folder, file, old, new, words):
     assert [word for word in words if word not in message] == []
 
 
-def test_what_is_no_directory_is_refused_as_a_site(tmp_path):
+def test_site_that_is_not_a_directory_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"nowhere: missing \(expected a site directory\)"):
         read_site(tmp_path / "nowhere")
     (tmp_path / "file").write_text("x")

@@ -35,7 +35,7 @@ def written(tmp_path, text):
     return read_record(tmp_path / "interlocks.toml", Interlocks)
 
 
-def test_a_file_reads_and_says_when(tmp_path):
+def test_file_is_read_with_its_times(tmp_path):
     crane, tour, door = written(tmp_path, TEXT).interlock
     assert crane.spans(SEVENTH, SEVENTH + 1) == [(SEVENTH + 16 / 24, SEVENTH + 17 / 24)]
     assert crane.spans(SEVENTH + 0.75, SEVENTH + 1) == []
@@ -56,7 +56,7 @@ def test_hours_of_every_day_agree_with_a_clock_read_minute_by_minute():
         assert bool(each.spans(mjd, mjd + 1e-6)) is inside, at
 
 
-def test_a_span_from_now_on_is_cut_to_what_was_asked():
+def test_span_is_cut_to_the_requested_interval():
     tour = Interlock(name="n", why="tests", daily_from=time(9), daily_until=time(10))
     found = np.array(tour.spans(SEVENTH + 9.5 / 24, SEVENTH + 2))
     np.testing.assert_allclose((found - SEVENTH) * 24, [[9.5, 10], [33, 34]], atol=1e-6)
@@ -75,7 +75,7 @@ def test_a_span_from_now_on_is_cut_to_what_was_asked():
         ("daily_from = 23:00:00\n", "", "belong together"),
         ("daily_from = 23:00:00", "daily_from = 01:00:00", "are the same"),
         ("switch = true", "switch = true\nend = 2003-09-07T16:00:00Z", "a switch has no times"),
-        ("switch = true", "", "says no time"),
+        ("switch = true", "", "has no times"),
         ('"hut-door"', '"tour"', "given twice"),
         ('["shine"]', '["sing"]', "forbids"),
         ('["shine"]', "[]", "forbids"),

@@ -26,14 +26,14 @@ def test_the_example_in_metres_and_radians():
     assert kept.margin_counts == (20.0, 20.0)
 
 
-def test_what_is_not_said_has_the_usual_value(tmp_path):
+def test_missing_values_have_defaults(tmp_path):
     kept = read(tmp_path, ROOM + "low_mm = [0, 0, 0]\nhigh_mm = [1000, 2000, 3000]\n")
     assert kept.sun.half_angle_deg == 5.0
     assert kept.boxes()[0].length == np.inf
     assert kept.boxes()[0].size.tolist() == [1.0, 2.0, 3.0]
 
 
-def test_why_is_kept_in_one_line(tmp_path):
+def test_why_is_stored_in_one_line(tmp_path):
     text = '[[box]]\nname = "room"\nwhy = """people\n  work"""\nlow_mm = [0, 0, 0]\nhigh_mm = [1000, 2000, 3000]\n'
     assert read(tmp_path, text).boxes()[0].why == "people work"
 
@@ -57,8 +57,8 @@ def test_both_ways_of_giving_a_box_agree(tmp_path):
         (ROOM + "low_mm = [0, 0, 0]\nhigh_mm = [1000, 2000, 0.01]\n", "along z, 0.01 mm (expected 50 to 1e+06)"),
         (ROOM + "centre_mm = [0, 0, 0]\nsize_mm = [1000, -2000, 500]\n", "along y, -2000 mm"),
         (ROOM + "centre_mm = [0, 2e7, 0]\nsize_mm = [1000, 2000, 500]\n", "y = 2e+07 mm"),
-        (ROOM + "low_mm = [0, 0, 0]\nsize_mm = [1000, 2000, 500]\n", "given by low_mm, size_mm"),
-        (ROOM, "given by nothing"),
+        (ROOM + "low_mm = [0, 0, 0]\nsize_mm = [1000, 2000, 500]\n", "defined by low_mm, size_mm"),
+        (ROOM, "defined by nothing"),
         ('[[box]]\nname = "room"\nlow_mm = [0, 0, 0]\nhigh_mm = [1000, 1000, 1000]\n', "why is missing"),
         (2 * (ROOM + "low_mm = [0, 0, 0]\nhigh_mm = [1000, 2000, 3000]\n"), "given twice"),
         ("[sun]\nhalf_angle_deg = 0.0873\n", "half_angle_deg = 0.0873"),

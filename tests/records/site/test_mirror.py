@@ -61,7 +61,7 @@ def test_an_uncertainty_may_stand_alone(tmp_path, u):
         ("cyclic_cosine_mm = [2.0]\ncyclic_sine_mm = [0.0]\nu_cyclic_mm = 1.0", "cyclic_cosine_mm"),
     ],
 )
-def test_what_does_not_belong_together_is_refused_in_one_line(tmp_path, more, problem):
+def test_inconsistent_keys_are_refused_in_one_line(tmp_path, more, problem):
     with pytest.raises(InputError) as caught:
         sheet(tmp_path, more)
     assert str(caught.value).startswith("ZP101.toml: ")

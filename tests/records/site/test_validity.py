@@ -24,7 +24,7 @@ def test_night_01_has_none():
     assert expired_of_site(catseye.load("night-01")) == ()
 
 
-def test_a_night_after_its_mirrors_certificate_is_doubtful_and_says_so():
+def test_night_after_a_mirrors_certificate_is_doubtful():
     night = catseye.load("night-01")
     old = night.mirrors["ZP101"].model_copy(update={"valid_until": date(2001, 1, 1)})
     answer = catseye.reduce(replace(night, mirrors={**night.mirrors, "ZP101": old}))

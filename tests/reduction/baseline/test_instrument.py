@@ -311,7 +311,7 @@ def test_tables_that_do_not_join_are_refused_in_one_line(tmp_path, heights):
     with pytest.raises(InputError, match=r"heights.csv: pillar 'C' of .*o.csv is missing"):
         calibrate_baseline(seen, tops, settings=EXACT)
     (tmp_path / "x.csv").write_text((tmp_path / "o.csv").read_text().replace("\nA,", "\nX,"))
-    with pytest.raises(InputError, match=r"pillar 'X' is not one of the known \(A, B, C, D, E, F\)"):
+    with pytest.raises(InputError, match=r"pillar 'X' is unknown \(expected one of A, B, C, D, E, F\)"):
         calibrate_baseline(read_observations(tmp_path / "x.csv"), None, best, settings=EXACT)
     with pytest.raises(InputError, match="reference-height"):
         calibrate_baseline(seen, heights(), best, settings=replace(EXACT, reference_height=100.0))

@@ -1,1 +1,1 @@
-"""Air, sound and the instruments that measure them, on the way out."""
+"""Output of air, sound and the instruments that measure them."""

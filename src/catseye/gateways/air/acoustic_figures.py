@@ -1,4 +1,4 @@
-"""Figures of acoustic paths as SVG text: what was heard, where it was found, and the temperature in time."""
+"""Figures of acoustic paths as SVG text: recordings, correlations, temperature over time."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -10,11 +10,11 @@ from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, 
 if TYPE_CHECKING:
     from catseye.reduction.air.acoustic_recording import AcousticPath, ChannelTrace
 
-HEARD = {"ab": "towards the target", "ba": "towards the ranger", "loop": "loop-back"}
+DIRECTIONS = {"ab": "towards the target", "ba": "towards the ranger", "loop": "loop-back"}
 
 
 def acoustic_figures(path: "AcousticPath") -> dict[str, str]:
-    """Every figure of one path by its name, as SVG text."""
+    """SVG text of each figure of one path, by name."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
@@ -33,9 +33,9 @@ def _recording(traces: Sequence["ChannelTrace"]) -> Figure:
         ax.plot(trace.time * 1e3, trace.samples, color=colour, lw=0.6)
         if np.isfinite(trace.arrival):
             ax.axvline(trace.arrival * 1e3, color=BAD, lw=1.0)
-        ax.set_title(f"{trace.channel}, {HEARD[trace.channel]} ({trace.file})")
+        ax.set_title(f"{trace.channel}, {DIRECTIONS[trace.channel]} ({trace.file})")
         ax.margins(x=0.0)
-    figure.supxlabel("from the file's first sample (ms); the red line is the arrival found", fontsize=9.0)
+    figure.supxlabel("time since the file's first sample (ms); red line: detected arrival", fontsize=9.0)
     return figure
 
 
@@ -52,10 +52,10 @@ def _correlation(traces: Sequence["ChannelTrace"]) -> Figure:
             if np.isfinite(trace.arrival):
                 ax.axvline(at, color=BAD, lw=0.9)
             ax.axhline(0.0, color=FAINT, lw=0.6)
-        wide.set_title(f"{trace.channel}, {HEARD[trace.channel]}")
+        wide.set_title(f"{trace.channel}, {DIRECTIONS[trace.channel]}")
         wide.margins(x=0.0)
-    panels[-1, 0].set_xlabel("delay from the file's first sample (ms)")
-    panels[-1, 1].set_xlabel("from the arrival found (µs)")
+    panels[-1, 0].set_xlabel("delay since the file's first sample (ms)")
+    panels[-1, 1].set_xlabel("relative to the detected arrival (µs)")
     return figure
 
 
@@ -63,16 +63,18 @@ def _in_time(path: "AcousticPath") -> Figure:
     used, air, sheet = path.used, path.temperatures, path.sheet
     minutes = (path.shots.mjd[used] - path.shots.mjd[0]) * 1440.0
     t, u, noise = air.temperature_c[used], air.u_temperature_c[used], air.parts_c["time"][used]
-    both = path.shots.time_ba is not None
-    figure = Figure(figsize=(9.4, 5.2 if both else 3.2), layout="constrained")
-    panels = figure.subplots(2 if both else 1, 1, sharex=True, squeeze=False)[:, 0]
-    panels[0].fill_between(minutes, t - u, t + u, color="#dfe9f3", lw=0, label="standard uncertainty, common part too")
-    panels[0].errorbar(minutes, t, noise, fmt="o", color=SERIES[0], ms=4, elinewidth=1.0, label="by sound, bar: noise")
+    bidirectional = path.shots.time_ba is not None
+    figure = Figure(figsize=(9.4, 5.2 if bidirectional else 3.2), layout="constrained")
+    panels = figure.subplots(2 if bidirectional else 1, 1, sharex=True, squeeze=False)[:, 0]
+    panels[0].fill_between(
+        minutes, t - u, t + u, color="#dfe9f3", lw=0, label="standard uncertainty, incl. common part"
+    )
+    panels[0].errorbar(minutes, t, noise, fmt="o", color=SERIES[0], ms=4, elinewidth=1.0, label="acoustic (bar: noise)")
     station = path.shots.weather[0][used]
     panels[0].plot(minutes, station, color=SERIES[1], lw=1.1, ls="--", label="thermometer of the sheet")
     panels[0].set_ylabel("mean temperature of the path (°C)")
     panels[0].legend(loc="best")
-    if both:
+    if bidirectional:
         panels[1].errorbar(minutes, air.wind[used], air.u_wind[used], fmt="o", color=SERIES[2], ms=4, elinewidth=1)
         panels[1].axhline(0.0, color=FAINT, lw=0.7)
         panels[1].set_ylabel(f"wind, {sheet.ranger} to {sheet.target} (m/s)")

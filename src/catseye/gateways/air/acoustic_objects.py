@@ -1,4 +1,4 @@
-"""Acoustic paths as JSON, tables and words."""
+"""Acoustic paths as JSON, tables and text."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -21,11 +21,11 @@ TIMES = (
     "u_group_refractivity_ppm", "status",
 )  # fmt: skip
 
-MOST_USED = 0.8  # share of a path's shots; with fewer something is wrong with the rest
+MOST_USED = 0.8  # least share of a path's shots for a good verdict
 
 
 class Mean(NamedTuple):
-    """The plain mean of a path's temperatures (°C), winds (m/s) and refractivities with their uncertainties."""
+    """Mean temperature (°C), wind (m/s) and refractivity of a path, with uncertainties."""
 
     used: int
     temperature_c: float
@@ -36,24 +36,24 @@ class Mean(NamedTuple):
 
 
 def mean(path: "AcousticPath") -> Mean:
-    """Means over the used shots, by the full covariance: what is common to all does not shrink."""
+    """Means over the used shots, with the full covariance: common errors do not average out."""
     used, air = path.used, path.temperatures
     count = int(used.sum())
     if count == 0:
         return Mean(0, *(np.nan,) * 5)
-    both = np.ix_(used, used)
+    block = np.ix_(used, used)
     return Mean(
         count,
         float(air.temperature_c[used].mean()),
-        float(np.sqrt(air.covariance_c2[both].sum())) / count,
+        float(np.sqrt(air.covariance_c2[block].sum())) / count,
         float(air.wind[used].mean()),
         float(air.group_refractivity[used].mean()),
-        float(np.sqrt(air.covariance_group[both].sum())) / count,
+        float(np.sqrt(air.covariance_group[block].sum())) / count,
     )
 
 
 def acoustic_verdict(paths: Sequence["AcousticPath"]) -> Verdict:
-    """Paths that have a temperature, how many shots had a part in it, and the sheets' validity."""
+    """Verdict on acoustic paths: temperatures, share of used shots, validity of the sheets."""
     doubts: list[str] = []
     for path in paths:
         doubts += expired({f"{path.sheet.ranger} to {path.sheet.target}": path.sheet}, float(path.shots.mjd[-1]))
@@ -62,11 +62,11 @@ def acoustic_verdict(paths: Sequence["AcousticPath"]) -> Verdict:
 
 
 def _own_verdict(paths: Sequence["AcousticPath"]) -> Verdict:
-    lost = [path for path in paths if not path.used.any()]
-    if lost and len(lost) == len(paths):
-        return Verdict("failed", "no shot of any path could be used")
-    if lost:
-        return Verdict("doubtful", f"no shot could be used of {lost[0].sheet.ranger} to {lost[0].sheet.target}")
+    unusable = [path for path in paths if not path.used.any()]
+    if unusable and len(unusable) == len(paths):
+        return Verdict("failed", "no usable shot of any path")
+    if unusable:
+        return Verdict("doubtful", f"no usable shot of {unusable[0].sheet.ranger} to {unusable[0].sheet.target}")
     thin = [path for path in paths if path.used.mean() < MOST_USED]
     if thin:
         share = 100.0 * float(thin[0].used.mean())
@@ -75,12 +75,12 @@ def _own_verdict(paths: Sequence["AcousticPath"]) -> Verdict:
 
 
 def acoustic_object(paths: Sequence["AcousticPath"]) -> dict[str, Any]:
-    """What `catseye acoustic --json` gives."""
+    """Object that `catseye acoustic --json` prints."""
     return {"verdict": acoustic_verdict(paths).to_object(), "paths": [_path(path) for path in paths]}
 
 
 def full_object(paths: Sequence["AcousticPath"]) -> dict[str, Any]:
-    """The same with the covariances, as acoustic.json keeps it."""
+    """The same with covariances, as in acoustic.json."""
     items = []
     for path in paths:
         covariances = {
@@ -134,7 +134,7 @@ def _shot(path: "AcousticPath", k: int) -> dict[str, Any]:
 
 
 def path_temperatures_csv(paths: Sequence["AcousticPath"]) -> str:
-    """The table that a campaign takes: a row a shot that has a temperature, in order of time."""
+    """Table that a campaign reads: one row per shot with a temperature, in time order."""
     rows = [
         (path.shots.mjd[k], path.sheet.ranger, path.sheet.target, path.temperatures.temperature_c[k],
          path.temperatures.u_temperature_c[k])
@@ -146,7 +146,7 @@ def path_temperatures_csv(paths: Sequence["AcousticPath"]) -> str:
 
 
 def shots_csv(paths: Sequence["AcousticPath"]) -> str:
-    """Every shot, used or not."""
+    """Table of all shots, used or not."""
     rows = []
     for path in paths:
         shots, air = path.shots, path.temperatures
@@ -168,13 +168,13 @@ def shots_csv(paths: Sequence["AcousticPath"]) -> str:
 
 
 def words(path: "AcousticPath") -> list[tuple[str, str]]:
-    """A path in passages: title and text."""
+    """Title and text of each passage on a path."""
     sheet, over = path.sheet, mean(path)
     total = len(path.shots.mjd)
     ends = f"{sheet.ranger} to {sheet.target}, {sheet.length_m:.3f} m"
     if over.used == 0:
         return [("Path", ends), ("No shot", f"of {total} was used. The first: {path.status(0)}")]
-    ways = "both directions" if path.shots.time_ba is not None else "one direction, the wind given"
+    ways = "both directions" if path.shots.time_ba is not None else "one direction, with the wind given"
     scatter = path.temperatures.temperature_c[path.used].std(ddof=1) if over.used > 1 else np.nan
     spread = f"; they scatter by {scatter:.3f} °C" if over.used > 1 else ""
     parts = sorted(((_first(part[path.used]), name) for name, part in path.temperatures.parts_c.items()), reverse=True)
@@ -182,7 +182,7 @@ def words(path: "AcousticPath") -> list[tuple[str, str]]:
     passages = [
         ("Path", f"{ends}; {over.used} of {total} shots used, {ways}"),
         ("Temperature", f"{over.temperature_c:.3f} °C, u {over.u_temperature_c:.3f} °C (mean of the shots{spread})"),
-        ("Made of", f"{largest} °C in one shot; all but time is common to all shots"),
+        ("Contributions", f"{largest} °C in one shot; all but time are common to all shots"),
         ("Wind", f"{over.wind:+.2f} m/s from {sheet.ranger} to {sheet.target}"),
         ("Index", f"n_g - 1 = {over.refractivity / PPM:.3f} ppm, u {over.u_refractivity / PPM:.3f} ppm, "
                   f"at {sheet.wavelength_um:g} µm ({path.air_model}; sound by {path.model})"),

@@ -1,4 +1,4 @@
-"""All files of acoustic paths: tables, object, and a report of one HTML page that needs nothing else."""
+"""Files of acoustic paths: tables, JSON and one HTML report."""
 
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
@@ -28,19 +28,19 @@ if TYPE_CHECKING:
 
 FORMAT = "catseye-acoustic-1"
 CAPTIONS = {
-    "recording": "The first shot as it was heard, about the predicted arrival.",
-    "correlation": "The correlation with the known signal over the window, and about its peak, where dots are samples: "
-    "the arrival is sought between them.",
-    "temperature": "Mean temperature of the path. The band holds what is common to all shots: length, electronics, "
-    "humidity, crosswind, the formula; the bars only what changes from shot to shot.",
+    "recording": "Recording of the first shot around the predicted arrival.",
+    "correlation": "Correlation with the known signal over the window and around its peak. Dots are samples; "
+    "the arrival is interpolated between them.",
+    "temperature": "Mean temperature of the path. The band includes what all shots share: length, electronics, "
+    "humidity, crosswind, formula. The bars show only what varies from shot to shot.",
 }
 
 
 def write_acoustic(paths: Sequence["AcousticPath"], directory: Path) -> None:
-    """Tables, object, report, and last the provenance with the hashes of the others.
+    """Write tables, JSON, report, and the provenance with their hashes.
 
     paths       as reduced
-    directory   exists, and is ours to fill: see `writers.output.whole_directory`
+    directory   existing, from `writers.output.whole_directory`
     """
     when = datetime.now(UTC)
     files: Files = {
@@ -55,7 +55,7 @@ def write_acoustic(paths: Sequence["AcousticPath"], directory: Path) -> None:
 
 
 def acoustic_report(paths: Sequence["AcousticPath"], when: datetime) -> str:
-    """The whole page; `when` is UTC."""
+    """HTML report; `when` is UTC."""
     names = [f"{path.sheet.ranger} to {path.sheet.target}" for path in paths]
     links = "".join(f'<a href="#path-{i}">{escape(name)}</a>' for i, name in enumerate(names))
     header = (
@@ -96,8 +96,8 @@ def _budget(path: "AcousticPath") -> str:
         return ""
     k = int(np.argmax(path.used))
     rows = [(name, f"{float(part[k]):.4f}") for name, part in path.temperatures.parts_c.items()]
-    rows.append(("all together", f"{float(path.temperatures.u_temperature_c[k]):.4f}"))
-    return paragraph("Standard uncertainty of the first used shot, °C, by cause; causes add in squares.") + table(
+    rows.append(("combined", f"{float(path.temperatures.u_temperature_c[k]):.4f}"))
+    return paragraph("Standard uncertainty of the first used shot, °C, by cause; causes add in quadrature.") + table(
         ("cause", "u (°C)"), rows, "tn"
     )
 
@@ -120,7 +120,7 @@ def _shots(path: "AcousticPath") -> str:
 
 
 def _inputs(paths: Sequence["AcousticPath"]) -> dict[str, str]:
-    """File -> SHA-256; of files of one name in several directories, with their path's name before it."""
+    """SHA-256 by file; equal file names get their path's name as a prefix."""
     digests: dict[str, str] = {}
     for path in paths:
         for name, digest in path.hashes.items():
@@ -134,5 +134,5 @@ def _provenance(inputs: Mapping[str, str], when: datetime) -> str:
         "provenance",
         "Provenance",
         table(("file read", "SHA-256"), list(inputs.items()), "th"),
-        table(("what", "value"), [("made (UTC)", f"{when:%Y-%m-%d %H:%M:%S}"), *versions().items()], "tt"),
+        table(("item", "value"), [("made (UTC)", f"{when:%Y-%m-%d %H:%M:%S}"), *versions().items()], "tt"),
     )

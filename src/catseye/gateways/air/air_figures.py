@@ -1,7 +1,7 @@
-"""Figure of the index of air as SVG text: against each variable, its uncertainty, and every other model beside it.
+"""Figure of the index of air as SVG text, with its uncertainty and the other models.
 
-The index moves by tens of ppm where its uncertainty is a tenth. So each variable has two panels: above the index;
-below, enlarged, what the other models differ from the chosen one, over its uncertainty as bands.
+The index varies by tens of ppm where its uncertainty is a tenth. So each variable has two panels: the index above;
+below, enlarged, the other models' differences from the chosen one, with its uncertainty as bands.
 """
 
 from dataclasses import asdict, dataclass
@@ -19,14 +19,14 @@ from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, 
 
 WIDTH, HEIGHT = 9.4, 10.4  # inches
 POINTS = 121
-NAMES = {  # for readers; a model without one goes by its own
+NAMES = {  # display names; default: the model's own
     "ciddor_hill1999": "Ciddor, Hill 1999",
     "rueger1990": "Rüeger 1990 (the notes)",
     "iag1999_closed": "IAG 1999, closed formula",
     "barrell_sears1963": "Barrell, Sears 1963",
 }
 COLOURS = {name: SERIES[i % len(SERIES)] for i, name in enumerate(MODELS)}
-DISTANCE = 100.0  # m, over which the bars say micrometres
+DISTANCE = 100.0  # m, for the micrometres beside the bars
 UNCERTAINTIES = {
     "u_temperature_c": ValidInterval(
         "u of temperature", "C", 0.0, 100.0, "the notion of a small standard uncertainty", 1
@@ -42,12 +42,12 @@ UNCERTAINTIES = {
 
 @dataclass(frozen=True)
 class Variable:
-    """One variable of the figure.
+    """Variable of the figure.
 
-    key      the argument that it is
-    label    of the axis
-    around   half the width drawn about the given state; None for `ends`
-    ends     drawn whatever the state; the given value is always within
+    key      argument name of the model
+    label    axis label
+    around   half the width drawn around the state; None for `ends`
+    ends     fixed ends, extended to include the state
     """
 
     key: str
@@ -55,11 +55,11 @@ class Variable:
     around: float | None
     ends: tuple[float, float] = (0.0, 0.0)
 
-    def values(self, given: float, model: IndexModel) -> NDArray[np.float64]:
-        """What is drawn of it, within the model's limits."""
-        low, high = self.ends if self.around is None else (given - self.around, given + self.around)
+    def values(self, state: float, model: IndexModel) -> NDArray[np.float64]:
+        """Values drawn, within the model's limits."""
+        low, high = self.ends if self.around is None else (state - self.around, state + self.around)
         limit = model.limits[self.key]
-        return np.linspace(max(min(low, given), limit.lower), min(max(high, given), limit.upper), POINTS)
+        return np.linspace(max(min(low, state), limit.lower), min(max(high, state), limit.upper), POINTS)
 
 
 VARIABLES = (
@@ -73,7 +73,7 @@ VARIABLES = (
 
 @dataclass(frozen=True)
 class StateUncertainty:
-    """Standard uncertainties of a state of air, from 0 on, uncorrelated.
+    """Standard uncertainties of a state of air, at least 0, uncorrelated.
 
     temperature_c      °C
     pressure_hpa       hPa
@@ -98,7 +98,7 @@ def air_plot(
     co2_ppm: float = 450.0,
     uncertainty: StateUncertainty = CERTAIN,
 ) -> tuple[Svg, dict[str, Any]]:
-    """The group index about one state of air as SVG text, and what it says in numbers.
+    """Group index around one state of air: SVG text and a summary in numbers.
 
     temperature_c, pressure_hpa, humidity_percent   the state: °C, hPa, % over liquid water
     wavelength_um   vacuum wavelength, um
@@ -107,9 +107,9 @@ def air_plot(
     uncertainty     of the state
 
     Source: the models'; uncertainty by the law of propagation, [JCGM100] eq. 10. Other models are drawn only where they
-    hold, and named in `not_drawn` where they hold nowhere in the figure.
+    are valid, and listed in `not_drawn` where they are valid nowhere in the figure.
 
-    Raises ValidityError for values outside the chosen model's limits, and for uncertainties that are none.
+    Raises ValidityError for values outside the chosen model's limits, and for invalid uncertainties.
     """
     u = {f"u_{name}": value for name, value in asdict(uncertainty).items()}
     for key, value in u.items():
@@ -121,8 +121,8 @@ def air_plot(
         "wavelength_um": float(wavelength_um),
         "co2_ppm": float(co2_ppm),
     }
-    here = air(**state, model=model)
-    parts = _parts(here, u)
+    chosen = air(**state, model=model)
+    parts = _parts(chosen, u)
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
@@ -135,58 +135,58 @@ def air_plot(
         _draw_parts(figure, pairs[-1], parts)
         pairs[0][0].set_ylabel("group refractivity (ppm)")
         pairs[3][0].set_ylabel("group refractivity (ppm)")
-        pairs[0][1].set_ylabel("others less this (ppm)")
-        pairs[3][1].set_ylabel("others less this (ppm)")
+        pairs[0][1].set_ylabel("other models − this (ppm)")
+        pairs[3][1].set_ylabel("other models − this (ppm)")
         not_drawn = sorted(set(MODELS) - drawn - {model})
-        figure.suptitle(_title(state, here, not_drawn), x=0.01, ha="left", fontweight="bold", fontsize=10.5)
+        figure.suptitle(_title(state, chosen, not_drawn), x=0.01, ha="left", fontweight="bold", fontsize=10.5)
         figure.legend(*_key(pairs), loc="outside lower left", ncols=3)
         text = svg(figure)
-    return text, _summary(state, here, parts, not_drawn)
+    return text, _summary(state, chosen, parts, not_drawn)
 
 
-def _parts(here: AirState, u: dict[str, float]) -> dict[str, float]:
-    """Standard uncertainty of the index, ppm, by where it comes from."""
-    slope = here.sensitivity
+def _parts(chosen: AirState, u: dict[str, float]) -> dict[str, float]:
+    """Standard uncertainty of the index by cause, ppm."""
+    slope = chosen.sensitivity
     return {
-        "formula": float(here.standard_uncertainty) / PPM,
+        "formula": float(chosen.standard_uncertainty) / PPM,
         "temperature": abs(float(slope.temperature_c)) * u["u_temperature_c"] / PPM,
         "pressure": abs(float(slope.pressure_hpa)) * u["u_pressure_hpa"] / PPM,
         "humidity": abs(float(slope.humidity_percent)) * u["u_humidity_percent"] / PPM,
-        "together": float(here.combined_uncertainty(**u)) / PPM,
+        "together": float(chosen.combined_uncertainty(**u)) / PPM,
     }
 
 
 def _draw(above, below, variable: Variable, state: dict[str, float], model: str, u: dict[str, float]) -> set[str]:
-    """One variable: index above, other models' differences and the uncertainty below; names of the others drawn."""
+    """Draw the index above and differences of other models below; names of those drawn."""
     x = variable.values(state[variable.key], MODELS[model])
     x = x[_inside(MODELS[model], state | {variable.key: x}, x.shape)]
     swept = air(**(state | {variable.key: x}), model=model)
     index = np.broadcast_to(swept.group_refractivity / PPM, x.shape)
-    whole = np.broadcast_to(swept.combined_uncertainty(**u) / PPM, x.shape)
+    u_total = np.broadcast_to(swept.combined_uncertainty(**u) / PPM, x.shape)
     formula = np.full(x.shape, swept.standard_uncertainty / PPM)
-    own = COLOURS[model]
-    above.fill_between(x, index - whole, index + whole, color=own, alpha=0.25, lw=0)
-    above.plot(x, index, color=own, lw=1.4)
+    colour = COLOURS[model]
+    above.fill_between(x, index - u_total, index + u_total, color=colour, alpha=0.25, lw=0)
+    above.plot(x, index, color=colour, lw=1.4)
     for ax in (above, below):
         ax.axvline(state[variable.key], color=FAINT, lw=0.8, ls=":")
         ax.set_xlim(x[0], x[-1])
         ax.ticklabel_format(useOffset=False)
     above.tick_params(labelbottom=False)
     above.set_title(_slope(variable, state, model), fontweight="normal", fontsize=8.5)
-    if np.any(whole > formula):
-        below.fill_between(x, -whole, whole, color=own, alpha=0.16, lw=0, label="u with the inputs'")
-    below.fill_between(x, -formula, formula, color=own, alpha=0.28, lw=0, label="u of the formula")
-    below.axhline(0.0, color=own, lw=1.4, label=_name(model))
+    if np.any(u_total > formula):
+        below.fill_between(x, -u_total, u_total, color=colour, alpha=0.16, lw=0, label="u with inputs")
+    below.fill_between(x, -formula, formula, color=colour, alpha=0.28, lw=0, label="u of formula")
+    below.axhline(0.0, color=colour, lw=1.4, label=_name(model))
     drawn = set()
     for name in MODELS:
         if name == model:
             continue
         inside = _inside(MODELS[name], state | {variable.key: x}, x.shape)
         if np.any(inside):
-            other = np.full(x.shape, np.nan)
-            there = {key: np.broadcast_to(value, x.shape)[inside] for key, value in (state | {variable.key: x}).items()}
-            other[inside] = air(**there, model=name).group_refractivity / PPM
-            below.plot(x, other - index, color=COLOURS[name], lw=1.2, label=_name(name))
+            refractivity = np.full(x.shape, np.nan)
+            valid = {key: np.broadcast_to(value, x.shape)[inside] for key, value in (state | {variable.key: x}).items()}
+            refractivity[inside] = air(**valid, model=name).group_refractivity / PPM
+            below.plot(x, refractivity - index, color=COLOURS[name], lw=1.2, label=_name(name))
             drawn.add(name)
     below.set_xlabel(variable.label)
     return drawn
@@ -201,13 +201,13 @@ def _slope(variable: Variable, state: dict[str, float], model: str) -> str:
         return f"fixed at {MODELS[model].co2_ppm:.0f} ppm in this model"
     unit = variable.label.split("(")[1].rstrip(")")
     slope = float(getattr(air(**state, model=model).sensitivity, variable.key)) / PPM
-    if variable.key == "co2_ppm":  # a single ppm moves nothing that a reader could compare
+    if variable.key == "co2_ppm":  # per 100 ppm: the effect of 1 ppm is too small to read
         slope, unit = 100.0 * slope, f"100 {unit}"
     return f"{slope:+.4f} ppm per {unit} here".replace("-", "−")
 
 
 def _inside(model: IndexModel, values: dict[str, Any], shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Where a model holds: within its limits, and with room for the vapour."""
+    """True where a model is valid: within its limits and below vapour saturation."""
     inside = np.ones(shape, bool)
     for key, value in values.items():
         inside &= (model.limits[key].lower <= value) & (value <= model.limits[key].upper)
@@ -216,7 +216,7 @@ def _inside(model: IndexModel, values: dict[str, Any], shape: tuple[int, ...]) -
 
 
 def _draw_parts(figure: Figure, pair, parts: dict[str, float]) -> None:
-    """What makes the uncertainty at the state, as bars over both panels' place."""
+    """Draw the uncertainty's contributions at the state as bars, over both panels."""
     grid = pair[0].get_gridspec()
     for ax in pair:
         ax.remove()
@@ -238,7 +238,7 @@ def _draw_parts(figure: Figure, pair, parts: dict[str, float]) -> None:
 
 
 def _key(pairs) -> tuple[list, list]:
-    """Handles and labels of all that is drawn below, once each."""
+    """Handles and labels of the lower panels' curves, without duplicates."""
     handles: dict[str, Any] = {}
     for _, below in pairs[:-1]:
         for handle, label in zip(*below.get_legend_handles_labels(), strict=True):
@@ -246,25 +246,27 @@ def _key(pairs) -> tuple[list, list]:
     return list(handles.values()), list(handles)
 
 
-def _title(state: dict[str, float], here: AirState, not_drawn: list[str]) -> str:
+def _title(state: dict[str, float], chosen: AirState, not_drawn: list[str]) -> str:
     text = (
-        f"{_name(here.model)} at {state['temperature_c']:g} °C, {state['pressure_hpa']:g} hPa, "
+        f"{_name(chosen.model)} at {state['temperature_c']:g} °C, {state['pressure_hpa']:g} hPa, "
         f"{state['humidity_percent']:g} %, {state['wavelength_um']:g} µm: group refractivity "
-        f"{float(here.group_refractivity) / PPM:.3f} ppm"
+        f"{float(chosen.group_refractivity) / PPM:.3f} ppm"
     )
     names = "; ".join(_name(name) for name in not_drawn)
     return f"{text}\nnot drawn, outside their limits: {names}" if not_drawn else text
 
 
-def _summary(state: dict[str, float], here: AirState, parts: dict[str, float], not_drawn: list[str]) -> dict[str, Any]:
+def _summary(
+    state: dict[str, float], chosen: AirState, parts: dict[str, float], not_drawn: list[str]
+) -> dict[str, Any]:
     differences = {}
     for name, model in MODELS.items():
-        if name != here.model and bool(_inside(model, state, ()).all()):
-            other = float(air(**state, model=name).group_refractivity)
-            differences[name] = (other - float(here.group_refractivity)) / PPM
+        if name != chosen.model and bool(_inside(model, state, ()).all()):
+            refractivity = float(air(**state, model=name).group_refractivity)
+            differences[name] = (refractivity - float(chosen.group_refractivity)) / PPM
     return {
-        "model": here.model,
-        "group_refractivity_ppm": float(here.group_refractivity) / PPM,
+        "model": chosen.model,
+        "group_refractivity_ppm": float(chosen.group_refractivity) / PPM,
         "u_group_refractivity_ppm": parts["together"],
         **{f"u_of_{name}_ppm": value for name, value in parts.items() if name != "together"},
         "other_less_this_ppm": differences,

@@ -1,4 +1,4 @@
-"""The index of air on the way out: its verdict, its lines for people, a plain object for JSON in SI units."""
+"""Index of air as JSON (SI units) and text, with its verdict."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -12,8 +12,8 @@ from catseye.gateways.writers.verdict import Verdict
 if TYPE_CHECKING:
     from catseye.atmosphere.index.air import AirState
 
-FORMULA_ALONE = "u is the formula's alone until the sensors' are given (--u-temperature-c and its like)"
-WEATHER = ("temperature", "pressure", "humidity")  # that every index and every speed of sound depends on
+FORMULA_ALONE = "u is that of the formula only; give the sensors' with --u-temperature-c etc."
+WEATHER = ("temperature", "pressure", "humidity")  # inputs of every index and every speed of sound
 
 
 def stated_inputs(**u: Any) -> tuple[str, ...]:
@@ -26,26 +26,26 @@ def stated_inputs(**u: Any) -> tuple[str, ...]:
 
 
 def uncertainty_words(stated: Sequence[str]) -> str:
-    """A sentence on what an uncertainty contains.
+    """Sentence on the contributions that an uncertainty includes.
 
     stated   of `stated_inputs`
 
     >>> uncertainty_words(("temperature",))
-    "u has the formula's part and that of temperature; not given: pressure, humidity"
+    "u includes the formula and temperature; not given: pressure, humidity"
     """
     missing = [name for name in WEATHER if name not in stated]
     if not stated:
         return FORMULA_ALONE
     if not missing:
-        return "u has the formula's part and the sensors'"
-    return f"u has the formula's part and that of {', '.join(stated)}; not given: {', '.join(missing)}"
+        return "u includes the formula and the sensors"
+    return f"u includes the formula and {', '.join(stated)}; not given: {', '.join(missing)}"
 
 
 def air_verdict(air: "AirState", u: Any, stated: Sequence[str] | None = None) -> Verdict:
-    """Good within the formula's limits, which were checked; what its uncertainty stands for.
+    """Verdict on the air: formula limits, and the contributions its uncertainty includes.
 
-    u        standard uncertainty of the group index, as told
-    stated   inputs whose uncertainty it has, of `stated_inputs`; None: all if it is more than the formula's
+    u        standard uncertainty of the group index
+    stated   inputs whose uncertainty it includes, from `stated_inputs`; None: all if it exceeds the formula's
     """
     if stated is None:
         stated = WEATHER if np.any(np.asarray(u) > np.asarray(air.standard_uncertainty) * (1.0 + 1e-12)) else ()
@@ -62,11 +62,11 @@ def air_object(
     stated: Sequence[str] | None = None,
     u_formula: Any = None,
 ) -> dict[str, Any]:
-    """The air as `catseye air --json` gives it.
+    """Object that `catseye air --json` prints.
 
     u           standard uncertainty of the group index, formula and instruments
-    stated      inputs whose uncertainty it has, of `stated_inputs`
-    u_formula   its part of formulas; None: the index's alone
+    stated      inputs whose uncertainty it includes, from `stated_inputs`
+    u_formula   its part from formulas; None: that of the index formula only
     """
     alone = air.standard_uncertainty if u_formula is None else u_formula
     return {
@@ -91,9 +91,9 @@ def air_object(
 
 
 def air_passages(answer: dict[str, Any]) -> list[Passage]:
-    """The index, its uncertainty and its slopes; of many states, from the smallest to the largest value.
+    """Index, uncertainty and slopes as text; for many states, the range of values.
 
-    answer   as `air_object` gives it
+    answer   from `air_object`
     """
     slope = answer["sensitivity"]
     carbon = (
@@ -104,7 +104,7 @@ def air_passages(answer: dict[str, Any]) -> list[Passage]:
     stated = answer["uncertainty_of"]
     if stated is None:
         stated = () if np.array_equal(answer["standard_uncertainty"], answer["formula_uncertainty"]) else WEATHER
-    whose = uncertainty_words(stated).removeprefix("u is ").removeprefix("u has ")
+    whose = uncertainty_words(stated).removeprefix("u is ").removeprefix("u ")
     dew_point = spread(answer["dew_point_c"], ".2f")
     rows = {
         "group index": spread(answer["group_index"], ".9f"),
@@ -125,13 +125,13 @@ def air_passages(answer: dict[str, Any]) -> list[Passage]:
 
 
 def spread(values: Any, form: str, factor: float = 1.0) -> str:
-    """A number, or of several the smallest and the largest; "none" where there is none.
+    """Number, or the smallest and the largest of several; "none" if empty.
 
     >>> spread(1.5, ".2f"), spread([1.0, 3.0, 2.0], "g"), spread(float("nan"), "g")
     ('1.50', '1 to 3', 'none')
     """
-    known = np.asarray(values, dtype=float)[np.isfinite(values)] * factor
-    if not known.size:
+    finite = np.asarray(values, dtype=float)[np.isfinite(values)] * factor
+    if not finite.size:
         return "none"
-    low, high = (format(float(v), form) for v in (known.min(), known.max()))
+    low, high = (format(float(v), form) for v in (finite.min(), finite.max()))
     return low if low == high else f"{low} to {high}"

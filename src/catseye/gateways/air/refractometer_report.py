@@ -1,4 +1,4 @@
-"""A refractometer path as objects, text, table, figure and page."""
+"""Refractometer path as JSON, text, table, figure and page."""
 
 import csv
 import io
@@ -34,7 +34,7 @@ SERIES = ("mjd_utc", "section", "phase_rad", "group_refractivity_ppm", "u_group_
 
 
 def refractometer_verdict(calibration: "PathCalibration") -> Verdict:
-    """Scatter of phases and weather as claimed, the phase's slope with the index, and the sheet's validity."""
+    """Verdict on scatter against the claim, slope of the phase, and validity of the sheet."""
     readings = calibration.readings
     doubts = expired({"the path": readings.sheet}, readings.mjd_utc[-1]) + humidity_doubts(readings.humidity_percent)
     return _own_verdict(calibration).hearing(doubts)
@@ -43,17 +43,17 @@ def refractometer_verdict(calibration: "PathCalibration") -> Verdict:
 def _own_verdict(calibration: "PathCalibration") -> Verdict:
     if not calibration.slope.agrees:
         ratio = calibration.slope.ratio
-        return Verdict("doubtful", f"the phase follows the weather's index {ratio:.3f} times, not once")
+        return Verdict("doubtful", f"the slope of phase against the weather's index is {ratio:.3f} of theory, not 1")
     factor, degrees = calibration.variance_factor, calibration.degrees_of_freedom
     if not degrees >= 1.0:
-        return Verdict("doubtful", "nothing checks the calibration")
+        return Verdict("doubtful", "the calibration has no redundancy to check it")
     if factor > 1.0 + 3.0 * (2.0 / degrees) ** 0.5:
         return Verdict("doubtful", f"phases and weather scatter more than claimed (variance factor {factor:.2f})")
     return Verdict("good", f"phases and weather agree as claimed (variance factor {factor:.2f})")
 
 
 def refractometer_object(calibration: "PathCalibration") -> dict[str, Any]:
-    """A calibrated path as `catseye refractometer --json` gives it."""
+    """Object that `catseye refractometer --json` prints."""
     sheet, readings, parameters = calibration.readings.sheet, calibration.readings, _parameters(calibration)
     counts = Counter(calibration.status)
     return {
@@ -135,7 +135,7 @@ def _parameters(calibration: "PathCalibration") -> dict[str, Any]:
 
 
 def passages(calibration: "PathCalibration") -> list[Passage]:
-    """What a person should know, in order."""
+    """Summary passages for a reader, in order."""
     sheet, counts = calibration.readings.sheet, Counter(calibration.status)
     good = np.isfinite(calibration.refractivity)
     n, u, t = (
@@ -143,10 +143,11 @@ def passages(calibration: "PathCalibration") -> list[Passage]:
         calibration.u_refractivity[good] / PPM,
         calibration.temperature_c[good],
     )
-    others = ", ".join(f"{counts[word]} {word}" for word in STATUS[1:] if counts[word])
+    exclusions = ", ".join(f"{counts[word]} {word}" for word in STATUS[1:] if counts[word])
     passages = [
         Passage(
-            "The readings", f"{counts['good']} of {len(calibration.readings)} used" + (f"; {others}" if others else "")
+            "The readings",
+            f"{counts['good']} of {len(calibration.readings)} used" + (f"; {exclusions}" if exclusions else ""),
         ),
         Passage(
             "Calibration",
@@ -155,14 +156,14 @@ def passages(calibration: "PathCalibration") -> list[Passage]:
             f"{calibration.pressure_0_hpa:.2f} hPa, {calibration.humidity_0_percent:.1f} %, {sheet.air_model})",
         ),
         Passage(
-            "Of it",
+            "Contributions",
             ", ".join(f"{cause} {part / PPM:.3f}" for cause, part in calibration.budget.items()) + " ppm",
         ),
         Passage("The slope", _slope(calibration)),
         Passage(
             "The air",
-            f"n_g - 1 from {n.min():.2f} to {n.max():.2f} ppm, each ± {np.median(u):.2f}"
-            + (f"; as warm as {np.nanmin(t):.2f} to {np.nanmax(t):.2f} °C" if np.isfinite(t).any() else ""),
+            f"n_g - 1 from {n.min():.2f} to {n.max():.2f} ppm, ± {np.median(u):.2f} per reading"
+            + (f", as air of {np.nanmin(t):.2f} to {np.nanmax(t):.2f} °C" if np.isfinite(t).any() else ""),
         ),
         Passage("The length", _length(calibration)),
     ]
@@ -173,29 +174,29 @@ def _slope(calibration: "PathCalibration") -> str:
     sheet, slope = calibration.readings.sheet, calibration.slope
     theory = float(phase_slope(sheet.path_length_m, modulation_hz=sheet.modulation_hz)) * PPM * 1e3
     if slope.agrees is None:
-        return f"{theory:.3f} mrad a ppm by theory; the index changed too little to test it"
+        return f"{theory:.3f} mrad per ppm in theory; the index varied too little to test it"
     verdict = "agrees" if slope.agrees else "DISAGREES"
     times = f"{slope.ratio:.3f} ± {slope.u:.3f} times"
-    return f"{theory:.3f} mrad a ppm by theory; the weather's index goes {times} as far as that: {verdict}"
+    return f"{theory:.3f} mrad per ppm in theory; against the weather's index {times} that: {verdict}"
 
 
 def _length(calibration: "PathCalibration") -> str:
     sheet, absolute = calibration.readings.sheet, calibration.absolute
     if absolute.status != CycleStatus.SURE:
         return (
-            f"{sheet.path_length_m:.4f} m ± {sheet.u_path_length_mm:g} mm does not tell the whole cycles: no absolute "
+            f"{sheet.path_length_m:.4f} m ± {sheet.u_path_length_mm:g} mm does not fix the whole cycles: no absolute "
             "index (five u must fit into a quarter wavelength, 50 mm at 1500 MHz)"
         )
     return (
         f"{sheet.path_length_m:.5f} m ± {sheet.u_path_length_mm:g} mm alone gives n_g - 1 = "
         f"{(float(absolute.group_index) - 1.0) / PPM:.2f} ± {float(absolute.u) / PPM:.2f} ppm "
-        f"(N {int(absolute.cycles)}); the weather's index asks for {calibration.path_length:.6f} m "
+        f"(N {int(absolute.cycles)}); the weather's index implies {calibration.path_length:.6f} m "
         f"± {calibration.u_path_length * 1e3:.3f} mm"
     )
 
 
 def series_csv(calibration: "PathCalibration") -> str:
-    """A row a reading; a cell is empty where there is no number."""
+    """Table of readings as CSV; empty cells for missing numbers."""
     readings = calibration.readings
     columns = (
         [f"{v:.8f}" for v in readings.mjd_utc],
@@ -223,7 +224,7 @@ def series_csv(calibration: "PathCalibration") -> str:
 
 
 def refractometer_figures(calibration: "PathCalibration") -> "dict[str, Figure]":
-    """The night and its residuals, and phase against weather."""
+    """Figures of the night with residuals, and phase against weather."""
     from catseye.gateways.writers.drawing import styled  # matplotlib is heavy
 
     with styled():
@@ -243,30 +244,30 @@ def _night(calibration: "PathCalibration"):
     used = np.array([s == "good" for s in calibration.status])
     off = np.array([s == "weather off" for s in calibration.status])
     figure = Figure(figsize=(9.4, 6.4), layout="constrained")
-    index, rest, warm = figure.subplots(3, 1, sharex=True, gridspec_kw={"height_ratios": (3, 2, 2)})
-    index.scatter(hours, calibration.weather.mean / PPM, s=5, c=SERIES[1], lw=0, alpha=0.6, label="by the weather")
+    index, residual, warm = figure.subplots(3, 1, sharex=True, gridspec_kw={"height_ratios": (3, 2, 2)})
+    index.scatter(hours, calibration.weather.mean / PPM, s=5, c=SERIES[1], lw=0, alpha=0.6, label="from weather")
     path = np.where(good, calibration.refractivity, np.nan) / PPM
     gaps = np.flatnonzero(np.diff(hours) > 10.0 * np.median(np.diff(hours))) + 1
     lines = [np.insert(v, gaps, np.nan) for v in (hours, path, calibration.temperature_c, calibration.u_temperature_c)]
-    index.plot(lines[0], lines[1], color=SERIES[0], lw=1.2, label="by the phase")
+    index.plot(lines[0], lines[1], color=SERIES[0], lw=1.2, label="from phase")
     for row in np.flatnonzero([s == "stray" for s in calibration.status]):
         index.axvline(hours[row], color=BAD, lw=0.6, ls=":", alpha=0.6)
     low, high = np.nanpercentile(path, [0, 100])
     index.set_ylim(low - 0.25 * (high - low) - 0.2, high + 0.25 * (high - low) + 0.2)
     index.set_ylabel("n_g − 1 (ppm)")
     index.set_title(f"{calibration.readings.sheet.path}: group index of the path (dotted: stray phases)")
-    rest.axhline(0.0, color=FAINT, lw=0.8)
-    rest.scatter(hours[used], calibration.residual[used] / PPM, s=5, c=INK, lw=0, alpha=0.7, label="used")
-    rest.scatter(hours[off], calibration.residual[off] / PPM, s=14, c=BAD, marker="x", lw=0.8, label="left out")
+    residual.axhline(0.0, color=FAINT, lw=0.8)
+    residual.scatter(hours[used], calibration.residual[used] / PPM, s=5, c=INK, lw=0, alpha=0.7, label="used")
+    residual.scatter(hours[off], calibration.residual[off] / PPM, s=14, c=BAD, marker="x", lw=0.8, label="excluded")
     spread = 6.0 * float(np.nanstd(calibration.residual[used])) / PPM
-    rest.set_ylim(-spread, spread)
-    rest.set_ylabel("weather − path (ppm)")
+    residual.set_ylim(-spread, spread)
+    residual.set_ylabel("weather − path (ppm)")
     when, _, t, u = lines
     warm.fill_between(when, t - u, t + u, color=SERIES[0], alpha=0.25, lw=0, label="± u")
-    warm.plot(when, t, color=SERIES[0], lw=1.0, label="mean of the path")
+    warm.plot(when, t, color=SERIES[0], lw=1.0, label="path mean")
     warm.set_ylabel("°C")
     warm.set_xlabel(f"hours since MJD {calibration.readings.mjd_utc[0]:.4f} UTC")
-    for ax in (index, rest, warm):
+    for ax in (index, residual, warm):
         for s in calibration.followed.sections[1:]:
             ax.axvline(hours[s.first], color=BAD, lw=1.0)
         ax.legend(loc="best", ncols=2)
@@ -281,20 +282,20 @@ def _line(calibration: "PathCalibration"):
     figure = Figure(figsize=(9.4, 4.2), layout="constrained")
     ax = figure.add_subplot()
     used = np.array([s == "good" for s in calibration.status])
-    drift = (calibration.refractivity - calibration.index_0) * slope  # what the phase would be without drift and jumps
-    weather = calibration.refractivity + calibration.residual  # of the thermometers that were not left out
+    drift = (calibration.refractivity - calibration.index_0) * slope  # phase without drift and jumps
+    weather = calibration.refractivity + calibration.residual  # from the thermometers in use
     ax.scatter(weather[used] / PPM, drift[used], s=8, c=SERIES[0], lw=0, alpha=0.6, label="readings")
     ends = np.array([np.nanmin(weather[used]), np.nanmax(weather[used])])
     ax.plot(ends / PPM, (ends - calibration.index_0) * slope, color=INK, lw=1.1, label="theory: −(4πf/c) L")
-    ax.set_xlabel("n_g − 1 by the weather (ppm)")
-    ax.set_ylabel("phase from the reference phase (rad)")
+    ax.set_xlabel("n_g − 1 from weather (ppm)")
+    ax.set_ylabel("phase relative to the reference phase (rad)")
     ax.set_title("Phase against weather: the phase falls as the index rises")
     ax.legend(loc="best")
     return figure
 
 
 def refractometer_report(calibration: "PathCalibration", when: datetime) -> str:
-    """The whole page; `when` in UTC."""
+    """HTML report; `when` is UTC."""
     drawn, sheet = _svgs(calibration), calibration.readings.sheet
     words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in passages(calibration))
     parameters = _parameters(calibration)["thermometers"]
@@ -304,7 +305,7 @@ def refractometer_report(calibration: "PathCalibration", when: datetime) -> str:
             f"{calibration.index_0 / PPM:.3f} ± {calibration.u_index_0 / PPM:.3f} ppm",
             "at the reference phase",
         ),
-        card("Weather over phase", _card_slope(calibration), "1: the path's air changes as the sensors'"),
+        card("Weather over phase", _card_slope(calibration), "1: the path's air changes as at the sensors"),
         card(
             "Readings", f"{calibration.status.count('good')} of {len(calibration.readings)}", "used in the calibration"
         ),
@@ -319,16 +320,16 @@ def refractometer_report(calibration: "PathCalibration", when: datetime) -> str:
         section(
             "night",
             "The night",
-            picture(drawn["night"], "Index of the path by phase and by weather; what is left between them; and the "
-                    "mean temperature that the index stands for at the pressure and humidity read. Red lines: a jump, "
-                    "or a gap over which the whole cycles are not known."),
-            picture(drawn["slope"], "The theoretical slope is not fitted: readings along it say that the path's air "
-                    "changes as the sensors' does."),
+            picture(drawn["night"], "Index of the path from phase and from weather; their difference; and the mean "
+                    "temperature equivalent to the index at the measured pressure and humidity. Red lines: a jump, "
+                    "or a gap after which the whole cycles are unknown."),
+            picture(drawn["slope"], "The theoretical slope is not fitted: readings along it show that the path's air "
+                    "changes as the air at the sensors."),
         ),
         section(
             "budget",
             "Budget",
-            paragraph("Standard uncertainty of the calibrated index by cause; causes add in squares."),
+            paragraph("Standard uncertainty of the calibrated index by cause; causes add in quadrature."),
             table(("cause", "ppm"), [(c, f"{p / PPM:.4f}") for c, p in calibration.budget.items()], "tn"),
             table(("thermometer", "reads too high (°C)", "u (°C)"), thermometers, "tnn"),
         ),
@@ -336,7 +337,7 @@ def refractometer_report(calibration: "PathCalibration", when: datetime) -> str:
             "provenance",
             "Provenance",
             table(("file read", "SHA-256"), list(calibration.readings.hashes.items()), "th"),
-            table(("what", "value"), facts, "tt"),
+            table(("item", "value"), facts, "tt"),
         ),
     ]  # fmt: skip
     return page("catseye: refractometer", "\n".join(body))
@@ -350,11 +351,11 @@ def _card_slope(calibration: "PathCalibration") -> str:
 def write_refractometer(
     calibration: "PathCalibration", directory: Path, progress: Callable[[str, int, int], None] | None = None
 ) -> None:
-    """Table, object, report, and last the provenance with the hashes of the others.
+    """Write table, JSON, figure, report, and last the provenance with their hashes.
 
     calibration   a calibrated path
-    directory     exists, and is ours to fill: see `writers.output.whole_directory`
-    progress      told of each file
+    directory     existing, from `writers.output.whole_directory`
+    progress      called for each file
     """
     when = datetime.now(UTC)
     files: Files = {

@@ -1,4 +1,4 @@
-"""The speed of sound as a plain object for JSON and as rows for people, the other models beside the one asked for."""
+"""Speed of sound as JSON and text, with other models."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -16,17 +16,17 @@ from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.verdict import Verdict
 
 Weather = tuple[Any, Any, Any]
-FREQUENCIES_HZ = (1e3, 10e3)  # what loudspeakers give
+FREQUENCIES_HZ = (1e3, 10e3)  # range of loudspeakers
 
 
 def sound_object(
     state: Sound, weather: Weather, co2_ppm: Any, *, u: Any, stated: Sequence[str] | None = None
 ) -> dict[str, Any]:
-    """Sound as `catseye sound --json` gives it.
+    """Object that `catseye sound --json` prints.
 
     weather   temperature °C, pressure hPa, relative humidity %, numbers or arrays
     u         standard uncertainty of the speed, formula and inputs, m/s
-    stated    inputs whose uncertainty it has, of `stated_inputs`
+    stated    inputs whose uncertainty it includes, from `stated_inputs`
     """
     slopes = state.sensitivity._asdict()
     if not MODELS[state.model].has_co2:
@@ -55,7 +55,7 @@ def sound_object(
 
 
 def gamma_water_cost(state: Sound, weather: Weather) -> dict[str, Any]:
-    """What the ratio of specific heats that the notes print for water costs, at this weather."""
+    """Effect of the misprinted ratio of specific heats of water in the notes, at this weather."""
     t, p, _ = weather
     printed = sound_parker2004.speed(t, p, state.vapour_pressure_hpa)
     right = sound_parker2004.speed(t, p, state.vapour_pressure_hpa, gamma_water=sound_parker2004.GAMMA_VAPOUR)
@@ -69,10 +69,10 @@ def gamma_water_cost(state: Sound, weather: Weather) -> dict[str, Any]:
 
 
 def sound_verdict(state: Sound, humidity_percent: Any, u: Any, stated: Sequence[str] | None = None) -> Verdict:
-    """Good within the formula's limits, which were checked, and with a humidity in percent; what its u stands for.
+    """Verdict on the speed: formula limits, humidity, contributions its u includes.
 
-    u        standard uncertainty of the speed, m/s, as told
-    stated   inputs whose uncertainty it has, of `stated_inputs`; None: all if it is more than the formula's
+    u        standard uncertainty of the speed, m/s
+    stated   inputs whose uncertainty it includes, from `stated_inputs`; None: all if it exceeds the formula's
     """
     if stated is None:
         stated = SENSED if np.any(np.asarray(u) > np.asarray(state.standard_uncertainty) * (1.0 + 1e-12)) else ()
@@ -81,17 +81,17 @@ def sound_verdict(state: Sound, humidity_percent: Any, u: Any, stated: Sequence[
 
 
 def sound_passages(answer: dict[str, Any]) -> list[Passage]:
-    """The speed, its slopes and what other formulas say; of many states, from the smallest to the largest value.
+    """Speed, slopes and other formulas as text; for many states, the range of values.
 
-    answer   as `sound_object` gives it
+    answer   from `sound_object`
     """
     slope, cost, low = answer["sensitivity"], answer["notes_gamma_w"], answer["dispersion"][0]
     carbon = (
         f"{spread(slope['co2_ppm'], '+.5f', 100.0)} m/s per 100 ppm of carbon dioxide"
         if "co2_ppm" in slope
-        else "the formula's air has its own carbon dioxide"
+        else "carbon dioxide fixed by the formula"
     )
-    others = "; ".join(
+    alternatives = "; ".join(
         f"{name} {spread(item['speed'], '.3f')} ± {spread(item['standard_uncertainty'], '.2g')} m/s"
         if item["speed"] is not None
         else f"{name}: {item['reason']}"
@@ -110,8 +110,8 @@ def sound_passages(answer: dict[str, Any]) -> list[Passage]:
         f"{spread(answer['travel_time_per_m_per_c'], '+.4f', 1e6)} µs/m/°C",
         "vapour": f"{spread(answer['vapour_pressure_hpa'], '.3f')} hPa",
         "formula": answer["model"],
-        "formulas": others,
-        "notes": f"γ_w = {cost['printed']} (4.3) is printed for {cost['right']:.2f}: slow by "
+        "formulas": alternatives,
+        "notes": f"γ_w = {cost['printed']} (4.3) is a misprint of {cost['right']:.2f}: slow by "
         f"{spread(cost['slow_by'], '.3f')} m/s, {spread(cost['temperature_read_high_by_c'], '.2f')} °C too warm in "
         "thermometry",
         "dispersion": f"at {low['frequency_hz']:g} Hz faster by {spread(low['phase_excess'], '.3f')} m/s",

@@ -1,1 +1,1 @@
-"""An EDM baseline on the way out."""
+"""Output of an EDM baseline calibration."""

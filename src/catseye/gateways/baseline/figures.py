@@ -15,7 +15,7 @@ MARKERS = "osD^vP"
 
 
 def baseline_figures(calibration: "BaselineCalibration") -> dict[str, Figure]:
-    """Every figure of the report by its name."""
+    """Figures of the report, by name."""
     with styled():
         drawn = {
             "line": _line(calibration),
@@ -51,8 +51,8 @@ def _line(calibration: "BaselineCalibration") -> Figure:
     ax.margins(x=0.05, y=0.35)
     ax.set_xlim(right=s.x.max() + 0.25 * np.ptp(s.x))
     ax.set_ylim(top=ax.get_ylim()[1] + 0.35 * np.ptp(ax.get_ylim()))
-    ax.set_xlabel("along the line (m)")
-    ax.set_ylabel("to its left (mm)")
+    ax.set_xlabel("distance along the line (m)")
+    ax.set_ylabel("offset to the left (mm)")
     return figure
 
 
@@ -64,7 +64,7 @@ def _residuals(calibration: "BaselineCalibration") -> Figure:
     far = np.linspace(0.0, 1.03 * float(distance.max()), 101)
     settings = calibration.settings
     claim = settings.specified_mm + settings.specified_ppm * PPM * far / MILLIMETRE
-    ax.fill_between(far, -2 * claim, 2 * claim, color="#eef2f5", lw=0, label="twice the maker's claim")
+    ax.fill_between(far, -2 * claim, 2 * claim, color="#eef2f5", lw=0, label="twice the claimed u")
     ax.axhline(0.0, color=FAINT, lw=0.8)
     for k, label, colour, marker in _setups(calibration):
         mine = shots.setup == k
@@ -79,11 +79,14 @@ def _residuals(calibration: "BaselineCalibration") -> Figure:
 
 
 def _weather(calibration: "BaselineCalibration") -> Figure:
-    """Residuals in ppm over the change of the index: a slope is a light that does not follow the sensors."""
-    shots, way = calibration.observations, calibration.lengths
-    residual = shot_residuals(calibration) / way.distance / PPM
-    change = -(way.index - way.index[calibration.keep].mean()) / PPM
-    long = way.distance > 0.25 * way.distance.max()
+    """Residuals in ppm over the change of the index.
+
+    A slope shows that the light does not follow the sensors' index.
+    """
+    shots, lengths = calibration.observations, calibration.lengths
+    residual = shot_residuals(calibration) / lengths.distance / PPM
+    change = -(lengths.index - lengths.index[calibration.keep].mean()) / PPM
+    long = lengths.distance > 0.25 * lengths.distance.max()
     figure = Figure(figsize=(9.4, 4.0), layout="constrained")
     ax = figure.add_subplot()
     ax.axhline(0.0, color=FAINT, lw=0.8)
@@ -94,22 +97,22 @@ def _weather(calibration: "BaselineCalibration") -> Figure:
     if np.isfinite(share):
         ends = np.array([change[long].min(), change[long].max()])
         ax.plot(ends, (1.0 - share) * ends, color=INK, lw=1.1, label=f"light followed {share:.2f} ± {u:.2f} of it")
-    ax.set_xlabel("change that the weather makes in the corrected length (ppm)")
+    ax.set_xlabel("change of the corrected length by weather (ppm)")
     ax.set_ylabel("residual over distance (ppm)")
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower left", ncols=7)
     return figure
 
 
 def _corrections(calibration: "BaselineCalibration") -> Figure:
-    way = calibration.lengths
+    lengths = calibration.lengths
     figure = Figure(figsize=(9.4, 3.4), layout="constrained")
     panels = figure.subplots(1, 3)
     for ax, values, label, scale in (
-        (panels[0], way.first, "first velocity (mm)", MILLIMETRE),
-        (panels[1], way.second + way.chord, "second velocity, chord (µm)", 1e-6),
-        (panels[2], way.level, "slope to level (mm)", MILLIMETRE),
+        (panels[0], lengths.first, "first velocity (mm)", MILLIMETRE),
+        (panels[1], lengths.second + lengths.chord, "second velocity, chord (µm)", 1e-6),
+        (panels[2], lengths.level, "slope to level (mm)", MILLIMETRE),
     ):
-        ax.scatter(way.distance, values / scale, s=10, c=SERIES[0], lw=0, alpha=0.7)
+        ax.scatter(lengths.distance, values / scale, s=10, c=SERIES[0], lw=0, alpha=0.7)
         ax.axhline(0.0, color=FAINT, lw=0.8)
         ax.set_title(label)
         ax.set_xlabel("distance (m)")
@@ -137,7 +140,7 @@ def _cyclic(calibration: "BaselineCalibration") -> Figure:
     for k, label, colour, marker in _setups(calibration):
         mine = shots.setup == k
         ax.scatter(share[mine] * unit, values[mine], s=18, c=colour, marker=marker, lw=0, alpha=0.75, label=label)
-    ax.set_xlabel(f"place in the unit length of {unit:g} m (m)")
+    ax.set_xlabel(f"position in the unit length of {unit:g} m (m)")
     ax.set_ylabel("cyclic term and residual (mm)")
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower left", ncols=7)
     return figure

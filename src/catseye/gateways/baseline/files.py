@@ -1,4 +1,4 @@
-"""All files of an EDM baseline, and the record that keeps its pillars."""
+"""Files of an EDM baseline, and its record of pillars."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
@@ -24,12 +24,12 @@ MARK = f'format = "{FORMAT}"'
 def write_calibration(
     calibration: "BaselineCalibration", directory: Path, inputs: Mapping[str, str], *, progress: Progress | None = None
 ) -> None:
-    """Tables, object, report, and last the provenance with the hashes of the others.
+    """Write tables, JSON, report, and the provenance with their hashes.
 
     calibration   a calibration
-    directory     exists, and is ours to fill: see `writers.output.whole_directory`
-    inputs        SHA-256 of each file read, by its name
-    progress      told of each file
+    directory     existing, from `writers.output.whole_directory`
+    inputs        SHA-256 of each input file, by name
+    progress      called for each file
     """
     from catseye.gateways.baseline.report import baseline_report  # matplotlib is heavy
 
@@ -55,15 +55,15 @@ def write_record(
     by: str | None = None,
     report: str | None = None,
 ) -> None:
-    """BASELINE.toml, whole or not at all.
+    """Write BASELINE.toml atomically.
 
     calibration   a calibration
     path          new, or an earlier one of catseye
-    inputs        SHA-256 of each file read, by its name
+    inputs        SHA-256 of each input file, by name
     serial        of the instrument
     measured_on   day of the shots
     by            who measured
-    report        where it is written up
+    report        reference to the report
     """
     record = Baseline(
         format=FORMAT,

@@ -1,4 +1,4 @@
-"""An EDM baseline as plain objects for JSON, and as text for people; SI, with the unit in the key elsewhere."""
+"""EDM baseline as JSON and text; SI units unless a key says otherwise."""
 
 from itertools import combinations
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -19,7 +19,7 @@ TEST_KEYS = ("name", "statistic", "limit", "passed", "text")
 
 
 class Span(NamedTuple):
-    """Distance between two pillars along the straight line, with its standard uncertainty, m."""
+    """Straight-line distance between two pillars with its standard uncertainty, m."""
 
     start: str
     end: str
@@ -28,7 +28,7 @@ class Span(NamedTuple):
 
 
 def spans(calibration: "BaselineCalibration") -> list[Span]:
-    """Every pair of pillars, in their order along the line, with full covariance."""
+    """Distances of all pairs of pillars along the line, with full covariance."""
     s, n = calibration.solution, len(calibration.names)
     rows, covariance = s.places
     spans = []
@@ -43,7 +43,7 @@ def spans(calibration: "BaselineCalibration") -> list[Span]:
 
 
 def baseline_verdict(calibration: "BaselineCalibration") -> Verdict:
-    """Tests of ISO 17123-4 and of the shots, and what speaks against the weather."""
+    """Verdict from the tests of ISO 17123-4 and of the shots, and from weather notes."""
     return _own_verdict(calibration).hearing(humidity_doubts(calibration.observations.humidity_percent))
 
 
@@ -52,13 +52,11 @@ def _own_verdict(calibration: "BaselineCalibration") -> Verdict:
     if failed:
         return Verdict("failed", f"tests failed: {'; '.join(failed)}")
     if calibration.suspects:
-        return Verdict(
-            "doubtful", f"{len(calibration.suspects)} suspects among the shots, first {_suspect(calibration)}"
-        )
+        return Verdict("doubtful", f"{len(calibration.suspects)} suspect shots, first {_suspect(calibration)}")
     if not isinstance(calibration.test, FullTest):
         return Verdict("doubtful", f"ISO 17123-4's full test was not possible: {calibration.test}")
     passed = sum(d.passed is True for d in calibration.decisions)
-    return Verdict("good", f"every test that could be made passed ({passed})")
+    return Verdict("good", f"every possible test passed ({passed})")
 
 
 def _suspect(calibration: "BaselineCalibration") -> str:
@@ -67,7 +65,7 @@ def _suspect(calibration: "BaselineCalibration") -> str:
 
 
 def baseline_object(calibration: "BaselineCalibration") -> dict[str, Any]:
-    """A baseline as `catseye baseline --json` gives it."""
+    """Object that `catseye baseline --json` prints."""
     s, test = calibration.solution, calibration.test
     zero, u_zero = s.of("zero")
     scale, u_scale = s.of("scale")
@@ -130,7 +128,7 @@ def _cyclic(calibration: "BaselineCalibration") -> dict[str, Any] | None:
 
 
 def _full(calibration: "BaselineCalibration") -> dict[str, Any] | None:
-    test, every = calibration.test, calibration.all_shots
+    test, total = calibration.test, calibration.all_shots
     if not isinstance(test, FullTest):
         return {"status": test}
     return {
@@ -139,12 +137,12 @@ def _full(calibration: "BaselineCalibration") -> dict[str, Any] | None:
         "u_zero_correction": test.u_zero,
         "s": test.s,
         "degrees_of_freedom": test.degrees_of_freedom,
-        "all_shots": None if every is None else {"s": every.s, "degrees_of_freedom": every.degrees_of_freedom},
+        "all_shots": None if total is None else {"s": total.s, "degrees_of_freedom": total.degrees_of_freedom},
     }
 
 
 def _noise(calibration: "BaselineCalibration") -> dict[str, Any]:
-    """Standard deviations, and their standard uncertainties by the first-order rule."""
+    """Standard deviations and their standard uncertainties (first-order propagation)."""
     noise, u = calibration.solution.noise, calibration.solution.u_noise
     parts: dict[str, Any] = {}
     for k, (key, variance, unit) in enumerate(
@@ -175,7 +173,7 @@ def _pillars(calibration: "BaselineCalibration") -> dict[str, Any]:
 
 
 def passages(calibration: "BaselineCalibration") -> list[Passage]:
-    """What a person should know, in order."""
+    """Summary passages for a reader, in order."""
     s, test = calibration.solution, calibration.test
     zero, u_zero = (v / MILLIMETRE for v in s.of("zero"))
     shots = calibration.observations
@@ -189,9 +187,9 @@ def passages(calibration: "BaselineCalibration") -> list[Passage]:
     ]
     scale, u_scale = (v / PPM for v in s.of("scale"))
     if np.isfinite(scale):
-        passages.append(Passage("Scale", f"{scale:+.2f} ± {u_scale:.2f} ppm (shows too long where above zero)"))
+        passages.append(Passage("Scale", f"{scale:+.2f} ± {u_scale:.2f} ppm (positive: reads too long)"))
     else:
-        passages.append(Passage("Scale", "not determined without a known baseline"))
+        passages.append(Passage("Scale", "not determined without certified distances"))
     cyclic = _cyclic(calibration)
     for term in cyclic["terms"] if cyclic else ():
         text = (

@@ -1,4 +1,4 @@
-"""The report of an EDM baseline: one HTML page that needs nothing else."""
+"""Report of an EDM baseline, one self-contained HTML page."""
 
 from collections.abc import Mapping
 from datetime import datetime
@@ -33,11 +33,11 @@ CONTENTS = {
 
 
 def baseline_report(calibration: "BaselineCalibration", when: datetime, inputs: Mapping[str, str]) -> str:
-    """The whole page.
+    """HTML report.
 
     calibration   a calibration
     when          UTC
-    inputs        SHA-256 of each file read, by its name
+    inputs        SHA-256 of each input file, by name
     """
     drawn = svgs(baseline_figures(calibration))
     links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())
@@ -64,12 +64,12 @@ def _summary(calibration: "BaselineCalibration") -> str:
     s, test = calibration.solution, calibration.test
     zero, u_zero = (v / MILLIMETRE for v in s.of("zero"))
     scale, u_scale = (v / PPM for v in s.of("scale"))
-    known = np.isfinite(scale)
+    valid = np.isfinite(scale)
     failed = [d for d in calibration.decisions if d.passed is False]
     longest = max(spans(calibration), key=lambda span: span.distance)
     cards = [
         card("Zero", f"{zero:+.3f} ± {u_zero:.3f} mm", "observed minus true"),
-        card("Scale", f"{scale:+.2f} ± {u_scale:.2f} ppm" if known else "not determined", "shows too long above zero"),
+        card("Scale", f"{scale:+.2f} ± {u_scale:.2f} ppm" if valid else "not determined", "positive: reads too long"),
         card(
             "s of one distance",
             f"{test.s / MILLIMETRE:.3f} mm" if isinstance(test, FullTest) else "unknown",
@@ -103,7 +103,7 @@ def _pillars(calibration: "BaselineCalibration", drawn: dict[str, str]) -> str:
     return section(
         "pillars",
         CONTENTS["pillars"],
-        picture(drawn["line"], "Pillars along the line from the first to the last, and how far they stand off it."),
+        picture(drawn["line"], "Pillars along the line from the first to the last, and their offsets from it."),
         table(("pillar", "x (m)", "u (mm)", "y (m)", "u (mm)", "height (m)"), rows, "tnnnnn"),
         paragraph(f"Horizontal distances at {height}; their full covariance is in baseline.json and BASELINE.toml."),
         table(("from", "to", "distance (m)", "u (mm)"), pairs, "ttnn"),
@@ -112,14 +112,14 @@ def _pillars(calibration: "BaselineCalibration", drawn: dict[str, str]) -> str:
 
 def _residuals(drawn: dict[str, str]) -> str:
     parts = [
-        picture(drawn["residuals"], "Every shot, by set-up: those of a set lie together where the set, not the shot, "
-                "makes the scatter."),
-        picture(drawn["weather"], "Residuals of the longer lines over what the weather's change did to the corrected "
-                "length: flat where the light follows the weather as read, rising where the correction is too much."),
-        picture(drawn["corrections"], "What was added to the lengths shown."),
+        picture(drawn["residuals"], "All shots, by set-up. Shots of a set lie together if the scatter is between sets, "
+                "not between shots."),
+        picture(drawn["weather"], "Residuals of the longer lines over the change of the corrected length by weather: "
+                "flat if the light follows the weather readings, rising if the correction is too large."),
+        picture(drawn["corrections"], "Corrections added to the displayed lengths."),
     ]  # fmt: skip
     if "cyclic" in drawn:
-        parts.append(picture(drawn["cyclic"], "Cyclic terms over the unit length, with the residuals about them."))
+        parts.append(picture(drawn["cyclic"], "Cyclic terms over the unit length, with residuals."))
     return section("residuals", CONTENTS["residuals"], *parts)
 
 
@@ -134,8 +134,8 @@ def _tests(calibration: "BaselineCalibration") -> str:
         "tests",
         CONTENTS["tests"],
         paragraph(
-            f"Each at the level {calibration.settings.level:g}. Limits come from the claim and the degrees of freedom, "
-            "never from the scatter that they judge. A set, its repeats averaged, counts as one distance."
+            f"All at the level {calibration.settings.level:g}. Limits follow from claim and degrees of freedom, "
+            "not from the scatter under test. A set, its repeats averaged, counts as one distance."
         ),
         table(("test", "statistic", "limit", "outcome", "meaning"), rows, "wnntw"),
     )
@@ -144,17 +144,17 @@ def _tests(calibration: "BaselineCalibration") -> str:
 def _budget(calibration: "BaselineCalibration") -> str:
     s = calibration.solution
     last = f"x {calibration.order[-1]}"
-    wanted = [n for n in ("zero", "scale", *calibration.cyclic, last) if n in s.names]
-    at = [s.names.index(n) for n in wanted]
-    unit = [PPM if n == "scale" else MILLIMETRE for n in wanted]
+    parameters = [n for n in ("zero", "scale", *calibration.cyclic, last) if n in s.names]
+    at = [s.names.index(n) for n in parameters]
+    unit = [PPM if n == "scale" else MILLIMETRE for n in parameters]
     rows = [(cause, *(f"{part[i] / u:.4f}" for i, u in zip(at, unit, strict=True))) for cause, part in s.parts.items()]
-    rows.append(("all together", *(f"{s.of(n)[1] / u:.4f}" for n, u in zip(wanted, unit, strict=True))))
-    heads = [f"x of {calibration.names[calibration.order[-1]]}" if n == last else n for n in wanted]
-    heads = [f"{h} ({'ppm' if n == 'scale' else 'mm'})" for h, n in zip(heads, wanted, strict=True)]
+    rows.append(("combined", *(f"{s.of(n)[1] / u:.4f}" for n, u in zip(parameters, unit, strict=True))))
+    heads = [f"x of {calibration.names[calibration.order[-1]]}" if n == last else n for n in parameters]
+    heads = [f"{h} ({'ppm' if n == 'scale' else 'mm'})" for h, n in zip(heads, parameters, strict=True)]
     return section(
         "budget",
         CONTENTS["budget"],
-        paragraph("Standard uncertainty that each cause gives; causes are independent and add in squares."),
+        paragraph("Standard uncertainty by cause; causes are independent and add in quadrature."),
         table(("cause", *heads), rows, "t" + "n" * len(heads)),
     )
 
@@ -184,9 +184,9 @@ def _sets(calibration: "BaselineCalibration") -> str:
     return section(
         "sets",
         CONTENTS["sets"],
-        paragraph("Left out: " + "; ".join(left_out), "bad") if left_out else "",
+        paragraph("Excluded: " + "; ".join(left_out), "bad") if left_out else "",
         table(columns, rows, "ttnnnnnnn"),
-        paragraph("Every shot is in observations.csv."),
+        paragraph("All shots are in observations.csv."),
     )
 
 
@@ -196,5 +196,5 @@ def _provenance(calibration: "BaselineCalibration", when: datetime, inputs: Mapp
         "provenance",
         CONTENTS["provenance"],
         table(("file read", "SHA-256"), list(inputs.items()), "th"),
-        table(("what", "value"), [("made (UTC)", f"{when:%Y-%m-%d %H:%M:%S}"), *facts], "tt"),
+        table(("item", "value"), [("made (UTC)", f"{when:%Y-%m-%d %H:%M:%S}"), *facts], "tt"),
     )

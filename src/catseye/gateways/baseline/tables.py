@@ -1,4 +1,4 @@
-"""An EDM baseline as CSV tables."""
+"""EDM baseline as CSV tables."""
 
 from typing import TYPE_CHECKING
 
@@ -29,13 +29,13 @@ def pillars_csv(calibration: "BaselineCalibration") -> str:
 
 
 def distances_csv(calibration: "BaselineCalibration") -> str:
-    """Every pair of pillars: horizontal distance at the reference height, with its standard uncertainty."""
+    """Horizontal distances of all pairs of pillars at the reference height, with uncertainty."""
     rows = [(a, b, f"{d:.6f}", f"{u / MILLIMETRE:.4f}") for a, b, d, u in spans(calibration)]
     return csv_text(("from_pillar", "to_pillar", "distance_m", "u_distance_mm"), rows)
 
 
 def shot_residuals(calibration: "BaselineCalibration") -> np.ndarray:
-    """(m,) observed minus adjusted of every shot, m; nan for those left out."""
+    """Observed minus adjusted of every shot, (m,) m; nan for excluded shots."""
     used = calibration.solution.used
     residual = np.full(len(calibration.keep), np.nan)
     residual[calibration.keep] = calibration.solution.residual[used.set] + used.within
@@ -43,8 +43,8 @@ def shot_residuals(calibration: "BaselineCalibration") -> np.ndarray:
 
 
 def observations_csv(calibration: "BaselineCalibration") -> str:
-    """Every shot from what was shown to its residual."""
-    shots, way, s = calibration.observations, calibration.lengths, calibration.solution
+    """Every shot from the displayed length to its residual."""
+    shots, lengths, s = calibration.observations, calibration.lengths, calibration.solution
     residual = shot_residuals(calibration)
     w_shot, w_set = np.full(len(shots), np.nan), np.full(len(shots), np.nan)
     w_shot[calibration.keep], w_set[calibration.keep] = s.w_shot, s.w_set[s.used.set]
@@ -56,12 +56,12 @@ def observations_csv(calibration: "BaselineCalibration") -> str:
             shots.set[k] + 1,
             shots.setup[k] + 1,
             f"{shots.slope[k]:.6f}",
-            f"{(way.index[k] - 1.0) / PPM:.4f}",
-            f"{way.first[k] / MILLIMETRE:.4f}",
-            f"{way.second[k] * 1e6:.4f}",
-            f"{way.chord[k] * 1e6:.4f}",
-            f"{way.level[k] / MILLIMETRE:.4f}",
-            f"{way.distance[k]:.7f}",
+            f"{(lengths.index[k] - 1.0) / PPM:.4f}",
+            f"{lengths.first[k] / MILLIMETRE:.4f}",
+            f"{lengths.second[k] * 1e6:.4f}",
+            f"{lengths.chord[k] * 1e6:.4f}",
+            f"{lengths.level[k] / MILLIMETRE:.4f}",
+            f"{lengths.distance[k]:.7f}",
             cell(shots.direction[k] / DEGREE, ".7f"),
             cell(residual[k] / MILLIMETRE, "+.4f"),
             cell(w_shot[k], "+.3f"),

@@ -1,4 +1,4 @@
-"""A certificate of calibration: one page that a person can read, print and sign."""
+"""Certificate of calibration: one page to read, print and sign."""
 
 import math
 from collections.abc import Iterator
@@ -16,8 +16,8 @@ from catseye.reduction.calibrations.calibration import Calibration, Quantity
 from catseye.reduction.calibrations.check_outcome import CheckOutcome
 
 TITLE = "Certificate of calibration"
-MARK = f"<title>{TITLE}"  # by which a page is known as ours
-SHOWN = 12  # readings named at most
+MARK = f"<title>{TITLE}"  # identifies a page of catseye
+MOST_NAMED = 12  # readings named at most
 SIGNATURES = ("measured by", "checked by", "approved by")
 LINES = """<style>
 .sign { display: grid; grid-template-columns: repeat(3, 1fr); gap: 2.2rem; margin: 3.4rem 0 1rem; }
@@ -36,7 +36,7 @@ HEAD = {
 
 
 def certificate(calibration: Calibration, when: datetime) -> str:
-    """The whole page.
+    """HTML page of the certificate.
 
     calibration   the calibration
     when          UTC, of the computation
@@ -61,7 +61,7 @@ def certificate(calibration: Calibration, when: datetime) -> str:
 
 
 def rounded(value: float, u: float) -> tuple[str, str]:
-    """A value and its u, u with two digits and the value to the same place.
+    """Value and u as text: u with two digits, the value to the same decimal place.
 
     >>> rounded(180.68514159, 0.00545), rounded(-173.7, 12.0), rounded(1.5, 0.0)
     (('180.6851', '0.0054'), ('-174', '12'), ('1.5', '0'))
@@ -71,7 +71,7 @@ def rounded(value: float, u: float) -> tuple[str, str]:
     if u <= 0.0:
         return f"{value:.12g}", "0"
     places = max(0, 1 - math.floor(math.log10(u)))
-    if float(f"{u:.1e}") >= 10.0 ** (2 - places) and places > 0:  # 0.0996 rounds up to 0.10, which has a digit less
+    if float(f"{u:.1e}") >= 10.0 ** (2 - places) and places > 0:  # 0.0996 rounds up to 0.10, one digit fewer
         places -= 1
     return f"{value:.{places}f}", f"{u:.{places}f}"
 
@@ -81,14 +81,14 @@ def _results(calibration: Calibration) -> str:
         "results",
         "Results",
         table(
-            ("quantity", "value", "u", "k", "U = k u", "interval", "unit", "what it is"),
+            ("quantity", "value", "u", "k", "U = k u", "interval", "unit", "description"),
             [_result(q) for q in calibration.quantities],
             "tnnnnntw",
         ),
         paragraph(
-            "u is the standard uncertainty (1σ) of all known causes together, U = k u the expanded uncertainty; the "
-            "interval holds the quantity with a probability of about 95 %. k is 2 for a normal quantity, more where u "
-            "rests on few readings (Student).",
+            "u is the standard uncertainty (1σ) of all known causes, U = k u the expanded uncertainty; the "
+            "interval contains the quantity with a probability of about 95 %. k is 2 for a normal quantity, more if u "
+            "is based on few readings (Student).",
             "faint",
         ),
         _correlations(calibration),
@@ -113,7 +113,7 @@ def _result(q: Quantity) -> tuple[str, ...]:
 
 
 def _correlations(calibration: Calibration) -> str:
-    """Coefficients of correlation, where there are several quantities."""
+    """Correlation coefficients, if there are several quantities."""
     if len(calibration.quantities) < 2:
         return ""
     u = [q.u or 1.0 for q in calibration.quantities]
@@ -128,15 +128,15 @@ def _to_copy(record: dict[str, Any]) -> str:
     if not record:
         return ""
     lines = "\n".join(record_lines(_readable(record)))
-    return f"<h3>For the record of the instrument</h3><pre>{escape(lines)}</pre>"
+    return f"<h3>For the instrument's record</h3><pre>{escape(lines)}</pre>"
 
 
 def _readable(value: Any) -> Any:
-    """Numbers to nine digits, far below any uncertainty, for people; the record file has them all."""
+    """Numbers to nine digits, far below any uncertainty; the record file has full precision."""
     if isinstance(value, dict):
-        return {key: _readable(each) for key, each in value.items()}
+        return {key: _readable(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_readable(each) for each in value]
+        return [_readable(item) for item in value]
     return float(f"{value:.9g}") if isinstance(value, float) else value
 
 
@@ -157,9 +157,9 @@ def _tests(calibration: Calibration) -> str:
 
 
 def _limit(decision: CheckOutcome) -> str:
-    """A limit of a test with the side on which it stands: ≤ or ≥."""
-    shown = _number(decision.limit, ".4g")
-    return shown if decision.limit != decision.limit else f"{'≥' if decision.least else '≤'} {shown}"
+    """Limit of a test with its sign, ≤ or ≥."""
+    text = _number(decision.limit, ".4g")
+    return text if decision.limit != decision.limit else f"{'≥' if decision.least else '≤'} {text}"
 
 
 def _outcome(decision: CheckOutcome) -> str:
@@ -168,7 +168,7 @@ def _outcome(decision: CheckOutcome) -> str:
 
 def _notes(calibration: Calibration) -> str:
     lines = "".join(f"<li>{escape(note)}</li>" for note in calibration.notes)
-    return section("notes", "Worth knowing", f'<ul class="notes">{lines}</ul>') if lines else ""
+    return section("notes", "Notes", f'<ul class="notes">{lines}</ul>') if lines else ""
 
 
 def _readings(calibration: Calibration) -> str:
@@ -194,7 +194,7 @@ def _inputs(calibration: Calibration, when: datetime) -> str:
 
 
 def _form(column: str) -> str:
-    """How a column's numbers are written: lengths to 0.1 µm or finer, statistics with two decimals."""
+    """Number format of a column: lengths to 0.1 µm or finer, statistics with two decimals."""
     if column.endswith(("_m", "_mm")):
         return ".7f" if column.endswith("_m") else ".5f"
     if column.split("|")[-1] in ("w", "tau", ""):
@@ -213,23 +213,23 @@ def _number(value: float, form: str) -> str:
 
 
 def test_line(decision: CheckOutcome) -> str:
-    """One test in a line: its number and limit, passed or failed, and what it means.
+    """One test as a line: number, limit, outcome and meaning.
 
-    A comparison that chose a model has no outcome but what its text says.
+    A comparison that chose a model has no outcome other than its text.
 
     >>> test_line(CheckOutcome("cyclic order 1: F", 1816.0, 4.541, None, "significant: kept"))
     'cyclic order 1: F 1816, limit 4.541: significant: kept'
     """
     if decision.passed is None:
-        known = f" {decision.statistic:.4g}, limit {decision.limit:.4g}" if decision.comparison else ""
-        return f"{decision.name}{known}: {'' if known else 'not judged; '}{decision.text}"
+        values = f" {decision.statistic:.4g}, limit {decision.limit:.4g}" if decision.comparison else ""
+        return f"{decision.name}{values}: {'' if values else 'not judged; '}{decision.text}"
     outcome = "passed" if decision.passed else "FAILED"
     numbers = f" {decision.comparison}" if decision.comparison else ""
     return f"{decision.name}{numbers}: {outcome}; {decision.text}"
 
 
 def passages(calibration: Calibration) -> Iterator[tuple[str, str]]:
-    """(title, text) of each paragraph that a terminal shows of a calibration."""
+    """Title and text of each paragraph that a terminal shows of a calibration."""
     provenance = calibration.provenance
     yield (
         "Calibration",
@@ -243,8 +243,8 @@ def passages(calibration: Calibration) -> Iterator[tuple[str, str]]:
         yield "" if number else "Tests", test_line(decision)
     odd = [f"{number} ({state})" for number, state in enumerate(calibration.states, start=1) if state != "used"]
     if odd:
-        more = f" and {len(odd) - SHOWN} more" if len(odd) > SHOWN else ""
-        yield "Readings", f"{len(calibration.rows)}, of which {', '.join(odd[:SHOWN])}{more}"
+        more = f" and {len(odd) - MOST_NAMED} more" if len(odd) > MOST_NAMED else ""
+        yield "Readings", f"{len(calibration.rows)}, of which {', '.join(odd[:MOST_NAMED])}{more}"
     elif calibration.states:
         yield "Readings", f"{len(calibration.rows)}, all used"
     for number, note in enumerate(calibration.notes):

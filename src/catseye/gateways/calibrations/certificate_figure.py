@@ -1,4 +1,4 @@
-"""The figure of a calibration: readings and fit, residuals below, and their spectrum where there is one."""
+"""Figure of a calibration: readings and fit, residuals, and spectrum if present."""
 
 import numpy as np
 
@@ -33,7 +33,7 @@ def _main(ax, calibration: Calibration) -> None:
     ax.plot(*calibration.curve["readings"], "o", ms=3.2, color=SERIES[0], mew=0, label="readings used", zorder=3)
     x, y = calibration.curve.get("left out", (np.zeros(0), np.zeros(0)))
     if len(x):
-        ax.plot(x, y, "x", ms=6, color=BAD, mew=1.4, label="left out", zorder=4)
+        ax.plot(x, y, "x", ms=6, color=BAD, mew=1.4, label="excluded", zorder=4)
     ax.set_xlabel(calibration.axes[0])
     ax.set_ylabel(calibration.axes[1])
     if calibration.equal_axes:
@@ -49,7 +49,7 @@ def _residuals(ax, calibration: Calibration) -> None:
     ax.plot(x, v, "o", ms=3.0, color=SERIES[0], mew=0)
     ax.set_xlabel(calibration.axes[0])
     unit = calibration.axes[1].rpartition("(")[2]
-    # The residual column's own unit wins over the readings', which may be coarser.
+    # The residual column's unit takes precedence over the readings', which may be coarser.
     column = next((c for c in calibration.columns if c.startswith("residual")), "")
     word = column.rpartition("_")[2].replace("um", "µm")
     ax.set_ylabel(f"residual ({word or unit.rstrip(')')})")
@@ -60,5 +60,5 @@ def _spectrum(ax, calibration: Calibration) -> None:
     ax.plot(period, height, color=SERIES[2], lw=0.9)
     ax.set_xscale("log")
     ax.set_xlabel("period along the rail (mm)")
-    ax.set_ylabel("residuals' wave (µm)")
+    ax.set_ylabel("amplitude of residuals (µm)")
     ax.set_ylim(bottom=0.0)

@@ -1,4 +1,4 @@
-"""A calibration as a record in TOML and as an object for JSON."""
+"""Calibration as a TOML record and as JSON."""
 
 import json
 import math
@@ -16,12 +16,12 @@ from catseye.reduction.calibrations.kind import PROVENANCE
 from catseye.version import __version__
 
 FORMAT = "catseye-calibration-1"
-MARK = f'format = "{FORMAT}"'  # by which a file is known as ours
+MARK = f'format = "{FORMAT}"'  # identifies a file of catseye
 BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def calibration_verdict(calibration: Calibration) -> Verdict:
-    """Whether the calibration's own tests bear it out; what failed is named, and nothing found is dropped."""
+    """Verdict from the calibration's own tests; failed tests are named."""
     off = sorted((o for o in calibration.plausible if o.passed is False), key=lambda o: not o.grave)
     if off and off[0].grave:
         return Verdict("failed", off[0].text)
@@ -33,17 +33,17 @@ def calibration_verdict(calibration: Calibration) -> Verdict:
     if off or failed:
         return Verdict("doubtful", "; ".join(outcome.text for outcome in (*failed, *off)))
     if calibration.degrees_of_freedom < 1 and not any(d.passed for d in calibration.decisions):
-        return Verdict("doubtful", "nothing was measured twice and no test could be made")
+        return Verdict("doubtful", "no redundancy: nothing was measured twice and no test is possible")
     suspects = [number for number, state in enumerate(calibration.states, start=1) if state == "suspect"]
     if suspects:
         named = ", ".join(map(str, suspects[:8])) + (" ..." if len(suspects) > 8 else "")
         return Verdict("doubtful", f"suspect readings: {named}")
     passed = sum(decision.passed is True for decision in calibration.decisions)
-    return Verdict("good", f"its own tests passed ({passed})" if passed else "nothing speaks against it")
+    return Verdict("good", f"its own tests passed ({passed})" if passed else "no test failed")
 
 
 def calibration_object(calibration: Calibration) -> dict[str, Any]:
-    """A calibration as `catseye calibrate --json` gives it; units are in the keys, null stands for undefined."""
+    """Object that `catseye calibrate --json` prints; units in the keys, null for undefined."""
     return plain(
         {
             "format": FORMAT,
@@ -78,7 +78,7 @@ def calibration_object(calibration: Calibration) -> dict[str, Any]:
 
 
 def calibration_toml(calibration: Calibration) -> str:
-    """A calibration as its record: RECORD.toml, which `records.laboratory.calibration.CalibrationRecord` reads back."""
+    """RECORD.toml, as read by `records.laboratory.calibration.CalibrationRecord`."""
     provenance = calibration.provenance
     head = {
         "kind": calibration.kind,
@@ -92,7 +92,7 @@ def calibration_toml(calibration: Calibration) -> str:
         "notes": list(calibration.notes),
     }
     lines = [MARK, *_pairs(head)]
-    lines += ["", "# to copy into the record of the instrument", *_table("record", calibration.record)]
+    lines += ["", "# to copy into the instrument's record", *_table("record", calibration.record)]
     for q in calibration.quantities:
         lines += ["", "[[quantity]]", *_pairs(vars(q))]
     matrix = ",\n".join(f"  {_value([float(v) for v in row])}" for row in np.atleast_2d(calibration.covariance))
@@ -113,7 +113,7 @@ def calibration_toml(calibration: Calibration) -> str:
 
 
 def record_lines(record: dict[str, Any]) -> list[str]:
-    """What can be copied into the instrument's record, as TOML; a table each where it belongs to several records."""
+    """TOML lines to copy into the instrument's record; one table per record."""
     lines = list(_pairs({key: value for key, value in record.items() if not isinstance(value, dict)}))
     for name, values in record.items():
         if isinstance(values, dict):
@@ -122,7 +122,7 @@ def record_lines(record: dict[str, Any]) -> list[str]:
 
 
 def _table(name: str, values: dict[str, Any]) -> list[str]:
-    """A table and the tables in it."""
+    """A table and its subtables."""
     inner = {key: value for key, value in values.items() if isinstance(value, dict)}
     lines = [f"[{name}]", *_pairs({key: value for key, value in values.items() if key not in inner})]
     for key, value in inner.items():
@@ -131,7 +131,7 @@ def _table(name: str, values: dict[str, Any]) -> list[str]:
 
 
 def _pairs(values: dict[str, Any]) -> Iterable[str]:
-    """Lines of key = value; what is undefined is left out, as TOML has no word for it."""
+    """Lines of key = value; undefined values are omitted, as TOML has no null."""
     return [
         f"{_key(key)} = {_value(value)}"
         for key, value in values.items()
@@ -140,7 +140,7 @@ def _pairs(values: dict[str, Any]) -> Iterable[str]:
 
 
 def _cell(value: Any) -> Any:
-    """A cell of the readings; an undefined number is an empty text."""
+    """Cell of the readings; undefined numbers become an empty text."""
     return "" if value is None or (isinstance(value, float) and not math.isfinite(value)) else value
 
 
@@ -149,7 +149,7 @@ def _key(name: str) -> str:
 
 
 def _value(value: Any) -> str:
-    """A value as TOML writes it.
+    """Value in TOML syntax.
 
     >>> _value(["a", 1.5, True, 3])
     '["a", 1.5, true, 3]'
@@ -158,7 +158,7 @@ def _value(value: Any) -> str:
         value = value.item()
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, str):  # a JSON string is a basic string of TOML but for one character
+    if isinstance(value, str):  # JSON and TOML basic strings differ in one character
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, float):
         return repr(value)

@@ -1,4 +1,4 @@
-"""The notes' calibration reports of a monument and of a mirror: one page to fill, print and sign."""
+"""Calibration report forms of the notes for a monument and a mirror, one page each."""
 
 from collections.abc import Callable, Sequence
 from datetime import datetime
@@ -24,9 +24,9 @@ from catseye.version import __version__
 
 SERVO_ROWS = 9  # an axis's position at the cube and its eight chip settings
 MATRIX_CELLS = 9
-WIDTH = 250  # of a sketch, its own units
+WIDTH = 250  # of a sketch, in its own units
 AXIS = 62.0  # length of an axis in a sketch
-DRAWN = "Turns in the sketches are drawn far too large; each is positive as drawn."
+DRAWN = "Rotations in the sketches are exaggerated; all are positive as drawn."
 STYLE = """<style>
 @page { margin: 9mm 12mm; }
 body { max-width: 186mm; padding: 8mm 0; font-size: 9.5pt; line-height: 1.3; }
@@ -65,12 +65,12 @@ svg .angle { fill: #d9641e; font-weight: 600; }
 
 
 def mark(kind: str) -> str:
-    """The text by which a page of a kind is known as ours."""
+    """Text that identifies a page of a kind as catseye's."""
     return f"<title>{FORMS[kind].title}"
 
 
 def field_report(report: Report, when: datetime) -> str:
-    """The whole page.
+    """HTML page of the form.
 
     report    filled or blank
     when      UTC, of the filling
@@ -113,7 +113,7 @@ def _rows(fields: Sequence[ReportField]) -> str:
 
 
 def _servo(axes: Sequence[Sequence[ReportField]]) -> str:
-    """Both axes' settings side by side, each a table."""
+    """Settings of both axes side by side, one table each."""
     if not axes:
         return ""
     tables = [
@@ -131,13 +131,13 @@ def _servo(axes: Sequence[Sequence[ReportField]]) -> str:
 
 def _matrix(report: Report, rule: str) -> str:
     cells = report.fields[-MATRIX_CELLS:]
-    shown = [
+    matrix_cells = [
         f"<td><span>{field.entry.name}</span><b>{text}</b></td>"
         for field, text in zip(cells, written_matrix(cells), strict=True)
     ]
-    rows = "\n".join("<tr>" + "".join(shown[row : row + 3]) + "</tr>" for row in (0, 3, 6))
-    known = [field.u for field in cells if field.u]
-    most = f"; u of an element at most {max(known):.1e}" if known else ""
+    rows = "\n".join("<tr>" + "".join(matrix_cells[row : row + 3]) + "</tr>" for row in (0, 3, 6))
+    stated = [field.u for field in cells if field.u]
+    most = f"; u of an element at most {max(stated):.1e}" if stated else ""
     return f'<h2>{rule}{most}</h2><table class="matrix"><tbody>{rows}</tbody></table>'
 
 
@@ -147,7 +147,7 @@ def _notes(report: Report) -> str:
     if missing:
         names = ", ".join(entry.name for entry in missing)
         count = f"{len(missing)} field{'' if len(missing) == 1 else 's'}"
-        blank_note = f"{count} not in the record and left blank: {escape(names)}."
+        blank_note = f"{count} missing in the record and left blank: {escape(names)}."
     lines = [escape(line) for line in report.notes.splitlines()]
     return f'<h2>NOTES</h2><div class="notes">{"<br>".join([*lines, *([blank_note] if blank_note else [])])}</div>'
 
@@ -161,7 +161,7 @@ def _origin(report: Report, when: datetime) -> str:
     )
     return (
         f"From {report.file}, SHA-256 {report.sha256}{provenance}. Printed by catseye {__version__}, "
-        f"{when:%Y-%m-%d %H:%M:%S} UTC. u is the standard uncertainty (1σ), empty where the record does not say it. "
+        f"{when:%Y-%m-%d %H:%M:%S} UTC. u is the standard uncertainty (1σ), empty where the record has none. "
         f"{DRAWN}"
     )
 
@@ -171,7 +171,7 @@ def _small(text: str) -> str:
 
 
 def sketches(kind: str) -> str:
-    """The axes and the positive senses, drawn with the same rotations that compute the matrix.
+    """Sketches of axes and positive senses, with the rotations that compute the matrix.
 
     kind   monument or mirror
     """
@@ -180,7 +180,7 @@ def sketches(kind: str) -> str:
 
 
 def _plan() -> str:
-    """The monument from above: east right, north up."""
+    """Monument from above: east right, north up."""
     o, alpha1 = np.array([96.0, 96.0]), 40.0 * DEGREE
     azimuth = np.pi - alpha1
     axes = gamma(alpha1, 0.0, 0.0)[:, :2]
@@ -201,7 +201,7 @@ def _plan() -> str:
 
 
 def _tip() -> str:
-    """The mount seen from its v-block."""
+    """Mount seen from its v-block."""
     o, alpha2 = np.array([92.0, 108.0]), 16.0 * DEGREE
 
     def axes(t: float) -> np.ndarray:
@@ -220,7 +220,7 @@ def _tip() -> str:
 
 
 def _pitch() -> str:
-    """The mount from its side, the v-block on the right."""
+    """Mount from the side, the v-block on the right."""
     o, alpha3 = np.array([92.0, 108.0]), 16.0 * DEGREE
 
     def axes(t: float) -> np.ndarray:
@@ -239,7 +239,7 @@ def _pitch() -> str:
 
 
 def _turned_plan() -> str:
-    """The mirror from above, the v-block on the right."""
+    """Mirror from above, the v-block on the right."""
     return _offset_axes(
         "From above: Δx, Δz, β₂",
         lambda t: lambda_(0.0, t * 16.0 * DEGREE)[:, [2, 0]],
@@ -251,7 +251,7 @@ def _turned_plan() -> str:
 
 
 def _turned_side() -> str:
-    """The mirror from its side, the v-block on the right."""
+    """Mirror from the side, the v-block on the right."""
     return _offset_axes(
         "Looking along x̂: Δy, Δz, β₁",
         lambda t: lambda_(t * 16.0 * DEGREE, 0.0)[:, [2, 1]],
@@ -271,9 +271,9 @@ def _offset_axes(
     rows: Sequence[int],
     third: str,
 ) -> str:
-    """Mount axes at the ball, mirror axes at the scan point, what is right of and above it positive.
+    """Mount axes at the ball and mirror axes at the scan point; right and up are positive.
 
-    axes     share of the turn to the mirror's axes (3, 2) in the sketch
+    axes     function of the share of the rotation to the mirror's axes (3, 2) in the sketch
     names    mount axes right and up, mirror axes right and up
     marks    offsets right and up, angle
     rows     of the axes drawn right and up
@@ -302,7 +302,7 @@ def _offset_axes(
 
 
 def _face() -> str:
-    """The mirror's own axes, seen from the v-block: the azimuth of the beam."""
+    """Mirror axes, seen from the v-block: azimuth of the beam."""
     o, theta = np.array([92.0, 86.0]), 50.0 * DEGREE
     return _sketch(
         "From the v-block: Θ from x̃, Φ from z̃",
@@ -326,7 +326,10 @@ def _sketch(title: str, height: int, *shapes: str) -> str:
 def _arrow(
     start: np.ndarray, direction: Sequence[float] | np.ndarray, name: str, *, old: bool = False, length: float = AXIS
 ) -> str:
-    """An axis with its name; an old one, before the turn, is faint and broken. Directions are (right, up)."""
+    """Axis with its name; an old one, before the rotation, is faint and dashed.
+
+    Directions are (right, up).
+    """
     along = np.asarray(direction, dtype=float) * (1, -1)
     tip = start + length * along
     line = f'x1="{start[0]:.1f}" y1="{start[1]:.1f}" x2="{tip[0]:.1f}" y2="{tip[1]:.1f}"'
@@ -344,18 +347,18 @@ def _turn(
     radius: float,
     named: float = 0.5,
 ) -> str:
-    """The way of a positive angle, from t = 0 to 1, with its name beside it at t = `named`."""
+    """Arc of a positive angle, from t = 0 to 1, with its name at t = `named`."""
     points = [centre + radius * np.asarray(path(t), dtype=float) * (1, -1) for t in np.linspace(0.0, 1.0, 33)]
-    way = "L".join(f"{x:.2f} {y:.2f}" for x, y in points)
+    outline = "L".join(f"{x:.2f} {y:.2f}" for x, y in points)
     out = points[round(32 * named)] - centre
     x, y = centre + out * (1 + (8 + 3 * len(name)) / np.linalg.norm(out))
     head = _head(points[-1], points[-1] - points[-2], "#d9641e")
     label = f'<text class="angle" x="{x:.1f}" y="{y:.1f}">{name}</text>'
-    return f'<path class="turn" data-angle="{name}" d="M{way}"/>{head}{label}'
+    return f'<path class="turn" data-angle="{name}" d="M{outline}"/>{head}{label}'
 
 
 def _head(tip: np.ndarray, along: np.ndarray, colour: str) -> str:
-    """The head of an arrow, as an SVG polygon."""
+    """Head of an arrow, as an SVG polygon."""
     unit = along / np.linalg.norm(along)
     side = np.array([-unit[1], unit[0]])
     corners = (tip + 3 * unit, tip - 6 * unit + 3.5 * side, tip - 6 * unit - 3.5 * side)
@@ -363,7 +366,7 @@ def _head(tip: np.ndarray, along: np.ndarray, colour: str) -> str:
 
 
 def _through(at: np.ndarray, name: str, shift: tuple[float, float], *, away: bool = False) -> str:
-    """An axis through the paper: a point when it comes, a cross when it goes."""
+    """Axis through the paper: a dot towards the viewer, a cross away."""
     x, y = at
     ring = f'<circle cx="{x}" cy="{y}" r="6" fill="#fff" stroke="#1f5a99" stroke-width="1.6"/>'
     cross = f'<path d="M{x - 4} {y - 4}L{x + 4} {y + 4}M{x - 4} {y + 4}L{x + 4} {y - 4}" stroke="#1f5a99"/>'

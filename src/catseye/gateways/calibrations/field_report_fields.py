@@ -1,4 +1,4 @@
-"""The fields of the notes' two calibration reports, in their printed order, filled from a record or blank."""
+"""Fields of the notes' two calibration reports, in printed order, filled or blank."""
 
 import math
 from collections.abc import Callable
@@ -17,21 +17,21 @@ from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry
 
 LEAST_PLACES = 6  # decimals of a matrix, as the notes print them
-U_OF_ANY_PHASE = math.pi / math.sqrt(3.0)  # rad: nothing is known of an angle, uniform over a turn
+U_OF_ANY_PHASE = math.pi / math.sqrt(3.0)  # rad: unknown angle, uniform over a turn
 HEADED = 3  # fields in the form's head: number, date, initials
 SUBSCRIPTS = "₁₂₃"
 
 
 @dataclass(frozen=True)
 class ReportEntry:
-    """A field as the form has it.
+    """Field of the form.
 
-    name    as the notes print it
-    key     of the record
-    unit    of the value; none for text and for the motion chip's plain integers
-    u       key of its standard uncertainty, if the record has one
-    sense   what is positive, or what it is
-    aid     how a person reads the angle too: dms or arcsec
+    name    as printed in the notes
+    key     key in the record
+    unit    unit of the value; empty for text and for the motion chip's integers
+    u       key of the standard uncertainty, if the record has one
+    sense   positive direction, or description
+    aid     additional notation of an angle: dms or arcsec
     """
 
     name: str
@@ -44,7 +44,7 @@ class ReportEntry:
 
 @dataclass(frozen=True)
 class Form:
-    """One of the two reports: its title and place in the notes, its fields and the matrix at its end."""
+    """Report form: title and place in the notes, fields, matrix."""
 
     title: str
     figure: str
@@ -60,7 +60,7 @@ class Form:
 
 @dataclass(frozen=True)
 class ReportField:
-    """A field with what the record says: value None where it says nothing, u None where it is not known."""
+    """Field with its value from the record; value and u are None where missing."""
 
     entry: ReportEntry
     value: Any = None
@@ -69,13 +69,13 @@ class ReportField:
 
 @dataclass(frozen=True)
 class Report:
-    """A form filled from a record, or blank.
+    """Form filled from a record, or blank.
 
     kind         monument or mirror
     file         name of the record's file, empty for a blank form
-    sha256       of that file
+    sha256       hash of that file
     fields       in the form's order, the matrix last
-    provenance   of the record: when, by whom, until when, from which report
+    provenance   of the record: date, person, validity, report
     notes        of the record
     """
 
@@ -88,12 +88,12 @@ class Report:
 
     @property
     def missing(self) -> tuple[ReportEntry, ...]:
-        """What the record does not say; a blank form misses nothing."""
+        """Entries missing in the record; empty for a blank form."""
         return tuple(field.entry for field in self.fields if field.value is None) if self.file else ()
 
 
 def _servo(axis: int) -> tuple[ReportEntry, ...]:
-    """The motion chip's settings of an axis, 0 azimuth, 1 elevation."""
+    """Motion chip settings of an axis, 0 azimuth, 1 elevation."""
     commands = (
         ("ABV", "velocity", "2⁻¹⁶ counts/sample"),
         ("ABA", "acceleration", "2⁻¹⁶ counts/sample²"),
@@ -188,12 +188,12 @@ PROVENANCE = ("serial", "measured_on", "valid_until", "by", "report")
 
 
 def read_report(kind: str, path: Path) -> Report:
-    """The form of a kind, filled from the record in a TOML file.
+    """Form of a kind, filled from the record in a TOML file.
 
     kind    monument or mirror
     path    of the record
 
-    Raises InputError where the file is missing or is no such record.
+    Raises InputError if the file is missing or not a record of this kind.
     """
     folder = Folder(path.parent)
     record = folder.record(path.name, FORMS[kind].record)
@@ -204,12 +204,12 @@ def read_report(kind: str, path: Path) -> Report:
 
 
 def blank_report(kind: str) -> Report:
-    """The form of a kind with nothing in it."""
+    """Blank report form of a kind."""
     return Report(kind, "", "", _filled(FORMS[kind], None), {})
 
 
 def report_object(report: Report, written: str | None) -> dict[str, Any]:
-    """A report as `catseye certificate --json` gives it; units stand beside the values, null where nothing is said.
+    """Object that `catseye certificate --json` prints; units beside the values, null if missing.
 
     written   path of the page, as the user gave it
     """
@@ -228,7 +228,7 @@ def report_object(report: Report, written: str | None) -> dict[str, Any]:
 
 
 def written_value(field: ReportField) -> str:
-    """A value with the digits that belong to its u; as the record has it where u is not known.
+    """Value with the digits that its u justifies; as in the record if u is unknown.
 
     >>> at = ReportEntry("x", "x_mm", "mm")
     >>> [written_value(ReportField(at, value, u)) for value, u in ((29503.7431, 0.1), (-2.4e-5, None), (12, 0.3))]
@@ -243,14 +243,14 @@ def written_value(field: ReportField) -> str:
 
 
 def written_u(field: ReportField) -> str:
-    """Its standard uncertainty with two digits; held where it is zero, which fixes a coordinate."""
+    """Standard uncertainty with two digits; "held" where it is zero, for a fixed coordinate."""
     if field.u is None or field.value is None:
         return ""
     return rounded(0.0, field.u)[1] if field.u else "held"
 
 
 def written_aid(field: ReportField) -> str:
-    """The same angle in degrees, minutes and seconds, or in seconds alone.
+    """Angle in degrees, minutes and seconds, or in seconds only.
 
     >>> written_aid(ReportField(ReportEntry("azimuth", "azimuth_deg", "deg", aid="dms"), 122.19722))
     '122° 11′ 50.0″'
@@ -259,41 +259,41 @@ def written_aid(field: ReportField) -> str:
         return ""
     seconds = field.value * (1.0 if field.entry.unit == "rad" else DEGREE) / ARCSECOND
     if field.entry.aid == "arcsec":
-        return f"{round(seconds, 1) + 0.0:+.1f}″"  # + 0.0 makes minus zero plain zero
+        return f"{round(seconds, 1) + 0.0:+.1f}″"  # + 0.0 turns minus zero into zero
     minutes, tenths = divmod(round(abs(seconds) * 10.0), 600)
     return f"{'-' if seconds < -0.05 else ''}{minutes // 60}° {minutes % 60:02d}′ {tenths / 10.0:04.1f}″"
 
 
 def written_matrix(fields: tuple[ReportField, ...]) -> list[str]:
-    """The elements with one number of decimals, that of the greatest u among them, six at least."""
+    """Elements with the decimals of the largest u among them, at least six."""
     if fields[0].value is None:
         return ["" for _ in fields]
-    known = [field.u for field in fields if field.u]
-    places = max(LEAST_PLACES, len(rounded(0.0, max(known))[0].partition(".")[2]) if known else 0)
+    stated = [field.u for field in fields if field.u]
+    places = max(LEAST_PLACES, len(rounded(0.0, max(stated))[0].partition(".")[2]) if stated else 0)
     return [f"{round(field.value, places) + 0.0:.{places}f}" for field in fields]
 
 
 def _filled(form: Form, record: Any) -> tuple[ReportField, ...]:
-    """Every field of the form, the matrix last."""
+    """Fields of the form, the matrix last."""
     stated = [ReportField(e, getattr(record, e.key, None), _uncertainty(e, record)) for e in form.entries]
     return (*stated, *_matrix(form, record))
 
 
 def _uncertainty(entry: ReportEntry, record: Any) -> float | None:
-    """u of a field in its own unit."""
+    """Standard uncertainty of a field in its own unit."""
     u = getattr(record, entry.u, None) if entry.u else None
     if u is None or getattr(record, entry.key) is None:
         return None
     if entry.key == "azimuth_deg":
         return float(u) / DEGREE
-    if entry.key == "leakage_phase_rad":  # each quadrature has u; a phasor lost in it may have any phase
+    if entry.key == "leakage_phase_rad":  # each quadrature has u; the phase of a phasor below u is arbitrary
         amplitude = record.leakage_amplitude_volt
         return min(u / amplitude, U_OF_ANY_PHASE) if amplitude else U_OF_ANY_PHASE
     return float(u)
 
 
 def _matrix(form: Form, record: Any) -> tuple[ReportField, ...]:
-    """The nine direction cosines, row by row, with the u that those of the angles give them."""
+    """The nine direction cosines, row by row, with u propagated from the angles."""
     entries = [
         ReportEntry(f"{form.symbol}{SUBSCRIPTS[i]}{SUBSCRIPTS[j]}", f"{form.matrix}_{i + 1}{j + 1}")
         for i in range(3)
@@ -304,7 +304,7 @@ def _matrix(form: Form, record: Any) -> tuple[ReportField, ...]:
     angles = np.array([getattr(record, key) for key in form.angles])
     u = [getattr(record, key, None) for key in form.u_angles]
     values = form.turned(*angles).ravel()
-    if any(each is None for each in u):
+    if any(value is None for value in u):
         return tuple(ReportField(e, float(value)) for e, value in zip(entries, values, strict=True))
     spread = matrix_uncertainty(form.turned, angles, np.array(u, dtype=float)).ravel()
     return tuple(ReportField(e, float(v), float(s)) for e, v, s in zip(entries, values, spread, strict=True))
@@ -313,12 +313,12 @@ def _matrix(form: Form, record: Any) -> tuple[ReportField, ...]:
 def matrix_uncertainty(turned: Callable[..., np.ndarray], angles: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Standard uncertainties (3, 3) of a rotation matrix's elements.
 
-    turned    function of the angles that gives the matrix
+    turned    function from the angles to the matrix
     angles    (n,), rad
     u         (n,), rad, of each angle, independent
 
-    Source: [JCGM100] eq. 10. The derivatives are exact: each element is a cos t + b sin t + c of every angle t, whose
-    derivative is half the difference of its values a quarter turn ahead and behind.
+    Source: [JCGM100] eq. 10. The derivatives are exact: in each angle t an element is a cos t + b sin t + c, whose
+    derivative is half the difference of its values at t ± a quarter turn.
     """
     quarter = 0.5 * math.pi * np.eye(len(angles))
     slopes = np.array([0.5 * (turned(*(angles + q)) - turned(*(angles - q))) for q in quarter])

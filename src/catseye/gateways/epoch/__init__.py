@@ -1,1 +1,1 @@
-"""One night on the way out: ranges, coordinates, surface and pose as files, figures, words and pages."""
+"""Output of one night: ranges, coordinates, surface and pose as files, figures and text."""

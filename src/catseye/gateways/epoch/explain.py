@@ -1,4 +1,4 @@
-"""A shot explained, as an object for programs and as lines for people."""
+"""Explanation of a shot as JSON and as text lines."""
 
 from datetime import datetime, timedelta
 from typing import Any
@@ -14,18 +14,18 @@ from catseye.records.night.campaign import REFERENCE
 from catseye.reduction.budget.explanation import Explanation
 
 MICROMETRE = 1e-6
-LIKELY_SLIP = 1e-6  # probability of another number of whole cycles that is worth a word
-SMALLEST_SHARE = 5e-5  # of a line in the text's table
+LIKELY_SLIP = 1e-6  # least probability of a wrong cycle count that is reported
+SMALLEST_SHARE = 5e-5  # of a row in the text table
 START_OF_MJD = datetime(1858, 11, 17)
 
 
 def explanation_object(explanation: Explanation, seed: int | None = None) -> dict[str, Any]:
-    """An explanation as `catseye explain --json` gives it: metres, shares of 1, null where there is nothing to tell.
+    """Object that `catseye explain --json` prints: metres, shares of 1, null where undefined.
 
-    seed   of the Monte Carlo, where there was one
+    seed   of the Monte Carlo, if one was run
 
-    An input's value and standard uncertainty are in its unit, its sensitivity is metres a unit, its contribution
-    metres. Infinite degrees of freedom are null, and `agrees` where the draws are too few to tell.
+    An input's value and standard uncertainty are in its unit, its sensitivity in metres per unit, its contribution
+    in metres. Infinite degrees of freedom are null, and so is `agrees` if there are too few draws.
     """
     budget, cycles = explanation.budget, explanation.cycles
     return {
@@ -59,21 +59,21 @@ def explanation_object(explanation: Explanation, seed: int | None = None) -> dic
 
 
 def explanation_verdict(explanation: Explanation) -> Verdict:
-    """Whether the shot has a range that its own chain and the network bear out."""
+    """Verdict on the shot's range from its own chain and the network."""
     if explanation.budget is None:
         if explanation.status == "reference":
-            return Verdict("good", "a reference shot, which follows the electronics and has no range of its own")
+            return Verdict("good", "a reference shot, which tracks the electronics and has no range")
         return Verdict("failed", f"no range: {explanation.reason or explanation.status}")
     if explanation.reason:
-        return Verdict("doubtful", f"left out of the adjustment: {explanation.reason}")
+        return Verdict("doubtful", f"excluded from the adjustment: {explanation.reason}")
     if explanation.cycles is not None and float(explanation.cycles.slip_probability) > LIKELY_SLIP:
         chance = float(explanation.cycles.slip_probability)
-        return Verdict("doubtful", f"the number of whole cycles is another with a probability of {chance:.1e}")
+        return Verdict("doubtful", f"the number of whole cycles is wrong with a probability of {chance:.1e}")
     if explanation.scattered is not None and agreement(explanation.budget, explanation.scattered, digits=1) is False:
-        return Verdict("doubtful", "the budget differs from its Monte Carlo: believe the Monte Carlo")
+        return Verdict("doubtful", "the budget differs from its Monte Carlo: use the Monte Carlo")
     if explanation.adjusted is None:
-        return Verdict("doubtful", "no adjustment stands behind it, so nothing checks it")
-    return Verdict("good", "it took part in the adjustment, which bears it out")
+        return Verdict("doubtful", "there is no adjustment to check it")
+    return Verdict("good", "used in the adjustment, which confirms it")
 
 
 def _inputs(explanation: Explanation) -> list[dict[str, Any]]:
@@ -143,7 +143,7 @@ def _adjusted(explanation: Explanation) -> dict[str, Any] | None:
 
 
 def explanation_passages(explanation: Explanation) -> list[Passage]:
-    """The shot, its return, its range, cycles, Monte Carlo, the network's word, and what else there is to know."""
+    """Passages on the shot, its return, range, cycles, Monte Carlo and network."""
     passages = [Passage(f"Shot {explanation.shot}", _shot(explanation)), Passage("The return", _return(explanation))]
     if explanation.budget is not None:
         passages += [Passage("The range", _range(explanation)), Passage("Whole cycles", _cycles(explanation))]
@@ -161,17 +161,17 @@ def when(explanation: Explanation) -> str:
 
 
 def metres(length: float) -> str:
-    """A length with micrometres, in groups of three.
+    """Length to micrometres, in groups of three digits.
 
     >>> metres(71.1038541)
     '71.103\u202f854 m'
     """
-    whole, _, decimals = f"{length:.6f}".partition(".")
-    return f"{whole}.{decimals[:3]}\u202f{decimals[3:]} m"
+    integer, _, decimals = f"{length:.6f}".partition(".")
+    return f"{integer}.{decimals[:3]}\u202f{decimals[3:]} m"
 
 
 def micrometres(u: float) -> str:
-    """A small length with two or three digits.
+    """Small length with two or three digits.
 
     >>> micrometres(7.8169e-5), micrometres(-3.4e-6)
     ('78 µm', '-3.4 µm')
@@ -180,19 +180,19 @@ def micrometres(u: float) -> str:
     return f"{size:.0f} µm" if abs(size) >= 10.0 else f"{size:.1f} µm"
 
 
-def distribution(given: Input) -> str:
-    """Its name, with the degrees of freedom where they are finite."""
-    degrees = given.degrees_of_freedom
-    return given.distribution + (f", {degrees:.0f}" if np.isfinite(degrees) else "")
+def distribution(quantity: Input) -> str:
+    """Name of the distribution, with its degrees of freedom if finite."""
+    degrees = quantity.degrees_of_freedom
+    return quantity.distribution + (f", {degrees:.0f}" if np.isfinite(degrees) else "")
 
 
 def _shot(explanation: Explanation) -> str:
     what = "its internal cube" if explanation.target == REFERENCE else explanation.target
     start = f"{explanation.ranger} on {what} at {when(explanation)}. "
     if explanation.status == "used":
-        return start + "It took part in the adjustment."
+        return start + "It was used in the adjustment."
     if explanation.status == "reference":
-        return start + "It follows the drift of the electronics; a range it gives none."
+        return start + "It tracks the drift of the electronics and has no range."
     meaning = MEANING.get(explanation.status, "")
     meaning = f" ({meaning})" if explanation.reason and meaning and meaning not in explanation.reason else ""
     return start + (
@@ -206,7 +206,7 @@ def _return(explanation: Explanation) -> str:
         return f"{amplitude:.4f} V after the leakage; its noise is unknown."
     return (
         f"{amplitude:.4f} V after the leakage, phase {np.mod(np.angle(explanation.phasor), 2.0 * np.pi):.4f} rad; "
-        f"noise of the samples across it {1e3 * explanation.u_across:.2f} mV, that is "
+        f"noise of the samples in quadrature {1e3 * explanation.u_across:.2f} mV, that is "
         f"{1e3 * explanation.u_across / amplitude:.2f} mrad."
     )
 
@@ -220,7 +220,7 @@ def _range(explanation: Explanation) -> str:
         f"{metres(budget.value)}, u {micrometres(budget.u)}, scan point to reference point as this shot alone gives "
         f"it; with {100.0 * budget.probability:g} % within ±{micrometres(budget.expanded)} "
         f"(k {budget.coverage_factor:.2f}, {many} degrees of freedom)."
-        + (" That knows nothing of what this shot was rejected for." if explanation.reason else "")
+        + (" It does not include the reason for which this shot was rejected." if explanation.reason else "")
     )
 
 
@@ -239,7 +239,7 @@ def _cycles(explanation: Explanation) -> str:
 
 def _shared(explanation: Explanation) -> str:
     pairs = [f"{c['first']} and {c['second']}: {c['correlation']:+.2f}" for c in _correlations(explanation)]
-    return "What acts on target and references alike, such as leakage, is one input; " + (
+    return "An effect common to target and references, such as leakage, is one input; " + (
         f"correlated are {', '.join(pairs)}." if pairs else "no two inputs are correlated."
     )
 
@@ -250,7 +250,7 @@ def _scatter(explanation: Explanation) -> str:
     assert budget is not None
     verdict = {
         True: "the budget's interval agrees",
-        False: "the budget's interval differs: believe this one",
+        False: "the budget's interval differs: use this one",
         None: "too few draws to compare the budget's interval",
     }[agreement(budget, scattered, digits=1)]
     u = f"u {micrometres(scattered.u)}" if np.isfinite(scattered.u) else "too few cycles for a u"
@@ -274,23 +274,23 @@ def _network(explanation: Explanation) -> str:
 
 
 def budget_lines(explanation: Explanation) -> list[str]:
-    """The table of inputs for a terminal, largest share first, the smallest in one line."""
+    """Table of inputs for a terminal, by share; the smallest are combined in one line."""
     budget = explanation.budget
     if budget is None:
         return []
     lines = [f"{'share %':>7} {'µm':>7}  {'input':<35}{'value':>11}{'u':>10} {'unit':<5}{'mm/unit':>10}  distribution"]
     order = np.argsort(-np.abs(budget.share), kind="stable")
-    shown = [k for k in order if abs(budget.share[k]) >= SMALLEST_SHARE]
-    for k in shown:
-        item, given = explanation.items[k], explanation.items[k].given
+    listed = [k for k in order if abs(budget.share[k]) >= SMALLEST_SHARE]
+    for k in listed:
+        item, quantity = explanation.items[k], explanation.items[k].given
         lines.append(
-            f"{100.0 * budget.share[k]:7.2f} {abs(budget.contribution[k]) / MICROMETRE:7.2f}  {given.name:<35}"
-            f"{given.value:>11.6g}{given.u:>10.2g} {item.unit:<5}{item.slope / MILLIMETRE:>10.4g}  "
-            f"{distribution(given)}"
+            f"{100.0 * budget.share[k]:7.2f} {abs(budget.contribution[k]) / MICROMETRE:7.2f}  {quantity.name:<35}"
+            f"{quantity.value:>11.6g}{quantity.u:>10.2g} {item.unit:<5}{item.slope / MILLIMETRE:>10.4g}  "
+            f"{distribution(quantity)}"
         )
-    rest = [k for k in order if k not in set(shown)]
-    if rest:
-        size = float(np.sqrt(np.sum(budget.contribution[rest] ** 2))) / MICROMETRE
-        share = 100.0 * float(budget.share[rest].sum())
-        lines.append(f"{share:7.2f} {size:7.2f}  {len(rest)} smaller inputs (--json or --page)")
+    small = [k for k in order if k not in set(listed)]
+    if small:
+        size = float(np.sqrt(np.sum(budget.contribution[small] ** 2))) / MICROMETRE
+        share = 100.0 * float(budget.share[small].sum())
+        lines.append(f"{share:7.2f} {size:7.2f}  {len(small)} smaller inputs (--json or --page)")
     return [*lines, f"{100.0:7.2f} {budget.u / MICROMETRE:7.2f}  together"]

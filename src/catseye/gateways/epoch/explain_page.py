@@ -1,4 +1,4 @@
-"""A shot explained on one page that needs nothing else: budget, Monte Carlo, every input with its source."""
+"""Explanation of a shot on one self-contained page: budget, Monte Carlo, inputs and sources."""
 
 from datetime import datetime
 from html import escape
@@ -24,7 +24,7 @@ from catseye.records.night.campaign import Campaign
 from catseye.reduction.budget.explanation import Explanation
 from catseye.reduction.budget.scene import Assumptions
 
-MARK = "<title>catseye: shot "  # tells our pages from others' files
+MARK = "<title>catseye: shot "  # identifies a page of catseye
 WIDE = 4.5  # standard uncertainties on either side in the histogram
 GROUPS = (
     ("the samples", SERIES[0], ("noise", "amplitude", "steps")),
@@ -40,9 +40,9 @@ GROUPS = (
 
 
 def explanation_page(explanation: Explanation, campaign: Campaign, made_at: datetime) -> str:
-    """The whole page.
+    """HTML page.
 
-    campaign   that the shot is of
+    campaign   of the shot
     made_at    UTC
     """
     name = campaign.site.campaign.name
@@ -65,7 +65,7 @@ def explanation_page(explanation: Explanation, campaign: Campaign, made_at: date
 
 
 def figures(explanation: Explanation) -> dict[str, Figure]:
-    """The budget's contributions and, after a Monte Carlo, its histogram."""
+    """Contributions of the budget and, after a Monte Carlo, its histogram."""
     with styled():
         drawn = {"contributions": _contributions(explanation)}
         if explanation.scattered is not None:
@@ -102,7 +102,7 @@ def _contributions(explanation: Explanation) -> Figure:
     ax.invert_yaxis()
     ax.set_xlim(0.0, 1.16 * max(budget.u / MICROMETRE, float(size.max(initial=0.0))))
     ax.grid(axis="y", visible=False)
-    ax.set_xlabel("contribution to the standard uncertainty, µm (beside: share of its square)")
+    ax.set_xlabel("contribution to the standard uncertainty, µm (right: share of variance)")
     used = {_colour(explanation.items[k].key) for k in order}
     handles = [mpl.patches.Patch(color=colour, label=name) for name, colour, _ in GROUPS if colour in used]
     ax.legend(handles=handles, loc="lower right")
@@ -133,7 +133,7 @@ def _histogram(explanation: Explanation) -> Figure:
             ax.axvspan(d - wide, d + wide, color=SERIES[2] + "22", lw=0)
             ax.axvline(d, color=SERIES[2], lw=1.4, label="adjusted distance, ± u")
         else:
-            ax.plot([], [], color=BAD, label=f"adjusted distance {micrometres(d * MICROMETRE)} off, out of the picture")
+            ax.plot([], [], color=BAD, label=f"adjusted distance {micrometres(d * MICROMETRE)} off, outside the figure")
     ax.set_xlim(-WIDE * u, WIDE * u)
     ax.set_ylim(0.0, None)
     ax.set_yticks([])
@@ -145,12 +145,12 @@ def _histogram(explanation: Explanation) -> Figure:
 
 def _cards(explanation: Explanation) -> str:
     budget, cycles = explanation.budget, explanation.cycles
-    cards = [card("Status", explanation.status, explanation.reason or "nothing speaks against this shot")]
+    cards = [card("Status", explanation.status, explanation.reason or "no objection to this shot")]
     if budget is not None and cycles is not None:
         biggest = explanation.items[int(np.argmax(np.abs(budget.share)))].given.name
         cards += [
             card("Range", metres(budget.value), "before any adjustment, scan point to reference point"),
-            card("Standard uncertainty", micrometres(budget.u), f"most of it: {biggest}"),
+            card("Standard uncertainty", micrometres(budget.u), f"largest part: {biggest}"),
             card(
                 f"{100.0 * budget.probability:g} % interval",
                 f"± {micrometres(budget.expanded)}",
@@ -165,28 +165,28 @@ def _budget(explanation: Explanation, drawn: str) -> str:
     assert budget is not None
     rows = []
     for k in np.argsort(-np.abs(budget.share), kind="stable"):
-        item, given = explanation.items[k], explanation.items[k].given
+        item, quantity = explanation.items[k], explanation.items[k].given
         rows.append(
             (
-                given.name,
-                f"{given.value:.7g} {item.unit}",
-                f"{given.u:.2g}",
-                distribution(given),
+                quantity.name,
+                f"{quantity.value:.7g} {item.unit}",
+                f"{quantity.u:.2g}",
+                distribution(quantity),
                 f"{item.slope / MILLIMETRE:.4g}",
                 f"{budget.contribution[k] / MICROMETRE:+.2f}",
                 f"{100.0 * budget.share[k]:.2f}",
                 item.source,
             )
         )
-    columns = ("input", "value", "u", "distribution", "mm a unit", "µm", "share, %", "source")
+    columns = ("input", "value", "u", "distribution", "mm per unit", "µm", "share, %", "source")
     return section(
         "budget",
         "Budget",
-        picture(drawn, "What each input adds to the standard uncertainty of this range."),
+        picture(drawn, "Contribution of each input to the standard uncertainty of this range."),
         table(columns, rows, "tnntnnnw"),
         paragraph(
-            "µm: slope times u, with its sign. A share of zero is an effect of second order, or one that this head's "
-            "sheet gives no coupling for.",
+            "µm: slope times u, with its sign. A share of zero is a second-order effect, or one for which this head's "
+            "sheet has no coupling.",
             "faint",
         ),
     )
@@ -199,10 +199,10 @@ def _scattered(drawn: str | None) -> str:
         "monte-carlo",
         "Monte Carlo",
         paragraph(
-            "Every input drawn from its distribution and carried through the whole chain, nothing linearised: noise on "
+            "Every input drawn from its distribution and propagated through the chain, not linearised: noise on "
             "the phasors, a path of the drifting electronics, the air along the path, the glass and its tilt."
         ),
-        picture(drawn, "Draws of the range against the budget's normal law."),
+        picture(drawn, "Draws of the range against the budget's normal distribution."),
     )
 
 
@@ -225,6 +225,6 @@ def _provenance(explanation: Explanation, campaign: Campaign, made_at: datetime)
     return section(
         "provenance",
         "Provenance",
-        folded("Versions and assumptions", table(("what", "value"), rows.items(), "tt")),
+        folded("Versions and assumptions", table(("item", "value"), rows.items(), "tt")),
         folded("SHA-256 of the files read", table(("file", "SHA-256"), campaign.hashes.items(), "th")),
     )

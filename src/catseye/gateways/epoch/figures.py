@@ -20,13 +20,13 @@ COLOURS = {
     "benchmark": "#b08a1e",
 }
 MARKERS = {"ground ranger": "^", "feed-arm ranger": "s", "structure": "D", "benchmark": "o"}
-CROWD = 300  # points, or prisms, from which colour alone tells of each: no name, number or ellipsoid
-PIXELS = 2000  # marks or lines from which they are drawn as pixels: a page of lines would take megabytes
-LOOSE = 1.0 * MILLIMETRE  # u of a coordinate beyond which the ranges do not hold it and no ellipsoid is drawn
+CROWD = 300  # points or prisms from which only colour is shown: no name, number or ellipsoid
+PIXELS = 2000  # marks or lines from which they are rasterised, to limit the page's size
+LOOSE = 1.0 * MILLIMETRE  # u above which a coordinate is not determined by the ranges: no ellipsoid
 
 
 def figures(reduction: Reduction) -> dict[str, Figure]:
-    """Every figure of the report by its name."""
+    """Figures of the report, by name."""
     with styled():
         drawn = {
             "plan": _plan(reduction),
@@ -43,22 +43,22 @@ def figures(reduction: Reduction) -> dict[str, Figure]:
 
 
 def _view(reduction: Reduction, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, 2) and covariances (n, 2, 2) seen along a direction; `axes` (2, 3) are the page's."""
+    """Points (n, 2) and covariances (n, 2, 2) projected along a direction; `axes` (2, 3) span the page."""
     coordinates = reduction.coordinates
     return coordinates.x @ axes.T, axes @ coordinates.joint.blocks @ axes.T
 
 
 def _draw_network(ax, reduction: Reduction, axes: np.ndarray, rows: Sequence[int], share: float) -> None:
-    """Points by kind with the outlines of their ellipsoids, enlarged the usual one to `share` of the view."""
+    """Draw points by kind with ellipsoids, scaled so that the median one has `share` of the view."""
     kinds = list(kinds_of(reduction).values())
     where, covariance = _view(reduction, axes)
     values, vectors = np.linalg.eigh(covariance)
     sigma = np.sqrt(np.maximum(values, 0.0))
-    held = np.array([r for r in rows if sigma[r, 1] < LOOSE], dtype=int)
+    sure = np.array([r for r in rows if sigma[r, 1] < LOOSE], dtype=int)
     loose = np.array([r for r in rows if sigma[r, 1] >= LOOSE], dtype=int)
     extent = float(np.max(np.ptp(where[list(rows)], axis=0)))
     for kind, colour in COLOURS.items():
-        of_kind = [r for r in held if kinds[r] == kind]
+        of_kind = [r for r in sure if kinds[r] == kind]
         if of_kind:
             marker = MARKERS.get(kind, "o")
             size = 22 if kind in MARKERS else 9 if len(of_kind) <= CROWD else 4
@@ -72,17 +72,17 @@ def _draw_network(ax, reduction: Reduction, axes: np.ndarray, rows: Sequence[int
             label=f"u above {LOOSE / MILLIMETRE:g} mm: no ellipsoid",
         )  # fmt: skip
     ax.set_aspect("equal")
-    if len(rows) > CROWD:  # the many are dots
-        held = np.array([r for r in held if kinds[r] != "dish prism"], dtype=int)
-    if not len(held):
+    if len(rows) > CROWD:  # crowded: prisms as dots
+        sure = np.array([r for r in sure if kinds[r] != "dish prism"], dtype=int)
+    if not len(sure):
         return
-    usual = float(np.median(sigma[held, 1]))
+    usual = float(np.median(sigma[sure, 1]))
     scale = nice(share * extent / usual) if usual > 0.0 else 1.0
-    angle = np.degrees(np.arctan2(vectors[held, 1, 1], vectors[held, 0, 1]))
+    angle = np.degrees(np.arctan2(vectors[sure, 1, 1], vectors[sure, 0, 1]))
     outline = EllipseCollection(
-        2 * scale * sigma[held, 1], 2 * scale * sigma[held, 0], angle, units="xy", offsets=where[held],
-        offset_transform=ax.transData, facecolors=[COLOURS.get(kinds[r], INK) + "30" for r in held],
-        edgecolors=[COLOURS.get(kinds[r], INK) for r in held], linewidths=0.7, zorder=2,
+        2 * scale * sigma[sure, 1], 2 * scale * sigma[sure, 0], angle, units="xy", offsets=where[sure],
+        offset_transform=ax.transData, facecolors=[COLOURS.get(kinds[r], INK) + "30" for r in sure],
+        edgecolors=[COLOURS.get(kinds[r], INK) for r in sure], linewidths=0.7, zorder=2,
     )  # fmt: skip
     ax.add_collection(outline)
     reference = nice(usual)
@@ -109,7 +109,7 @@ def _beams(ax, reduction: Reduction, axes: np.ndarray) -> None:
 
 
 def _rows(reduction: Reduction) -> list[int]:
-    """Points to draw: all but the fixed points, which hide behind their scan points."""
+    """Rows to draw: all but the fixed points, which coincide with their scan points."""
     return [row for row, kind in enumerate(kinds_of(reduction).values()) if kind != "fixed point"]
 
 
@@ -163,25 +163,25 @@ def _feed_arm(reduction: Reduction) -> Figure | None:
     if not rows:
         return None
     figure = Figure(figsize=(9.4, 4.9), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
-    _draw_network(left, reduction, np.eye(3)[:2], rows, 0.06)
-    left.set_xlabel("x, east (m)")
-    left.set_ylabel("y, north (m)")
-    left.margins(0.22)
+    plan, bars = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
+    _draw_network(plan, reduction, np.eye(3)[:2], rows, 0.06)
+    plan.set_xlabel("x, east (m)")
+    plan.set_ylabel("y, north (m)")
+    plan.margins(0.22)
     for row in rows:
-        left.annotate(
+        plan.annotate(
             names[row], reduction.coordinates.x[row, :2], xytext=(0, 17), textcoords="offset points", ha="center",
             va="bottom", fontsize=8, color=COLOURS["feed-arm ranger"],
         )  # fmt: skip
     u = reduction.coordinates.u[rows] / MILLIMETRE
     at = np.arange(len(rows))
     for i, label in enumerate(("x, east", "y, north", "z, up")):
-        right.barh(at + 0.25 * (i - 1), u[:, i], 0.22, color=SERIES[i], label=label)
-    right.set_yticks(at, [names[row] for row in rows])
-    right.invert_yaxis()
-    right.grid(visible=False, axis="y")
-    right.set_xlabel("standard uncertainty (mm)")
-    figure.legend(*right.get_legend_handles_labels(), loc="outside lower right", ncols=3)
+        bars.barh(at + 0.25 * (i - 1), u[:, i], 0.22, color=SERIES[i], label=label)
+    bars.set_yticks(at, [names[row] for row in rows])
+    bars.invert_yaxis()
+    bars.grid(visible=False, axis="y")
+    bars.set_xlabel("standard uncertainty (mm)")
+    figure.legend(*bars.get_legend_handles_labels(), loc="outside lower right", ncols=3)
     return figure
 
 
@@ -192,14 +192,14 @@ def _minutes(reduction: Reduction, mjd: np.ndarray) -> np.ndarray:
 def _residuals(reduction: Reduction) -> Figure:
     ranges, shots = reduction.coordinates.ranges, reduction.campaign.shots
     figure = Figure(figsize=(9.4, 3.9), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
+    plot, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
     minutes = _minutes(reduction, shots.mjd_utc[ranges.shot])
     residual = ranges.residual / MILLIMETRE
     ground = np.array([name in reduction.campaign.monuments for name in ranges.ranger])
     for mine, kind in ((ground, "ground ranger"), (~ground, "feed-arm ranger")):
         mine = mine & ranges.used
         many = bool(mine.sum() > PIXELS)
-        left.scatter(
+        plot.scatter(
             minutes[mine], residual[mine], s=2 if many else 8, c=COLOURS[kind], lw=0, alpha=0.4 if many else 0.75,
             label=f"{kind}s", rasterized=many,
         )  # fmt: skip
@@ -209,12 +209,12 @@ def _residuals(reduction: Reduction) -> Figure:
         mine = out & ((residual > 0) == up)
         label = f"rejected (to {np.max(np.abs(residual[out]), initial=0.0):.1f} mm, beyond the edge)" if up else None
         edge = np.clip(residual[mine], -0.94 * span, 0.94 * span)
-        left.scatter(minutes[mine], edge, s=26, c=BAD, marker=marker, lw=0, label=label if np.any(out) else None)
-    left.set_ylim(-span, span)
-    left.set_title("Residuals of the ranges")
-    left.set_xlabel("minutes after the first shot")
-    left.set_ylabel("observed minus adjusted (mm)")
-    figure.legend(*left.get_legend_handles_labels(), loc="outside lower left", ncols=3)
+        plot.scatter(minutes[mine], edge, s=26, c=BAD, marker=marker, lw=0, label=label if np.any(out) else None)
+    plot.set_ylim(-span, span)
+    plot.set_title("Residuals of the ranges")
+    plot.set_xlabel("minutes after the first shot")
+    plot.set_ylabel("observed minus adjusted (mm)")
+    figure.legend(*plot.get_legend_handles_labels(), loc="outside lower left", ncols=3)
 
     w = ranges.standardised[ranges.used]
     edges = np.arange(-4.0, 4.01, 0.4)
@@ -316,11 +316,11 @@ def _weather(reduction: Reduction) -> Figure:
         (weather.humidity_percent, "humidity (%)"),
     )
     for ax, (values, label) in zip(panels, columns, strict=True):
-        for i, each in enumerate(site.weather_station):
-            there = station == each.name
+        for i, device in enumerate(site.weather_station):
+            readings = station == device.name
             ax.plot(
-                minutes[there], values[there], "-" if there.sum() > PIXELS / 4 else ".-", ms=2.5, lw=0.7,
-                color=SERIES[i % len(SERIES)], label=f"{each.name}, {each.elevation_m:.0f} m above sea level",
+                minutes[readings], values[readings], "-" if readings.sum() > PIXELS / 4 else ".-", ms=2.5, lw=0.7,
+                color=SERIES[i % len(SERIES)], label=f"{device.name}, {device.elevation_m:.0f} m above sea level",
             )  # fmt: skip
         ax.set_ylabel(label)
         ax.ticklabel_format(useOffset=False)

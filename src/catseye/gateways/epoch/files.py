@@ -1,4 +1,4 @@
-"""All files of a reduction, written into a directory."""
+"""Write all files of a reduction into a directory."""
 
 from collections.abc import Iterator
 from datetime import UTC, datetime
@@ -16,35 +16,35 @@ from catseye.gateways.writers.written import Files, write_files
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.epoch.ranges import Progress
 
-AT_ONCE = 150  # points whose rows are computed together
+STEP = 150  # points whose rows are computed together
 
 
 def _covariance(reduction: Reduction) -> Iterator[bytes]:
-    """The full covariance of coordinates.json."""
+    """Full covariance of coordinates.json."""
     coordinates = reduction.coordinates
-    every = np.arange(len(coordinates.points))
+    indices = np.arange(len(coordinates.points))
     cards = {
         "BUNIT": ("m2", "ground frame; x, y, z point by point"),
         "CAMPAIGN": (reduction.campaign.site.campaign.name, ""),
-        "ORDER": ("covariance_order", "of coordinates.json beside it"),
+        "ORDER": ("covariance_order", "of coordinates.json in this directory"),
     }
-    parts = (coordinates.joint.between(every[k : k + AT_ONCE], every) for k in range(0, len(every), AT_ONCE))
-    return matrix_pages(parts, 3 * len(every), cards)
+    parts = (coordinates.joint.between(indices[k : k + STEP], indices) for k in range(0, len(indices), STEP))
+    return matrix_pages(parts, 3 * len(indices), cards)
 
 
 def write_reduction(reduction: Reduction, directory: Path, progress: Progress | None = None) -> None:
-    """Tables, objects, report, and last the provenance with the hashes of the others."""
+    """Write tables, JSON, report, and the provenance with their hashes."""
     when = datetime.now(UTC)
-    held = cache(reduction.held)  # once, for covariance.fits and the page
+    cached = cache(reduction.held)  # once, for covariance.fits and the page
 
-    beside = matrix_file(reduction.coordinates.points) == COVARIANCE
+    separate = matrix_file(reduction.coordinates.points) == COVARIANCE
     files: Files = {
         "ranges.csv": lambda: ranges_csv(reduction),
         "coordinates.csv": lambda: coordinates_csv(reduction),
         "surface.csv": lambda: surface_csv(reduction),
         "coordinates.json": lambda: json_page(coordinates_object(reduction)),
-        **({COVARIANCE: lambda: _covariance(held())} if beside else {}),
+        **({COVARIANCE: lambda: _covariance(cached())} if separate else {}),
         "pose.json": lambda: json_page(pose_object(reduction)),
-        "report.html": lambda: report(held(), when, progress),
+        "report.html": lambda: report(cached(), when, progress),
     }
     write_files(files, directory, provenance_object(reduction, when), progress=progress)

@@ -1,4 +1,4 @@
-"""A reduced night as plain objects for JSON: SI units unless a key says otherwise, null for what is not a number."""
+"""Reduced night as JSON: SI units unless a key says otherwise, null for missing numbers."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from catseye.reduction.air.group_index import BenchmarkSeries
     from catseye.reduction.epoch.epoch import Reduction
 
-MOST_INSIDE = 500  # points whose full covariance is written as text: some 40 MB
+MOST_INSIDE = 500  # most points whose full covariance is written as text: some 40 MB
 COVARIANCE = "covariance.fits"
 CERTIFICATE = ("serial", "measured_on", "valid_until", "by", "report")
 
 
 def reduction_object(reduction: "Reduction") -> dict[str, Any]:
-    """A reduction as `catseye reduce --json` gives it."""
+    """Object that `catseye reduce --json` prints."""
     coordinates, surface = reduction.coordinates, reduction.surface
     points = {}
     for row, name in enumerate(coordinates.points):
@@ -53,7 +53,7 @@ def reduction_object(reduction: "Reduction") -> dict[str, Any]:
 
 
 def estimated_air(reduction: "Reduction") -> dict[str, Any]:
-    """What the ranges, the benchmarks and sound said of the air; units in the keys."""
+    """Estimates of the air from ranges, benchmarks and sound; units in the keys."""
     from catseye.reduction.air.group_index import benchmark_refractometers
 
     *stations, profile = reduction.coordinates.air.items()
@@ -72,7 +72,7 @@ def estimated_air(reduction: "Reduction") -> dict[str, Any]:
 
 
 def benchmark_object(series: "BenchmarkSeries") -> dict[str, Any]:
-    """What a benchmark path says of the air beside the weather stations, means over its used shots."""
+    """Air of a benchmark path and of the weather stations, means over its used shots."""
     used = series.used
     return {
         "benchmark": series.benchmark,
@@ -89,7 +89,7 @@ def benchmark_object(series: "BenchmarkSeries") -> dict[str, Any]:
 
 
 def mean_ppm(refractivity: np.ndarray) -> float:
-    """Mean of refractivities in ppm; nan of none."""
+    """Mean of refractivities in ppm; nan if empty."""
     return float(refractivity.mean()) / PPM if len(refractivity) else float("nan")
 
 
@@ -109,14 +109,14 @@ def surface_object(reduction: "Reduction") -> dict[str, Any] | None:
 
 
 def matrix_file(points: Sequence[str]) -> str:
-    """Name of the file that holds the full covariance of so many points."""
+    """Name of the file with these points' full covariance."""
     return COVARIANCE if len(points) > MOST_INSIDE else "coordinates.json"
 
 
 def coordinates_object(reduction: "Reduction") -> dict[str, Any]:
-    """The `--json` object and the full covariance, m², rows and columns in the order stated.
+    """Object of `--json` with the full covariance, m², rows and columns in the stated order.
 
-    Of more points than MOST_INSIDE the matrix is in a file beside it, which is named; their own blocks stay.
+    Beyond MOST_INSIDE points the matrix is in a separate file, which is named; the points' own blocks stay.
     """
     coordinates = reduction.coordinates
     inside = matrix_file(coordinates.points) != COVARIANCE
@@ -130,7 +130,7 @@ def coordinates_object(reduction: "Reduction") -> dict[str, Any]:
 
 
 def pose_object(reduction: "Reduction") -> dict[str, Any]:
-    """The antenna's pose and the paraboloid behind it; nulls and the reason where the dish was not seen."""
+    """Pose of the antenna and its fitted paraboloid; nulls and a reason if the dish was not seen."""
     surface, posture = reduction.surface, reduction.campaign.site.campaign
     nominal = {"azimuth_deg": posture.azimuth_deg, "elevation_deg": posture.elevation_deg}
     common = {"format": FORMAT, "campaign": posture.name, "nominal_posture": nominal}
@@ -152,7 +152,7 @@ def pose_object(reduction: "Reduction") -> dict[str, Any]:
 
 
 def provenance_object(reduction: "Reduction", when: datetime) -> dict[str, Any]:
-    """What went in, by which programs, with which settings, when; `writers.written.write_files` adds what came out."""
+    """Inputs, programs, settings and time; `writers.written.write_files` adds the outputs."""
     campaign = reduction.campaign
     return {
         "format": FORMAT,
@@ -172,7 +172,7 @@ def provenance_object(reduction: "Reduction", when: datetime) -> dict[str, Any]:
 
 
 def certificates(campaign: "Campaign") -> dict[str, Any]:
-    """Who vouches for each calibration; null where the file does not say."""
+    """Provenance of each calibration; null where the file has none."""
     records: dict[str, Any] = {"site.toml": campaign.site}
     records |= {f"mirrors/{name}.toml": mirror for name, mirror in campaign.mirrors.items()}
     records |= {f"monuments/{name}.toml": monument for name, monument in campaign.monuments.items()}

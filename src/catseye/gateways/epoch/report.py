@@ -1,4 +1,4 @@
-"""The report of a reduction: one HTML page that needs nothing else."""
+"""Report of a reduction, one self-contained HTML page."""
 
 from collections import Counter
 from datetime import datetime
@@ -37,10 +37,10 @@ CONTENTS = {
 
 
 def report(reduction: Reduction, when: datetime, progress: Progress | None = None) -> str:
-    """The whole page of a reduction, HTML; `progress` is told of each figure and of the dish's pose."""
+    """HTML report of a reduction; `progress` is called for each figure and the dish's pose."""
     drawn = pictures(reduction, progress)
     if progress is not None:
-        progress("page: the dish by each command", len(drawn), len(drawn) + 1)
+        progress("page: dish pose by each command", len(drawn), len(drawn) + 1)
     name = reduction.campaign.site.campaign.name
     links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())
     header = (
@@ -68,12 +68,12 @@ def report(reduction: Reduction, when: datetime, progress: Progress | None = Non
 
 
 def pictures(reduction: Reduction, progress: Progress | None = None) -> dict[str, str]:
-    """The figures of the page, as SVG text."""
-    made = figures(reduction)
+    """Figures of the page, as SVG text."""
+    drawings = figures(reduction)
     texts: dict[str, str] = {}
-    for done, (name, figure) in enumerate(made.items()):
+    for count, (name, figure) in enumerate(drawings.items()):
         if progress is not None:
-            progress(f"page: figure {name.replace('_', ' ')}", done, len(made) + 1)
+            progress(f"page: figure {name.replace('_', ' ')}", count, len(drawings) + 1)
         texts[name] = svg(figure)
     return texts
 
@@ -97,7 +97,7 @@ def _summary(reduction: Reduction) -> str:
     ]
     if rows:
         worst = max(float(np.max(u)) for _, _, u in rows)
-        cards.insert(1, card("Feed arm known to", f"{worst:.2f} mm", "largest u of a coordinate of its rangers"))
+        cards.insert(1, card("Feed arm uncertainty", f"{worst:.2f} mm", "largest u of a coordinate of its rangers"))
     if surface is not None:
         u = float(np.median(surface.u_deviation)) / MILLIMETRE
         cards.insert(
@@ -120,7 +120,7 @@ def _summary(reduction: Reduction) -> str:
         CONTENTS["summary"],
         f'<div class="cards">{"".join(cards)}</div>',
         f"<dl>{words}</dl>",
-        f'<h3>Worth knowing</h3><ul class="notes">{notes}</ul>' if notes else "",
+        f'<h3>Notes</h3><ul class="notes">{notes}</ul>' if notes else "",
     )
 
 
@@ -153,11 +153,11 @@ def _dish(reduction: Reduction, drawn: dict[str, str]) -> str:
     pose, u = surface.pose(), np.sqrt(np.diag(surface.fit.covariance))
     posture = reduction.campaign.site.campaign
     motion = [
-        (f"shift along {axis}", f"{value / MILLIMETRE:+.3f} mm", f"{each / MILLIMETRE:.3f} mm")
-        for axis, value, each in zip("xyz", pose["translation"], u[:3], strict=True)
+        (f"shift along {axis}", f"{value / MILLIMETRE:+.3f} mm", f"{sigma / MILLIMETRE:.3f} mm")
+        for axis, value, sigma in zip("xyz", pose["translation"], u[:3], strict=True)
     ] + [
-        (f"rotation about {axis}", f"{value / ARCSECOND:+.2f}″", f"{each / ARCSECOND:.2f}″")
-        for axis, value, each in zip("xyz", pose["rotation"], u[3:], strict=True)
+        (f"rotation about {axis}", f"{value / ARCSECOND:+.2f}″", f"{sigma / ARCSECOND:.2f}″")
+        for axis, value, sigma in zip("xyz", pose["rotation"], u[3:], strict=True)
     ]
     places = [
         ("pivot of the rotation: nominal vertex", *(f"{v:.5f}" for v in pose["pivot"])),
@@ -171,7 +171,7 @@ def _dish(reduction: Reduction, drawn: dict[str, str]) -> str:
         paragraph(
             f"The paraboloid of {surface.focal_length:g} m focal length that fits {len(surface.names)} prisms best "
             f"(least squares of the normal residuals) points to azimuth {aim[0]:.4f}°, elevation {aim[1]:.4f}°; the "
-            f"encoders said {posture.azimuth_deg:g}° and {posture.elevation_deg:g}°. Frame: ground."
+            f"encoders read {posture.azimuth_deg:g}° and {posture.elevation_deg:g}°. Frame: ground."
         ),
         table(("against the nominal posture", "value", "u"), motion, "tnn"),
         table(("in the ground frame (m)", "x", "y", "z"), places, "tnnn"),
@@ -188,10 +188,10 @@ def _dish(reduction: Reduction, drawn: dict[str, str]) -> str:
 
 
 def _network(reduction: Reduction, drawn: dict[str, str]) -> str:
-    every = "Every point with the outline of its 1σ ellipsoid, enlarged as stated above the figure"
+    points = "All points with the outline of its 1σ ellipsoid, enlarged as stated above the figure"
     if crowded(reduction):
-        every = (
-            "Prisms of the dish as dots, too many for ellipsoids; every other point with the outline of its 1σ "
+        points = (
+            "Prisms of the dish as dots, too many for ellipsoids; all other points with the outline of its 1σ "
             "ellipsoid, enlarged as stated above the figure"
         )
     return section(
@@ -199,8 +199,8 @@ def _network(reduction: Reduction, drawn: dict[str, str]) -> str:
         CONTENTS["network"],
         picture(
             drawn["plan"],
-            f"Plan. {every}; thin lines are used ranges. Hollow circles: points that the ranges leave open in at least "
-            "one direction.",
+            f"Plan. {points}; thin lines are used ranges. Hollow circles: points that the ranges do not determine in "
+            "at least one direction.",
         ),
         picture(drawn["elevation"], "Elevation, seen across the telescope's azimuth."),
     )
@@ -233,7 +233,7 @@ def _rejected(reduction: Reduction) -> str:
         "rejected",
         CONTENTS["rejected"],
         paragraph(f"{len(rows)} of {len(shots)} shots. They stay in ranges.csv with their reasons."),
-        table(("shot", "ranger", "target", "why", "what was seen"), rows, "ntttw"),
+        table(("shot", "ranger", "target", "reason", "observation"), rows, "ntttw"),
     )
 
 
@@ -273,7 +273,7 @@ def _rangers(reduction: Reduction, drawn: dict[str, str]) -> str:
         "rangers",
         CONTENTS["rangers"],
         paragraph("Each ranger's zero is estimated with the coordinates; its laboratory calibration is the prior."),
-        picture(drawn["zeros"], "Corrections to the rangers' zeros against what their laboratory claimed."),
+        picture(drawn["zeros"], "Corrections to the rangers' zeros against the laboratory's uncertainties."),
         table(columns, rows, "tttnnnnnn"),
     )
 
@@ -284,11 +284,11 @@ def _air(reduction: Reduction, drawn: dict[str, str]) -> str:
     label, unit = (
         ("gradient with height", "°C/m")
         if profile == "gradient"
-        else ("half-way between the stations warmer than on their line by", "°C")
+        else ("midway between the stations warmer than interpolated by", "°C")
     )
     rows.append((label, f"{value:+.4f} {unit}", f"{u:.4f} {unit}"))
     rows += [
-        (f"{line}: its sound reads too warm by", f"{warm:+.3f} °C", f"{s:.3f} °C")
+        (f"{line}: acoustic temperature too high by", f"{warm:+.3f} °C", f"{s:.3f} °C")
         for line, (warm, s) in reduction.coordinates.sound.items()
     ]
     benchmarks = [
@@ -304,10 +304,10 @@ def _air(reduction: Reduction, drawn: dict[str, str]) -> str:
         for one in map(benchmark_object, benchmark_refractometers(reduction))
         if one["shots"]
     ]
-    columns = ("benchmark", "ranger", "shots", "by the path", "by the stations", "adjusted", "stations too warm (°C)")
+    columns = ("benchmark", "ranger", "shots", "path", "stations", "adjusted", "stations too warm (°C)")
     paths = paragraph(
         "Each benchmark path is a refractometer: n_g − 1 (ppm) from its phase, its certificate and the ranger's sheet, "
-        "beside the weather stations as they read and as the adjustment leaves them."
+        "compared with the weather stations as read and as adjusted."
     )
     return section(
         "air",
@@ -315,7 +315,7 @@ def _air(reduction: Reduction, drawn: dict[str, str]) -> str:
         picture(drawn["refractivity"], "Group refractivity (n − 1) along every used path, coloured by its mean height.")
         if "refractivity" in drawn
         else "",
-        picture(drawn["weather"], "What the weather stations recorded."),
+        picture(drawn["weather"], "Readings of the weather stations."),
         table((f"estimated with the coordinates (model {reduction.settings.air_model})", "value", "u"), rows, "tnn"),
         *([paths, table(columns, benchmarks, "ttnnnnn")] if benchmarks else []),
     )
@@ -341,7 +341,7 @@ def _points(reduction: Reduction) -> str:
         paragraph(
             "A ranger's name is its scan point; its monument's fixed point ends in -F. Covariances are in "
             f"coordinates.csv, the full matrix in {matrix_file(coordinates.points)}. A large u means that the ranges "
-            "leave that direction open and only the typed position holds it."
+            "do not determine that direction and it rests on the typed position."
         ),
         table(columns, rows, "ttnnnnnnn"),
     )

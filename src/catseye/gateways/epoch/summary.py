@@ -1,4 +1,4 @@
-"""A reduction told in sentences, for people who did not design it."""
+"""Summary of a reduction in sentences, for readers outside the project."""
 
 from collections import Counter
 
@@ -14,22 +14,22 @@ from catseye.records.site.validity import expired_of_site
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.epoch.reason import ShotStatus
 
-TOO_WIDE = 0.5  # variance factor: claims 1.4 times the scatter; whole nights of two generators have 0.77 and more
-MOST_REJECTED = 0.1  # share of all shots; more is no usual night
+TOO_WIDE = 0.5  # variance factor: claims 1.4 times the scatter; complete nights of two generators have at least 0.77
+MOST_REJECTED = 0.1  # share of all shots in a usual night
 MEANING = {
-    "blocked": "nothing came back",
-    "reflected": "light from elsewhere in the return",
-    "undecided": "shots that contradict each other, and nothing says which is wrong",
+    "blocked": "no return",
+    "reflected": "stray reflection",
+    "undecided": "shots that contradict each other, cause undetermined",
     "clipped": "the converter was overdriven",
-    "dead": "converter or cable",
-    "noise unknown": "too few samples to tell their noise",
-    "bad reference": "something else in the beam of the internal cube",
+    "dead": "converter or cable fault",
+    "noise unknown": "too few samples to estimate the noise",
+    "bad reference": "obstruction in the beam of the internal cube",
     "no reference": "the drift of the electronics is unknown",
 }
 
 
 def verdict(reduction: Reduction) -> Verdict:
-    """Scatter against what is claimed, shots lost, and the verdict of an exported campaign."""
+    """Verdict from scatter against the claim, rejected shots, and the exported campaign's verdict."""
     return _own_verdict(reduction).resting_on({"the exported campaign": reduction.campaign.verdict})
 
 
@@ -37,9 +37,9 @@ def _own_verdict(reduction: Reduction) -> Verdict:
     coordinates = reduction.coordinates
     factor, degrees = coordinates.variance_factor, coordinates.degrees_of_freedom
     if coordinates.status != CONVERGED:
-        return Verdict("failed", f"the adjustment did not settle: {coordinates.status}")
+        return Verdict("failed", f"the adjustment did not converge: {coordinates.status}")
     if not (np.isfinite(factor) and degrees >= 1.0):
-        return Verdict("doubtful", "nothing was measured twice, so nothing checks the claimed uncertainties")
+        return Verdict("doubtful", "nothing was measured twice, so the claimed uncertainties are unchecked")
     _, spread = trust_limits(reduction)
     if factor > 1.0 + 2.0 * spread:
         more = 100.0 * (np.sqrt(factor) - 1.0)
@@ -48,7 +48,7 @@ def _own_verdict(reduction: Reduction) -> Verdict:
         less = 100.0 * (1.0 - np.sqrt(factor))
         return Verdict(
             "doubtful",
-            f"the measurements scatter {less:.0f} % less than their uncertainties claim: is one in another unit?",
+            f"the measurements scatter {less:.0f} % less than their uncertainties claim: check the units",
         )
     shots, rejected = len(reduction.status), len(reduction.rejected)
     if rejected > MOST_REJECTED * shots:
@@ -57,25 +57,25 @@ def _own_verdict(reduction: Reduction) -> Verdict:
     if count[ShotStatus.UNDECIDED]:
         return Verdict(
             "doubtful",
-            f"{count[ShotStatus.UNDECIDED]} shots contradict each other, and nothing says which is wrong",
+            f"{count[ShotStatus.UNDECIDED]} shots contradict each other, and the wrong ones cannot be identified",
         )
     if coordinates.doubts:
         return Verdict("doubtful", coordinates.doubts[0])
-    if ended := expired_of_site(reduction.campaign):
-        return Verdict("doubtful", "; ".join(ended))
+    if expired_records := expired_of_site(reduction.campaign):
+        return Verdict("doubtful", "; ".join(expired_records))
     says = "as their uncertainties claim" if factor >= 1.0 - 2.0 * spread else "less than their uncertainties claim"
     return Verdict("good", f"the measurements scatter {says}, and {rejected} of {shots} shots were rejected")
 
 
 def passages(reduction: Reduction) -> list[Passage]:
-    """The night, the shots, the feed arm, the dish, the air, and how far to trust it all."""
+    """Passages on the night, shots, feed arm, dish, air and reliability."""
     return [
         Passage("The night", _night(reduction)),
         Passage("The shots", _shots(reduction)),
         Passage("The feed arm", _feed_arm(reduction)),
         Passage("The dish", _dish(reduction)),
         Passage("The air", _air(reduction)),
-        Passage("The trust", _trust(reduction)),
+        Passage("Reliability", _trust(reduction)),
         *([Passage("Notes", "; ".join(reduction.notes) + ".")] if reduction.notes else []),
     ]
 
@@ -92,7 +92,7 @@ def feed_arm_rows(reduction: Reduction) -> list[tuple[str, np.ndarray, np.ndarra
 
 
 def pointing(reduction: Reduction) -> tuple[float, float] | None:
-    """Azimuth and elevation of the fitted axis, degrees, azimuth beside the nominal one."""
+    """Azimuth and elevation of the fitted axis, degrees; the azimuth near the nominal one."""
     if reduction.surface is None:
         return None
     x, y, z = reduction.surface.pose()["axis"]
@@ -102,7 +102,7 @@ def pointing(reduction: Reduction) -> tuple[float, float] | None:
 
 
 def trust_limits(reduction: Reduction) -> tuple[float, float]:
-    """The variance factor's expectation and its standard deviation, for its degrees of freedom."""
+    """Expectation and standard deviation of the variance factor."""
     degrees = reduction.coordinates.degrees_of_freedom
     return 1.0, float(np.sqrt(2.0 / degrees)) if degrees > 0.0 else float("nan")
 
@@ -132,7 +132,7 @@ def _shots(reduction: Reduction) -> str:
     )
     rejected = f"{len(reduction.rejected)} were rejected: {reasons}" if reduction.rejected else "none was rejected"
     return (
-        f"{count[ShotStatus.USED]} ranges went into one adjustment; {references} shots on the reference cubes followed "
+        f"{count[ShotStatus.USED]} ranges went into one adjustment; {references} shots on the reference cubes tracked "
         f"the drift of the electronics; {rejected}."
     )
 
@@ -145,7 +145,7 @@ def _feed_arm(reduction: Reduction) -> str:
     worst = np.max([u for _, _, u in rows], axis=0)
     return (
         f"{len(rows)} rangers around x {centre[0]:.1f}, y {centre[1]:.1f}, z {centre[2]:.1f} m (east, north, up from "
-        f"the pintle), each known to {worst[0]:.2f} mm east, {worst[1]:.2f} mm north and {worst[2]:.2f} mm up or "
+        f"the pintle), determined to {worst[0]:.2f} mm east, {worst[1]:.2f} mm north and {worst[2]:.2f} mm up or "
         "better (standard uncertainty)."
     )
 
@@ -153,7 +153,7 @@ def _feed_arm(reduction: Reduction) -> str:
 def _dish(reduction: Reduction) -> str:
     surface = reduction.surface
     if surface is None:
-        return "Too few of its prisms were seen to say where it is."
+        return "Too few of its prisms were seen to determine its pose."
     shift = surface.fit.translation / MILLIMETRE
     u = np.sqrt(np.diag(surface.fit.covariance))
     turn = surface.fit.rotation / ARCSECOND
@@ -163,9 +163,9 @@ def _dish(reduction: Reduction) -> str:
         f"{len(surface.names)} prisms lie on a paraboloid of {surface.focal_length:g} m focal length to "
         f"{surface.rms / MILLIMETRE:.3f} mm rms. Against the nominal posture its vertex is at "
         f"{shift[0]:+.2f}, {shift[1]:+.2f}, {shift[2]:+.2f} mm east, north, up "
-        f"(u {', '.join(f'{each / MILLIMETRE:.2f}' for each in u[:3])}) and it is turned by "
+        f"(u {', '.join(f'{sigma / MILLIMETRE:.2f}' for sigma in u[:3])}) and it is turned by "
         f"{turn[0]:+.1f}, {turn[1]:+.1f}, {turn[2]:+.1f} arc seconds about those axes "
-        f"(u {', '.join(f'{each / ARCSECOND:.1f}' for each in u[3:])}): its axis points to azimuth {aim[0]:.4f}°, "
+        f"(u {', '.join(f'{sigma / ARCSECOND:.1f}' for sigma in u[3:])}): its axis points to azimuth {aim[0]:.4f}°, "
         f"elevation {aim[1]:.4f}°."
     )
 
@@ -178,23 +178,21 @@ def _air(reduction: Reduction) -> str:
     return (
         f"{weather.temperature_c.mean():.1f} °C, {weather.pressure_hpa.mean():.1f} hPa, "
         f"{weather.humidity_percent.mean():.0f} % humidity on average; it slowed the light by "
-        f"{coordinates.refractivity_ppm:.2f} parts in a million. The ranges also weighed the thermometers, "
-        f"which read too high by: {offsets}."
+        f"{coordinates.refractivity_ppm:.2f} parts in a million. Estimated from the ranges, the "
+        f"thermometers read too high by: {offsets}."
     )
 
 
 def _trust(reduction: Reduction) -> str:
     factor, degrees = reduction.coordinates.variance_factor, reduction.coordinates.degrees_of_freedom
     if not (np.isfinite(factor) and degrees >= 1.0):
-        return "Nothing was measured twice, so nothing checks the claimed uncertainties."
+        return "Nothing was measured twice, so the claimed uncertainties are unchecked."
     _, spread = trust_limits(reduction)
     ratio = 100.0 * (np.sqrt(factor) - 1.0)
     if abs(factor - 1.0) <= 2.0 * spread:
         verdict = "the measurements scatter as their uncertainties claim"
     elif factor < 1.0:
-        verdict = (
-            f"the measurements scatter {-ratio:.0f} % less than claimed: the uncertainties here are on the safe side"
-        )
+        verdict = f"the measurements scatter {-ratio:.0f} % less than claimed: the uncertainties here are conservative"
     else:
         verdict = f"the measurements scatter {ratio:.0f} % more than claimed: the uncertainties here are too small"
     return f"Variance factor {factor:.2f} with {degrees:.0f} degrees of freedom (expected 1 ± {spread:.2f}): {verdict}."

@@ -1,4 +1,4 @@
-"""Results as tables: CSV with a header, units in the names, one row a shot, a point or a prism."""
+"""Results as CSV: header, units in the names, one row per shot, point or prism."""
 
 import math
 from collections.abc import Sequence
@@ -62,15 +62,15 @@ SURFACE = ["point", "x_dish_m", "y_dish_m", "z_dish_m", "deviation_mm", "u_devia
 
 Values = np.ndarray | Sequence[object]
 PLACES = {"_m": 7, "_mm": 4, "_rad": 7, "_v": 5, "_deg": 4, "_ppm": 5, "_mm2": 8, "_utc": 9}
-OTHERS = 4  # decimals of numbers without a unit
+PLAIN_DECIMALS = 4  # decimals of numbers without a unit
 
 
 def ranges_csv(reduction: Reduction) -> str:
-    """Every shot in the campaign's order, with every correction to its range.
+    """Table of every shot in the campaign's order, with every correction to its range.
 
-    vacuum_length + air + d0 + zero + glass + obliquity + leakage + head = range: the length that the phase stands
-    for in vacuum, carried into air, then the constants. Cells stay empty where a shot got no phase or saw the internal
-    cube.
+    vacuum_length + air + d0 + zero + glass + obliquity + leakage + head = range: the length that the phase
+    represents in vacuum, converted to air, then the constants. Cells are empty for shots without a phase or on the
+    internal cube.
     """
     campaign, phases, ranges = reduction.campaign, reduction.phases, reduction.coordinates.ranges
     half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz
@@ -78,7 +78,7 @@ def ranges_csv(reduction: Reduction) -> str:
     air = vacuum * (1.0 / (1.0 + ranges.refractivity) - 1.0)
     shots, count = campaign.shots, len(campaign.shots.shot)
     d0 = {name: campaign.mirror_of(name).d0_mm for name in dict.fromkeys(shots.ranger)}
-    every: dict[str, Values] = {
+    fields: dict[str, Values] = {
         "shot": shots.shot,
         "mjd_utc": shots.mjd_utc,
         "ranger": shots.ranger,
@@ -95,7 +95,7 @@ def ranges_csv(reduction: Reduction) -> str:
         "difference_rad": ranges.phase,
         "cycles": ranges.cycles.astype(int),
         "margin_mm": ranges.margin / MILLIMETRE,
-        "thin": ["thin" if each else "" for each in ranges.thin],
+        "thin": ["thin" if uncertain else "" for uncertain in ranges.thin],
         "vacuum_length_m": vacuum,
         "refractivity_ppm": ranges.refractivity / PPM,
         "air_mm": air / MILLIMETRE,
@@ -113,7 +113,7 @@ def ranges_csv(reduction: Reduction) -> str:
         "redundancy": ranges.redundancy,
         "detectable_mm": ranges.detectable / MILLIMETRE,
     }
-    columns = {name: _cells(name, values) for name, values in every.items()}
+    columns = {name: _cells(name, values) for name, values in fields.items()}
     for name, values in adjusted.items():
         columns[name] = [""] * count
         for k, text in zip(ranges.shot.tolist(), _cells(name, values), strict=True):
@@ -122,7 +122,7 @@ def ranges_csv(reduction: Reduction) -> str:
 
 
 def coordinates_csv(reduction: Reduction) -> str:
-    """Every point in the ground frame, with its standard uncertainties and covariances."""
+    """Table of every point in the ground frame, with standard uncertainties and covariances."""
     coordinates = reduction.coordinates
     covariance = coordinates.joint.blocks / MILLIMETRE**2
     u = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
@@ -141,7 +141,10 @@ def coordinates_csv(reduction: Reduction) -> str:
 
 
 def surface_csv(reduction: Reduction) -> str:
-    """The dish prisms in the fitted paraboloid's frame; a deviation is along the normal, positive towards the focus."""
+    """Dish prisms in the fitted paraboloid's frame.
+
+    A deviation is along the normal, positive towards the focus.
+    """
     surface, coordinates = reduction.surface, reduction.coordinates
     if surface is None:
         return _csv(SURFACE, {name: [] for name in SURFACE})
@@ -183,8 +186,8 @@ def _csv(header: list[str], columns: dict[str, Values]) -> str:
 
 
 def _cells(name: str, values: Values) -> list[str]:
-    """A column's numbers with the digits that its unit deserves; empty where one is none."""
-    places = PLACES.get(f"_{name.rpartition('_')[2]}", OTHERS) if "_" in name else OTHERS
+    """Numbers of a column with suitable digits; empty if not finite."""
+    places = PLACES.get(f"_{name.rpartition('_')[2]}", PLAIN_DECIMALS) if "_" in name else PLAIN_DECIMALS
     plain = values.tolist() if isinstance(values, np.ndarray) else values
     return [
         (f"{value:.{places}f}" if math.isfinite(value) else "") if isinstance(value, float) else str(value)

@@ -1,1 +1,1 @@
-"""A journal on the way out: tables, FITS, a campaign."""
+"""Output of a journal: tables, FITS, a campaign."""

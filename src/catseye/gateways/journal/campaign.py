@@ -1,9 +1,9 @@
-"""A run of a journal, or a part of it, as a campaign directory that `catseye reduce` reads.
+"""Export of a journal's run, or part of it, as a campaign directory for `catseye reduce`.
 
-What a campaign cannot hold is left out and told: shots without samples, taken in another way than site.toml says, not
-later than the ranger's last, without weather; readings with a silent sensor. What the live reduction did not believe
-goes along in doubts.csv, how far the telescope's bodies shook in jitter.csv, and in postures.csv where it was, if it
-moved. The directory is read before it appears.
+Entries that a campaign cannot hold are left out and reported: shots without samples, taken with other settings than
+site.toml's, not later than the ranger's last, without weather; readings with a missing sensor. Readings and shots that
+the live reduction rejected are in doubts.csv, jitter of the telescope's bodies in jitter.csv, and, if the telescope
+moved, its positions in postures.csv. The directory is validated before it appears.
 """
 
 import csv
@@ -40,38 +40,38 @@ from catseye.reduction.live.weather import StationWatch
 from catseye.verdict import Verdict
 
 MARGIN = round(WEATHER_MARGIN * TICKS_PER_DAY)  # ticks
-MOST_TOLD = 3  # examples of each reason
-LIES = (ShotStatus.REFLECTED, ShotStatus.BAD_REFERENCE)  # what a night's own samples may not show again
+MOST_EXAMPLES = 3  # examples of each reason
+HIDDEN_FAULTS = (ShotStatus.REFLECTED, ShotStatus.BAD_REFERENCE)  # may not show again in the night's own samples
 
 
 @dataclass
 class LeftOut:
-    """Why and how often something was left out, and the first few of each."""
+    """Reasons for omissions, with counts and the first few examples."""
 
     counts: Counter[str] = field(default_factory=Counter)
     examples: dict[str, list[str]] = field(default_factory=dict)
 
     def add(self, reason: str, which: str) -> None:
         self.counts[reason] += 1
-        if self.counts[reason] <= MOST_TOLD:
+        if self.counts[reason] <= MOST_EXAMPLES:
             self.examples.setdefault(reason, []).append(which)
 
     def notes(self) -> list[str]:
-        """What was left out, a line for each reason."""
+        """One line per reason for an omission."""
         return [
-            f"left out {count}: {reason} ({', '.join(self.examples[reason])}{', ...' if count > MOST_TOLD else ''})"
+            f"left out {count}: {reason} ({', '.join(self.examples[reason])}{', ...' if count > MOST_EXAMPLES else ''})"
             for reason, count in sorted(self.counts.items())
         ]
 
 
 @dataclass(frozen=True)
 class CampaignExport:
-    """What was written.
+    """Summary of an exported campaign.
 
-    shots, readings   how many
-    left_out          how many of each reason
-    notes             lines for people: what was left out, what was changed
-    verdict           a reduction of the campaign is no better
+    shots, readings   numbers written
+    left_out          number omitted, by reason
+    notes             lines on omissions and changes
+    verdict           upper limit of the verdict of a reduction of the campaign
     """
 
     shots: int
@@ -83,7 +83,7 @@ class CampaignExport:
 
 @dataclass(frozen=True)
 class ExportedShot:
-    """A shot that goes into the campaign."""
+    """Shot that goes into the campaign."""
 
     ticks: int
     seq: int
@@ -102,65 +102,67 @@ def export_campaign(
     span: tuple[int, int] | None = None,
     chain: ChainReport | None = None,
 ) -> CampaignExport:
-    """A run's shots, samples and weather in the layout of docs/formats/campaign.md, whole or not at all.
+    """Write a run's shots, samples and weather as docs/formats/campaign.md, atomically.
 
-    run    its number
-    span   ticks, the end not in it; all
-    chain  what checking said: events that are not as they were written are left out, and told
+    run    number of the run
+    span   ticks, end exclusive; None for all
+    chain  result of the check; altered events are left out and reported
 
-    Raises InputError: no such run, no shot or weather that a campaign can hold, a directory that is another's.
+    Raises InputError: unknown run, no shot or weather that a campaign can hold, a directory that is not catseye's.
     """
     stored, site = reader.run(run), reader.site(run)
-    left = LeftOut()
+    omissions = LeftOut()
     reader.left_out = {} if chain is None else {run: chain.bad}
     for seq in sorted(reader.left_out.get(run, ())):
-        left.add("an event that is not as it was written", f"event {seq}")
-    readings, why = _readings(reader, run, span, site, left)
+        omissions.add("an event that is not as it was written", f"event {seq}")
+    readings, why = _readings(reader, run, span, site, omissions)
     if not readings:
-        raise InputError(f"journal {reader.place}: run {run} has no whole weather reading in the span (expected one)")
+        raise InputError(f"journal {reader.place}: run {run} has no complete weather reading in the span")
     motion = JournalMotion.of(reader, run, span)
-    chosen = _chosen(reader, run, span, site, left, sorted(reading.ticks for reading in readings), motion)
+    chosen = _chosen(reader, run, span, site, omissions, sorted(reading.ticks for reading in readings), motion)
     if not chosen:
-        reasons = "; ".join(left.notes()) or "no shots in the span"
+        reasons = "; ".join(omissions.notes()) or "no shots in the span"
         raise InputError(f"journal {reader.place}: run {run} has no shot that a campaign can hold: {reasons}")
-    notes, wrong = left.notes(), list[str]()
+    notes, wrong = omissions.notes(), list[str]()
     doubts = _doubts(reader, run, chosen, readings, why, notes, wrong)
-    stood = motion.during((chosen[0].ticks, chosen[-1].ticks), notes)
-    wrong += [stood.wrong] * bool(stood.wrong)
-    site = _as_it_stood(site, chosen, readings, stood, notes, wrong)
+    motion_rows = motion.during((chosen[0].ticks, chosen[-1].ticks), notes)
+    wrong += [motion_rows.wrong] * bool(motion_rows.wrong)
+    site = _observed_site(site, chosen, readings, motion_rows, notes, wrong)
     verdict = export_verdict(chain, len(chosen) + len(readings), wrong)
     with whole_directory(out, Path(reader.place)) as directory:
         for path, text in site_files(site).items():
             (directory / path).parent.mkdir(exist_ok=True)
             (directory / path).write_text(text, encoding="utf-8", newline="")
-        for name in ("monuments", "mirrors", "triplets"):  # which must be there, be they empty
+        for name in ("monuments", "mirrors", "triplets"):  # required, even if empty
             (directory / name).mkdir(exist_ok=True)
         (directory / "weather.csv").write_text(_weather_csv(readings), encoding="utf-8", newline="")
         (directory / "shots.csv").write_text(_shots_csv(chosen, notes), encoding="utf-8", newline="")
-        for name, rows in ((DOUBTS, doubts), (JITTER, stood.jitter), (POSTURES, stood.postures)):
+        for name, rows in ((DOUBTS, doubts), (JITTER, motion_rows.jitter), (POSTURES, motion_rows.postures)):
             if rows:
                 (directory / name).write_text(_table(rows), encoding="utf-8", newline="")
         _write_frames(reader, run, chosen, directory / "frames.npy")
         read_campaign(directory)
         provenance = origin(datetime.now(UTC), stored.hashes)
         chains = [] if chain is None else [chain_object(chain)]
-        told = {"run": stored.uuid, "notes": notes, "chains": chains, "verdict": verdict.to_object()}
-        seal(directory, reader, {"made_by": "catseye export", **provenance, **told})
-    return CampaignExport(len(chosen), len(readings), dict(left.counts), tuple(notes), verdict)
+        remarks = {"run": stored.uuid, "notes": notes, "chains": chains, "verdict": verdict.to_object()}
+        seal(directory, reader, {"made_by": "catseye export", **provenance, **remarks})
+    return CampaignExport(len(chosen), len(readings), dict(omissions.counts), tuple(notes), verdict)
 
 
 def _readings(
-    reader: JournalReader, run: int, span: tuple[int, int] | None, site: SiteFolder, left: LeftOut
+    reader: JournalReader, run: int, span: tuple[int, int] | None, site: SiteFolder, omissions: LeftOut
 ) -> tuple[list[LiveWeather], dict[tuple[str, int], str]]:
-    """Whole readings of the site's stations, in order of time, an hour longer than the span; and why which of them,
-    by station and ticks, does not count: the live reduction's watch is asked again, in the journal's order and with
-    what its epochs suspected, and marks whole stretches."""
+    """Complete readings of the site's stations, and reasons for rejected ones by station and ticks.
+
+    In time order, an hour longer than the span. The live reduction's watch is run again, in the journal's order and
+    with the suspicions of its epochs, and marks complete stretches.
+    """
     readings: list[LiveWeather] = []
     why: dict[tuple[str, int], str] = {}
     watch = StationWatch.of(site)
     for _, entry in reader.events(run, kinds=["weather", "solutions"]):
         if isinstance(entry, EpochSolution):
-            watch.judged(_suspected(entry.answer))
+            watch.judged(_suspicions(entry.answer))
         elif isinstance(entry, LiveWeather):
             doubt = watch.add(entry)
             if span is None or span[0] - MARGIN <= entry.ticks < span[1] + MARGIN:
@@ -173,24 +175,24 @@ def _readings(
             if read.station == stretch.station and inside:
                 why.setdefault((read.station, read.ticks), stretch.why)
     stations = {station.name for station in site.site.weather_station}
-    kept: list[LiveWeather] = []
+    accepted: list[LiveWeather] = []
     latest: dict[str, int] = {}
     for read in sorted(readings, key=lambda read: read.ticks):
         which = f"{read.station} at {stamp(read.ticks)}"
         if read.station not in stations:
-            left.add("a reading of a station that site.toml does not name", which)
+            omissions.add("a reading of a station that site.toml does not name", which)
         elif read.ticks <= latest.get(read.station, -1):
-            left.add("a reading not later than its station's last", which)
+            omissions.add("a reading not later than its station's last", which)
         elif problem := _unholdable(read):
-            left.add(problem, which)
+            omissions.add(problem, which)
         else:
             latest[read.station] = read.ticks
-            kept.append(read)
-    return kept, why
+            accepted.append(read)
+    return accepted, why
 
 
-def _suspected(answer: StoredAnswer) -> dict[str, tuple[float, bool]]:
-    """Suspicions of a stored answer, as `StationWatch.judged` takes them; none of one that an older version wrote."""
+def _suspicions(answer: StoredAnswer) -> dict[str, tuple[float, bool]]:
+    """Suspicions of a stored answer for `StationWatch.judged`; empty for older versions."""
     biases = answer.get("biases") or {}
     return {name: (float(str(b["offset_c"])), b["judgement"] == "biased") for name, b in biases.items()}
 
@@ -204,24 +206,27 @@ def _doubts(
     notes: list[str],
     wrong: list[str],
 ) -> list[DoubtRow]:
-    """Exported readings and shots that the live reduction did not believe; `wrong` hears what spoils the campaign."""
-    made = [
+    """Rows of readings and shots rejected by the live reduction.
+
+    Problems that make the campaign doubtful are appended to `wrong`.
+    """
+    rows = [
         DoubtRow(what="weather", name=read.station, mjd_utc=float(stamp(read.ticks)), why=why[read.station, read.ticks])
         for read in readings
         if (read.station, read.ticks) in why
     ]
-    if made:
+    if rows:
         times = np.array([float(stamp(shot.ticks)) for shot in chosen])
         try:
-            told = believed_samples([_sample(read) for read in readings], made, times)[1]
+            messages = believed_samples([_sample(read) for read in readings], rows, times)[1]
         except InputError:
-            told, made = ["no weather station was believed throughout: all readings are exported as they are"], []
-            wrong += told
-        notes += told
+            messages, rows = ["no weather station was trusted throughout: all readings are exported unmarked"], []
+            wrong += messages
+        notes += messages
     reasons: dict[int, str] = {}
     for _, solution in reader.solutions(run):
         for number, line in (solution.answer.get("rejected") or {}).items():
-            if status_of(line) in LIES:
+            if status_of(line) in HIDDEN_FAULTS:
                 reasons[int(number)] = line
     names = _names(chosen)
     shots = [
@@ -230,16 +235,16 @@ def _doubts(
         if shot.number in reasons
     ]
     if shots:
-        notes.append(f"named in {DOUBTS} as not believed by the epochs: {len(shots)} of the shots")
-    return made + shots
+        notes.append(f"named in {DOUBTS} as rejected by the epochs: {len(shots)} of the shots")
+    return rows + shots
 
 
 def _table(rows: Sequence[DoubtRow | JitterRow | PostureRow]) -> str:
     text = io.StringIO(newline="")
     writer = csv.DictWriter(text, tuple(type(rows[0]).model_fields), lineterminator="\n")
     writer.writeheader()
-    for each in rows:
-        writer.writerow(each.model_dump() | {"mjd_utc": f"{each.mjd_utc:.8f}"})
+    for row in rows:
+        writer.writerow(row.model_dump() | {"mjd_utc": f"{row.mjd_utc:.8f}"})
     return text.getvalue()
 
 
@@ -269,11 +274,11 @@ def _chosen(
     run: int,
     span: tuple[int, int] | None,
     site: SiteFolder,
-    left: LeftOut,
+    omissions: LeftOut,
     weather: list[int],
     motion: JournalMotion,
 ) -> list[ExportedShot]:
-    """The shots that a campaign holds, in order of time."""
+    """Shots that a campaign can hold, in time order."""
     refusal = _refusals(site, weather, motion)
     chosen: list[ExportedShot] = []
     for seq, entry in reader.shots(run):
@@ -281,27 +286,27 @@ def _chosen(
         if span is not None and not span[0] <= shot.ticks < span[1]:
             continue
         if reason := refusal(entry):
-            left.add(reason, f"shot {shot.number} of {shot.ranger}")
+            omissions.add(reason, f"shot {shot.number} of {shot.ranger}")
             continue
-        taken = (shot.number, shot.ranger, shot.target, shot.cycles, shot.samples_per_cycle)
-        chosen.append(ExportedShot(shot.ticks, seq, *taken))
+        fields = (shot.number, shot.ranger, shot.target, shot.cycles, shot.samples_per_cycle)
+        chosen.append(ExportedShot(shot.ticks, seq, *fields))
     chosen.sort(key=lambda shot: (shot.ticks, shot.seq))
-    kept: list[ExportedShot] = []
+    retained: list[ExportedShot] = []
     latest: dict[str, int] = {}
     for shot_ in chosen:
         which = f"shot {shot_.number} of {shot_.ranger}"
         if shot_.ticks <= latest.get(shot_.ranger, -1):
-            left.add("a shot not later than its ranger's last", which)
+            omissions.add("a shot not later than its ranger's last", which)
         elif shot_.ticks - chosen[0].ticks > LONGEST_CAMPAIGN * TICKS_PER_DAY:
-            left.add("a shot more than a day after the first", which)
+            omissions.add("a shot more than a day after the first", which)
         else:
             latest[shot_.ranger] = shot_.ticks
-            kept.append(shot_)
-    return kept
+            retained.append(shot_)
+    return retained
 
 
 def _refusals(site: SiteFolder, weather: list[int], motion: JournalMotion) -> Callable[[AnsweredShot], str]:
-    """What says why a campaign of a site cannot hold a shot; "" where it can."""
+    """Function that returns why a campaign of the site cannot hold a shot; "" if it can."""
     rangers, targets = set(site.rangers), set(site.target_names) | {REFERENCE}
     ranging, adc = site.site.ranging, site.site.adc
     volts = adc.full_scale_volt / 2**15
@@ -329,26 +334,26 @@ def _refusals(site: SiteFolder, weather: list[int], motion: JournalMotion) -> Ca
     return refusal
 
 
-def _as_it_stood(
+def _observed_site(
     site: SiteFolder,
     chosen: list[ExportedShot],
     readings: list[LiveWeather],
-    told: MotionRows,
+    motion_rows: MotionRows,
     notes: list[str],
     wrong: list[str],
 ) -> SiteFolder:
-    """The site with the campaign's start and posture, and the stations that spoke; `wrong` as for `_doubts`."""
+    """Site with the campaign's start and posture and the stations with readings; `wrong` as for `_doubts`."""
     named: dict[str, object] = {"start_mjd_utc": chosen[0].ticks / TICKS_PER_DAY}
-    if told.posture is not None:
-        azimuth, elevation = told.posture
+    if motion_rows.posture is not None:
+        azimuth, elevation = motion_rows.posture
         named |= {"azimuth_deg": azimuth / DEGREE % 360.0, "elevation_deg": elevation / DEGREE}
     else:
-        wrong.append("no posture was journalled in the span: azimuth and elevation are site.toml's")
+        wrong.append("no posture in the journal for the span: azimuth and elevation are site.toml's")
         notes.append(wrong[-1])
     spoke = {read.station for read in readings}
     stations = tuple(station for station in site.site.weather_station if station.name in spoke)
     if silent := sorted({station.name for station in site.site.weather_station} - spoke):
-        notes.append(f"weather stations that said nothing were left out of site.toml: {', '.join(silent)}")
+        notes.append(f"weather stations without readings were left out of site.toml: {', '.join(silent)}")
     posture = site.site.campaign.model_copy(update=named)
     return replace(site, site=site.site.model_copy(update={"campaign": posture, "weather_station": stations}))
 
@@ -366,10 +371,10 @@ def _row(number: int, ticks: int, ranger: str, target: str, cycles: int, samples
 
 
 def _shots_csv(chosen: list[ExportedShot], notes: list[str]) -> str:
-    """Shots by their numbers; by their seq where numbers are not each once."""
+    """Table of shots by number, or by seq where numbers are not unique."""
     numbers = _names(chosen)
     if numbers != [shot.number for shot in chosen]:
-        notes.append("shot numbers are not each once: shots.csv has the journal's seq instead")
+        notes.append("shot numbers are not unique: shots.csv has the journal's seq instead")
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(ShotRow.model_fields)
@@ -380,7 +385,7 @@ def _shots_csv(chosen: list[ExportedShot], notes: list[str]) -> str:
 
 
 def _names(chosen: list[ExportedShot]) -> list[int]:
-    """What shots.csv calls them: their numbers, or their seq where numbers are not each once."""
+    """Names in shots.csv: shot numbers, or seq where numbers are not unique."""
     numbers = [shot.number for shot in chosen]
     distinct = len(set(numbers)) == len(numbers) and min(numbers) >= 0
     return numbers if distinct else [shot.seq for shot in chosen]
@@ -397,9 +402,9 @@ def _weather_csv(readings: list[LiveWeather]) -> str:
 
 
 def _write_frames(reader: JournalReader, run: int, chosen: list[ExportedShot], path: Path) -> None:
-    """A row a shot, as long as the longest, zeros behind the shorter ones; one buffer in memory at a time.
+    """Write frames, one row per shot, zero-padded to the longest; one buffer in memory at a time.
 
-    Written, not mapped: where the disk is full, a mapped file ends the process.
+    Written, not mapped: on a full disk a mapped file would kill the process.
     """
     width = max(shot.cycles * shot.samples_per_cycle for shot in chosen)
     rows = {shot.seq: row for row, shot in enumerate(chosen)}

@@ -1,7 +1,7 @@
-"""Runs of a journal as tables: CSV, and FITS binary tables as a telescope's samplers write them.
+"""Runs of a journal as tables: CSV, and FITS binary tables like a telescope's samplers.
 
-One file a quantity: shots, weather, postures, commands, happenings, solutions, coordinates. Columns are defined once:
-CSV says the unit in the name, FITS in TUNIT. Text in FITS is ASCII, others escaped.
+One file per quantity: shots, weather, postures, commands, happenings, solutions, coordinates. Columns are defined once:
+CSV has the unit in the name, FITS in TUNIT. Text in FITS is ASCII, other characters are escaped.
 """
 
 import csv
@@ -36,13 +36,13 @@ Cells = tuple[Any, ...]
 
 @dataclass(frozen=True)
 class TableColumn:
-    """A column.
+    """Column of a table.
 
-    name      in CSV, unit at its end
-    fits      in FITS
-    unit      in FITS; "" of none
-    kind      "f" double, "i" whole, "s" text
-    factor, shift   the FITS value is factor times the CSV's plus shift
+    name      name in CSV, with the unit at its end
+    fits      name in FITS
+    unit      unit in FITS; "" for none
+    kind      "f" double, "i" integer, "s" text
+    factor, shift   FITS value = factor × CSV value + shift
     """
 
     name: str
@@ -58,7 +58,7 @@ RUN = (TableColumn("run", "RUN", "i"), TableColumn("seq", "SEQ", "i"), TableColu
 
 @dataclass(frozen=True)
 class ExportTable:
-    """A quantity: what it is read from, its columns after run, seq and time, and its rows of one entry."""
+    """Quantity: its source, its columns after run, seq and time, and the rows of one entry."""
 
     kind: Kind
     fields: tuple[TableColumn, ...]
@@ -67,9 +67,9 @@ class ExportTable:
 
 def _shot(entry: Any) -> Iterable[Cells]:
     shot = entry.shot
-    taken = (shot.number, shot.ranger, shot.target, shot.cycles, shot.samples_per_cycle, shot.if_hz)
+    fields = (shot.number, shot.ranger, shot.target, shot.cycles, shot.samples_per_cycle, shot.if_hz)
     lengths = (entry.range_, entry.u_range / MILLIMETRE, entry.misfit / MILLIMETRE)
-    yield (*taken, shot.amplitude, shot.phase, entry.status, entry.text, *lengths)
+    yield (*fields, shot.amplitude, shot.phase, entry.status, entry.text, *lengths)
 
 
 def _solution(entry: EpochSolution) -> Iterable[Cells]:
@@ -89,10 +89,10 @@ def _coordinates(entry: EpochSolution) -> Iterable[Cells]:
     if not isinstance(names, list) or not isinstance(x, list) or len(names) != len(x):
         return
     matrix = entry.covariance
-    whole = matrix is not None and matrix.shape == (3 * len(names),) * 2
+    complete = matrix is not None and matrix.shape == (3 * len(names),) * 2
     for row, name in enumerate(names):
         at = slice(3 * row, 3 * row + 3)
-        c = (matrix[at, at] if whole and matrix is not None else np.full((3, 3), np.nan)) / MILLIMETRE**2
+        c = (matrix[at, at] if complete and matrix is not None else np.full((3, 3), np.nan)) / MILLIMETRE**2
         place = (float("nan") if value is None else value for value in x[row])
         yield (name, *place, *np.sqrt(np.diag(c)).tolist(), *c[(0, 0, 1), (1, 2, 2)].tolist())
 
@@ -192,24 +192,24 @@ def export_tables(
     progress: Progress | None = None,
     chains: Sequence[ChainReport] = (),
 ) -> dict[str, int]:
-    """Every quantity of some runs, into a directory that appears whole or not at all; rows by quantity.
+    """Write every quantity of some runs into a directory, atomically; rows by quantity.
 
-    runs    numbers
-    forms   of file
-    span    ticks, the end not in it; all
-    chains  what checking said: events that are not as they were written are left out, and the provenance says so
+    runs    numbers of the runs
+    forms   file formats
+    span    ticks, end exclusive; None for all
+    chains  results of the check; altered events are left out and listed in the provenance
 
-    Raises InputError: no such run, nothing to write, a directory that is another's.
+    Raises InputError: unknown run, nothing to write, a directory that is not catseye's.
     """
     reader.left_out = {chain.run: chain.bad for chain in chains}
     if not runs or not forms:
-        raise InputError(f"--out {out}: no run or no form was named (expected at least one of each)")
+        raise InputError(f"--out {out}: no run or no form given (expected at least one of each)")
     stored = [reader.run(run) for run in runs]
     counts = dict.fromkeys(TABLES, 0)
     with whole_directory(out, Path(reader.place)) as directory:
-        for done, (name, table) in enumerate(TABLES.items()):
+        for count, (name, table) in enumerate(TABLES.items()):
             if progress is not None:
-                progress(f"writing {name}", done, len(TABLES))
+                progress(f"writing {name}", count, len(TABLES))
             for form in forms:
                 rows = rows_of(reader, table, runs, span=span)
                 writer = _csv if form == "csv" else _fits
@@ -228,7 +228,7 @@ def export_tables(
 def rows_of(
     reader: JournalReader, table: ExportTable, runs: Sequence[int], *, span: tuple[int, int] | None
 ) -> Iterator[Cells]:
-    """The rows of a quantity: run, seq, the stamp as text of eight decimals, then its own."""
+    """Rows of a quantity: run, seq, time stamp with eight decimals, then its columns."""
     for run in runs:
         for seq, entry in reader.events(run, kinds=[table.kind], buffers=False):
             ticks = ticks_of(entry)
@@ -238,7 +238,7 @@ def rows_of(
 
 
 def ticks_of(entry: Entry) -> int:
-    """The instant of an entry, ticks."""
+    """Time of an entry, ticks."""
     return entry.shot.ticks if hasattr(entry, "shot") else entry.ticks
 
 
@@ -248,12 +248,12 @@ def stamp(ticks: int) -> str:
     >>> stamp(5288912500001)
     '52889.12500001'
     """
-    day, rest = divmod(ticks, TICKS_PER_DAY)
-    return f"{day}.{rest:08d}"
+    day, fraction = divmod(ticks, TICKS_PER_DAY)
+    return f"{day}.{fraction:08d}"
 
 
 def seal(directory: Path, reader: JournalReader, provenance: dict[str, Any]) -> None:
-    """The provenance, with the journal's name and the hashes of all files; a directory's under its own name."""
+    """Write the provenance with the journal's name and hashes; a directory under its own name."""
     outputs: dict[str, Any] = {}
     for path in sorted(directory.rglob("*")):
         if path.is_file():
@@ -270,9 +270,9 @@ def seal(directory: Path, reader: JournalReader, provenance: dict[str, Any]) -> 
 
 
 def _csv(path: Path, name: str, table: ExportTable, rows: Iterable[Cells]) -> int:
-    """Numbers as Python writes them, which reads back without the loss of a bit; empty where there is none.
+    """Write numbers as Python's repr, which is exact; empty cells where missing.
 
-    What rangers and people wrote may begin like a formula, which a spreadsheet would run: an apostrophe goes before it.
+    Text that a spreadsheet would evaluate as a formula gets a leading apostrophe.
     """
     count = 0
     with path.open("w", encoding="utf-8", newline="") as stream:
@@ -291,7 +291,7 @@ def _csv_cell(cell: Any) -> Any:
 
 
 def _fits(path: Path, name: str, table: ExportTable, rows: Iterable[Cells]) -> int:
-    """One binary table; times are doubles (0.6 us) in DMJD and exact in TICKS."""
+    """Write one binary table; times are doubles (0.6 us) in DMJD and exact in TICKS."""
     from astropy.io import fits
 
     columns = list(zip(*rows, strict=True)) or [() for _ in RUN + table.fields]
@@ -316,7 +316,7 @@ def _fits(path: Path, name: str, table: ExportTable, rows: Iterable[Cells]) -> i
     page.header["TIMESYS"] = ("UTC", "time scale of DMJD")
     page.header["TICKDAY"] = (TICKS_PER_DAY, "TICKS in a day, since MJD 0")
     page.header["ORIGIN"] = "catseye"
-    whole = io.BytesIO()
-    fits.HDUList([fits.PrimaryHDU(), page]).writeto(whole, checksum=True)
-    path.write_bytes(whole.getvalue())
+    stream = io.BytesIO()
+    fits.HDUList([fits.PrimaryHDU(), page]).writeto(stream, checksum=True)
+    path.write_bytes(stream.getvalue())
     return len(columns[0])

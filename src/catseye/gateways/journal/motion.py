@@ -1,4 +1,4 @@
-"""Motion of the telescope as a journal has it, for a campaign: where it stood or how it moved, how far it shook."""
+"""Motion of the telescope in a journal, for a campaign: postures and jitter."""
 
 import math
 from collections.abc import Mapping
@@ -21,18 +21,18 @@ from catseye.reduction.live.live import LiveSettings
 from catseye.reduction.site.motion import PostureTrack
 
 FASTEST = 1.0 * DEGREE  # rad/s: the GBT slews at 0.67 in azimuth
-STEADY = 0.01 * DEGREE  # rad that the telescope may move before it is told
+STEADY = 0.01 * DEGREE  # rad, largest motion not reported
 MARGIN = round(NEAREST * TICKS_PER_DAY)  # ticks from a shot to a posture
-EPOCH_MARGIN = round(60.0 / SECONDS_PER_DAY * TICKS_PER_DAY)  # ticks, of an epoch behind its last shot
+EPOCH_MARGIN = round(60.0 / SECONDS_PER_DAY * TICKS_PER_DAY)  # ticks, of an epoch after its last shot
 
 
 @dataclass(frozen=True)
 class MotionRows:
-    """Posture, postures and jitter that a campaign is written with.
+    """Posture, postures and jitter of an exported campaign.
 
-    posture    azimuth and elevation, rad, of its middle; None where nobody said
-    wrong      why its postures cannot be believed, in words; "" where they can
-    postures   rows, of a telescope that moved
+    posture    azimuth and elevation, rad, median over the campaign; None if unknown
+    wrong      reason why the postures are invalid; "" if valid
+    postures   rows, if the telescope moved
     jitter     rows
     """
 
@@ -44,7 +44,7 @@ class MotionRows:
 
 @dataclass(frozen=True, eq=False)
 class JournalMotion:
-    """The postures of a run, in order of time, each instant once, and the reader that knows its epochs."""
+    """Postures of a run in time order, without duplicate times, and the reader of its epochs."""
 
     reader: JournalReader
     run: int
@@ -52,21 +52,21 @@ class JournalMotion:
 
     @classmethod
     def of(cls, reader: JournalReader, run: int, span: tuple[int, int] | None) -> "JournalMotion":
-        """Motion of a run, within a span of ticks and two seconds more."""
-        found = {
+        """Motion of a run, within a span of ticks ± two seconds."""
+        by_ticks = {
             entry.ticks: entry
             for _, entry in reader.events(run, kinds=["postures"])
             if isinstance(entry, LivePosture) and (span is None or span[0] - MARGIN <= entry.ticks < span[1] + MARGIN)
         }
-        return cls(reader, run, [found[ticks] for ticks in sorted(found)])
+        return cls(reader, run, [by_ticks[ticks] for ticks in sorted(by_ticks)])
 
     @cached_property
     def moved(self) -> float:
-        """The largest change of an angle, rad."""
+        """Largest change of an angle, rad."""
         return self._moved(self.postures)
 
     def lacks(self, ticks: int) -> bool:
-        """True where the telescope moved and no posture is near an instant."""
+        """True where the telescope moved and no posture is near a time."""
         if self.moved <= STEADY:
             return False
         times = self._ticks
@@ -74,15 +74,15 @@ class JournalMotion:
         return bool(np.min(np.abs(times[max(at - 1, 0) : at + 1] - ticks)) > MARGIN)
 
     def during(self, span: tuple[int, int], notes: list[str]) -> MotionRows:
-        """From the first shot to the last, ticks; notes tell of what moved."""
+        """Motion from the first shot to the last, ticks; notes describe what moved."""
         within = [read for read in self.postures if span[0] <= read.ticks <= span[1]]
         if not within:
             return MotionRows(None, (), self._jitter(span, 0.0, notes))
         moved = self._moved(within)
         if moved <= STEADY:
             azimuth, elevation = np.unwrap([r.azimuth for r in within]), [r.elevation for r in within]
-            stood = float(np.median(azimuth)), float(np.median(elevation))
-            return MotionRows(stood, (), self._jitter(span, 0.0, notes))
+            median = float(np.median(azimuth)), float(np.median(elevation))
+            return MotionRows(median, (), self._jitter(span, 0.0, notes))
         notes.append(f"the telescope moved by {moved / DEGREE:.3f} deg: {POSTURES} says how")
         near = [read for read in self.postures if span[0] - MARGIN <= read.ticks <= span[1] + MARGIN]
         middle = PostureTrack.of(near).angles(0.5 * (span[0] + span[1]) / TICKS_PER_DAY)
@@ -102,32 +102,30 @@ class JournalMotion:
         return max(float(np.ptp(np.unwrap([r.azimuth for r in reads]))), float(np.ptp([r.elevation for r in reads])))
 
     def _jitter(self, span: tuple[int, int], climbed: float, notes: list[str]) -> tuple[JitterRow, ...]:
-        """Jitter of the bodies as each epoch of a span believed it, and how they bent while the telescope climbed, deg.
+        """Jitter of the bodies by epoch, and their bending while the telescope climbed, deg.
 
-        A journal of an older version does not say the first: what was set for the run.
+        Journals of older versions lack the first: the run's setting is used.
         """
-        found: dict[tuple[int, str], float] = {}
+        jitter: dict[tuple[int, str], float] = {}
         for _, solution in self.reader.solutions(self.run):
             ticks = solution.answer.get("ticks", solution.ticks)
             if span[0] <= ticks <= span[1] + EPOCH_MARGIN:
-                found |= {(ticks, body): mm for body, mm in (solution.answer.get("jitter_mm") or {}).items()}
+                jitter |= {(ticks, body): mm for body, mm in (solution.answer.get("jitter_mm") or {}).items()}
         live = self.reader.run(self.run).settings.get("live")
         settings = live if isinstance(live, Mapping) else {}
-        if not found:
+        if not jitter:
             usual = settings.get("jitter_mm")
-            found = {(span[0], str(body)): mm for body, mm in (usual if isinstance(usual, Mapping) else {}).items()}
-            if found:
-                notes.append(
-                    f"the journal's epochs do not say how far the telescope shook: {JITTER} has the run's setting"
-                )
+            jitter = {(span[0], str(body)): mm for body, mm in (usual if isinstance(usual, Mapping) else {}).items()}
+            if jitter:
+                notes.append(f"the journal's epochs have no jitter: {JITTER} has the run's setting")
         bending = settings.get("bending_mm_per_degree", LiveSettings().bending_mm_per_degree)
-        bent = {body: mm * climbed / math.sqrt(12.0) for body, mm in bending.items()}  # evenly through the climb
+        bent = {body: mm * climbed / math.sqrt(12.0) for body, mm in bending.items()}  # uniform over the climb
         try:
             return tuple(
                 JitterRow.model_validate(
                     {"mjd_utc": float(stamp(ticks)), "body": body, "u_mm": math.hypot(mm, bent.get(body, 0.0))}
                 )
-                for (ticks, body), mm in sorted(found.items())
+                for (ticks, body), mm in sorted(jitter.items())
             )
         except (ValidationError, TypeError) as problem:
             raise InputError(
@@ -137,14 +135,14 @@ class JournalMotion:
 
 
 def _jump(reads: list[LivePosture]) -> str:
-    """Where two readings are further apart than a telescope moves meanwhile; "" of none."""
+    """Text on two readings further apart than the telescope can move meanwhile; "" if none."""
     for before, after in pairwise(reads):
         seconds = (after.ticks - before.ticks) * TICK_SECONDS
         turned = abs((after.azimuth - before.azimuth + math.pi) % (2.0 * math.pi) - math.pi)
         apart = max(turned, abs(after.elevation - before.elevation))
         if apart > STEADY + FASTEST * seconds:
             jumped = f"the telescope moved by {apart / DEGREE:.3f} deg in {seconds:.3f} s"
-            return f"{jumped}, says the posture at {stamp(after.ticks)}: postures cannot be believed"
+            return f"{jumped}, by the posture at {stamp(after.ticks)}: postures are invalid"
     return ""
 
 

@@ -1,4 +1,4 @@
-"""How far a replay moved a journal's answers, for programs and for people."""
+"""Difference of a replay from the journal's answers, as JSON and text."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,16 +14,16 @@ TITLES: Mapping[Moving, str] = {
     Moving.BEAM: "Beam",
     Moving.FOCUS: "Focus",
 }
-UNITS: Mapping[Moving, tuple[str, str, float]] = {  # in a key, for people, in the unit of a movement
+UNITS: Mapping[Moving, tuple[str, str, float]] = {  # key, symbol, size of the unit
     **dict.fromkeys(Moving, ("mm", " mm", MILLIMETRE)),
     Moving.THERMOMETERS: ("c", " °C", 1.0),
     Moving.BEAM: ("arcsec", "″", ARCSECOND),
 }
 
 
-def movement_object(found: Mapping[Moving, Movement]) -> dict[str, Any]:
-    """What moved, by kind, as a plain object for JSON."""
-    return {moving.value: _object(moving, movement) for moving, movement in found.items()}
+def movement_object(moves: Mapping[Moving, Movement]) -> dict[str, Any]:
+    """Movements by kind, as an object for JSON."""
+    return {moving.value: _object(moving, movement) for moving, movement in moves.items()}
 
 
 def _object(moving: Moving, movement: Movement) -> dict[str, Any]:
@@ -45,9 +45,9 @@ def _place(far: Furthest) -> dict[str, Any]:
     return {"name": far.name, "epoch": far.epoch}
 
 
-def movement_words(found: Mapping[Moving, Movement]) -> list[tuple[str, str]]:
-    """Title and text of what moved, in its unit and in u, for people; what did not move is left out."""
-    return [(TITLES[moving], _words(moving, movement)) for moving, movement in found.items() if movement.largest.size]
+def movement_words(moves: Mapping[Moving, Movement]) -> list[tuple[str, str]]:
+    """Title and text of each movement, in its unit and in u; kinds that did not move are omitted."""
+    return [(TITLES[moving], _words(moving, movement)) for moving, movement in moves.items() if movement.largest.size]
 
 
 def _words(moving: Moving, movement: Movement) -> str:
@@ -64,11 +64,11 @@ def _words(moving: Moving, movement: Movement) -> str:
 
 
 def _at(far: Furthest) -> str:
-    return f"{far.name}, behind the last epoch" if far.epoch is None else f"{far.name}, epoch {far.epoch}"
+    return f"{far.name}, after the last epoch" if far.epoch is None else f"{far.name}, epoch {far.epoch}"
 
 
 def shown(value: float) -> str:
-    """A size with three decimals, or with a power of ten where those would say nothing.
+    """Size with three decimals, or with a power of ten if small.
 
     >>> shown(0.0), shown(1.25), shown(1.5e-11)
     ('0', '1.250', '1.5e-11')

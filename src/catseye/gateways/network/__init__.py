@@ -1,1 +1,1 @@
-"""An adjusted, planned or compared network on the way out."""
+"""Output of an adjusted, planned or compared network."""

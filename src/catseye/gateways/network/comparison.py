@@ -1,4 +1,4 @@
-"""What moved between two adjusted epochs, as JSON and CSV, in the axes of the first epoch's file."""
+"""Deformation between two adjusted epochs as JSON and CSV, in the axes of the first epoch's file."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.verdict import Verdict
 
 FORMAT = "catseye-comparison-1"
-NAMED = 8  # points told in sentences
-SMALLEST = np.finfo(float).tiny  # a probability below it is zero in double precision
+NAMED = 8  # points named in sentences
+SMALLEST = np.finfo(float).tiny  # smaller probabilities are zero in double precision
 UNTESTED = "not checked"
 DISPLACEMENTS: Formats = {
     "point": "",
@@ -34,10 +34,10 @@ DISPLACEMENTS: Formats = {
 
 @dataclass(frozen=True, eq=False)
 class ComparedEpochs:
-    """Two epochs and what moved between them.
+    """Two epochs and the deformation between them.
 
-    first, second   their adjustments
-    moved           of the common points, in x east, y north, z up
+    first, second   adjustments
+    moved           deformation of the common points, in x east, y north, z up
     """
 
     first: Findings
@@ -50,17 +50,17 @@ class ComparedEpochs:
 
     @property
     def variance_factor(self) -> VarianceFactor:
-        """That of both epochs together; known (1) or estimated."""
+        """Variance factor of both epochs together, known (1) or estimated."""
         return self.moved.variance_factor
 
     @cached_property
     def rows(self) -> np.ndarray:
-        """(n,) rows of the common points in the first epoch."""
+        """Rows of the common points in the first epoch, (n,)."""
         return np.array([self.first.solution.index[name] for name in self.deformation.names], dtype=int)
 
     @cached_property
     def displacement(self) -> np.ndarray:
-        """(n, 3) m in the axes of the file."""
+        """Displacements in the axes of the file, (n, 3) m."""
         return in_file_axes(self.first.network, self.deformation.displacement, self.deformation.covariance)[0]
 
     @cached_property
@@ -70,37 +70,45 @@ class ComparedEpochs:
 
     @cached_property
     def u(self) -> np.ndarray:
-        """(n, 3) m, standard uncertainties of the displacement."""
+        """Standard uncertainties of the displacements, (n, 3) m."""
         return np.sqrt(np.maximum(np.diagonal(self.covariance, axis1=1, axis2=2), 0.0))
 
     @cached_property
     def difference(self) -> tuple[np.ndarray, np.ndarray]:
-        """(n, 3) and (n, 3, 3): the plain difference of coordinates and its covariance, in the axes of the file."""
+        """Plain difference of coordinates (n, 3) and its covariance (n, 3, 3), in the file's axes."""
         return in_file_axes(self.first.network, self.moved.difference, self.moved.difference_covariance)
 
     @cached_property
     def length(self) -> np.ndarray:
-        """(n,) m, of what is known of the displacement; nan where nothing is."""
-        known = np.isfinite(self.displacement)
-        size = np.sqrt(np.sum(np.where(known, self.displacement, 0.0) ** 2, axis=1))
-        return np.where(known.any(axis=1), size, np.nan)
+        """Length of the known components of the displacements, (n,) m; nan if none."""
+        finite = np.isfinite(self.displacement)
+        size = np.sqrt(np.sum(np.where(finite, self.displacement, 0.0) ** 2, axis=1))
+        return np.where(finite.any(axis=1), size, np.nan)
 
     @cached_property
     def verdicts(self) -> list[str]:
-        """One word or two a point: moved, stable, held, not checked; undecided where the search is.
+        """Verdict on each point: moved, stable, held, unchecked or undecided.
 
-        Without a conclusion a point that differs from the rest by more than chance explains is not called stable.
+        If the search has no conclusion, a point that differs from the others significantly is not called stable.
         """
         d = self.deformation
         open_ = np.full(len(d.names), not d.conclusive) & (d.p_adjusted < d.level)
         return [
-            "held" if held else "moved" if moved else "undecided" if doubt else "stable" if np.isfinite(p) else UNTESTED
-            for held, moved, doubt, p in zip(d.held, d.moved, open_, d.p, strict=True)
+            "held"
+            if fixed
+            else "moved"
+            if moved
+            else "undecided"
+            if doubt
+            else "stable"
+            if np.isfinite(p)
+            else UNTESTED
+            for fixed, moved, doubt, p in zip(d.held, d.moved, open_, d.p, strict=True)
         ]
 
 
 def comparison_verdict(compared: ComparedEpochs) -> Verdict:
-    """Verdict of a comparison: no better than its epochs, doubtful where a point is doubted or the search is open.
+    """Verdict of a comparison: at most that of its epochs; doubtful if a point or the search is.
 
     compared   two epochs
     """
@@ -110,11 +118,11 @@ def comparison_verdict(compared: ComparedEpochs) -> Verdict:
         if judged.word != "good":
             return Verdict(judged.word, f"the {which} epoch: {judged.why}")
     if not np.isfinite(compared.deformation.p).any():
-        return Verdict("doubtful", "nothing can be tested: no displacement has an uncertainty")
-    text = "no point moved by more than chance explains"
+        return Verdict("doubtful", "no test possible: no displacement has an uncertainty")
+    text = "no point moved significantly"
     if moved:
         named = ", ".join(moved[:NAMED]) + (f" and {len(moved) - NAMED} more" if len(moved) > NAMED else "")
-        text = f"by more than chance explains moved {named}"
+        text = f"significant movement of {named}"
     doubts = compared.moved.doubts
     if doubts:
         return Verdict("doubtful", "; ".join([*doubts, *([text] if compared.deformation.conclusive else [])]))
@@ -122,7 +130,7 @@ def comparison_verdict(compared: ComparedEpochs) -> Verdict:
 
 
 def comparison_object(compared: ComparedEpochs) -> dict[str, Any]:
-    """What moved, as `catseye adjust A B --json` gives it; SI units.
+    """Object that `catseye adjust A B --json` prints; SI units.
 
     compared   two epochs
     """
@@ -170,13 +178,14 @@ def comparison_object(compared: ComparedEpochs) -> dict[str, Any]:
             "conclusive": d.conclusive,
             "homogeneity": compared.moved.homogeneity,
             "variance_factor": factor.value,
-            "variance_factor_degrees_of_freedom": factor.degrees_of_freedom,  # null: taken as known
+            "variance_factor_degrees_of_freedom": factor.degrees_of_freedom,  # null: known
             "congruence": {"all": _test(d.before), "stable": _test(d.after)},
             "moved": [name for name, verdict in zip(d.names, compared.verdicts, strict=True) if verdict == "moved"],
             "stable": [name for name, verdict in zip(d.names, compared.verdicts, strict=True) if verdict == "stable"],
             "steps": [vars(step) for step in d.steps],
             "points": {
-                name: {**dict(zip(keys, rest, strict=True)), "moved": rest[-1] == "moved"} for name, *rest in columns
+                name: {**dict(zip(keys, values, strict=True)), "moved": values[-1] == "moved"}
+                for name, *values in columns
             },
             "epochs": [_epoch(compared.first), _epoch(compared.second)],
         }
@@ -200,12 +209,12 @@ def _epoch(epoch: Findings) -> dict[str, Any]:
 
 
 def comparison_passages(compared: ComparedEpochs) -> list[Passage]:
-    """What moved and what was assumed, in sentences.
+    """Summary of movements and assumptions, in sentences.
 
     compared   two epochs
     """
     d = compared.deformation
-    passages = [Passage("What moved", f"{d.status[0].upper()}{d.status[1:]}.")]
+    passages = [Passage("Movements", f"{d.status[0].upper()}{d.status[1:]}.")]
     for i, (name, word) in enumerate(zip(d.names, compared.verdicts, strict=True)):
         if word in ("moved", "undecided") and len(passages) <= NAMED:
             parts = ", ".join(
@@ -216,10 +225,10 @@ def comparison_passages(compared: ComparedEpochs) -> list[Passage]:
                 if np.isfinite(value)
             )
             chance = f"p = {d.p[i]:.2g}" if d.p[i] > 0.0 else f"p < {SMALLEST:.0e}"
-            passages.append(Passage(name, f"{parts} mm; by chance {chance}."))
+            passages.append(Passage(name, f"{parts} mm; probability by chance {chance}."))
     count = sum(word in ("moved", "undecided") for word in compared.verdicts)
     if count > NAMED:
-        passages.append(Passage("And more", f"{count - NAMED} more points moved or are undecided."))
+        passages.append(Passage("Others", f"{count - NAMED} more points moved or are undecided."))
     words = [word for word in compared.moved.words if word != d.status]
     return passages + (
         [Passage("Assumed", " ".join(f"{word[0].upper()}{word[1:]}." for word in words))] if words else []
@@ -227,7 +236,7 @@ def comparison_passages(compared: ComparedEpochs) -> list[Passage]:
 
 
 def displacements_csv(compared: ComparedEpochs) -> Iterator[str]:
-    """Every common point: where it was, how far it moved, how sure that is.
+    """Table of common points: coordinates, displacements, uncertainties.
 
     compared   two epochs
     """

@@ -1,4 +1,4 @@
-"""The report of two epochs: what moved, how far, how sure that is; one HTML page that needs nothing else."""
+"""Report of the deformation between two epochs, one self-contained HTML page."""
 
 from collections.abc import Mapping
 from datetime import datetime
@@ -33,22 +33,22 @@ CONTENTS = {"summary": "Summary", "displacements": "Displacements", "epochs": "E
 CONFIDENCE = 0.95
 STILL = "#1f5a99"
 DOUBT = SERIES[4]
-SHARE = 0.12  # of the network's extent that the longest displacement or ellipse is drawn as, about
+SHARE = 0.12  # approximate size of the longest displacement or ellipse, share of the network's extent
 
 
 def comparison_report(compared: ComparedEpochs, when: datetime, inputs: Mapping[str, str]) -> str:
-    """The whole page.
+    """HTML report.
 
     compared   two epochs
     when       UTC
-    inputs     SHA-256 of each file read, by its name
+    inputs     SHA-256 of each input file, by name
     """
     first, second = (epoch.network.source or word for epoch, word in ((compared.first, "A"), (compared.second, "B")))
     links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())
     header = (
-        f"<header><h1>{escape(second)} against {escape(first)}: what moved</h1>"
+        f"<header><h1>{escape(second)} against {escape(first)}: deformation</h1>"
         f'<div class="faint">{len(compared.deformation.names)} common points, compared by catseye on '
-        f"{when:%Y-%m-%d %H:%M} UTC; displacements are the second epoch less the first, in the axes of "
+        f"{when:%Y-%m-%d %H:%M} UTC; displacements are the second epoch minus the first, in the axes of "
         f"{escape(first)}, u = standard uncertainty, 1σ</div><nav>{links}</nav></header>"
     )
     d = compared.deformation
@@ -75,18 +75,18 @@ def _summary(compared: ComparedEpochs) -> str:
     if np.isfinite(d.after.p):
         cards.append(card("Stable points congruent", f"p = {d.after.p:.2g}", _chance(d.after.p, d.level)))
     factor = compared.variance_factor
-    known = (
+    factor_origin = (
         "taken as known"
         if np.isinf(factor.degrees_of_freedom)
         else f"{factor.degrees_of_freedom:.0f} degrees of freedom"
     )
-    cards.append(card("Variance factor", f"{factor.value:.3f}", f"of both epochs, {known}"))
+    cards.append(card("Variance factor", f"{factor.value:.3f}", f"of both epochs, {factor_origin}"))
     detectable = d.detectable[np.isfinite(d.detectable)]
     text = f"{d.status[0].upper()}{d.status[1:]}."
     if len(detectable):
         text += (
-            f" The test of all points finds a displacement of the usual point from "
-            f"{quantity(float(np.median(detectable)), 'm')} on, in the direction seen worst, with probability "
+            f" The test of all points detects a displacement of a median point above "
+            f"{quantity(float(np.median(detectable)), 'm')}, in the least observable direction, with probability "
             f"{d.power:g}."
         )
     words = "".join(
@@ -104,7 +104,7 @@ def _summary(compared: ComparedEpochs) -> str:
 
 
 def _chance(p: float, level: float) -> str:
-    return "more than chance explains" if p < level else "no more than chance explains"
+    return "significant" if p < level else "not significant"
 
 
 def _displacements(compared: ComparedEpochs) -> str:
@@ -133,10 +133,10 @@ def _displacements(compared: ComparedEpochs) -> str:
         CONTENTS["displacements"],
         *(picture(figure.svg, figure.caption) for figure in drawn.values()),
         paragraph(
-            "Most significant first. p is the chance of such a displacement or a larger one of a point that did not "
-            "move; p of all is corrected for the number of points; the last column is the smallest displacement that "
-            "the test of all points finds. Displacements are the best estimate if the stable points did not move; the "
-            "plain difference is that of the coordinates."
+            "Most significant first. p is the probability of such a displacement or a larger one for a point that did "
+            "not move; p of all is corrected for the number of points; the last column is the smallest displacement "
+            "that the test of all points detects. Displacements are the best estimate if the stable points did not "
+            "move; the plain difference is that of the coordinates."
         ),
         table((*columns, "statistic", "p", "p of all", "detectable (mm)"), rows, "ttnnnnnnnnnn"),
     )
@@ -160,7 +160,7 @@ def _epochs(compared: ComparedEpochs) -> str:
 
 
 def comparison_figures(compared: ComparedEpochs) -> dict[str, CaptionedFigure]:
-    """Plan and elevation with displacements and their confidence ellipses, those that show any point.
+    """Plan and elevation with displacements and confidence ellipses, if any point can be shown.
 
     compared   two epochs
     """
@@ -173,15 +173,15 @@ def _view(compared: ComparedEpochs, bearing: float | None) -> tuple[Figure, str]
     d, first = compared.deformation, compared.first
     axes = PLAN if bearing is None else elevation_view(bearing)
     existing = first.network.points.existing
-    there = existing[:, :2] if bearing is None else existing
-    placed = np.asarray(there.all(axis=1))
+    visible = existing[:, :2] if bearing is None else existing
+    placed = np.asarray(visible.all(axis=1))
     flat = np.where(placed[:, None], np.nan_to_num(first.solution.x) @ axes.T, np.nan)
-    shown = compared.rows[np.isfinite(flat[compared.rows]).all(axis=1)]
-    if not len(shown):
-        shown = np.flatnonzero(np.isfinite(flat).all(axis=1))
+    view_rows = compared.rows[np.isfinite(flat[compared.rows]).all(axis=1)]
+    if not len(view_rows):
+        view_rows = np.flatnonzero(np.isfinite(flat).all(axis=1))
     if bearing is not None:
-        flat[:, 0] -= flat[shown, 0].min()
-    low, high = flat[shown].min(axis=0), flat[shown].max(axis=0)
+        flat[:, 0] -= flat[view_rows, 0].min()
+    low, high = flat[view_rows].min(axis=0), flat[view_rows].max(axis=0)
     size = max(float(np.max(high - low)), 1e-3)
     shift, spread = _in_view(d, axes)
     factor = confidence_scale(CONFIDENCE, 2, compared.variance_factor.degrees_of_freedom)
@@ -210,38 +210,39 @@ def _view(compared: ComparedEpochs, bearing: float | None) -> tuple[Figure, str]
 
 
 def _in_view(d: Deformation, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Displacements (n, 2) and covariances (n, 2, 2) in a view; nan where a coordinate that shows there is unknown."""
-    seen = axes.any(axis=0)
-    known = np.isfinite(d.displacement[:, seen]).all(axis=1)
-    shift = np.where(known[:, None], np.nan_to_num(d.displacement) @ axes.T, np.nan)
-    return shift, np.where(known[:, None, None], axes @ np.nan_to_num(d.covariance) @ axes.T, np.nan)
+    """Displacements (n, 2) and covariances (n, 2, 2) in a view; nan where a component is unknown."""
+    in_plane = axes.any(axis=0)
+    finite = np.isfinite(d.displacement[:, in_plane]).all(axis=1)
+    shift = np.where(finite[:, None], np.nan_to_num(d.displacement) @ axes.T, np.nan)
+    return shift, np.where(finite[:, None, None], axes @ np.nan_to_num(d.covariance) @ axes.T, np.nan)
 
 
 def _arrows(ax: Any, compared: ComparedEpochs, drawn: tuple[np.ndarray, np.ndarray], shape: tuple[Any, float]) -> None:
-    """Displacements and ellipses by verdict."""
-    (base, shift), (shown, scale) = drawn, shape
+    """Draw displacements and ellipses by verdict."""
+    (base, shift), (shapes, scale) = drawn, shape
     verdicts = np.array(compared.verdicts)
     for word, colour in (("stable", STILL), ("undecided", DOUBT), ("moved", BAD)):
-        here = (verdicts == word) & np.isfinite(shift).all(axis=1)
-        if not here.any():
+        chosen = (verdicts == word) & np.isfinite(shift).all(axis=1)
+        if not chosen.any():
             continue
         ax.add_collection(
             EllipseCollection(
-                2 * scale * shown.major[here], 2 * scale * shown.minor[here], 90.0 - shown.bearing[here] / DEGREE,
-                units="xy", offsets=base[here], offset_transform=ax.transData, facecolors=f"{colour}18",
+                2 * scale * shapes.major[chosen], 2 * scale * shapes.minor[chosen],
+                90.0 - shapes.bearing[chosen] / DEGREE,
+                units="xy", offsets=base[chosen], offset_transform=ax.transData, facecolors=f"{colour}18",
                 edgecolors=colour, linewidths=0.7, zorder=2,
             )
         )  # fmt: skip
         ax.quiver(
-            *base[here].T, *shift[here].T, angles="xy", scale_units="xy", scale=1.0, color=colour, width=0.0022,
+            *base[chosen].T, *shift[chosen].T, angles="xy", scale_units="xy", scale=1.0, color=colour, width=0.0022,
             headwidth=4.0, headlength=5.0, headaxislength=4.5, minlength=0.1, zorder=4,
         )  # fmt: skip
-        ax.scatter(*base[here].T, s=5, c=colour, lw=0, zorder=3, label=word)
+        ax.scatter(*base[chosen].T, s=5, c=colour, lw=0, zorder=3, label=word)
     for word, marker in (("held", "s"), (UNTESTED, "o")):
-        here = verdicts == word
-        if here.any():
+        chosen = verdicts == word
+        if chosen.any():
             ax.scatter(
-                *base[here].T, s=20, facecolors="white", edgecolors=INK, marker=marker, lw=0.9, zorder=3, label=word
+                *base[chosen].T, s=20, facecolors="white", edgecolors=INK, marker=marker, lw=0.9, zorder=3, label=word
             )
 
 

@@ -1,4 +1,4 @@
-"""Figures of an adjusted network: plan, elevation, residuals, redundancy. Dense parts are rasterised."""
+"""Figures of an adjusted network: plan, elevation, residuals, redundancy."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -14,34 +14,34 @@ from catseye.estimation.quality.ellipsoid import PLAN, Ellipse, elevation_view, 
 from catseye.gateways.network.findings import Findings
 from catseye.gateways.writers.drawing import BAD, FAINT, GRID, INK, SERIES, nice, styled, svg
 
-STATION, TARGET, HELD, PALE = "#1f5a99", "#1e8e74", "#22303c", "#6f8fa8"
-DENSE = 300  # points or marks from which they are rasterised, and only some are named
+STATION, TARGET, FIXED, PALE = "#1f5a99", "#1e8e74", "#22303c", "#6f8fa8"
+DENSE = 300  # points or marks from which they are rasterised and only some named
 LINES = 2_500  # observations drawn as lines at most
 NAMED = 45  # points named at most
-LOOSE = 20.0  # times the usual ellipse: beyond it none is drawn
-SHARE = 0.05  # of the network's extent that the usual ellipsoid's longest axis is drawn as, where points are few
-RASTER = 144  # dots an inch
+LOOSE = 20.0  # times the median ellipse; larger ones are not drawn
+SHARE = 0.05  # longest axis of the median ellipsoid over the network's extent, for few points
+RASTER = 144  # dots per inch
 WIDTH = 9.4  # inches, of every figure
 ROUND = np.array([(1, 0), (-1, 0), (0, 1), (0, -1), (0.8, 0.8), (-0.8, 0.8), (0.8, -0.8), (-0.8, -0.8)])
 
 
 @dataclass(frozen=True)
 class CaptionedFigure:
-    """A figure and what its caption has to say."""
+    """Figure and the text of its caption."""
 
     figure: Figure
     caption: str
 
     @property
     def svg(self) -> str:
-        """The figure as text of an SVG file."""
+        """Figure as the text of an SVG file."""
         return svg(self.figure)
 
 
 def network_figures(findings: Findings) -> dict[str, CaptionedFigure]:
-    """Plan, elevation, residuals and redundancy by name, those that show anything; x east, y north, z up.
+    """Plan, elevation, residuals and redundancy by name, where not empty; x east, y north, z up.
 
-    findings   what is told of a solution
+    findings   findings on a solution
     """
     with styled():
         drawn = {name: _view(findings, bearing) for name, bearing in views(findings).items()}
@@ -53,17 +53,17 @@ def network_figures(findings: Findings) -> dict[str, CaptionedFigure]:
 def views(findings: Findings) -> dict[str, float | None]:
     """Bearing of each view that has a point to show; None from above.
 
-    findings   what is told of a solution
+    findings   findings on a solution
     """
-    there = findings.network.points.existing
-    shown = {"plan": None} if there[:, :2].all(axis=1).any() else {}
-    return {**shown, **({"elevation": looking(findings)} if there.all(axis=1).any() else {})}
+    existing = findings.network.points.existing
+    plan_view = {"plan": None} if existing[:, :2].all(axis=1).any() else {}
+    return {**plan_view, **({"elevation": looking(findings)} if existing.all(axis=1).any() else {})}
 
 
 def looking(findings: Findings) -> float:
-    """Bearing along which the elevation is seen, rad, a whole degree: across the network's longest extent in plan.
+    """Viewing bearing of the elevation, rad, a whole degree: across the longest extent in plan.
 
-    findings   what is told of a solution
+    findings   findings on a solution
     """
     level = findings.solution.x[:, :2]
     level = level[findings.network.points.existing[:, :2].all(axis=1)]
@@ -78,38 +78,40 @@ def looking(findings: Findings) -> float:
 
 
 def enlargement(findings: Findings) -> float:
-    """How many times larger than the network the ellipsoids are drawn, 1, 2 or 5 times a power of ten; nan for none.
+    """Enlargement of the ellipsoids, 1, 2 or 5 times a power of ten; nan for none.
 
-    findings   what is told of a solution
+    findings   findings on a solution
 
-    The usual ellipsoid's longest axis becomes some hundredths of the network's extent, less where points are many.
+    The median ellipsoid's longest axis becomes some hundredths of the network's extent, less with many points.
     """
     longest = findings.ellipsoid.semi_axes[:, 0]
-    known = longest[np.isfinite(longest) & (longest > 0.0)]
-    if not len(known):
+    positive = longest[np.isfinite(longest) & (longest > 0.0)]
+    if not len(positive):
         return np.nan
-    share = SHARE / (1.0 + np.sqrt(len(known) / 150.0))
+    share = SHARE / (1.0 + np.sqrt(len(positive) / 150.0))
     x = findings.solution.x[:, findings.network.points.existing.any(axis=0)]
-    return nice(share * max(float(np.max(np.nanmax(x, axis=0) - np.nanmin(x, axis=0))), 1e-3) / float(np.median(known)))
+    return nice(
+        share * max(float(np.max(np.nanmax(x, axis=0) - np.nanmin(x, axis=0))), 1e-3) / float(np.median(positive))
+    )
 
 
 def _view(findings: Findings, bearing: float | None) -> tuple[Figure, str]:
-    """Points, lines of observations and ellipses, seen from above or along a bearing."""
+    """Draw points, observation lines and ellipses, from above or along a bearing."""
     solution = findings.solution
     axes = PLAN if bearing is None else elevation_view(bearing)
-    there = findings.network.points.existing[:, :2] if bearing is None else findings.network.points.existing
-    flat = np.where(there.all(axis=1, keepdims=True), np.nan_to_num(solution.x) @ axes.T, np.nan)
-    known = np.isfinite(flat).all(axis=1)
+    existing = findings.network.points.existing[:, :2] if bearing is None else findings.network.points.existing
+    flat = np.where(existing.all(axis=1, keepdims=True), np.nan_to_num(solution.x) @ axes.T, np.nan)
+    finite = np.isfinite(flat).all(axis=1)
     if bearing is not None:
-        flat[:, 0] -= flat[known, 0].min(initial=np.inf if known.any() else 0.0)
-    low, high = (flat[known].min(axis=0), flat[known].max(axis=0)) if known.any() else (np.zeros(2), np.ones(2))
+        flat[:, 0] -= flat[finite, 0].min(initial=np.inf if finite.any() else 0.0)
+    low, high = (flat[finite].min(axis=0), flat[finite].max(axis=0)) if finite.any() else (np.zeros(2), np.ones(2))
     size = max(float(np.max(high - low)), 1e-3)
     figure, ax = view_frame(0.5 * (low + high), high - low + 0.16 * size)
     lines = _lines(ax, findings, flat)
     scale = enlargement(findings)
     covariance = np.full((len(flat), 2, 2), np.nan)
     if solution.answered:
-        covariance[known] = projected(np.nan_to_num(solution.covariance[known]) * findings.factor, axes)
+        covariance[finite] = projected(np.nan_to_num(solution.covariance[finite]) * findings.factor, axes)
     loose, ellipses = _ellipses(ax, findings, flat, ellipse(covariance), scale)
     scale_bar(ax, nice(0.2 * size), scale)
     _marks(ax, findings, flat, loose)
@@ -127,13 +129,13 @@ def _view(findings: Findings, bearing: float | None) -> tuple[Figure, str]:
 
 
 def view_frame(centre: np.ndarray, span: np.ndarray) -> tuple[Figure, Any]:
-    """A figure of the usual width with one pair of axes, equally scaled, that holds a span about a centre."""
-    left, right, low, high = 0.8, 0.15, 0.85, 0.45  # inches beside the axes
-    wide = WIDTH - left - right
+    """Figure of standard width with one pair of equally scaled axes around a centre."""
+    pad_x, pad_end, low, high = 0.8, 0.15, 0.85, 0.45  # inches beside the axes
+    wide = WIDTH - pad_x - pad_end
     tall = float(np.clip(wide * span[1] / span[0], 1.6, 8.4))
     figure = Figure(figsize=(WIDTH, tall + low + high), dpi=RASTER)
-    ax = figure.add_axes((left / WIDTH, low / (tall + low + high), wide / WIDTH, tall / (tall + low + high)))
-    metres = max(span[0] / wide, span[1] / tall)  # to the inch
+    ax = figure.add_axes((pad_x / WIDTH, low / (tall + low + high), wide / WIDTH, tall / (tall + low + high)))
+    metres = max(span[0] / wide, span[1] / tall)  # per inch
     half = 0.5 * metres * np.array([wide, tall])
     ax.set(xlim=(centre[0] - half[0], centre[0] + half[0]), ylim=(centre[1] - half[1], centre[1] + half[1]))
     ax.set_aspect("equal")
@@ -141,7 +143,7 @@ def view_frame(centre: np.ndarray, span: np.ndarray) -> tuple[Figure, Any]:
 
 
 def file_ticks(axis: Any, findings: Findings, k: int, *, word: str, opposite: str) -> None:
-    """Ticks that read the file's own coordinate, whichever way it counts."""
+    """Set ticks that show the file's own coordinate, in its direction of counting."""
     axes = findings.network.axes
     j = int(np.argmax(np.abs(axes[k])))
     sign = axes[k, j]
@@ -150,39 +152,39 @@ def file_ticks(axis: Any, findings: Findings, k: int, *, word: str, opposite: st
 
 
 def _lines(ax: Any, findings: Findings, flat: np.ndarray) -> str:
-    """Thin lines of the active observations; the caption's sentence."""
+    """Draw thin lines for the active observations; sentence for the caption."""
     table = findings.table
     start, end = table.ends[table.active, 0], table.ends[table.active, 1]
-    both = (start >= 0) & (end >= 0)
-    pairs = np.unique(np.sort(np.stack([start[both], end[both]], axis=1), axis=1), axis=0)
+    pairwise = (start >= 0) & (end >= 0)
+    pairs = np.unique(np.sort(np.stack([start[pairwise], end[pairwise]], axis=1), axis=1), axis=0)
     pairs = pairs[np.isfinite(flat[pairs]).all(axis=(1, 2))]
     if not len(pairs):
         return "No lines: no observation joins two points."
-    every = max(1, int(np.ceil(len(pairs) / LINES)))
-    # a fixed scatter over the pairs, or a whole station would lose or keep all of its lines
-    drawn = pairs[np.random.default_rng(len(pairs)).permutation(len(pairs))[::every]]
+    step = max(1, int(np.ceil(len(pairs) / LINES)))
+    # a seeded random choice, so that every station keeps a share of its lines
+    drawn = pairs[np.random.default_rng(len(pairs)).permutation(len(pairs))[::step]]
     few = len(drawn) < DENSE
     ends = np.full((len(drawn), 3, 2), np.nan)
     ends[:, :2] = flat[drawn]
     ax.plot(*ends.reshape(-1, 2).T, color=FAINT, lw=0.7 if few else 0.2, alpha=0.5 if few else 0.35, zorder=1)
     ax.plot([], [], color=FAINT, lw=0.8, label="observed")
-    return "Thin lines: observations." if every == 1 else f"Thin lines: one in {every} of {len(pairs)} observed pairs."
+    return "Thin lines: observations." if step == 1 else f"Thin lines: one in {step} of {len(pairs)} observed pairs."
 
 
-def _ellipses(ax: Any, findings: Findings, flat: np.ndarray, shown: Ellipse, scale: float) -> tuple[np.ndarray, str]:
-    """Outlines of the standard ellipsoids to scale; which points (n,) have none, and the caption's sentence."""
-    known = np.isfinite(shown.major)
-    if not (np.isfinite(scale) and np.any(shown.major[known] > 0.0)):
-        return ~known, "No ellipsoids: nothing is known of the uncertainties."
-    usual = float(np.median(shown.major[known & (shown.major > 0.0)]))
-    loose = ~known | (shown.major > LOOSE * usual)
-    held = np.flatnonzero(~loose & (shown.major > 0.0))
-    colour = np.where(findings.stations[held], STATION, TARGET)
-    many = len(held) > DENSE
+def _ellipses(ax: Any, findings: Findings, flat: np.ndarray, outline: Ellipse, scale: float) -> tuple[np.ndarray, str]:
+    """Draw standard ellipsoids to scale; mask (n,) of points without one, and the caption's sentence."""
+    finite = np.isfinite(outline.major)
+    if not (np.isfinite(scale) and np.any(outline.major[finite] > 0.0)):
+        return ~finite, "No ellipsoids: uncertainties unknown."
+    usual = float(np.median(outline.major[finite & (outline.major > 0.0)]))
+    loose = ~finite | (outline.major > LOOSE * usual)
+    rows = np.flatnonzero(~loose & (outline.major > 0.0))
+    colour = np.where(findings.stations[rows], STATION, TARGET)
+    many = len(rows) > DENSE
     ax.add_collection(
         EllipseCollection(
-            2 * scale * shown.major[held], 2 * scale * shown.minor[held], 90.0 - shown.bearing[held] / DEGREE,
-            units="xy", offsets=flat[held], offset_transform=ax.transData, facecolors=[f"{c}20" for c in colour],
+            2 * scale * outline.major[rows], 2 * scale * outline.minor[rows], 90.0 - outline.bearing[rows] / DEGREE,
+            units="xy", offsets=flat[rows], offset_transform=ax.transData, facecolors=[f"{c}20" for c in colour],
             edgecolors=list(colour), linewidths=0.35 if many else 0.7, zorder=3, rasterized=many,
         )
     )  # fmt: skip
@@ -195,9 +197,9 @@ def thousands(value: float) -> str:
 
 
 def scale_bar(ax: Any, length: float, scale: float, *, what: str = "ellipsoids") -> None:
-    """A bar above the axes with its length on the ground and, in what is enlarged, as it was before."""
-    left, right = ax.get_xlim()
-    share = length / (right - left)
+    """Draw a scale bar above the axes, with its length on the ground and in the enlarged parts."""
+    low, high_x = ax.get_xlim()
+    share = length / (high_x - low)
     box = ax.get_position().height * ax.figure.get_figheight()
     high = 1.0 + 0.16 / box
     ax.plot([0.0, share], [high, high], lw=2.2, solid_capstyle="butt", transform=ax.transAxes, clip_on=False, color=INK)
@@ -211,7 +213,7 @@ def scale_bar(ax: Any, length: float, scale: float, *, what: str = "ellipsoids")
 
 
 def _length(value: float) -> str:
-    """A small length with the unit that suits it.
+    """Small length in a suitable unit.
 
     >>> _length(2e-4), _length(2e-6)
     ('0.2 mm', '2 µm')
@@ -220,21 +222,21 @@ def _length(value: float) -> str:
 
 
 def _marks(ax: Any, findings: Findings, flat: np.ndarray, loose: np.ndarray) -> None:
-    """Stations, targets, held and loose points, each with a mark of its own."""
-    held = ~findings.network.points.free.any(axis=1)
+    """Draw stations, targets, held and loose points, each with its own mark."""
+    fixed = ~findings.network.points.free.any(axis=1)
     many = len(flat) > DENSE
     for mine, marker, colour, area, name in (
-        (~findings.stations & ~held & ~loose, "o", TARGET, 4 if many else 12, "target"),
-        (findings.stations & ~held & ~loose, "^", STATION, 26, "station"),
-        (~findings.stations & held, "s", HELD, 20, "held point"),
-        (findings.stations & held, "^", HELD, 26, "held station"),
+        (~findings.stations & ~fixed & ~loose, "o", TARGET, 4 if many else 12, "target"),
+        (findings.stations & ~fixed & ~loose, "^", STATION, 26, "station"),
+        (~findings.stations & fixed, "s", FIXED, 20, "held point"),
+        (findings.stations & fixed, "^", FIXED, 26, "held station"),
     ):
         if mine.any():
             ax.scatter(*flat[mine].T, s=area, c=colour, marker=marker, lw=0, zorder=4, label=name, rasterized=many)
     if loose.any() and findings.answered:
         ax.scatter(
             *flat[loose].T, s=26, facecolors="white", edgecolors=BAD, lw=1.2, zorder=4,
-            label=f"no ellipsoid: over {LOOSE:g} times the usual",
+            label=f"no ellipsoid: over {LOOSE:g} times the median",
         )  # fmt: skip
     elif loose.any():
         ax.scatter(*flat[loose].T, s=20, facecolors="white", edgecolors=FAINT, lw=1.0, zorder=4, label="not adjusted")
@@ -244,7 +246,7 @@ def _marks(ax: Any, findings: Findings, flat: np.ndarray, loose: np.ndarray) -> 
 
 
 def point_names(ax: Any, findings: Findings, flat: np.ndarray) -> None:
-    """Names where there is room for them, stations first; each beside its point where it covers least."""
+    """Draw point names where they fit, stations first, at the side with least overlap."""
     order = [*np.flatnonzero(findings.stations), *np.flatnonzero(~findings.stations)]
     order = [i for i in order if np.isfinite(flat[i]).all()]
     chosen = order if len(order) <= NAMED else [i for i in order if findings.stations[i]][:NAMED]
@@ -254,14 +256,14 @@ def point_names(ax: Any, findings: Findings, flat: np.ndarray) -> None:
     outward = where - where.mean(axis=0)
     outward /= np.maximum(np.hypot(*outward.T), 1e-9)[:, None]
     point = ax.figure.dpi / 72.0
-    taken = [*np.concatenate([where - 4.0 * point, where + 4.0 * point], axis=1)]  # left, low, right, high
+    occupied = [*np.concatenate([where - 4.0 * point, where + 4.0 * point], axis=1)]  # left, low, right, high
     for i, at, out in zip(chosen, where, outward, strict=True):
         half = point * np.array([2.5 * len(findings.names[i]), 4.0])
         centres = at + ROUND * (6.0 * point + half)
         boxes = np.concatenate([centres - half, centres + half], axis=1)
-        cost = _overlap(boxes, np.array(taken)) - point * ROUND @ out
+        cost = _overlap(boxes, np.array(occupied)) - point * ROUND @ out
         best = int(np.argmin(cost))
-        taken.append(boxes[best])
+        occupied.append(boxes[best])
         ax.annotate(
             findings.names[i], flat[i], xytext=(centres[best] - at) / point, textcoords="offset points", ha="center",
             va="center", fontsize=7.5, zorder=5, color=STATION if findings.stations[i] else INK,
@@ -269,45 +271,48 @@ def point_names(ax: Any, findings: Findings, flat: np.ndarray) -> None:
         )  # fmt: skip
 
 
-def _overlap(boxes: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """(k,) area that each of k boxes shares with others; boxes are left, low, right, high."""
-    low = np.maximum(boxes[:, None, :2], others[:, :2])
-    high = np.minimum(boxes[:, None, 2:], others[:, 2:])
+def _overlap(boxes: np.ndarray, other_boxes: np.ndarray) -> np.ndarray:
+    """Overlap area of each of k boxes with others, (k,).
+
+    Boxes are left, low, right, high.
+    """
+    low = np.maximum(boxes[:, None, :2], other_boxes[:, :2])
+    high = np.minimum(boxes[:, None, 2:], other_boxes[:, 2:])
     return np.prod(np.maximum(high - low, 0.0), axis=2).sum(axis=1)
 
 
 def _residuals(findings: Findings) -> tuple[Figure, str]:
-    """Standardised residuals in the order of the file, and their histogram against the normal distribution."""
+    """Standardised residuals in file order, and their histogram against the normal distribution."""
     table = findings.table
-    shown = np.flatnonzero(np.isfinite(findings.statistic))
-    w = findings.statistic[shown]
+    tested = np.flatnonzero(np.isfinite(findings.statistic))
+    w = findings.statistic[tested]
     figure = Figure(figsize=(WIDTH, 3.9), dpi=RASTER)
-    left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
+    sequence, histogram = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
     figure.subplots_adjust(left=0.065, right=0.985, bottom=0.21, top=0.91, wspace=0.17)
     span = max(1.25 * (findings.critical if np.isfinite(findings.critical) else 4.0), 4.0)
     inside = np.abs(w) <= span
     many = len(w) > 5 * DENSE
     for k, kind in enumerate(table.kinds):
-        mine = inside & (table.kind[shown] == k)
+        mine = inside & (table.kind[tested] == k)
         if mine.any():
-            left.scatter(
-                shown[mine], w[mine], s=2 if many else 10, c=SERIES[k % len(SERIES)], lw=0, alpha=0.5 if many else 0.8,
+            sequence.scatter(
+                tested[mine], w[mine], s=2 if many else 10, c=SERIES[k % len(SERIES)], lw=0, alpha=0.5 if many else 0.8,
                 rasterized=many, label=kind.replace("_", " "),
             )  # fmt: skip
     if not inside.all():
         far = w[~inside]
-        left.scatter(
-            shown[~inside], np.clip(far, -0.97 * span, 0.97 * span), s=26, c=BAD, marker="D", lw=0, zorder=3,
+        sequence.scatter(
+            tested[~inside], np.clip(far, -0.97 * span, 0.97 * span), s=26, c=BAD, marker="D", lw=0, zorder=3,
             label=f"beyond the edge, to {np.max(np.abs(far)):.3g}",
         )  # fmt: skip
     for limit in (-findings.critical, findings.critical):
-        left.axhline(limit, color=BAD, lw=0.8, ls="--")
-    left.set_ylim(-span, span)
-    left.set_title("Every tested observation")
-    left.set_xlabel("number in the file")
-    left.set_ylabel(f"test statistic {'τ' if findings.test == 'tau' else 'w'}")
+        sequence.axhline(limit, color=BAD, lw=0.8, ls="--")
+    sequence.set_ylim(-span, span)
+    sequence.set_title("All tested observations")
+    sequence.set_xlabel("number in the file")
+    sequence.set_ylabel(f"test statistic {'τ' if findings.test == 'tau' else 'w'}")
     figure.legend(
-        *left.get_legend_handles_labels(),
+        *sequence.get_legend_handles_labels(),
         loc="lower left",
         bbox_to_anchor=(0.05, 0.0),
         ncols=5,
@@ -315,23 +320,23 @@ def _residuals(findings: Findings) -> tuple[Figure, str]:
     )
     step = 0.4 if len(w) < 2000 else 0.2
     edges = np.arange(-4.0, 4.0 + 1e-9, step)
-    right.hist(np.clip(w, -3.999, 3.999), edges, color=PALE, alpha=0.8, label="observed")
+    histogram.hist(np.clip(w, -3.999, 3.999), edges, color=PALE, alpha=0.8, label="observed")
     t = np.linspace(-4.0, 4.0, 161)
-    right.plot(t, len(w) * step * np.exp(-0.5 * t**2) / np.sqrt(2 * np.pi), color=INK, lw=1.2, label="normal")
-    right.set_title("Against the normal")
-    right.set_xlabel("the same; beyond 4 in the last bins")
-    right.set_ylabel("observations")
-    right.legend(loc="upper left", handlelength=1.2)
-    right.set_ylim(top=right.get_ylim()[1] * 1.25)
+    histogram.plot(t, len(w) * step * np.exp(-0.5 * t**2) / np.sqrt(2 * np.pi), color=INK, lw=1.2, label="normal")
+    histogram.set_title("Against the normal distribution")
+    histogram.set_xlabel("test statistic; values beyond 4 in the last bins")
+    histogram.set_ylabel("observations")
+    histogram.legend(loc="upper left", handlelength=1.2)
+    histogram.set_ylim(top=histogram.get_ylim()[1] * 1.25)
     return figure, (
         f"Left: test statistics of {len(w)} observations; dashed: ±{findings.critical:.2f}, beyond which an "
-        f"observation is suspect (level {findings.level:g} for all of them together). Right: their histogram, and the "
+        f"observation is suspect (level {findings.level:g} for all tests together). Right: their histogram, and the "
         "normal distribution that the claimed uncertainties predict."
     )
 
 
 def _redundancy(findings: Findings) -> tuple[Figure, str]:
-    """How much of an error each observation would show, kind by kind."""
+    """Share of an error that would show in each observation's residual, by kind."""
     table = findings.table
     active = table.active & np.isfinite(table.redundancy)
     kinds = [k for k in range(len(table.kinds)) if (active & (table.kind == k)).any()]
@@ -347,6 +352,6 @@ def _redundancy(findings: Findings) -> tuple[Figure, str]:
     ax.set_ylabel("observations")
     figure.legend(*ax.get_legend_handles_labels(), loc="upper right", ncols=5)
     return figure, (
-        "Redundancy numbers. In the grey zone, below 0.1, an observation is hardly checked: nine tenths of an error "
-        "in it would go into the coordinates."
+        "Redundancy numbers. In the grey zone, below 0.1, an observation is hardly checked: over nine tenths of an "
+        "error would affect the coordinates."
     )

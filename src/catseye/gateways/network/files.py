@@ -1,4 +1,4 @@
-"""All files of an adjusted network, or of two epochs compared, written into a directory."""
+"""Write the files of an adjusted network, or of two compared epochs."""
 
 import hashlib
 from collections.abc import Mapping
@@ -36,13 +36,13 @@ def write_network(
     progress: Progress | None = None,
     treated: "AdjustedNetwork | None" = None,
 ) -> None:
-    """Tables, objects, report, and last the provenance with the hashes of the others.
+    """Write tables, JSON, report, and the provenance with their hashes.
 
-    findings    what is told of a solution
-    directory   exists, and is ours to fill: see `writers.output.whole_directory`
-    inputs      SHA-256 of each file read, by its name, see `input_hashes`
-    progress    told of each file
-    treated     how observations were treated, where that was asked for
+    findings    findings on a solution
+    directory   existing, from `writers.output.whole_directory`
+    inputs      SHA-256 of each input file, by name, see `input_hashes`
+    progress    called for each file
+    treated     treatment of the observations, if requested
     """
     when = datetime.now(UTC)
     provenance = {"format": FORMAT, "made_by": "catseye adjust", "settings": _settings(findings)}
@@ -57,12 +57,12 @@ def write_network(
 def write_comparison(
     compared: ComparedEpochs, directory: Path, inputs: Mapping[str, str], *, progress: Progress | None = None
 ) -> None:
-    """What moved, then the files of each epoch with its number before their names, last the provenance.
+    """Write the comparison, the files of each epoch with its number as prefix, and the provenance.
 
     compared    two epochs
-    directory   exists, and is ours to fill
-    inputs      SHA-256 of each file read, by its name
-    progress    told of each file
+    directory   existing, from `writers.output.whole_directory`
+    inputs      SHA-256 of each input file, by name
+    progress    called for each file
     """
     from catseye.gateways.network.comparison_report import comparison_report
 

@@ -1,4 +1,4 @@
-"""What the ways out tell of an adjusted network, computed once, in the axes of its own file."""
+"""Findings on an adjusted network, shared by all outputs, in the axes of its own file."""
 
 import re
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ from catseye.estimation.quality.reliability import (
 )
 
 ROLES = ("from", "to", "third", "fourth")
-STATIONED = ("distance", "direction", "angle", "azimuth")  # words in the kinds that are measured from a station
+STATIONED = ("distance", "direction", "angle", "azimuth")  # words in the names of kinds measured from a station
 MEASURES = (
     "observed",
     "u",
@@ -43,23 +43,23 @@ COMPONENTS = ("x", "y", "z")
 
 @dataclass(frozen=True, eq=False)
 class ObservationTable:
-    """All m observations of a network in the order of its file, a column each; lengths in m, angles in rad.
+    """All m observations of a network in file order, as columns; lengths in m, angles in rad.
 
-    kinds             names of kinds, to which `kind` points
+    kinds             names of kinds, indexed by `kind`
     kind              (m,) int
     unit              (m,) "m", "rad" or "1"
     component         (m,) axis of the file, for one coordinate of a point or vector; else ""
-    sign              (m,) -1 where the file counts that axis the other way than this package
+    sign              (m,) -1 where the file's axis is opposite to this package's
     ends              (m, 4) rows of the points by role, from, to, third, fourth; -1 for none
-    group, row        (m,) int: where it stands in the network's groups
-    active            (m,) bool: took part
-    checked           (m,) bool: other observations would show an error in it
-    bias_to_noise     (m,) how many standard uncertainties of any result an error just not detectable moves it, at most;
+    group, row        (m,) int: position in the network's groups
+    active            (m,) bool: used in the adjustment
+    checked           (m,) bool: an error in it would show by other observations
+    bias_to_noise     (m,) largest effect of an error just not detectable on any result, in its standard uncertainties;
                       nan where unknown, as within correlated groups
-    effect            (m,) m, how far an error of the size of mdb moves the named point that it moves most, or nan
+    effect            (m,) m, largest movement of a named point by an error of the size of mdb, or nan
     observed, residual, u, redundancy, standardised, mdb, estimated_error   (m,) as in `GroupFit`; mdb is its
-                      detectable_error; the last three are nan where nothing checks the observation, and all four
-                      where there is no answer
+                      detectable_error; the last three are nan for unchecked observations, and all four without
+                      an answer
     """
 
     kinds: tuple[str, ...]
@@ -87,7 +87,7 @@ class ObservationTable:
 
     @cached_property
     def worst_first(self) -> np.ndarray:
-        """(m,) rows by falling |standardised|, those without a test last; of |residual| / u if none has one."""
+        """Rows by falling |standardised|, (m,), untested ones last; by |residual| / u if none has a test."""
         size = np.abs(self.standardised)
         if not np.isfinite(size).any():
             size = np.abs(self.residual) / self.u
@@ -95,11 +95,11 @@ class ObservationTable:
 
 
 def observation_table(solution: NetworkSolution) -> ObservationTable:
-    """The observations of a solution, in the order of the file where the network knows it, else group by group.
+    """Observations of a solution, in file order where known, else group by group.
 
     solution   an adjusted network
 
-    A component along an axis that the file counts the other way has its sign turned, with all that follows it.
+    The sign of components along an axis opposite in the file is reversed, with all derived values.
     """
     network = solution.network
     kinds: dict[str, int] = {}
@@ -118,22 +118,24 @@ _COLUMNS = tuple(ObservationTable.__dataclass_fields__)[1:]
 
 
 def _part(solution: NetworkSolution, g: int, kinds: dict[str, int], effect: np.ndarray) -> dict[str, np.ndarray]:
-    """The columns of one group, the effects of undetected errors known; `kinds` gains its kinds."""
+    """Columns of one group, given the effects of undetected errors; its kinds are added to `kinds`."""
     group, fit = solution.network.groups[g], solution.fits[g]
     m = len(fit.residual)
-    own = getattr(group, "kind", "") if "kinds" not in type(group).__dict__ else ""  # else each row has its own
+    group_kind = getattr(group, "kind", "") if "kinds" not in type(group).__dict__ else ""  # else a kind per row
     names, at = (
-        (np.array([own]), np.zeros(m, dtype=int)) if own else np.unique(_each(group, "kinds"), return_inverse=True)
+        (np.array([group_kind]), np.zeros(m, dtype=int))
+        if group_kind
+        else np.unique(_row_texts(group, "kinds"), return_inverse=True)
     )
     code = np.array([kinds.setdefault(str(name), len(kinds)) for name in names], dtype=int)
     ends = np.full((m, len(ROLES)), -1)
     for role, end in enumerate(points_of(group)[: len(ROLES)]):
         ends[:, role] = end
     component, sign = _components(solution.network, getattr(group, "component", np.full(m, "")))
-    known = fit.detectable_error > 0.0  # zero where no statistics were computed
-    shown = fit.active & known & checked(fit)
+    computed = fit.detectable_error > 0.0  # zero without statistics
+    tested_rows = fit.active & computed & checked(fit)
     independent = group.covariance.ndim == 1
-    tested = np.where(shown | (known & ~fit.active), sign, np.nan)
+    tested = np.where(tested_rows | (computed & ~fit.active), sign, np.nan)
     return {
         "kind": code[at],
         "unit": np.asarray(getattr(group, "units", np.full(m, getattr(group, "unit", "") or "1"))),
@@ -143,27 +145,27 @@ def _part(solution: NetworkSolution, g: int, kinds: dict[str, int], effect: np.n
         "group": np.full(m, g),
         "row": np.arange(m),
         "active": fit.active,
-        "checked": shown,
+        "checked": tested_rows,
         "observed": sign * group.observed,
         "residual": sign * fit.residual,
         "u": fit.sigma,
-        "redundancy": np.where(known, fit.redundancy, np.nan),
+        "redundancy": np.where(computed, fit.redundancy, np.nan),
         "standardised": tested * fit.standardised,
         "mdb": np.abs(tested) * fit.detectable_error,
         "estimated_error": tested * fit.estimated_error,
-        "bias_to_noise": np.where(shown & independent, bias_to_noise(fit.redundancy, NONCENTRALITY), np.nan),
-        "effect": np.where(shown, effect, np.nan),
+        "bias_to_noise": np.where(tested_rows & independent, bias_to_noise(fit.redundancy, NONCENTRALITY), np.nan),
+        "effect": np.where(tested_rows, effect, np.nan),
     }
 
 
-def _each(group: object, name: str) -> np.ndarray:
-    """(m,) texts of a group's rows, its name where it is of no kind of ours."""
-    own = getattr(group, name, None)
-    return np.asarray(own) if own is not None else np.full(len(group.observed), group.name)  # type: ignore[attr-defined]
+def _row_texts(group: object, name: str) -> np.ndarray:
+    """Texts of a group's rows, (m,); the group's name for foreign kinds."""
+    texts = getattr(group, name, None)
+    return np.asarray(texts) if texts is not None else np.full(len(group.observed), group.name)  # type: ignore[attr-defined]
 
 
 def _components(network: ObservationNetwork, component: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Components as the file calls them, and the sign with which it counts them."""
+    """Components in the file's names, and their signs."""
     called, sign = component.astype("U8"), np.ones(len(component))
     for k, name in enumerate(COMPONENTS):
         mine = component == name
@@ -174,9 +176,9 @@ def _components(network: ObservationNetwork, component: np.ndarray) -> tuple[np.
 
 
 def in_file_axes(network: ObservationNetwork, x: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates or displacements (n, 3) and covariances (n, 3, 3) turned into the axes of the network's file.
+    """Coordinates or displacements (n, 3) and covariances (n, 3, 3) in the axes of the network's file.
 
-    By exchange and sign, not by a product: an unknown coordinate leaves the others known.
+    By exchange and sign, not by a product: an unknown coordinate does not affect the others.
     """
     at = np.argmax(np.abs(network.axes), axis=0)
     sign = network.axes[at, np.arange(3)]
@@ -184,7 +186,7 @@ def in_file_axes(network: ObservationNetwork, x: np.ndarray, covariance: np.ndar
 
 
 def _file_order(network: ObservationNetwork) -> np.ndarray:
-    """Rows of all groups, one after another, in the order of their places in the file; as they are if one has none."""
+    """Rows of all groups in file order; unchanged if a group has no places in the file."""
     total = sum(len(g.observed) for g in network.groups)
     if len(network.groups) < 2 or len(network.places) != len(network.groups) or not all(network.places):
         return np.arange(total)
@@ -198,7 +200,7 @@ def _file_order(network: ObservationNetwork) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Relative:
-    """How well the vector between two points is known, in the axes of the file.
+    """Relative position of two points and its uncertainty, in the axes of the file.
 
     first, second   names
     distance        m
@@ -217,23 +219,23 @@ class Relative:
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """A solution and what is said of it, in the axes of its file.
+    """Findings on a solution, in the axes of its file.
 
-    solution      what was adjusted
+    solution      adjusted network
     x             (n, 3) m; nan where a coordinate is absent
     covariance    (n, 3, 3) m^2, times the variance factor where `scaled`; nan in rows and columns of absent coordinates
-    factor        what the covariances and squared uncertainties were multiplied by; 1 unless `scaled`
-    scaled        the variance factor was applied
-    ellipsoid     standard ones of the points
+    factor        applied to the covariances and squared uncertainties; 1 unless `scaled`
+    scaled        True if the variance factor was applied
+    ellipsoid     standard ellipsoids of the points
     table         observations
-    test          which test single observations had: "w" with the claimed sigmas, "tau" where `scaled`
-    statistic, p  (m,) of it in the order of `table`, the p-value corrected for their number; nan without a test
+    test          test of single observations: "w" with the claimed sigmas, "tau" where `scaled`
+    statistic, p  (m,) in the order of `table`, the p-value corrected for their number; nan without a test
     suspects      rows of `table` that the tests reject, worst first
-    whole         chi-square test of the variance factor against 1
-    level         of `whole`, and of all single tests together
-    level_single  of one of them; nan where nothing is tested
-    relative      between the pairs of points asked for
-    critical      |statistic| beyond which an observation is suspect; nan where nothing is tested
+    global_test   chi-square test of the variance factor against 1
+    level         of `global_test`, and of all single tests together
+    level_single  of a single test; nan if nothing is tested
+    relative      between the requested pairs of points
+    critical      |statistic| above which an observation is suspect; nan if nothing is tested
     """
 
     solution: NetworkSolution
@@ -247,7 +249,7 @@ class Findings:
     statistic: np.ndarray
     p: np.ndarray
     suspects: np.ndarray
-    whole: GlobalTest
+    global_test: GlobalTest
     level: float
     level_single: float
     critical: float
@@ -263,37 +265,37 @@ class Findings:
 
     @property
     def answered(self) -> bool:
-        """There are coordinates to trust as far as their covariance says."""
+        """True if there are coordinates, valid within their covariance."""
         return self.solution.status.startswith(CONVERGED)
 
     @cached_property
     def u(self) -> np.ndarray:
-        """(n, 3) m, standard uncertainties of the coordinates."""
+        """Standard uncertainties of the coordinates, (n, 3) m."""
         return np.sqrt(np.maximum(np.diagonal(self.covariance, axis1=1, axis2=2), 0.0))
 
     @cached_property
     def coordinates(self) -> np.ndarray:
-        """(n, 3) bool: coordinates that exist, in the axes of the file."""
+        """Mask (n, 3) of existing coordinates, in the axes of the file."""
         return np.asarray((self.network.points.absent @ np.abs(self.network.axes)) == 0.0)
 
     @cached_property
     def u_parameters(self) -> np.ndarray:
-        """(p,) of the parameters, variance factor applied where `scaled`."""
+        """Standard uncertainties of the parameters, (p,), with the variance factor where `scaled`."""
         return self.solution.u_parameters * np.sqrt(self.factor)
 
     @cached_property
     def stations(self) -> np.ndarray:
-        """(n,) bool: points that something was measured from."""
-        from_here = np.zeros(len(self.names), dtype=bool)
+        """Mask (n,) of points from which something was measured."""
+        is_station = np.zeros(len(self.names), dtype=bool)
         table = self.table
         sighted = np.array([any(word in kind for word in STATIONED) for kind in table.kinds], dtype=bool)
         start = table.ends[:, 0] if len(table) else np.zeros(0, dtype=int)
-        from_here[start[(start >= 0) & sighted[table.kind]]] = True
-        return from_here
+        is_station[start[(start >= 0) & sighted[table.kind]]] = True
+        return is_station
 
     @cached_property
-    def seen(self) -> np.ndarray:
-        """(n,) how many active observations name each point."""
+    def observation_counts(self) -> np.ndarray:
+        """Number of active observations of each point, (n,)."""
         count = np.zeros(len(self.names), dtype=int)
         for end in self.table.ends[self.table.active].T:
             count += np.bincount(end[end >= 0], minlength=len(count))
@@ -301,7 +303,7 @@ class Findings:
 
     @cached_property
     def _row_of(self) -> np.ndarray:
-        """Row of the table of each observation, counted through the groups."""
+        """Row in the table of each observation, counted through the groups."""
         row = np.empty(len(self.table), dtype=int)
         row[self._start[self.table.group] + self.table.row] = np.arange(len(self.table))
         return row
@@ -311,15 +313,15 @@ class Findings:
         return np.cumsum([0, *(len(f.residual) for f in self.solution.fits)])
 
     def row_of(self, group: int, row: int) -> int:
-        """Row of the table where a row of a group stands."""
+        """Row in the table of a row of a group."""
         return int(self._row_of[self._start[group] + row])
 
     def in_table(self, parts: Sequence[np.ndarray]) -> np.ndarray:
-        """One (m,) array a group, in the order of the table."""
+        """Array (m,) in table order from one array per group."""
         return np.concatenate([[], *parts])[self._start[self.table.group] + self.table.row]
 
     def label(self, row: int) -> str:
-        """What an observation of the table is called: its kind, its points, its place in the file."""
+        """Label of an observation: its kind, points and place in the file."""
         component = str(self.table.component[row])
         text = label(self.network, int(self.table.group[row]), int(self.table.row[row]))
         return f"{component} of {text}" if component else text
@@ -335,20 +337,20 @@ def findings(
     level: float = 0.05,
     pairs: Sequence[tuple[str, str]] = (),
 ) -> Findings:
-    """All that the ways out tell of a solution.
+    """Findings on a solution.
 
     solution   an adjusted network, with an answer or without
     scaled     multiply covariances by the variance factor, and test observations against it (tau tests)
     level      of the chi-square test, and of all tests of single observations together
-    pairs      of points, by name, whose relative ellipsoids are wanted
+    pairs      pairs of points, by name, for relative ellipsoids
 
-    Raises EstimationError for a name that is not in the network, and where `scaled` and nothing was measured twice.
+    Raises EstimationError for a name that is not in the network, and if `scaled` without redundancy.
     """
     factor = solution.variance_factor if scaled else 1.0
     if scaled and not np.isfinite(factor) and np.isfinite(solution.covariance).any():
         raise EstimationError(
             f"the variance factor is unknown ({solution.degrees_of_freedom:g} degrees of freedom); "
-            "leave the uncertainties as claimed"
+            "do not scale the claimed uncertainties"
         )
     x, covariance = in_file_axes(solution.network, solution.x, solution.covariance * factor)
     table = observation_table(solution)
@@ -378,7 +380,7 @@ def findings(
         statistic=statistic * table.sign,
         p=p,
         suspects=suspects[np.argsort(-np.abs(statistic[suspects]), kind="stable")],
-        whole=global_test(solution.variance_factor * degrees, degrees if np.isfinite(degrees) else 0.0, level),
+        global_test=global_test(solution.variance_factor * degrees, degrees if np.isfinite(degrees) else 0.0, level),
         level=level,
         level_single=single,
         critical=limit,
@@ -387,7 +389,7 @@ def findings(
 
 
 def _relative(solution: NetworkSolution, pair: tuple[str, str], factor: float) -> Relative:
-    """The vector between two points, in the coordinates that both have; unknown where there is no answer."""
+    """Vector between two points in their common coordinates; nan without an answer."""
     strange = [name for name in pair if name not in solution.index]
     if strange:
         raise EstimationError(f"point {strange[0]!r} is not in the network (expected one of its names)")
@@ -396,8 +398,8 @@ def _relative(solution: NetworkSolution, pair: tuple[str, str], factor: float) -
     if solution.answered:
         covariance = relative_covariance(solution.block(pair)) * factor
     (vector,), (covariance,) = in_file_axes(solution.network, vector[None], covariance[None])
-    there = np.flatnonzero(np.isfinite(vector))
-    distance = float(np.linalg.norm(vector[there]))
-    unit = vector[there] / distance if distance > 0.0 else np.full(len(there), np.nan)
-    u = float(np.sqrt(np.maximum(unit @ covariance[np.ix_(there, there)] @ unit, 0.0))) if len(there) else np.nan
+    common = np.flatnonzero(np.isfinite(vector))
+    distance = float(np.linalg.norm(vector[common]))
+    unit = vector[common] / distance if distance > 0.0 else np.full(len(common), np.nan)
+    u = float(np.sqrt(np.maximum(unit @ covariance[np.ix_(common, common)] @ unit, 0.0))) if len(common) else np.nan
     return Relative(*pair, distance, u, covariance, ellipsoid(covariance))

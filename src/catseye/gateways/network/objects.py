@@ -1,4 +1,4 @@
-"""An adjusted network as JSON: SI units, in the axes of its file; null for what is not a number or not known.
+"""Adjusted network as JSON: SI units, in the axes of its file; null for missing numbers.
 
 Written in pieces of some thousand rows, so that a million observations need no more memory than their columns.
 """
@@ -22,14 +22,14 @@ PIECE = 5_000  # rows of a piece
 
 
 def network_object(findings: Findings, treated: "AdjustedNetwork | None" = None) -> dict[str, Any]:
-    """An adjusted network as `catseye adjust --json` gives it, whole.
+    """Complete object that `catseye adjust --json` prints.
 
-    findings   what is told of a solution
-    treated    how its observations were treated, where that was asked for
+    findings   findings on a solution
+    treated    treatment of its observations, if requested
 
     Angles run clockwise, azimuths from north, whatever the file's own sense. `mdb` is for the single test at 0.1 % with
     power 80 %; `test` is w, or tau where `scaled`, and `p` its p-value corrected for the number of tests. `from`, `to`,
-    `third` and `fourth` follow the kind: at, backsight, foresight of an angle. Parameters stand in x east, y north,
+    `third` and `fourth` follow the kind: at, backsight, foresight of an angle. Parameters refer to x east, y north,
     z up.
     """
     points = {name: value for low in _starts(len(findings.names)) for name, value in _points(findings, low)}
@@ -43,11 +43,11 @@ def network_object(findings: Findings, treated: "AdjustedNetwork | None" = None)
 
 
 def network_json(findings: Findings, *, lines: bool = False, treated: "AdjustedNetwork | None" = None) -> Iterator[str]:
-    """The text of `network_object` in pieces.
+    """Text of `network_object` in pieces.
 
-    findings   what is told of a solution
-    treated    how its observations were treated, where that was asked for
-    lines      a line for each entry, for reading; else all on one line, for programs
+    findings   findings on a solution
+    treated    treatment of its observations, if requested
+    lines      one line per entry, for reading; else all on one line, for programs
 
     >>> from itertools import chain
     >>> list(chain(_joined(iter([["a", "b"], ["c"]]), ", ")))
@@ -87,7 +87,7 @@ def _starts(count: int) -> range:
 
 def _head(findings: Findings, treated: "AdjustedNetwork | None") -> dict[str, Any]:
     """All but the points and the observations."""
-    solution, whole = findings.solution, findings.whole
+    solution, overall = findings.solution, findings.global_test
     degrees = solution.degrees_of_freedom
     likely = None if treated is None else findings.in_table(treated.likely)
     return plain(
@@ -106,14 +106,14 @@ def _head(findings: Findings, treated: "AdjustedNetwork | None") -> dict[str, An
             "degrees_of_freedom": degrees,
             "scaled": findings.scaled,
             "chi_square": {
-                "statistic": whole.factor * degrees,
+                "statistic": overall.factor * degrees,
                 "degrees": degrees,
-                "lower": whole.lower * degrees,
-                "upper": whole.upper * degrees,
-                "p": whole.p,
-                "passed": whole.lower <= whole.factor <= whole.upper if np.isfinite(whole.p) else None,
+                "lower": overall.lower * degrees,
+                "upper": overall.upper * degrees,
+                "p": overall.p,
+                "passed": overall.lower <= overall.factor <= overall.upper if np.isfinite(overall.p) else None,
                 "level": findings.level,
-                "verdict": whole.outcome,
+                "verdict": overall.outcome,
             },
             "critical": {
                 "test": findings.test,
@@ -148,7 +148,7 @@ def _head(findings: Findings, treated: "AdjustedNetwork | None") -> dict[str, An
 
 
 def _treatment(findings: Findings, treated: "AdjustedNetwork") -> dict[str, Any]:
-    """What was left out or weighed down, by rows of the observations; and estimated components of variance."""
+    """Rows left out or down-weighted, and estimated variance components."""
     sign, components = findings.table.sign, treated.components
     rejections = []
     for rejection in treated.rejections:
@@ -178,7 +178,7 @@ def _treatment(findings: Findings, treated: "AdjustedNetwork") -> dict[str, Any]
 
 
 def _points(findings: Findings, low: int) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Name and object of the points from row `low` on, a piece of them."""
+    """Name and object of a piece of the points, from row `low` on."""
     part = slice(low, low + PIECE)
     axes, names = np.abs(findings.network.axes), np.array(findings.network.axis_names)
     points = findings.network.points
@@ -193,9 +193,9 @@ def _points(findings: Findings, low: int) -> Iterator[tuple[str, dict[str, Any]]
         fixed,
         datum,
         absent,
-        findings.seen[part].tolist(),
+        findings.observation_counts[part].tolist(),
     )
-    for name, (x, y, z), u, covariance, semi_axes, directions, held, chosen, gone, observations in zip(
+    for name, (x, y, z), u, covariance, semi_axes, directions, fixed_axes, chosen, absent_axes, observations in zip(
         *columns, strict=True
     ):
         yield (
@@ -207,18 +207,18 @@ def _points(findings: Findings, low: int) -> Iterator[tuple[str, dict[str, Any]]
                 "u": u,
                 "covariance": covariance,
                 "ellipsoid": {"semi_axes": semi_axes, "directions": directions},
-                "fixed": names[held].tolist(),
+                "fixed": names[fixed_axes].tolist(),
                 "datum": names[chosen].tolist(),
-                "absent": names[gone].tolist(),
+                "absent": names[absent_axes].tolist(),
                 "observations": observations,
             },
         )
 
 
 def _observations(findings: Findings, low: int, treated: "AdjustedNetwork | None") -> dict[str, list[Any]]:
-    """Columns of the observations from row `low` on, a piece of them."""
+    """Columns of the observations from row `low` on, one piece."""
     table, part = findings.table, slice(low, low + PIECE)
-    names = [*findings.names, None]  # the last one for none, which is -1
+    names = [*findings.names, None]  # the last one is for -1, none
     columns: dict[str, list[Any]] = {"kind": [table.kinds[k] for k in table.kind[part].tolist()]}
     for role, end in zip(ROLES, table.ends.T, strict=True):
         if role in ROLES[:2] or np.any(end >= 0):
@@ -239,14 +239,14 @@ def _observations(findings: Findings, low: int, treated: "AdjustedNetwork | None
 
 
 def _row_texts(columns: dict[str, list[Any]]) -> list[str]:
-    """The rows of columns as JSON objects, a template filled: three times as fast as an object each."""
+    """Rows of columns as JSON text from one template: three times as fast as objects."""
     codes, texts = zip(*(_column_texts(values) for values in columns.values()), strict=True)
     template = "{" + ", ".join(f"{json.dumps(key)}: {code}" for key, code in zip(columns, codes, strict=True)) + "}"
     return [template % row for row in zip(*texts, strict=True)]
 
 
 def _column_texts(values: list[Any]) -> tuple[str, list[Any]]:
-    """How a column of numbers, truths or texts, with None, is written in JSON, and what is put there."""
+    """JSON format of a column of numbers, booleans or texts with None, and its values."""
     types = set(map(type, values))
     if types == {float}:
         return "%r", values
@@ -256,7 +256,7 @@ def _column_texts(values: list[Any]) -> tuple[str, list[Any]]:
 
 
 def _numbers(values: np.ndarray) -> list[Any]:
-    """Nested lists, None for what is not finite."""
+    """Nested lists with None for non-finite values."""
     if np.isfinite(values).all():
         return values.tolist()
     return np.where(np.isfinite(values), values.astype(object), np.array(None)).tolist()

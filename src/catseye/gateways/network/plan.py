@@ -1,4 +1,4 @@
-"""A planned network as JSON, CSV and a report: what it will be worth, where it is weak, what to measure next."""
+"""Planned network as JSON, CSV and report: predicted quality, weak points, next observations."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping
@@ -24,27 +24,27 @@ from catseye.gateways.writers.verdict import Verdict, verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
 
 FORMAT = "catseye-plan-1"
-LARGEST_RATIO = 1.2  # of departure over claim on paper: what is measured is then worse than claimed
-LISTED = 10  # weakest points, and observations that hold most, in text and report
+LARGEST_RATIO = 1.2  # largest acceptable departure over claim in the Monte Carlo
+LISTED = 10  # weakest points and most important observations in text and report
 CONTENTS = {
     "summary": "Summary",
     "network": "Network",
     "weakest": "Weakest points",
-    "next": "What to measure next",
-    "observations": "What each observation holds",
-    "paper": "Measured on paper",
+    "next": "Next observations",
+    "observations": "Worth of each observation",
+    "paper": "Monte Carlo",
     "provenance": "Provenance",
 }
 
 
 @dataclass(frozen=True, eq=False)
 class PlanFindings:
-    """What is told of a plan.
+    """Findings on a plan.
 
-    findings   of its predicted solution
-    plan       of the network, with the worth of its observations and the candidates
-    picked     the schedule of further ranges, empty where no budget was given
-    scatter    of measuring on paper, where asked
+    findings   findings on its predicted solution
+    plan       plan of the network, with the worth of its observations and the candidates
+    picked     schedule of additional ranges, empty without a time budget
+    scatter    Monte Carlo scatter, if requested
     """
 
     findings: Findings
@@ -54,13 +54,13 @@ class PlanFindings:
 
     @property
     def weakest(self) -> np.ndarray:
-        """(k,) rows of the points, the least known first; held ones left out."""
+        """Rows of the points, (k,), weakest first, without held ones."""
         order = np.argsort(-self.plan.weakest, kind="stable")
         return order[self.plan.weakest[order] > 0.0]
 
     @property
     def worth(self) -> np.ndarray:
-        """(m,) m, of every observation in the order of the table."""
+        """Worth of every observation in table order, (m,) m."""
         offset = np.cumsum([0, *(len(w) for w in self.plan.worth)])
         return np.concatenate([np.zeros(0), *self.plan.worth])[
             offset[self.findings.table.group] + self.findings.table.row
@@ -68,24 +68,24 @@ class PlanFindings:
 
 
 def plan_verdict(plan_findings: PlanFindings) -> Verdict:
-    """Whether the network, measured so, would hold every point and check itself."""
+    """Verdict on the plan: every point determined and every observation checked."""
     findings = plan_findings.findings
     if not findings.answered:
         return Verdict("failed", findings.solution.status)
     alone = int(np.isinf(plan_findings.worth).sum())
     if alone:
-        return Verdict("doubtful", f"{alone} observations are indispensable: without any one of them a point floats")
+        return Verdict("doubtful", f"{alone} observations are indispensable: losing one leaves a point undetermined")
     unchecked = int(np.sum(~findings.table.checked))
     if unchecked:
         return Verdict("doubtful", f"an error in {unchecked} of {len(findings.table)} observations would not show")
     if plan_findings.scatter is not None and plan_findings.scatter.ratio > LARGEST_RATIO:
         ratio = plan_findings.scatter.ratio
-        return Verdict("doubtful", f"measured on paper it is off by {ratio:.2f} times what it claims")
-    return Verdict("good", "every point would be held, and every observation checked by others")
+        return Verdict("doubtful", f"in the Monte Carlo the departures are {ratio:.2f} times the claimed uncertainties")
+    return Verdict("good", "every point would be determined and every observation checked by others")
 
 
 def plan_object(plan_findings: PlanFindings) -> dict[str, Any]:
-    """A plan as `catseye plan --json` gives it: the keys of an adjustment, predicted, and those of the plan."""
+    """Object that `catseye plan --json` prints: the keys of an adjustment, predicted, and the plan's."""
     plan, findings = plan_findings.plan, plan_findings.findings
     base = network_object(findings)
     for row, worth in zip(base["observations"], plain(plan_findings.worth.tolist()), strict=True):
@@ -123,7 +123,7 @@ def _candidate(c: Candidate, *, scheduled: bool) -> dict[str, Any]:
 def _scatter(scatter: MonteCarloScatter | None) -> dict[str, Any] | None:
     if scatter is None:
         return None
-    free = scatter.predicted > 0.0  # neither held nor absent
+    free = scatter.predicted > 0.0  # neither fixed nor absent
     return {
         "runs": scatter.runs,
         "asked": scatter.asked,
@@ -136,12 +136,12 @@ def _scatter(scatter: MonteCarloScatter | None) -> dict[str, Any] | None:
 
 
 def plan_json(plan_findings: PlanFindings) -> Iterator[str]:
-    """A plan as JSON text on one line."""
+    """Plan as JSON text on one line."""
     yield json.dumps(plan_object(plan_findings), allow_nan=False)
 
 
 def plan_passages(plan_findings: PlanFindings) -> list[Passage]:
-    """Worth, weak points, single points of failure, what to measure next, and what measuring on paper said."""
+    """Passages on quality, weak points, next observations, and Monte Carlo."""
     plan, findings = plan_findings.plan, plan_findings.findings
     u = quantity(plan.mean_u, "m")
     passages = [
@@ -161,11 +161,11 @@ def plan_passages(plan_findings: PlanFindings) -> list[Passage]:
     table, worth = findings.table, plan_findings.worth
     needed = np.flatnonzero(np.isinf(worth))
     unchecked = int(np.sum(~table.checked))
-    text = f"{len(needed)} observations cannot be spared: without one of them a point floats"
+    text = f"{len(needed)} observations are indispensable: without one of them a point is undetermined"
     text += f", first {findings.label(int(needed[0]))}." if len(needed) else "." if unchecked else " (none)."
     text = text if len(needed) else "No single observation is indispensable."
     if unchecked:
-        text += f" {unchecked} are checked by no other: an error there would not show."
+        text += f" {unchecked} are not checked by others: an error there would not show."
     else:
         detectable = table.mdb[np.isfinite(table.mdb) & (table.unit == "m")]
         if len(detectable):
@@ -191,29 +191,29 @@ def plan_passages(plan_findings: PlanFindings) -> list[Passage]:
         more = f" and {len(plan_findings.picked) - 6} more" if len(plan_findings.picked) > 6 else ""
         passages.append(
             Passage(
-                "In the time",
+                "In the given time",
                 f"{len(plan_findings.picked)} ranges, {order}{more}, would bring it to {quantity(last.mean_u, 'm')}.",
             )
         )
     if plan_findings.scatter is not None:
-        passages.append(Passage("On paper", scatter_words(plan_findings.scatter)))
+        passages.append(Passage("Monte Carlo", scatter_words(plan_findings.scatter)))
     return passages
 
 
 def scatter_words(s: MonteCarloScatter) -> str:
-    """What measuring on paper said."""
+    """Result of the Monte Carlo, in sentences."""
     text = (
-        f"measured {s.asked} times, {s.runs} of them with an answer: departures are {s.ratio:.2f} of the claimed "
+        f"{s.asked} runs, {s.runs} of them with an answer: departures are {s.ratio:.2f} of the claimed "
         "standard uncertainties, root mean square"
     )
-    text += "." if s.ratio < 1.2 else ": what was put in beside the claimed noise shows."
+    text += "." if s.ratio < 1.2 else ": the errors added to the claimed noise show."
     if np.isfinite(s.found):
         text += f" {100 * s.found:.1f} % of the gross errors were left out, and {100 * s.false:.2f} % of the good ones."
     return text
 
 
 def candidates_csv(plan_findings: PlanFindings) -> Iterator[str]:
-    """Further ranges, the best first, then the schedule."""
+    """Table of additional ranges, the best first, then the schedule."""
     yield "list,from,to,u_mm,mean_u_mm,gain_um,at_s\n"
     for name, rows in (("candidate", plan_findings.plan.candidates), ("schedule", plan_findings.picked)):
         for c in rows:
@@ -229,7 +229,7 @@ def _cell(text: str) -> str:
 
 
 def plan_report(plan_findings: PlanFindings, when: datetime, inputs: Mapping[str, str]) -> str:
-    """The whole page of a plan, HTML."""
+    """HTML report of a planned network."""
     from catseye.gateways.network.figures import network_figures
     from catseye.gateways.network.report import provenance_section, view_pictures
 
@@ -244,9 +244,9 @@ def plan_report(plan_findings: PlanFindings, when: datetime, inputs: Mapping[str
         f"<nav>{links}</nav></header>"
     )
     words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in plan_passages(plan_findings))
-    following = _ranges(plan.candidates) if plan.candidates else paragraph("No ranges to add: none are planned.")
+    following = _ranges(plan.candidates) if plan.candidates else paragraph("No ranges to add.")
     scheduled = (
-        "<h3>In the time given, one after the other</h3>" + _ranges(plan_findings.picked, scheduled=True)
+        "<h3>Schedule in the given time</h3>" + _ranges(plan_findings.picked, scheduled=True)
         if plan_findings.picked
         else ""
     )
@@ -270,8 +270,8 @@ def plan_report(plan_findings: PlanFindings, when: datetime, inputs: Mapping[str
             "next",
             CONTENTS["next"],
             paragraph(
-                "Each further range alone, the best first: what it would lower the mean standard uncertainty to. "
-                "Visibility is not known here: a pair may be hidden."
+                "Each additional range alone, the best first, with the resulting mean standard uncertainty. "
+                "Visibility is unknown here: a pair may be obstructed."
             ),
             following,
             scheduled,
@@ -279,10 +279,10 @@ def plan_report(plan_findings: PlanFindings, when: datetime, inputs: Mapping[str
         section(
             "observations",
             CONTENTS["observations"],
-            paragraph("Worth: how much the mean standard uncertainty would grow were the observation left out."),
+            paragraph("Worth: increase of the mean standard uncertainty without the observation."),
             _worth(plan_findings),
         ),
-        section("paper", CONTENTS["paper"], scatter or paragraph("Not asked for (--runs).", "faint")),
+        section("paper", CONTENTS["paper"], scatter or paragraph("Not requested (--runs).", "faint")),
         provenance_section(when, inputs, {"candidates listed": str(len(plan.candidates))}),
     ]
     return page(f"catseye plan: {name}", "\n".join(body))
@@ -291,15 +291,13 @@ def plan_report(plan_findings: PlanFindings, when: datetime, inputs: Mapping[str
 def _cards(plan_findings: PlanFindings) -> list[str]:
     findings, plan = plan_findings.findings, plan_findings.plan
     return [
-        card("Coordinates known to", quantity(plan.mean_u, "m"), "root mean square over the points of interest"),
+        card("Coordinate uncertainty", quantity(plan.mean_u, "m"), "root mean square over the points of interest"),
         card(
             "Weakest point",
             findings.names[plan_findings.weakest[0]] if len(plan_findings.weakest) else "none",
             f"{quantity(float(plan.weakest.max(initial=0.0)), 'm')} along its longest axis",
         ),
-        card(
-            "Indispensable", str(int(np.isinf(plan_findings.worth).sum())), "observations without which a point floats"
-        ),
+        card("Indispensable", str(int(np.isinf(plan_findings.worth).sum())), "losing one leaves a point undetermined"),
         card("Unchecked", str(int(np.sum(~findings.table.checked))), "observations whose error would not show"),
     ]
 
@@ -317,7 +315,7 @@ def _weakest(plan_findings: PlanFindings) -> str:
 
 
 def _worth(plan_findings: PlanFindings) -> str:
-    """What each observation holds, those of most worth first."""
+    """Table of the observations' worth, the largest first."""
     findings = plan_findings.findings
     order = np.argsort(-plan_findings.worth, kind="stable")[: 5 * LISTED]
     return table(
@@ -338,7 +336,7 @@ def _worth(plan_findings: PlanFindings) -> str:
 
 
 def _ranges(rows: tuple[Candidate, ...], *, scheduled: bool = False) -> str:
-    columns = ("from", "to", "u (mm)", "mean u then (mm)", "gain (µm)", *(("done at (s)",) if scheduled else ()))
+    columns = ("from", "to", "u (mm)", "resulting mean u (mm)", "gain (µm)", *(("done at (s)",) if scheduled else ()))
     lines = [
         (
             c.from_,
@@ -360,7 +358,7 @@ def write_plan(
     *,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> None:
-    """Report, tables and object of a plan, and last the provenance with the hashes of the others."""
+    """Write report, tables and JSON of a plan, and last the provenance with their hashes."""
     when = datetime.now(UTC)
     files: Files = {
         "report.html": lambda: plan_report(plan_findings, when, inputs),

@@ -1,4 +1,4 @@
-"""The report of an adjusted network: one HTML page that needs nothing else."""
+"""Report of an adjusted network, one self-contained HTML page."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
@@ -28,8 +28,8 @@ CONTENTS = {
     "provenance": "Provenance",
 }
 WORST = 100  # observations listed
-EVERY = 500  # points up to which all are listed
-WEAKEST = 200  # points listed of more than that
+MOST_LISTED = 500  # largest number of points listed completely
+WEAKEST = 200  # points listed otherwise
 UNCHECKED = 100  # unchecked observations named
 
 
@@ -41,13 +41,13 @@ def network_report(
     prefix: str = "",
     treated: "AdjustedNetwork | None" = None,
 ) -> str:
-    """The whole page.
+    """HTML report.
 
-    findings   what is told of a solution
+    findings   findings on a solution
     when       UTC
-    inputs     SHA-256 of each file read, by its name
-    prefix     of the names of the tables beside the report
-    treated    how observations were treated, where that was asked for
+    inputs     SHA-256 of each input file, by name
+    prefix     prefix of the tables' file names
+    treated    treatment of the observations, if requested
     """
     drawn = network_figures(findings)
     name = findings.network.source or "network"
@@ -78,37 +78,37 @@ def network_report(
 
 def _summary(findings: Findings, treated: "AdjustedNetwork | None") -> str:
     axis = findings.ellipsoid.semi_axes[:, 0]
-    known = axis[np.isfinite(axis) & (axis > 0.0)]
+    positive = axis[np.isfinite(axis) & (axis > 0.0)]
     cards = network_cards(findings)
-    if len(known):
-        usual, worst = quantity(float(np.median(known)), "m"), quantity(float(known.max()), "m")
-        cards.insert(1, card("Points known to", usual, f"longest axis of the usual ellipsoid; worst {worst}"))
+    if len(positive):
+        usual, worst = quantity(float(np.median(positive)), "m"), quantity(float(positive.max()), "m")
+        cards.insert(1, card("Point uncertainty", usual, f"longest axis of the median ellipsoid; worst {worst}"))
     listed = [*passages(findings), *([] if treated is None else treatment_passages(treated, findings))]
     words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in listed)
-    own = findings.network.description.strip()
+    text = findings.network.description.strip()
     return section(
         "summary",
         CONTENTS["summary"],
         f'<div class="cards">{"".join(cards)}</div>',
         f"<dl>{words}</dl>",
-        folded("The file's own words", *(paragraph(part) for part in own.split("\n\n"))) if own else "",
+        folded("Description in the file", *(paragraph(part) for part in text.split("\n\n"))) if text else "",
     )
 
 
 def network_cards(findings: Findings) -> list[str]:
-    """The numbers that matter first.
+    """Cards with the main numbers.
 
-    findings   what is told of a solution
+    findings   findings on a solution
     """
-    whole, active = findings.whole, findings.table.active
+    overall, active = findings.global_test, findings.table.active
     unchecked = int(np.sum(active & ~findings.table.checked)) if findings.answered else 0
-    interval = f"expected {whole.lower:.3f} to {whole.upper:.3f}" if np.isfinite(whole.p) else "not tested"
+    interval = f"expected {overall.lower:.3f} to {overall.upper:.3f}" if np.isfinite(overall.p) else "not tested"
     degrees = findings.solution.degrees_of_freedom
     suspects = str(len(findings.suspects)) if findings.answered else "unknown"
     return [
         card(
             "Variance factor",
-            factor_words(whole.factor) if np.isfinite(whole.p) else "unknown",
+            factor_words(overall.factor) if np.isfinite(overall.p) else "unknown",
             f"{interval}, {degrees:.0f} degrees of freedom" if np.isfinite(degrees) else interval,
         ),
         card("Suspect observations", suspects, f"of {int(active.sum())}, level {findings.level:g} for all"),
@@ -125,7 +125,7 @@ def _network(drawn: dict[str, CaptionedFigure]) -> str:
 
 
 def view_pictures(drawn: dict[str, CaptionedFigure]) -> list[str]:
-    """Plan and elevation as pictures; a sentence for one that has nothing to show.
+    """Plan and elevation as pictures; a sentence if there is nothing to show.
 
     drawn   figures by name, see `network_figures`
     """
@@ -148,17 +148,17 @@ def _observations(findings: Findings, drawn: dict[str, CaptionedFigure], file: s
         picture(drawn["residuals"].svg, drawn["residuals"].caption) if "residuals" in drawn else "",
         paragraph(
             f"{note} The residual is observed minus adjusted; the test statistic is the residual in units of its own "
-            "uncertainty; the estimated error is what would explain it best if nothing else were wrong."
+            "uncertainty; the estimated error explains it best if nothing else is wrong."
         ),
         observation_rows(findings, rows),
     )
 
 
 def observation_rows(findings: Findings, rows: Sequence[int] | np.ndarray) -> str:
-    """A table of observations; lengths in mm, angles in arc seconds.
+    """Table of observations; lengths in mm, angles in arc seconds.
 
-    findings   what is told of a solution
-    rows       of its table
+    findings   findings on a solution
+    rows       rows of its table
     """
     t, suspect = findings.table, set(findings.suspects.tolist())
     fine = {"m": (MILLIMETRE, "mm"), "rad": (ARCSECOND, "″")}
@@ -188,16 +188,16 @@ def observation_rows(findings: Findings, rows: Sequence[int] | np.ndarray) -> st
 
 def _reliability(findings: Findings, drawn: dict[str, CaptionedFigure]) -> str:
     if not findings.answered:
-        return section("reliability", CONTENTS["reliability"], paragraph("Unknown without an answer."))
+        return section("reliability", CONTENTS["reliability"], paragraph("Unknown without a solution."))
     rows = np.flatnonzero(findings.table.active & ~findings.table.checked)
     parts = [picture(drawn["redundancy"].svg, drawn["redundancy"].caption)] if "redundancy" in drawn else []
     if not len(rows):
-        parts.append(paragraph("Every observation is checked by others."))
+        parts.append(paragraph("All observations are checked by others."))
     else:
         more = f", the first {UNCHECKED} here" if len(rows) > UNCHECKED else ""
         parts.append(
             paragraph(
-                f"{len(rows)} observations are checked by no other; an error in one of them would not show{more}."
+                f"{len(rows)} observations are not checked by others; an error in one of them would not show{more}."
             )
         )
         parts.append(observation_rows(findings, rows[:UNCHECKED]))
@@ -207,7 +207,7 @@ def _reliability(findings: Findings, drawn: dict[str, CaptionedFigure]) -> str:
 def _points(findings: Findings, file: str) -> str:
     count = len(findings.names)
     rows, note = np.arange(count), ""
-    if count > EVERY:
+    if count > MOST_LISTED:
         rows = np.argsort(-np.nan_to_num(findings.ellipsoid.semi_axes[:, 0], nan=np.inf), kind="stable")[:WEAKEST]
         note = f"The {WEAKEST} weakest of {count}; all are in {file}. "
     names = findings.network.axis_names
@@ -223,7 +223,7 @@ def _points(findings: Findings, file: str) -> str:
             *(_number(float(v), ".7f") for v in findings.x[i]),
             *(_number(float(v), ".4f") for v in u[i]),
             " / ".join(_number(float(v), ".4g") for v in axis[i]),
-            str(findings.seen[i]),
+            str(findings.observation_counts[i]),
         )
         for i in rows.tolist()
     ]
@@ -235,7 +235,7 @@ def _points(findings: Findings, file: str) -> str:
         "points",
         CONTENTS["points"],
         paragraph(
-            f"{note}Semi-axes are those of the standard ellipsoid (1σ), “seen” is by how many observations. "
+            f"{note}Semi-axes are those of the standard ellipsoid (1σ), “seen” is the number of observations. "
             f"Covariances are in {file}."
         ),
         table(columns, lines, "tttnnnnnnnn"),
@@ -244,7 +244,7 @@ def _points(findings: Findings, file: str) -> str:
 
 
 def _relative(findings: Findings) -> str:
-    """The section on the pairs of points that were asked for."""
+    """Section on the requested pairs of points."""
     if not findings.relative:
         return ""
     rows = [
@@ -256,7 +256,7 @@ def _relative(findings: Findings) -> str:
         )
         for r in findings.relative
     ]
-    return "<h3>From point to point</h3>" + table(
+    return "<h3>Relative positions</h3>" + table(
         ("pair", "distance (m)", "u (mm)", "semi-axes of the relative ellipsoid (mm)"), rows, "tnnn"
     )
 
@@ -272,13 +272,13 @@ def _datum(findings: Findings) -> str:
     ]
     if rows:
         axes = "" if np.array_equal(findings.network.axes, np.eye(3)) else " Their axes are x east, y north, z up."
-        parts.append(paragraph(f"{len(rows)} parameters beside the points.{axes}"))
+        parts.append(paragraph(f"{len(rows)} additional parameters.{axes}"))
         parts.append(table(("parameter", "value", "u", "prior"), rows, "tnnt"))
     return section("datum", CONTENTS["datum"], *parts)
 
 
 def parameter_cells(value: float, u: float, unit: str) -> tuple[str, str]:
-    """A parameter and its uncertainty: angles in degrees and arc seconds, lengths in mm, ratios in ppm.
+    """Parameter and its uncertainty as text: degrees and arc seconds, mm, or ppm.
 
     value, u   in the unit
     unit       "m", "rad" or "1"
@@ -300,16 +300,16 @@ def _prior(start: float, sigma: float, unit: str) -> str:
 
 
 def provenance_section(when: datetime, inputs: Mapping[str, str], settings: Mapping[str, str]) -> str:
-    """Files read, programs and settings.
+    """Input files, programs and settings.
 
     when       UTC
     inputs     SHA-256 by name
-    settings   by what they are
+    settings   values by name
     """
     return section(
         "provenance",
         CONTENTS["provenance"],
-        paragraph(f"Adjusted {when:%Y-%m-%d %H:%M:%S} UTC. The same, for programs, is in provenance.json."),
+        paragraph(f"Adjusted {when:%Y-%m-%d %H:%M:%S} UTC. The same is in provenance.json, for programs."),
         table(("input", "SHA-256"), list(inputs.items()), "th"),
         table(("setting", "value"), list(settings.items()), "tt"),
         table(("part", "version"), list(versions().items()), "tt"),

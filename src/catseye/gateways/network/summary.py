@@ -1,4 +1,4 @@
-"""An adjusted network told in sentences: is it good, what is worst, what floats."""
+"""Summary of an adjusted network in sentences: quality, worst observations, undetermined points."""
 
 from typing import TYPE_CHECKING
 
@@ -14,13 +14,13 @@ from catseye.gateways.writers.verdict import Verdict
 if TYPE_CHECKING:
     from catseye.reduction.network import AdjustedNetwork
 
-NAMED = 5  # names in a sentence at most
-UNIT = 300.0  # times too large: from half way (in powers) between 100 and 1000 on, mm for m is the likely cause
-WEAK = 5.0  # times the usual uncertainty: such a point is named
+NAMED = 5  # most names in a sentence
+UNIT = 300.0  # times too large: above the geometric mean of 100 and 1000, mm for m is the likely cause
+WEAK = 5.0  # times the median uncertainty: weaker points are named
 
 
 def quantity(value: float, unit: str) -> str:
-    """A small value with three digits in the unit that suits it: mm, arc seconds, or as it is.
+    """Small value with three digits in a suitable unit: mm, arc seconds, or as it is.
 
     >>> quantity(0.000123456, "m"), quantity(1.5e-5, "rad"), quantity(2e-6, "1"), quantity(float("nan"), "m")
     ('0.123 mm', '3.09″', '2e-06', 'unknown')
@@ -33,43 +33,43 @@ def quantity(value: float, unit: str) -> str:
 
 
 def verdict(findings: Findings) -> Verdict:
-    """Whether the adjustment can be trusted as it is, and a few plain words why.
+    """Verdict on the adjustment, with reasons.
 
-    findings   what is told of a solution
+    findings   findings on a solution
     """
-    status, whole = findings.solution.status, findings.whole
+    status, overall = findings.solution.status, findings.global_test
     if not findings.answered:
         return Verdict("failed", f"no answer: {status}")
     if status != CONVERGED or findings.network.doubts:
         reasons = [*findings.network.doubts[:NAMED], *([status] if status != CONVERGED else [])]
         return Verdict("doubtful", "; ".join(reasons))
     sides = findings.solution.assumed if findings.network.points.fixed.any() else ()
-    if sides:  # a free network may lie on either side: that is a convention
-        text = f"nothing says on which side these points lie, and a mirror image fits as well: {_listed(sides)}"
-        return Verdict("doubtful", f"{text}; give them a rough place, or measure a zenith angle or a height")
-    if not np.isfinite(whole.p):
-        return Verdict("doubtful", "unchecked: nothing was measured twice, so nothing would show an error")
-    if whole.outcome == TOO_LARGE:
-        more = 100.0 * (np.sqrt(whole.factor) - 1.0)
+    if sides:  # the side of a free network is a convention
+        text = f"the side on which these points lie is undetermined; a mirror image fits as well: {_listed(sides)}"
+        return Verdict("doubtful", f"{text}; give approximate coordinates, or measure a zenith angle or a height")
+    if not np.isfinite(overall.p):
+        return Verdict("doubtful", "unchecked: no redundancy, so no error would show")
+    if overall.outcome == TOO_LARGE:
+        more = 100.0 * (np.sqrt(overall.factor) - 1.0)
         text = f"the observations scatter {more:.0f} % more than their uncertainties claim"
         return Verdict("doubtful", f"{text}; {_suspects(findings) or 'no single observation stands out'}")
     if len(findings.suspects):
-        text = "the whole agrees with the claimed uncertainties, single observations do not"
+        text = "the network agrees overall with the claimed uncertainties, single observations do not"
         return Verdict("doubtful", f"{text}; {_suspects(findings)}")
-    if too_good(whole.factor * findings.solution.degrees_of_freedom, findings.solution.degrees_of_freedom):
+    if too_good(overall.factor * findings.solution.degrees_of_freedom, findings.solution.degrees_of_freedom):
         return Verdict("doubtful", _too_good(findings))
-    if whole.outcome == TOO_SMALL:
-        less = 100.0 * (1.0 - np.sqrt(whole.factor))
+    if overall.outcome == TOO_SMALL:
+        less = 100.0 * (1.0 - np.sqrt(overall.factor))
         text = f"better than claimed: the observations scatter {less:.0f} % less than their uncertainties claim"
     else:
         text = "the observations agree with each other as their uncertainties claim"
     unchecked, out = int(np.sum(findings.table.active & ~findings.table.checked)), int(np.sum(~findings.table.active))
     text += f", {out} left out" if out else ""
-    return Verdict("good", text + (f", but {unchecked} of them are checked by no other" if unchecked else ""))
+    return Verdict("good", text + (f", but {unchecked} of them are not checked by others" if unchecked else ""))
 
 
 def factor_words(factor: float) -> str:
-    """A variance factor with three decimals, or three digits where it is so small that they say nothing.
+    """Variance factor with three decimals, or three digits if small.
 
     >>> factor_words(1.01842), factor_words(2.24e-7)
     ('1.018', '2.24e-07')
@@ -78,8 +78,8 @@ def factor_words(factor: float) -> str:
 
 
 def _too_good(findings: Findings) -> str:
-    """Why a variance factor that chance does not make so small is no good sign, with the factor of the sigmas."""
-    factor = findings.whole.factor
+    """Explanation of a variance factor too small for chance, with the factor of the sigmas."""
+    factor = findings.global_test.factor
     times = 1.0 / np.sqrt(factor) if factor > 0.0 else np.inf
     less = 100.0 * (1.0 - np.sqrt(factor))
     text = f"the observations scatter {less:.0f} % less than their uncertainties claim, too little for chance "
@@ -99,10 +99,10 @@ def _suspects(findings: Findings) -> str:
 
 
 def observation_words(findings: Findings, row: int) -> str:
-    """An observation, its residual and its test, in words.
+    """Observation, residual and test in words.
 
-    findings   what is told of a solution
-    row        of its table
+    findings   findings on a solution
+    row        row of its table
     """
     table, unit = findings.table, str(findings.table.unit[row])
     words = f"{findings.label(row)}: residual {quantity(table.residual[row], unit)}"
@@ -113,9 +113,9 @@ def observation_words(findings: Findings, row: int) -> str:
 
 
 def passages(findings: Findings) -> list[Passage]:
-    """Network, points, observations, and what is not checked; the verdict stands before them.
+    """Passages on network, points, observations and unchecked parts, after the verdict.
 
-    findings   what is told of a solution
+    findings   findings on a solution
     """
     passages = [Passage("The network", _network(findings))]
     if findings.answered:
@@ -128,33 +128,31 @@ def passages(findings: Findings) -> list[Passage]:
 
 
 def treatment_passages(treated: "AdjustedNetwork", findings: Findings) -> list[Passage]:
-    """What was left out or weighed down, and which uncertainties the observations themselves ask for.
+    """Passages on rows left out or down-weighted, and on estimated uncertainties.
 
-    treated    how observations were treated
-    findings   what is told of the solution
+    treated    treatment of the observations
+    findings   findings on the solution
     """
     passages = []
     rejected, undecided = (np.flatnonzero(findings.in_table(part)) for part in (treated.rejected, treated.undecided))
     if treated.treatment != "plain":
         how = (
-            "Left out"
-            if treated.treatment == "rejected"
-            else f"Robust weights ({treated.treatment}); given next to none"
+            "Left out" if treated.treatment == "rejected" else f"Robust weights ({treated.treatment}); weight near zero"
         )
         text = (
             f"{how}: {_listed([findings.label(int(i)) for i in rejected[:NAMED]], len(rejected)) or 'no observation'}."
         )
         if len(undecided):
             names = _listed([findings.label(int(i)) for i in undecided[:NAMED]], len(undecided))
-            text += f" Contradicted by others, and nothing says which is wrong: {names}."
-        passages.append(Passage("The treatment", text))
+            text += f" In contradiction with others, cause undetermined: {names}."
+        passages.append(Passage("Treatment", text))
     if treated.components is not None:
-        passages.append(Passage("The claims", _claims(treated)))
+        passages.append(Passage("Variance components", _claims(treated)))
     return passages + ([Passage("Notes", "; ".join(treated.notes) + ".")] if treated.notes else [])
 
 
 def _claims(treated: "AdjustedNetwork") -> str:
-    """Estimated components of variance; those of rangers are squares of a constant, m, and of a ratio."""
+    """Estimated variance components; those of rangers are squares of a constant, m, and of a ratio."""
     components = treated.components
     assert components is not None
     roots, u = components.roots()
@@ -166,7 +164,7 @@ def _claims(treated: "AdjustedNetwork") -> str:
         scale, unit = (1e6, "µm") if name.startswith("constant") else (1e6, "ppm")
         spread = f" (u {u_root * scale:.2g})" if np.isfinite(u_root) else ""
         words.append(f"{name.replace('^2 of', ' of').replace('  ', ' ')} {root * scale:.3g} {unit}{spread}")
-    return f"The observations themselves ask for: {_listed(words)}."
+    return f"Estimated from the observations: {_listed(words)}."
 
 
 def _network(findings: Findings) -> str:
@@ -180,32 +178,32 @@ def _network(findings: Findings) -> str:
     if findings.answered:
         text += f" Datum: {solution.datum}."
     if solution.approximate:
-        text += f" Approximate coordinates were found, not given, for {_listed(solution.approximate)}."
+        text += f" Approximate coordinates were computed for {_listed(solution.approximate)}."
     if solution.assumed:
-        text += f" Nothing says on which side these lie; it was assumed: {_listed(solution.assumed)}."
+        text += f" The side of these is undetermined and was assumed: {_listed(solution.assumed)}."
     if solution.replaced:
         named = _listed(solution.replaced)
-        text += f" Given coordinates that the observations contradict grossly were no start: {named}."
+        text += f" Given coordinates in gross contradiction to the observations were not used as a start: {named}."
     text += "".join(f" {note[0].upper()}{note[1:]}." for note in findings.network.notes)
-    lonely = [findings.names[i] for i in np.flatnonzero(findings.seen == 0)]
+    lonely = [findings.names[i] for i in np.flatnonzero(findings.observation_counts == 0)]
     return text + (f" Not observed at all: {_listed(lonely)}." if lonely else "")
 
 
 def _points(findings: Findings) -> str:
     axis = findings.ellipsoid.semi_axes[:, 0]
-    known = np.flatnonzero(np.isfinite(axis) & (axis > 0.0))
-    if not len(known):
-        return "Every point is held."
-    usual, worst = float(np.median(axis[known])), int(known[np.argmax(axis[known])])
+    positive = np.flatnonzero(np.isfinite(axis) & (axis > 0.0))
+    if not len(positive):
+        return "All points are held."
+    usual, worst = float(np.median(axis[positive])), int(positive[np.argmax(axis[positive])])
     text = (
-        f"Along the longest axis of its ellipsoid the usual point is known to {quantity(usual, 'm')} (1σ), the worst, "
+        f"Along the longest axis of its ellipsoid the median point has u {quantity(usual, 'm')} (1σ), the worst, "
         f"{findings.names[worst]}, to {quantity(axis[worst], 'm')}, {direction_words(findings, worst)}."
     )
-    weak = known[axis[known] > WEAK * usual]
+    weak = positive[axis[positive] > WEAK * usual]
     weak = weak[np.argsort(-axis[weak], kind="stable")]
     if len(weak) > 1:
         named = _listed([findings.names[i] for i in weak])
-        text += f" {len(weak)} points are over {WEAK:g} times worse than usual: {named}."
+        text += f" {len(weak)} points are over {WEAK:g} times worse than the median: {named}."
     for r in findings.relative:
         text += (
             f" {r.first} - {r.second}: {r.distance:.5f} m, u {quantity(r.u_distance, 'm')}; its relative ellipsoid has "
@@ -219,10 +217,10 @@ def _points(findings: Findings) -> str:
 
 
 def direction_words(findings: Findings, point: int) -> str:
-    """The longest axis of a point's ellipsoid in words.
+    """Longest axis of a point's ellipsoid, in words.
 
-    findings   what is told of a solution
-    point      its row
+    findings   findings on a solution
+    point      row of the point
     """
     east, north, up = findings.network.axes @ findings.ellipsoid.directions[point, :, 0]
     steep = np.arcsin(min(abs(up), 1.0)) / DEGREE
@@ -234,13 +232,13 @@ def direction_words(findings: Findings, point: int) -> str:
 
 
 def _observations(findings: Findings) -> str:
-    whole, table = findings.whole, findings.table
-    if not np.isfinite(whole.p):
-        return "Nothing is left over to compare them with."
+    overall, table = findings.global_test, findings.table
+    if not np.isfinite(overall.p):
+        return "No redundancy to test them."
     text = (
-        f"Variance factor {factor_words(whole.factor)} with {findings.solution.degrees_of_freedom:.0f} degrees of "
-        f"freedom; by chance it lies between {whole.lower:.3f} and {whole.upper:.3f} (level {findings.level:g}): "
-        f"{whole.outcome}."
+        f"Variance factor {factor_words(overall.factor)} with {findings.solution.degrees_of_freedom:.0f} degrees of "
+        f"freedom; expected between {overall.lower:.3f} and {overall.upper:.3f} (level {findings.level:g}): "
+        f"{overall.outcome}."
     )
     text += f" {_suspects(findings)}." if len(findings.suspects) else ""
     if np.isfinite(table.standardised).any() and not len(findings.suspects):
@@ -256,7 +254,7 @@ def _checks(findings: Findings) -> str:
     text = f"All {active} observations are checked by others." if not len(unchecked) else ""
     if len(unchecked):
         names = _listed([findings.label(int(i)) for i in unchecked[:NAMED]], len(unchecked))
-        text = f"{len(unchecked)} of {active} observations are checked by no other, where an error would not show: "
+        text = f"{len(unchecked)} of {active} observations are not checked by others, and an error would not show: "
         text += f"{names}."
     mdb = [
         f"{quantity(float(np.median(table.mdb[checked])), str(table.unit[np.argmax(checked)]))} of a "

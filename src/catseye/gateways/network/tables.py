@@ -1,4 +1,4 @@
-"""An adjusted network as CSV: units in the names, in the axes of its file; written in pieces."""
+"""Adjusted network as CSV: units in the names, in the axes of its file; written in pieces."""
 
 import csv
 import io
@@ -10,7 +10,7 @@ import numpy as np
 from catseye.constants import MILLIMETRE
 from catseye.gateways.network.findings import MEASURES, ROLES, Findings
 
-Formats = dict[str, str]  # of each column: how its numbers are written; "" for texts, "d" for whole numbers
+Formats = dict[str, str]  # number format of each column; "" for texts, "d" for integers
 Column = Sequence[str] | np.ndarray
 
 PIECE = 5_000  # rows of a piece
@@ -56,9 +56,9 @@ TRIANGLE = np.triu_indices(3)
 
 
 def coordinates_csv(findings: Findings) -> Iterator[str]:
-    """Every point, with standard uncertainties, covariances, and semi-axes of the standard ellipsoid.
+    """Table of points with standard uncertainties, covariances and semi-axes of the ellipsoid.
 
-    findings   what is told of a solution; variances are multiplied by its variance factor where it is `scaled`
+    findings   findings on a solution; variances include its variance factor where it is `scaled`
     """
     axes, names = np.abs(findings.network.axes), [cell(n) for n in findings.names]
     letters = np.array([cell(n) for n in findings.network.axis_names])
@@ -75,17 +75,17 @@ def coordinates_csv(findings: Findings) -> Iterator[str]:
             *(findings.ellipsoid.semi_axes[part].T / MILLIMETRE),
             [" ".join(letters[f]) for f in fixed[part]],
             [" ".join(letters[d]) for d in datum[part]],
-            findings.seen[part],
+            findings.observation_counts[part],
         ],
     )
 
 
 def observations_csv(findings: Findings, *, worst_first: bool = False) -> Iterator[str]:
-    """Every observation; lengths in m and angles in rad, as its `unit` says.
+    """Table of observations; lengths in m and angles in rad, as `unit` says.
 
-    findings      what is told of a solution
-    worst_first   by falling |standardised|; else in the order of the file. `number` counts from 0 in that of the file,
-                  as the indices of `suspects` in JSON do.
+    findings      findings on a solution
+    worst_first   by falling |standardised|; else in file order. `number` counts from 0 in file order, as the indices
+                  of `suspects` in JSON do.
     """
     rows, places = findings.table, findings.network.places
     order = rows.worst_first if worst_first else np.arange(len(rows))
@@ -115,7 +115,7 @@ def observations_csv(findings: Findings, *, worst_first: bool = False) -> Iterat
 
 
 def parameters_csv(findings: Findings) -> Iterator[str]:
-    """Every parameter beside the points, in x east, y north, z up; an empty prior_u is a free one, 0 a held one."""
+    """Table of additional parameters, in x east, y north, z up; empty prior_u: free, 0: held."""
     parameters = findings.network.parameters
     yield from table(
         PARAMETERS,
@@ -133,9 +133,9 @@ def parameters_csv(findings: Findings) -> Iterator[str]:
 def table(formats: Formats, count: int, columns: Callable[[slice], Sequence[Column]]) -> Iterator[str]:
     """Header and rows in pieces.
 
-    formats   of each column by its name
-    count     rows
-    columns   gives the columns of a slice of rows
+    formats   number format by column name
+    count     number of rows
+    columns   function that returns the columns of a slice of rows
     """
     yield ",".join(formats) + "\n"
     for low in range(0, count, PIECE):
@@ -146,7 +146,7 @@ def table(formats: Formats, count: int, columns: Callable[[slice], Sequence[Colu
 
 
 def _column(column: Column, form: str) -> tuple[str, Sequence]:
-    """The template of a column's cells and what is put there: texts as they are, empty where a number is not finite."""
+    """Template of a column's cells and its values; empty where a number is not finite."""
     if not isinstance(column, np.ndarray):
         return "%s", column
     values = column.tolist()
@@ -156,7 +156,7 @@ def _column(column: Column, form: str) -> tuple[str, Sequence]:
 
 
 def cell(text: str) -> str:
-    """One cell, quoted where CSV needs it.
+    """Cell, quoted where CSV needs it.
 
     >>> cell('a "b", c'), cell("P 1")
     ('"a ""b"", c"', 'P 1')

@@ -1,8 +1,8 @@
-"""An adjusted network in the XML that GNU Gama's gama-local writes (gama-local-adjustment), for programs that read it.
+"""Adjusted network in the XML of GNU Gama's gama-local (gama-local-adjustment).
 
 Units are Gama's: m and gon for values, mm and cc (1e-4 gon) for uncertainties, mm2 for covariances; `f` in percent.
-Its residual is adjusted less observed, the opposite of ours. The a-priori reference standard deviation is 1, because
-our sigmas are absolute. Where this file must differ from gama-local's own, `DIFFERENCES` says so in the file itself.
+Its residual is adjusted minus observed, opposite to catseye's. The a-priori reference standard deviation is 1, because
+sigmas are absolute here. Differences from gama-local's own files are listed in the file itself (`DIFFERENCES`).
 """
 
 from collections import Counter
@@ -20,7 +20,7 @@ from catseye.version import __version__
 NAMESPACE = "http://www.gnu.org/software/gama/gama-local-adjustment"
 GON = TWO_PI / 400.0  # rad
 CC = 1e-4 * GON  # rad
-FULL = 300  # unknowns: the covariance matrix of more is written as its diagonal, as with gama-local --cov-band 0
+FULL = 300  # most unknowns with a full covariance matrix; else its diagonal, as with gama-local --cov-band 0
 PIECE = 5_000
 TAGS = {
     "horizontal_distance": "distance",
@@ -52,7 +52,7 @@ ROLES = {
 }
 SHORT = "<obs>%.10f</obs><adj>%.10f</adj><stdev>%.6f</stdev><qrr>%.9g</qrr><f>%.3f</f>"
 TESTED = f"{SHORT}<std-residual>%.3f</std-residual>"
-BODIES = {5: SHORT, 6: TESTED, 8: f"{TESTED}<err-obs>%.6f</err-obs><err-adj>%.6f</err-adj>"}  # by how many numbers
+BODIES = {5: SHORT, 6: TESTED, 8: f"{TESTED}<err-obs>%.6f</err-obs><err-adj>%.6f</err-adj>"}  # by the number of values
 TURNING = ("direction", "angle", "azimuth")
 DIFFERENCES = """written by catseye, not by gama-local; it differs in this:
   approximate coordinates are the file's, or where it has none the adjusted ones;
@@ -63,9 +63,9 @@ DIFFERENCES = """written by catseye, not by gama-local; it differs in this:
 
 
 def network_xml(findings: Findings) -> Iterator[str]:
-    """The text of the XML file in pieces; one with only the reason where there is no answer.
+    """Text of the XML file in pieces; without an answer, only the reason.
 
-    findings   what is told of a solution; `scaled` becomes Gama's "aposteriori"
+    findings   findings on a solution; `scaled` becomes Gama's "aposteriori"
 
     Source: [GAMA18] schema gama-local-adjustment.xsd, version 1.00.
     """
@@ -91,12 +91,12 @@ def network_xml(findings: Findings) -> Iterator[str]:
 
 
 def _text(text: str) -> str:
-    """Text of an element; control characters, which XML cannot hold, become the replacement character."""
+    """Text of an element; control characters, invalid in XML, become the replacement character."""
     return escape("".join(c if c >= " " or c in "\t\n\r" else "\ufffd" for c in text))
 
 
 class _Unknowns:
-    """Which coordinates are unknown, fixed and constrained, as Gama counts them: x with y, z alone; orientations."""
+    """Unknown, fixed and constrained coordinates, as Gama counts them: x with y, z alone; orientations."""
 
     def __init__(self, findings: Findings):
         network = findings.network
@@ -104,10 +104,10 @@ class _Unknowns:
         flags = [(f @ np.abs(self.turn)) > 0.0 for f in (network.points.fixed, network.points.datum)]
         self.fixed, self.datum = (np.stack([f[:, :2].all(axis=1), f[:, 2]], axis=1) for f in flags)
         self.datum &= ~self.fixed
-        gone = (network.points.absent @ np.abs(self.turn)) > 0.0
-        self.there = np.stack([~gone[:, :2].any(axis=1), ~gone[:, 2]], axis=1)
+        absent = (network.points.absent @ np.abs(self.turn)) > 0.0
+        self.existing = np.stack([~absent[:, :2].any(axis=1), ~absent[:, 2]], axis=1)
         self.x, self.given = (
-            np.where(gone, np.nan, np.where(network.points.absent, 0.0, xyz) @ self.turn)
+            np.where(absent, np.nan, np.where(network.points.absent, 0.0, xyz) @ self.turn)
             for xyz in (findings.solution.x, network.points.xyz)
         )
         columns: dict[int, int] = {}
@@ -116,21 +116,21 @@ class _Unknowns:
             if column is not None:
                 columns |= {int(c): int(o) // 3 for c, o in zip(column, group.origin, strict=True) if c >= 0}  # type: ignore[attr-defined]
         self.orientations = dict(sorted(columns.items()))
-        free = np.repeat(~self.fixed & self.there, (2, 1), axis=1)
+        free = np.repeat(~self.fixed & self.existing, (2, 1), axis=1)
         self.coordinates = np.flatnonzero(free.ravel())  # in the file's axes
         self.clockwise = -np.sign(np.linalg.det(self.turn[:2, :2]))  # from x to y
         self.zero = np.arctan2(self.turn[0, 0], self.turn[1, 0])  # azimuth of the x axis
 
     def covariance(self, findings: Findings) -> tuple[np.ndarray, int]:
-        """Upper band of the unknowns' covariance row by row, and its width less the diagonal, without a factor."""
+        """Upper band of the unknowns' covariance by rows, and its width without the diagonal, unscaled."""
         size = len(self.coordinates) + len(self.orientations)
         turns = np.array(list(self.orientations), dtype=int)
         angular = np.full(len(turns), self.clockwise / CC)
         if size > FULL:
             blocks = np.nan_to_num(findings.solution.covariance)  # absent coordinates are not among these
-            own = np.einsum("ki,nkl,li->ni", self.turn, blocks, self.turn).ravel()
+            variances = np.einsum("ki,nkl,li->ni", self.turn, blocks, self.turn).ravel()
             return np.concatenate(
-                [own[self.coordinates] / MILLIMETRE**2, findings.solution.q.diagonal()[turns] / CC**2]
+                [variances[self.coordinates] / MILLIMETRE**2, findings.solution.q.diagonal()[turns] / CC**2]
             ), 0
         points, place = np.divmod(self.coordinates, 3)
         named = np.unique(points)
@@ -144,7 +144,7 @@ class _Unknowns:
 
 
 def _level_axes(axes: np.ndarray) -> tuple[np.ndarray, str]:
-    """The file's axes and Gama's name of them; x east, y north where its third one is not up."""
+    """Axes of the file and Gama's name of them; x east, y north if the third is not up."""
     if axes[2, 2] != 1.0:
         return np.eye(3), "en"
     letters = {(1, 0): "e", (-1, 0): "w", (0, 1): "n", (0, -1): "s"}
@@ -160,7 +160,7 @@ def _comment(findings: Findings) -> str:
 
 
 def _by_kind(findings: Findings) -> list[tuple[str, int]]:
-    """How many active rows of each kind; of vectors and coordinates those of the first axis, as gama-local counts."""
+    """Number of active rows of each kind; vectors and coordinates count once, as in gama-local."""
     table = findings.table
     split = np.array([TAGS.get(kind, "") in ("d", "coordinate-") for kind in table.kinds], dtype=bool)[table.kind]
     counted = table.active & (~split | (table.component == findings.network.axis_names[0]))
@@ -168,7 +168,7 @@ def _by_kind(findings: Findings) -> list[tuple[str, int]]:
 
 
 def _summary(findings: Findings, unknowns: _Unknowns) -> str:
-    network, table, whole = findings.network, findings.table, findings.whole
+    network, table, overall = findings.network, findings.table, findings.global_test
     kinds: Counter[str] = Counter()
     for kind, count in _by_kind(findings):
         kinds[TAGS.get(kind, "")] += count
@@ -176,9 +176,9 @@ def _summary(findings: Findings, unknowns: _Unknowns) -> str:
     equations = int(table.active.sum()) + priors
     free = int(np.sum(network.points.free)) + sum(p.sigma > 0.0 for p in network.parameters)
     degrees = round(findings.solution.degrees_of_freedom)
-    tested = np.isfinite(whole.p)
-    ratio, lower, upper = (np.sqrt(v) if tested else 0.0 for v in (whole.factor, whole.lower, whole.upper))
-    adjusted = ~unknowns.fixed & unknowns.there
+    tested = np.isfinite(overall.p)
+    ratio, lower, upper = (np.sqrt(v) if tested else 0.0 for v in (overall.factor, overall.lower, overall.upper))
+    adjusted = ~unknowns.fixed & unknowns.existing
     states = (("adjusted", adjusted), ("constrained", unknowns.datum), ("fixed", unknowns.fixed))
     return "".join(
         [
@@ -204,22 +204,22 @@ def _summary(findings: Findings, unknowns: _Unknowns) -> str:
 
 
 def _confidence_scale(findings: Findings) -> float:
-    """Half a confidence interval in standard deviations: normal, or Student's where the variance factor is applied."""
-    both = 0.5 * findings.level
-    return -float(stdtrit(findings.solution.degrees_of_freedom, both) if findings.scaled else ndtri(both))
+    """Half a confidence interval in standard deviations: normal, or Student's if scaled."""
+    tail = 0.5 * findings.level
+    return -float(stdtrit(findings.solution.degrees_of_freedom, tail) if findings.scaled else ndtri(tail))
 
 
 def _coordinates(findings: Findings, unknowns: _Unknowns) -> Iterator[str]:
-    given = np.where(np.isfinite(unknowns.given), unknowns.given, unknowns.x)
+    approximate = np.where(np.isfinite(unknowns.given), unknowns.given, unknowns.x)
     yield "<coordinates>\n"
-    for tag, xyz, shown in (
+    for tag, xyz, mask in (
         ("fixed", unknowns.x, unknowns.fixed),
-        ("approximate", given, ~unknowns.fixed & unknowns.there),
-        ("adjusted", unknowns.x, ~unknowns.fixed & unknowns.there),
+        ("approximate", approximate, ~unknowns.fixed & unknowns.existing),
+        ("adjusted", unknowns.x, ~unknowns.fixed & unknowns.existing),
     ):
         yield f"<{tag}>\n"
         capital = unknowns.datum if tag != "fixed" else np.zeros_like(unknowns.datum)
-        rows = zip(findings.names, xyz.tolist(), shown.tolist(), capital.tolist(), strict=True)
+        rows = zip(findings.names, xyz.tolist(), mask.tolist(), capital.tolist(), strict=True)
         yield "".join([_point(*row) for row in rows if any(row[2])])
         yield f"</{tag}>\n"
     yield "<orientation-shifts>\n"
@@ -241,23 +241,23 @@ def _coordinates(findings: Findings, unknowns: _Unknowns) -> Iterator[str]:
     yield "</original-index>\n</coordinates>\n"
 
 
-def _point(name: str, xyz: list[float], shown: list[bool], capital: list[bool]) -> str:
+def _point(name: str, xyz: list[float], mask: list[bool], capital: list[bool]) -> str:
     x, y = ("X", "Y") if capital[0] else ("x", "y")
     z = "Z" if capital[1] else "z"
-    level = f"<{x}>{xyz[0]:.10f}</{x}><{y}>{xyz[1]:.10f}</{y}>" if shown[0] else ""
-    return f"  <point><id>{_text(name)}</id>{level}{f'<{z}>{xyz[2]:.10f}</{z}>' if shown[1] else ''}</point>\n"
+    level = f"<{x}>{xyz[0]:.10f}</{x}><{y}>{xyz[1]:.10f}</{y}>" if mask[0] else ""
+    return f"  <point><id>{_text(name)}</id>{level}{f'<{z}>{xyz[2]:.10f}</{z}>' if mask[1] else ''}</point>\n"
 
 
 def _observations(findings: Findings, turn: np.ndarray) -> Iterator[str]:
     table = findings.table
-    written = np.abs(turn.T @ findings.network.axes).argmax(axis=0)  # where the file's axes stand in those written
+    written = np.abs(turn.T @ findings.network.axes).argmax(axis=0)  # index of the file's axes
     letter = {name: "xyz"[int(k)] for name, k in zip(findings.network.axis_names, written, strict=True)}
-    known = np.array([kind in TAGS for kind in table.kinds], dtype=bool)
-    shown = np.flatnonzero(table.active & known[table.kind])
+    supported = np.array([kind in TAGS for kind in table.kinds], dtype=bool)
+    rows = np.flatnonzero(table.active & supported[table.kind])
     names = [_text(name) for name in findings.names]
     numbers, length = _numbers(findings, table.sign if turn is not findings.network.axes else np.ones(len(table)))
-    for low in range(0, len(shown), PIECE):
-        part = shown[low : low + PIECE]
+    for low in range(0, len(rows), PIECE):
+        part = rows[low : low + PIECE]
         lines = []
         columns = (c[part].tolist() for c in (table.kind, table.component, length, table.ends, numbers))
         for kind, component, count, at, row in zip(*columns, strict=True):
@@ -269,11 +269,11 @@ def _observations(findings: Findings, turn: np.ndarray) -> Iterator[str]:
 
 
 def _numbers(findings: Findings, sign: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What gama-local writes of the observations, (m, 8), and how many of it (m,): those in the bodies' order.
+    """Values that gama-local writes of the observations, (m, 8), and their number (m,).
 
-    sign   (m,) turns components into the axes that are written
+    sign   (m,) sign of components in the written axes
 
-    The error is given of what is checked well, or stands out, and is not correlated with others.
+    The error is given for uncorrelated observations that are well checked or have a large residual.
     """
     table, share, scale = findings.table, _adjusted_share(findings), np.sqrt(findings.factor)
     angular = table.unit == "rad"
@@ -282,7 +282,7 @@ def _numbers(findings: Findings, sign: np.ndarray) -> tuple[np.ndarray, np.ndarr
     turning = np.array([TAGS.get(kind) in TURNING for kind in table.kinds], dtype=bool)[table.kind]
     sigma, v = table.u / fine, -sign * table.residual / fine
     qrr, control = (1.0 - share) * sigma**2, 100.0 * np.abs(1.0 - np.sqrt(share))
-    with np.errstate(invalid="ignore", divide="ignore"):  # without a check it is not shown
+    with np.errstate(invalid="ignore", divide="ignore"):  # unchecked: not written
         studentised, error = np.abs(v) / (scale * np.sqrt(qrr)), v / (1.0 - share)
     alone = np.array([g.covariance.ndim == 1 for g in findings.network.groups], dtype=bool)[table.group]
     full = alone & ((control >= 5.0) | (studentised > _confidence_scale(findings)))
@@ -303,12 +303,12 @@ def _numbers(findings: Findings, sign: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def _adjusted_share(findings: Findings) -> np.ndarray:
-    """(m,) variance of each adjusted observation over that of the observed one, variance factor 1."""
+    """Variance of each adjusted observation over that of the observed one, (m,), variance factor 1."""
     solution, table = findings.solution, findings.table
     share = 1.0 - table.redundancy
     x = solution.state
     for g, group in enumerate(findings.network.groups):
-        if group.covariance.ndim > 1:  # redundancy numbers of correlated observations are no such share
+        if group.covariance.ndim > 1:  # not valid for correlated observations
             _, jacobian = group.predict(x)
             columns = np.broadcast_to(group.columns, jacobian.shape)
             of_group = table.group == g

@@ -1,1 +1,1 @@
-"""Beams, glass, retroreflectors, coatings and laser safety on the way out."""
+"""Output of beams, glass, retroreflectors, coatings and laser safety."""

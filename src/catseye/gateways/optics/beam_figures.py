@@ -1,4 +1,4 @@
-"""A beam train as figures, words, object and files; coatings as curves."""
+"""Beam train as figure, text, JSON and files; coatings as curves."""
 
 import csv
 import io
@@ -29,35 +29,35 @@ POLARIZATIONS: tuple[coating.Polarization, ...] = ("s", "p")
 
 
 def beam_figure(beam_path: BeamPath) -> Svg:
-    """SVG text: the beam's radii along its path, and the power that returns by distance.
+    """SVG text: beam radii along the path, and returned power by distance.
 
     beam_path   a reduced beam train
     """
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
-        figure = Figure(figsize=(12.0, 6.6))  # margins by hand: the automatic ones differ in the last digit
+        figure = Figure(figsize=(12.0, 6.6))  # fixed margins: automatic ones are not reproducible to the last digit
         edges = {"left": 0.06, "right": 0.985, "bottom": 0.08, "top": 0.95, "hspace": 0.38, "wspace": 0.2}
         grid = figure.add_gridspec(2, 3, width_ratios=[1.0, 1.5, 1.0], **edges)
         profile = beam_profile(beam_path.train)
-        way, radii = profile["outward"]
+        distances, radii = profile["outward"]
         outward = figure.add_subplot(grid[0, 0])
-        _leg(outward, beam_path, "outward", (way / MILLIMETRE, radii))
+        _leg(outward, beam_path, "outward", (distances / MILLIMETRE, radii))
         outward.set(title="Laser to mirror", xlabel="from the laser (mm)", ylabel="radius at 1/e² (mm)")
         _range(figure.add_subplot(grid[0, 1]), beam_path, profile)
-        way, radii = profile["inward"]
+        distances, radii = profile["inward"]
         inward = figure.add_subplot(grid[0, 2])
-        _leg(inward, beam_path, "inward", ((way - way[0]) / MILLIMETRE, radii), way[0])
+        _leg(inward, beam_path, "inward", ((distances - distances[0]) / MILLIMETRE, radii), distances[0])
         inward.set(title="Mirror to detector", xlabel="from the first inward element (mm)")
         _power(figure.add_subplot(grid[1, :]), beam_path)
         return svg(figure)
 
 
 def _leg(ax, beam_path: BeamPath, leg: str, profile: tuple, start: float = 0.0) -> None:
-    """Radii in both planes and the apertures that stand there, within a head."""
-    way, radii = profile
+    """Radii in both planes and apertures, within a head."""
+    distances, radii = profile
     for k, axis in enumerate("xy"):
-        ax.plot(way, radii[:, k] / MILLIMETRE, color=SERIES[k], lw=1.6, label=axis)
+        ax.plot(distances, radii[:, k] / MILLIMETRE, color=SERIES[k], lw=1.6, label=axis)
     stops = [place for place in beam_path.places if place.leg == leg and np.isfinite(place.aperture)]
     top = 1.15 * max([float(np.max(radii)), *(place.aperture for place in stops)]) / MILLIMETRE
     for place in stops:
@@ -70,8 +70,8 @@ def _leg(ax, beam_path: BeamPath, leg: str, profile: tuple, start: float = 0.0) 
 def _range(ax, beam_path: BeamPath, profile: dict) -> None:
     clipped = next(place for place in beam_path.places if place.leg == "reflector")
     for leg, style in (("range", "-"), ("back", (0, (4, 2)))):
-        way, radii = profile[leg]
-        along = way - profile["range"][0][0]
+        distances, radii = profile[leg]
+        along = distances - profile["range"][0][0]
         for k, axis in enumerate("xy"):
             label = f"{axis}, {'out' if leg == 'range' else 'back, unclipped'}"
             ax.plot(along, radii[:, k] / MILLIMETRE, color=SERIES[k], ls=style, lw=1.6, label=label)
@@ -79,7 +79,7 @@ def _range(ax, beam_path: BeamPath, profile: dict) -> None:
     ax.axvline(at, color=FAINT, lw=0.7)
     ax.plot([at, at], [edge, 10.0 * edge], color=INK, lw=2.2, solid_capstyle="butt")
     colour = BAD if clipped.clipped > 0.01 else INK
-    text = f"{clipped.name}  \n{100 * clipped.clipped:.2g} % passes beside it  "
+    text = f"{clipped.name}  \n{100 * clipped.clipped:.2g} % misses it  "
     ax.text(at, 1.05 * edge, text, fontsize=7.5, color=colour, va="bottom", ha="right")
     ax.set_ylim(0.0, 1.25 * max(edge, float(max(np.max(profile[leg][1]) for leg in ("range", "back"))) / MILLIMETRE))
     ax.set(title="To the reflector and back", xlabel="path from the mirror (m)")
@@ -87,24 +87,24 @@ def _range(ax, beam_path: BeamPath, profile: dict) -> None:
 
 
 def _power(ax, beam_path: BeamPath) -> None:
-    known = [row for row in beam_path.returned if row.status == "ok"]
-    ax.plot([r.distance for r in known], [100.0 * r.hit for r in known], "o-", ms=4, color=SERIES[2], label="hits it")
-    both = [100.0 * r.hit * r.collected for r in known]
-    ax.plot([r.distance for r in known], both, "s-", ms=4, color=SERIES[0], label="and comes back to the detector")
+    good = [row for row in beam_path.returned if row.status == "ok"]
+    ax.plot([r.distance for r in good], [100.0 * r.hit for r in good], "o-", ms=4, color=SERIES[2], label="hits it")
+    collected = [100.0 * r.hit * r.collected for r in good]
+    ax.plot([r.distance for r in good], collected, "s-", ms=4, color=SERIES[0], label="on the detector")
     for row in beam_path.returned:
         if row.status != "ok":
             ax.axvline(row.distance, color=BAD, lw=1.0, ls=":")
     ax.set(title="Share of the beam", xlabel="distance to the reflector (m)", ylabel="share (%)")
-    ax.set_ylim(max(0.0, 1.1 * min(both, default=0.0) - 10.0), 101.0)
+    ax.set_ylim(max(0.0, 1.1 * min(collected, default=0.0) - 10.0), 101.0)
     ax.legend(loc="lower left")
 
 
 def coating_figure(names: Sequence[str] = DRAWN, wavelength_um: float = 0.780, incidence: float = 0.0) -> Svg:
-    """SVG text: reflectance by angle and by wavelength, and what a mirror adds to a range by angle.
+    """SVG text: reflectance by angle and wavelength, and the range error of a mirror by angle.
 
     names           of `coating.named`
-    wavelength_um   um, that they are made for
-    incidence       rad, that they are made for, and of the middle panel
+    wavelength_um   design wavelength, um
+    incidence       design incidence and that of the middle panel, rad
     """
     with mpl.rc_context():
         mpl.rcdefaults()
@@ -127,7 +127,7 @@ def coating_figure(names: Sequence[str] = DRAWN, wavelength_um: float = 0.780, i
         by_angle.set(title=f"At {wavelength_um * 1e3:g} nm", xlabel="incidence (°)", ylabel="reflectance (%)")
         at = f"At {incidence / DEGREE:g}°, by wavelength"
         by_wavelength.set(title=at, xlabel="wavelength (nm)", ylabel="reflectance (%)")
-        path.set(title="What the range grows by", xlabel="incidence (°)", ylabel="range (µm)", ylim=(-0.2, 2.6))
+        path.set(title="Increase of the range", xlabel="incidence (°)", ylabel="range (µm)", ylim=(-0.2, 2.6))
         for ax in (by_angle, by_wavelength):
             ax.set_ylim(-2.0, 102.0)
         figure.legend(*by_angle.get_legend_handles_labels(), loc="lower center", ncols=len(names))
@@ -136,7 +136,7 @@ def coating_figure(names: Sequence[str] = DRAWN, wavelength_um: float = 0.780, i
 
 
 def beam_plot(file: Path) -> tuple[Svg, dict[str, Any]]:
-    """The figure of a beam train as SVG text, and what it says in numbers.
+    """Figure of a beam train as SVG text, with numbers.
 
     file   the record
     """
@@ -147,9 +147,9 @@ def beam_plot(file: Path) -> tuple[Svg, dict[str, Any]]:
 def coating_plot(
     names: Sequence[str] = DRAWN, wavelength_um: float = 0.780, incidence: float = 0.0
 ) -> tuple[Svg, dict[str, Any]]:
-    """Coating curves as SVG text, and reflectance and range at the angle that they are made for.
+    """Coating curves as SVG text, with reflectance and range at the design angle.
 
-    names           of `coating.named`, at most 6; one that is not known raises ValidityError
+    names           of `coating.named`, at most 6; an unknown one raises ValidityError
     wavelength_um   um
     incidence       rad
     """
@@ -160,17 +160,17 @@ def coating_plot(
         layers = coating.named(name, wavelength_um, incidence)
         for polarization in POLARIZATIONS:
             how = f"{name}_{polarization}".replace("-", "_")
-            shown = coating.response(layers, wavelength_um, incidence, polarization=polarization)
+            response = coating.response(layers, wavelength_um, incidence, polarization=polarization)
             added = coating.group_path(layers, wavelength_um, incidence, polarization=polarization)
-            summary[f"{how}_reflectance"], summary[f"{how}_range"] = float(shown.reflectance), float(added)
+            summary[f"{how}_reflectance"], summary[f"{how}_range"] = float(response.reflectance), float(added)
     return coating_figure(names, wavelength_um, incidence), summary
 
 
 def read_beam(file: Path, distance: float | None = None) -> tuple[BeamPath, dict[str, str]]:
-    """A beam train's file, reduced, and the hash of what was read.
+    """Beam train of a file, reduced, and the file's hash.
 
     file       the record
-    distance   m, instead of the record's
+    distance   m, overrides the record's
     """
     folder = Folder(file.parent)
     train = folder.record(file.name, BeamTrain)
@@ -180,17 +180,17 @@ def read_beam(file: Path, distance: float | None = None) -> tuple[BeamPath, dict
 
 
 def beam_object(beam_path: BeamPath) -> dict[str, Any]:
-    """Everything as a plain object, SI units.
+    """Object of a beam train, SI units.
 
     beam_path   a reduced beam train
     """
     keys = ("leg", "name", "way", "radius", "curvature", "aperture", "clipped", "power")
     rows = ("distance", "radius", "hit", "collected", "power", "status")
-    lost = [row for row in beam_path.returned if row.status != "ok"]
-    good = beam_path.status == "ok" and not lost
+    failures = [row for row in beam_path.returned if row.status != "ok"]
+    good = beam_path.status == "ok" and not failures
     why = "every element passes the beam" if good else beam_path.status
-    if lost and beam_path.status == "ok":
-        why = f"no power from {', '.join(f'{row.distance:g}' for row in lost)} m: {lost[0].status}"
+    if failures and beam_path.status == "ok":
+        why = f"no power from {', '.join(f'{row.distance:g}' for row in failures)} m: {failures[0].status}"
     return {
         "verdict": Verdict("good" if good else "doubtful", why).to_object(),
         "name": beam_path.train.name,
@@ -206,7 +206,7 @@ def beam_object(beam_path: BeamPath) -> dict[str, Any]:
 
 
 def lines(beam_path: BeamPath) -> Iterator[str]:
-    """The tables as lines of text.
+    """Tables as lines of text.
 
     beam_path   a reduced beam train
     """
@@ -220,11 +220,11 @@ def lines(beam_path: BeamPath) -> Iterator[str]:
     for place in beam_path.places:
         size = " ".join(f"{_cell(r / MILLIMETRE, '8.4f'):>8}" for r in place.radius)
         front = " ".join(f"{_front(c):>9}" for c in place.curvature)
-        edge, lost = _cell(place.aperture / MILLIMETRE, ".2f"), _cell(100.0 * place.clipped, ".3g")
+        edge, clipped = _cell(place.aperture / MILLIMETRE, ".2f"), _cell(100.0 * place.clipped, ".3g")
         power = _cell(place.power * 1e3, ".4f")
-        yield f"{place.leg:<9} {place.name:<24.24} {place.way:9.3f} {size} {front} {edge:>9} {lost:>9} {power:>9}"
+        yield f"{place.leg:<9} {place.name:<24.24} {place.way:9.3f} {size} {front} {edge:>9} {clipped:>9} {power:>9}"
     if beam_path.status != "ok":
-        yield f"not known behind the reflector: {beam_path.status}"
+        yield f"unknown after the reflector: {beam_path.status}"
     yield f"{'distance, m':<12} {'radius x, y, mm':>17} {'hits, %':>10} {'collected, %':>13} {'detector, mW':>13}"
     for row in beam_path.returned:
         size = " ".join(f"{r / MILLIMETRE:8.3f}" for r in row.radius)
@@ -233,7 +233,7 @@ def lines(beam_path: BeamPath) -> Iterator[str]:
     waist, spot = (1e3 * v for v in beam_path.smallest_waist)
     yield f"smallest possible spot there: {spot:.3f} mm, from a waist of {waist:.3f} mm at the head"
     for name, effect in beam_path.range_effects.items():
-        yield f"range too long by {_cell(effect * 1e6, '.3f') or 'what is not known'} µm: {name}"
+        yield f"range too long by {_cell(effect * 1e6, '.3f') or 'an unknown number of'} µm: {name}"
     if np.isfinite(beam_path.u_image):
         yield f"u of the range from the image's place: {beam_path.u_image * 1e6:.3f} µm"
     for name, value in beam_path.laser.items():
@@ -241,11 +241,11 @@ def lines(beam_path: BeamPath) -> Iterator[str]:
 
 
 def write_beam(beam_path: BeamPath, directory: Path, inputs: dict[str, str]) -> None:
-    """Tables, figure, object, and last the provenance with the hashes of the others.
+    """Write tables, figure, JSON, and the provenance with their hashes.
 
     beam_path   a reduced beam train
-    directory   exists, and is ours to fill: see `writers.output.whole_directory`
-    inputs      hashes of what was read
+    directory   existing, from `writers.output.whole_directory`
+    inputs      hashes of the input files
     """
     files: Files = {
         "beam.csv": lambda: _places_csv(beam_path),
@@ -289,7 +289,7 @@ def _cell(value: float, form: str) -> str:
 
 
 def _front(curvature: float) -> str:
-    """Radius of a wavefront in metres; flat where it is beyond ten thousand kilometres."""
+    """Radius of a wavefront in metres; "flat" beyond 10 000 kilometres."""
     if not np.isfinite(curvature):
         return ""
     return "flat" if abs(curvature) < 1e-7 else f"{1.0 / curvature:.5g}"

@@ -1,4 +1,4 @@
-"""A glass as a plain object for JSON and as rows for people: indices, slopes, what a prism of it does, the others."""
+"""Glass as JSON and text: indices, slopes, prism of it, comparison with other glasses."""
 
 from typing import Any
 
@@ -23,21 +23,21 @@ from catseye.optics.retroreflector.warm_prism import EXPANSION_C, warm_prism, wa
 
 MODULATION_HZ = 1.5e9  # the GBT's
 AIR = (20.0, 933.0, 50.0)  # °C, hPa, %: of the notes' example, [PARKER04] eq. 1.49, by their model
-OBLIQUE = 30.0 * DEGREE  # at which the prism's change is told
+OBLIQUE = 30.0 * DEGREE  # incidence of the reported range change
 
 
 def glass_object(name: str, wavelength_um: float, temperature_c: float, *, height_mm: float) -> dict[str, Any]:
-    """One glass as `catseye glass NAME --json` gives it.
+    """Object of one glass that `catseye glass NAME --json` prints.
 
     name            in GLASSES
     wavelength_um   in vacuum, um
     temperature_c   °C, of the glass
-    height_mm       of a prism of it at 20 °C, mm, above 0
+    height_mm       height of a prism at 20 °C, mm, above 0
     """
     glass = glass_named(name)
     vacuum = absolute_index(wavelength_um, name, temperature_c)
-    here = float(wavelength_in_air_um(wavelength_um, name))
-    by_wavelength, by_temperature = slopes(here, name), temperature_slopes(wavelength_um, name, temperature_c)
+    wavelength = float(wavelength_in_air_um(wavelength_um, name))
+    by_wavelength, by_temperature = slopes(wavelength, name), temperature_slopes(wavelength_um, name, temperature_c)
     return {
         "verdict": glass_verdict(name, temperature_c).to_object(),
         "name": name,
@@ -47,13 +47,13 @@ def glass_object(name: str, wavelength_um: float, temperature_c: float, *, heigh
         "limits_um": [glass.shortest_um, glass.longest_um],
         "reference_c": glass.reference_c,
         "wavelength_um": wavelength_um,
-        "wavelength_in_air_um": here,
+        "wavelength_in_air_um": wavelength,
         "temperature_c": temperature_c,
-        "phase_index": phase_index(here, name),
-        "group_index": group_index(here, name),
+        "phase_index": phase_index(wavelength, name),
+        "group_index": group_index(wavelength, name),
         "phase_index_per_um": by_wavelength.phase,
         "group_index_per_um": by_wavelength.group,
-        "group_wavelength": group_wavelength(MODULATION_HZ, here, name),
+        "group_wavelength": group_wavelength(MODULATION_HZ, wavelength, name),
         "notes_phase_index": phase_index(wavelength_um, name),
         "notes_group_index": group_index(wavelength_um, name),
         "notes_group_wavelength": group_wavelength(MODULATION_HZ, wavelength_um, name),
@@ -67,7 +67,7 @@ def glass_object(name: str, wavelength_um: float, temperature_c: float, *, heigh
 
 
 def glass_verdict(name: str, temperature_c: float) -> Verdict:
-    """Good within the limits of the formulas, which were checked; doubtful beyond those of the expansion."""
+    """Verdict: good within the formulas' limits, doubtful beyond those of the expansion."""
     glass = glass_named(name)
     if not EXPANSION_C[0] <= temperature_c <= EXPANSION_C[1]:
         low, high = EXPANSION_C
@@ -77,7 +77,10 @@ def glass_verdict(name: str, temperature_c: float) -> Verdict:
 
 
 def _air_about(wavelength_um: float) -> tuple[str, dict[str, float]]:
-    """The air of the notes' example, in words and indices; the makers' where the notes' model does not reach."""
+    """Air of the notes' example, in words and indices.
+
+    The makers' reference air is taken where the notes' model is not valid.
+    """
     try:
         about = air(*AIR, wavelength_um=wavelength_um, model="rueger1990")
     except ValidityError:
@@ -87,63 +90,68 @@ def _air_about(wavelength_um: float) -> tuple[str, dict[str, float]]:
 
 
 def _in_air(name: str, wavelength_um: float, temperature_c: float, height: float) -> dict[str, Any]:
-    """A prism of the glass in the air about it, and what another glass costs there."""
+    """Prism of the glass in the surrounding air, and the errors of assuming another glass."""
     about, index = _air_about(wavelength_um)
-    asked = (height, name, wavelength_um, temperature_c)
+    prism_state = (height, name, wavelength_um, temperature_c)
     return {
-        "prism": {"air": about, **index_keys(index), **_prism_object(asked, index)},
+        "prism": {"air": about, **index_keys(index), **_prism_object(prism_state, index)},
         "others": {
-            other: _other(other, name, wavelength_um, height, index["air_group"]) for other in GLASSES if other != name
+            glass: _exchange(glass, name, wavelength_um, height, index["air_group"])
+            for glass in GLASSES
+            if glass != name
         },
     }
 
 
 def index_keys(index: dict[str, float]) -> dict[str, float]:
-    """The air's indices by their names in JSON."""
+    """Indices of the air by their names in JSON."""
     return {f"{key}_index": value for key, value in index.items()}
 
 
-def _prism_object(asked: tuple[float, str, float, float], index: dict[str, float]) -> dict[str, Any]:
-    """A prism at its temperature, in the air about it; `asked`: height at 20 °C, glass, vacuum um, °C."""
-    height, name, wavelength_um, _ = asked
+def _prism_object(prism_state: tuple[float, str, float, float], index: dict[str, float]) -> dict[str, Any]:
+    """Prism at its temperature in the surrounding air.
+
+    prism_state: height at 20 °C, glass, vacuum wavelength um, temperature °C.
+    """
+    height, name, wavelength_um, _ = prism_state
     phase, group = index["air_phase"], index["air_group"]
-    found = warm_prism(*asked, air_phase=phase, air_group=group)
-    per_c = warm_prism_slopes(*asked, air_phase=phase, air_group=group)
+    state = warm_prism(*prism_state, air_phase=phase, air_group=group)
+    per_c = warm_prism_slopes(*prism_state, air_phase=phase, air_group=group)
     notes = float(group_index(wavelength_um, name)) / index["air_group"]
     return {
         "height": height,
-        "height_at_temperature": found.height,
-        "phase_index_over_air": found.phase,
-        "group_index_over_air": found.group,
+        "height_at_temperature": state.height,
+        "phase_index_over_air": state.phase,
+        "group_index_over_air": state.group,
         "notes_group_index_over_air": notes,
-        "range_constant": found.range_constant,
+        "range_constant": state.range_constant,
         "range_constant_per_c": per_c.range_constant,
-        "reference_depth": found.reference_depth,
+        "reference_depth": state.reference_depth,
         "reference_depth_per_c": per_c.reference_depth,
-        "range_change_at_30_deg": prism.oblique_change(found.height, OBLIQUE, group=found.group, phase=found.phase),
+        "range_change_at_30_deg": prism.oblique_change(state.height, OBLIQUE, group=state.group, phase=state.phase),
         "notes_range_constant": prism.range_constant(height, notes),
     }
 
 
-def _other(other: str, name: str, wavelength_um: float, height: float, air_group: float) -> dict[str, Any] | None:
-    """What it costs to take one glass for another; None where the other's formula does not reach."""
-    known = GLASSES[other]
-    here = {which: float(wavelength_in_air_um(wavelength_um, which)) for which in (name, other)}
-    if not known.shortest_um <= here[other] <= known.longest_um:
+def _exchange(assumed: str, name: str, wavelength_um: float, height: float, air_group: float) -> dict[str, Any] | None:
+    """Errors of assuming another glass; None where its formula is not valid."""
+    glass = GLASSES[assumed]
+    in_air = {which: float(wavelength_in_air_um(wavelength_um, which)) for which in (name, assumed)}
+    if not glass.shortest_um <= in_air[assumed] <= glass.longest_um:
         return None
-    n, m = (float(group_index(um, which)) / air_group for which, um in here.items())
+    n, m = (float(group_index(um, which)) / air_group for which, um in in_air.items())
     wrong = prism.wrong_glass(height, assumed=n, true=m)
     return {
-        "phase_index": phase_index(here[other], other) - phase_index(here[name], name),
-        "group_index": group_index(here[other], other) - group_index(here[name], name),
+        "phase_index": phase_index(in_air[assumed], assumed) - phase_index(in_air[name], name),
+        "group_index": group_index(in_air[assumed], assumed) - group_index(in_air[name], name),
         "range_too_long_about_point": wrong.about_point,
         "range_too_long_about_face": wrong.about_face,
     }
 
 
 def glass_rows(answer: dict[str, Any]) -> list[tuple[str, str]]:
-    """The object's lines for a terminal, each (title, text)."""
-    own = answer["prism"]
+    """Title and text of each line for a terminal."""
+    body = answer["prism"]
     rows = [
         (answer["name"], f"{answer['what']}; {answer['source']}, {_limits(answer)}"),
         ("air", f"phase index {answer['phase_index']:.8f}, group index {answer['group_index']:.8f} at "
@@ -156,33 +164,34 @@ def glass_rows(answer: dict[str, Any]) -> list[tuple[str, str]]:
                    f"{answer['absolute_phase_index_per_c'] * 1e6:+.2f} and "
                    f"{answer['absolute_group_index_per_c'] * 1e6:+.2f} ppm per °C"),
         ("expansion", f"{answer['expansion_per_c'] * 1e6:.1f} ppm per °C"),
-        ("prism", f"{own['height'] * 1e3:g} mm high at 20 °C, now at {answer['temperature_c']:g} °C in air of "
-                  f"{own['air']}: range constant "
-                  f"{own['range_constant'] * 1e3:.4f} mm ({own['range_constant_per_c'] * 1e6:+.2f} µm per °C), point "
-                  f"{own['reference_depth'] * 1e3:.4f} mm below the face, "
-                  f"{own['range_change_at_30_deg'] * 1e6:+.2f} µm more at 30°"),
+        ("prism", f"{body['height'] * 1e3:g} mm high at 20 °C, here at {answer['temperature_c']:g} °C in air of "
+                  f"{body['air']}: range constant "
+                  f"{body['range_constant'] * 1e3:.4f} mm ({body['range_constant_per_c'] * 1e6:+.2f} µm per °C), point "
+                  f"{body['reference_depth'] * 1e3:.4f} mm below the face, "
+                  f"{body['range_change_at_30_deg'] * 1e6:+.2f} µm more at 30°"),
         ("the notes", f"take {answer['wavelength_um']:g} µm as in air: phase index {answer['notes_phase_index']:.8f}, "
                       f"group index {answer['notes_group_index']:.8f}, modulation "
                       f"{answer['notes_group_wavelength'] * 1e3:.6f} mm, half of it "
                       f"{answer['notes_group_wavelength'] * 5e2:.6f} mm"),
-        ("", f"and the index as relative to vacuum: n = {own['notes_group_index_over_air']:.6f} instead of "
-                      f"{own['group_index_over_air']:.6f}, range constant {own['notes_range_constant'] * 1e3:.4f} mm, "
-                      f"{(own['notes_range_constant'] - own['range_constant']) * 1e6:+.1f} µm"),
+        ("", f"and the index as relative to vacuum: n = {body['notes_group_index_over_air']:.6f} instead of "
+                      f"{body['group_index_over_air']:.6f}, range constant "
+                      f"{body['notes_range_constant'] * 1e3:.4f} mm, "
+                      f"{(body['notes_range_constant'] - body['range_constant']) * 1e6:+.1f} µm"),
     ]  # fmt: skip
-    for other, cost in answer["others"].items():
-        text = "its formula does not reach this wavelength"
+    for glass, cost in answer["others"].items():
+        text = "formula not valid at this wavelength"
         if cost is not None:
             text = (
-                f"group index {cost['group_index']:+.2e}; taken for {answer['name']} a range is "
+                f"group index {cost['group_index']:+.2e}; mistaken for {answer['name']}, a range is "
                 f"{cost['range_too_long_about_point'] * 1e6:.2f} µm too long "
                 f"({cost['range_too_long_about_face'] * 1e6:.2f} µm about the face)"
             )
-        rows.append((other, text))
+        rows.append((glass, text))
     return rows
 
 
 def table_object() -> dict[str, Any]:
-    """All glasses as `catseye glass --json` gives them."""
+    """Object of all glasses that `catseye glass --json` prints."""
     return {
         "verdict": Verdict("good", "the makers' formulas, each with its source and limits").to_object(),
         "glasses": {
@@ -206,6 +215,6 @@ def _limits(answer: dict[str, Any]) -> str:
 
 
 def table_rows() -> list[tuple[str, str]]:
-    """The table's lines for a terminal."""
+    """Lines of the table for a terminal."""
     table = table_object()["glasses"]
     return [(name, f"{entry['what']}; {entry['source']}, {_limits(entry)}") for name, entry in table.items()]

@@ -1,4 +1,4 @@
-"""Figure of what cube corners do to polarized light, as SVG text: six sectors, an analyser, the far field's axis."""
+"""Figure of polarization in cube corners as SVG text: sectors, analyser, far-field axis."""
 
 from typing import Any
 
@@ -28,45 +28,45 @@ METALS = ("gold", "silver", "aluminium")
 
 
 def corners(wavelength_um: float, glass: str) -> dict[str, Corner]:
-    """The kinds that are compared, by what people call them."""
+    """Compared kinds of corners, by display name."""
     glass_index = float(phase_index(wavelength_um, glass))
-    metals = {metal: np.conj(complex(index(metal, wavelength_um))) for metal in METALS}  # there time runs backwards
+    metals = {metal: np.conj(complex(index(metal, wavelength_um))) for metal in METALS}  # opposite time convention
     corners = {
         f"{glass}, bare": solid_corner(glass_index),
         f"{glass}, aluminium behind": solid_corner(glass_index, metals["aluminium"]),
     }
-    corners |= {f"hollow, {metal}": hollow_corner(behind) for metal, behind in metals.items()}
+    corners |= {f"hollow, {metal}": hollow_corner(metal_index) for metal, metal_index in metals.items()}
     return corners
 
 
 def polarization_plot(wavelength_um: float = 0.780, glass: str = "BK7-old") -> tuple[Svg, dict[str, Any]]:
     """Three panels as SVG text, and their numbers.
 
-    wavelength_um   um, in air, 0.62 to 1.01: where the metals and the glass are known
+    wavelength_um   um, in air, 0.62 to 1.01: range of the metals' and the glass's data
     glass           a name in `glass.GLASSES`
 
-    Raises ValidityError outside. Straight on the corner is lit evenly and has no antireflection to lose at its face.
+    Raises ValidityError outside. At normal incidence the corner is evenly lit and its face has no reflection loss.
     """
-    known = corners(wavelength_um, glass)
+    kinds = corners(wavelength_um, glass)
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
         drawn = Figure(figsize=(11.4, 4.3), layout="constrained")
-        left, middle, right = drawn.subplots(1, 3)
-        bare = next(iter(known.values()))
-        _draw_sectors(left, bare, glass)
-        _draw_analyser(middle, known)
-        _draw_axis(right, known)
+        sectors, analyser, axis = drawn.subplots(1, 3)
+        bare = next(iter(kinds.values()))
+        _draw_sectors(sectors, bare, glass)
+        _draw_analyser(analyser, kinds)
+        _draw_axis(axis, kinds)
         return svg(drawn), {
             "wavelength_um": wavelength_um,
             "glass": glass,
             "index": bare.index,
-            "corners": {name: _numbers(corner) for name, corner in known.items()},
+            "corners": {name: _numbers(corner) for name, corner in kinds.items()},
         }
 
 
 def _numbers(corner: Corner) -> dict[str, float]:
-    """Straight on: shares of the light that fell on it."""
+    """Shares of the incident light at normal incidence."""
     jones = sector_jones(corner, 0.0)
     all_back, crossed, axis = _shares(jones)
     split = through_plate(jones, retarder(0.5 * np.pi, 0.25 * np.pi))
@@ -80,14 +80,14 @@ def _numbers(corner: Corner) -> dict[str, float]:
 
 
 def _shares(jones: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """By azimuth of linear light: all that returns, what a crossed analyser passes, the far field's axis."""
+    """Returned light, crossed analyser and far-field axis, by azimuth of linear polarization."""
     light = linear(AZIMUTHS)
     axis = np.sum(np.abs(np.einsum("ij,aj->ai", far_field_jones(jones), light)) ** 2, axis=1)
     return returned_power(jones, light), returned_power(jones, light, analyser=linear(AZIMUTHS + 0.5 * np.pi)), axis
 
 
 def _draw_sectors(ax: Any, corner: Corner, glass: str) -> None:
-    """The aperture as the ranger sees it, with the field that leaves each sector."""
+    """Draw the aperture as seen by the ranger, with the field that leaves each sector."""
     ax.set_aspect("equal")
     ax.set_axis_off()
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
@@ -101,7 +101,7 @@ def _draw_sectors(ax: Any, corner: Corner, glass: str) -> None:
         entry = _sector_middle(order)
         field = j @ linear(0.0)
         phase = np.exp(-1j * turn)
-        path = -0.62 * entry[:, None] + 0.2 * np.real(field[:, None] * phase)  # it leaves opposite to where it enters
+        path = -0.62 * entry[:, None] + 0.2 * np.real(field[:, None] * phase)  # light leaves opposite to its entry
         ax.plot(*path, color=SERIES[0], lw=1.4)
         ax.annotate("", path[:, 8], path[:, 0], arrowprops={"arrowstyle": "->", "color": SERIES[0], "lw": 1.4})
         tilt, turning = ellipse(field)
@@ -110,18 +110,18 @@ def _draw_sectors(ax: Any, corner: Corner, glass: str) -> None:
     ax.annotate("", (0.16, 0.0), (-0.16, 0.0), arrowprops={"arrowstyle": "<->", "color": SERIES[1], "lw": 1.6})
     ax.set_xlim(-1.6, 1.6)
     ax.set_ylim(-1.4, 1.4)
-    ax.set_title(f"{glass}, bare, straight on\norange in, blue back: azimuth, ellipticity")
+    ax.set_title(f"{glass}, bare, normal incidence\norange in, blue back: azimuth, ellipticity")
 
 
 def _sector_middle(order: tuple[int, ...]) -> NDArray[np.float64]:
-    """Unit vector to the middle of the sector in which light of this order enters: least along the face met first."""
+    """Unit vector to the middle of the sector where light of this face order enters."""
     flat = EDGES[:, :2] / np.hypot(*EDGES[0, :2])
     middle = flat[order[2]] - flat[order[0]]
     return middle / np.hypot(*middle)
 
 
-def _draw_analyser(ax: Any, known: dict[str, Corner]) -> None:
-    for (name, corner), colour in zip(known.items(), SERIES, strict=False):
+def _draw_analyser(ax: Any, kinds: dict[str, Corner]) -> None:
+    for (name, corner), colour in zip(kinds.items(), SERIES, strict=False):
         for tilt, style in ((OBLIQUE, "-"), (0.0, "--")):
             back, crossed, _ = _shares(sector_jones(corner, tilt))
             ax.plot(np.degrees(AZIMUTHS), crossed / back, color=colour, ls=style, label=name if tilt else None)
@@ -129,13 +129,13 @@ def _draw_analyser(ax: Any, known: dict[str, Corner]) -> None:
     ax.set_xticks([0, 45, 90, 135, 180])
     ax.set_ylim(-0.01, 1.1)
     ax.set_xlabel("azimuth of linear light from an edge (°)")
-    ax.set_ylabel("share of what returns")
-    ax.set_title(f"Through a crossed analyser\n{np.degrees(OBLIQUE):.0f}° towards an edge; dashed: straight on")
+    ax.set_ylabel("share of the returned light")
+    ax.set_title(f"Through a crossed analyser\n{np.degrees(OBLIQUE):.0f}° towards an edge; dashed: normal incidence")
     ax.legend(loc="upper right")
 
 
-def _draw_axis(ax: Any, known: dict[str, Corner]) -> None:
-    for (name, corner), colour in zip(known.items(), SERIES, strict=False):
+def _draw_axis(ax: Any, kinds: dict[str, Corner]) -> None:
+    for (name, corner), colour in zip(kinds.items(), SERIES, strict=False):
         ends = []
         for tilt in TILTS:
             m = far_field_jones(sector_jones(corner, float(tilt)))
@@ -146,5 +146,5 @@ def _draw_axis(ax: Any, known: dict[str, Corner]) -> None:
     ax.set_xlim(0.0, 20.0)
     ax.set_ylim(0.0, 1.18)
     ax.set_xlabel("incidence, towards an edge (°)")
-    ax.set_ylabel("over a perfect corner of that area")
-    ax.set_title("Axis of the far field\nband: best to worst polarization")
+    ax.set_ylabel("relative to a perfect corner of that area")
+    ax.set_title("Far-field axis\nband: best to worst polarization")

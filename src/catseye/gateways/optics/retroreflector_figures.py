@@ -1,4 +1,4 @@
-"""Figures of retroreflectors as SVG text: what returns against the angle, and how a ball aberrates."""
+"""Figures of retroreflectors as SVG text: return by angle, and aberration of a ball."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -24,11 +24,11 @@ RECEIVER, DISTANCES = 0.05, (18.0, 50.0, 120.0)  # m: the GBT's lens; its calibr
 
 @dataclass(frozen=True)
 class Dimensions:
-    """What is drawn: the GBT's targets, in the notes' air, unless said otherwise.
+    """Dimensions drawn; by default the GBT's targets, in the notes' air.
 
-    height, aperture     m, of the prism; radius of its face, which the hollow cube's opening has too
+    height, aperture     m, of the prism; radius of its face and of the hollow cube's opening
     r1, r2               m, of the ball
-    ball_aperture        m, radius of what is used of the ball
+    ball_aperture        m, radius of the ball's used aperture
     glass                a name in GLASSES
     vacuum_um            wavelength, um
     reflectance          of each mirror of the hollow cube and of the silvered ball
@@ -44,7 +44,7 @@ class Dimensions:
     reflectance: float = 0.97
 
     def targets(self) -> tuple[HollowCube, SolidPrism, BallCatsEye]:
-        """The three retroreflectors that are drawn."""
+        """The three retroreflectors drawn."""
         about = air(20.0, 933.0, 50.0, wavelength_um=self.vacuum_um, model="rueger1990")
         n = index_over_air(self.vacuum_um, self.glass, air_phase=about.phase_index, air_group=about.group_index)
         index = {"group": float(n.group), "phase": float(n.phase)}
@@ -56,71 +56,73 @@ class Dimensions:
 
 
 def return_plot(dimensions: Dimensions | None = None) -> tuple[Svg, dict[str, Any]]:
-    """What each kind returns against the incidence, and how its range changes, as SVG text; and in numbers.
+    """Return and range change by incidence for each kind, as SVG text and in numbers.
 
     dimensions   of the targets; the GBT's if None
 
-    Source: `hollow_cube`, `solid_prism` and `cats_eye` in `optics.retroreflector`. Raises ValidityError for sizes that
-    are none.
+    Source: `hollow_cube`, `solid_prism` and `cats_eye` in `optics.retroreflector`. Raises ValidityError for invalid
+    sizes.
     """
-    given = Dimensions() if dimensions is None else dimensions
-    hollow, solid, ball = given.targets()
+    sizes = Dimensions() if dimensions is None else dimensions
+    hollow, solid, ball = sizes.targets()
     angles = np.linspace(0.0, FARTHEST_DEG, POINTS)
     incidence = angles * DEGREE
     kinds: list[tuple[str, Retroreflector, float, str, str]] = [
         ("hollow cube", hollow, 0.0, SERIES[0], "-"),
         ("bare prism, ranger on the side of an edge", solid, 0.0, SERIES[1], "-"),
         ("bare prism, between two edges", solid, np.pi / 3.0, SERIES[1], "--"),
-        ("prism with silvered faces", replace(solid, corner_reflectance=given.reflectance), 0.0, SERIES[3], "-"),
+        ("prism with silvered faces", replace(solid, corner_reflectance=sizes.reflectance), 0.0, SERIES[3], "-"),
         ("ball", ball, 0.0, SERIES[2], "-"),
     ]
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
         figure = Figure(figsize=(WIDTH, HEIGHT), layout="constrained")
-        left, right = figure.subplots(1, 2)
+        share_axes, change_axes = figure.subplots(1, 2)
         half = {}
-        for name, kind, azimuth, colour, line in kinds:
+        for name, kind, azimuth, colour, line in kinds:  # the names become keys of the summary
             share = kind.return_share(incidence, azimuth)
-            left.plot(angles, share, line, color=colour, lw=1.4, label=name)
+            share_axes.plot(angles, share, line, color=colour, lw=1.4, label=name)
             half[name.replace(" ", "_").replace(",", "")] = _falls_to_half(angles, share)
-        left.set(xlim=(0, FARTHEST_DEG), ylim=(0, 1), xlabel="incidence (°)", ylabel="share of the light on the face")
-        left.set_title("What returns")
-        figure.legend(*left.get_legend_handles_labels(), loc="outside lower left", ncols=3)
+        share_axes.set(
+            xlim=(0, FARTHEST_DEG), ylim=(0, 1), xlabel="incidence (°)", ylabel="share of the light on the face"
+        )
+        share_axes.set_title("Returned light")
+        figure.legend(*share_axes.get_legend_handles_labels(), loc="outside lower left", ncols=3)
         drawn = incidence <= 45.0 * DEGREE
-        _draw_change(right, angles[drawn], incidence[drawn], solid, given)
+        _draw_change(change_axes, angles[drawn], incidence[drawn], solid, sizes)
         text = svg(figure)
     summary = {
         "half_of_normal_at_deg": half,
         "total_reflection_to_deg": solid.acceptance / DEGREE,
         "ball_whole_to_deg": ball.acceptance / DEGREE,
-        "appendix_b_less_two_indices_at_30_deg": float(_appendix_b(given, solid, np.array(30.0 * DEGREE))),
+        "appendix_b_less_two_indices_at_30_deg": float(_appendix_b(sizes, solid, np.array(30.0 * DEGREE))),
     }
     return text, summary
 
 
 def aberration_plot(dimensions: Dimensions | None = None, *, beam_radius: float = 0.010) -> tuple[Svg, dict[str, Any]]:
-    """Range change, deviation and collected light of the ball, as SVG text; and in numbers.
+    """Range change, deviation and collected light of the ball, as SVG text and in numbers.
 
     dimensions    of the ball; the memo's if None
-    beam_radius   m, above 0: at 1/e^2, of the beam at the ball
+    beam_radius   1/e^2 radius of the beam at the ball, m, above 0
 
-    Source: `optics.retroreflector.cats_eye`, exact rays. Raises ValidityError for sizes that are none.
+    Source: `optics.retroreflector.cats_eye`, exact rays. Raises ValidityError for invalid sizes.
     """
     if not 0.0 < beam_radius < np.inf:
         raise ValidityError(f"beam_radius = {beam_radius:g} m is not above 0 and finite")
-    given = Dimensions() if dimensions is None else dimensions
-    ball = given.targets()[2]
+    sizes = Dimensions() if dimensions is None else dimensions
+    ball = sizes.targets()[2]
     focal = replace(ball, r2=float(focal_radius(ball.r1, ball.phase)))
     best = replace(ball, r2=ball.best_radius(beam_radius))
-    shown = [("as it is", ball, SERIES[0], "-"), ("best", best, SERIES[2], "--"), ("focal", focal, SERIES[1], "-")]
+    curves = [("actual", ball, SERIES[0], "-"), ("best", best, SERIES[2], "--"), ("focal", focal, SERIES[1], "-")]
     heights = np.linspace(0.0, ball.aperture, POINTS)
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
         figure = Figure(figsize=(WIDTH, HEIGHT), layout="constrained")
         path, bend, light = figure.subplots(1, 3)
-        for name, one, colour, line in shown:
+        for name, one, colour, line in curves:
             label = f"R2 {one.r2 * 1e3:.2f} mm, {name}"
             path.plot(heights * 1e3, one.path_change(heights) * 1e6, line, color=colour, lw=1.4, label=label)
             bend.plot(heights * 1e3, one.deviation(heights) / DEGREE * 3600.0, line, color=colour, lw=1.4)
@@ -130,10 +132,10 @@ def aberration_plot(dimensions: Dimensions | None = None, *, beam_radius: float 
             axes.set(xlabel="ray height (mm)", xlim=(0, ball.aperture * 1e3))
         low, high = path.get_ylim()
         level = low + 0.18 * (high - low) * weight / weight.max()
-        path.fill_between(heights * 1e3, low, level, color=FAINT, alpha=0.25, lw=0, label="power of the beam")
-        path.set(ylabel="to be added to the range (µm)", ylim=(low, high))
+        path.fill_between(heights * 1e3, low, level, color=FAINT, alpha=0.25, lw=0, label="beam power")
+        path.set(ylabel="to add to the range (µm)", ylim=(low, high))
         path.set_title("Path")
-        bend.set_ylabel("comes back converging by (″)")
+        bend.set_ylabel("convergence of the return (″)")
         bend.set_title("Deviation")
         figure.legend(*path.get_legend_handles_labels(), loc="outside lower center", ncols=4)
         collected = _draw_light(light, ball, beam_radius)
@@ -152,7 +154,7 @@ def aberration_plot(dimensions: Dimensions | None = None, *, beam_radius: float 
 
 
 def _falls_to_half(angles: Any, share: Any) -> float | None:
-    """Where a share first falls to half of what it is straight on; None where it does not."""
+    """Angle where a share falls to half of its value at normal incidence; None if nowhere."""
     below = np.nonzero(share <= 0.5 * share[0])[0]
     if len(below) == 0:
         return None
@@ -160,34 +162,34 @@ def _falls_to_half(angles: Any, share: Any) -> float | None:
     return float(np.interp(-0.5 * share[0], -share[k - 1 : k + 1], angles[k - 1 : k + 1]))
 
 
-def _appendix_b(given: Dimensions, solid: SolidPrism, incidence: Any) -> Any:
-    """Appendix B's change of range less the rigorous one, m."""
-    by_b = prism.obliquity_correction(given.height, solid.group, np.cos(incidence))
+def _appendix_b(sizes: Dimensions, solid: SolidPrism, incidence: Any) -> Any:
+    """Appendix B's change of range minus the rigorous one, m."""
+    by_b = prism.obliquity_correction(sizes.height, solid.group, np.cos(incidence))
     return by_b - solid.range_change(incidence)
 
 
-def _draw_change(ax: Any, angles: Any, incidence: Any, solid: SolidPrism, given: Dimensions) -> None:
-    """Change of the prism's range, and appendix B's departure from it on an axis of its own."""
+def _draw_change(ax: Any, angles: Any, incidence: Any, solid: SolidPrism, sizes: Dimensions) -> None:
+    """Draw the prism's change of range, and appendix B's departure from it on a second axis."""
     change = solid.range_change(incidence) * 1e6
     ax.plot(angles, change, color=SERIES[1], lw=1.4, label="prism: two indices (left axis)")
     ax.axhline(0.0, color=SERIES[0], lw=1.4, label="hollow cube, ball")
-    ax.set(xlim=(0, 45), xlabel="incidence (°)", ylabel="to be added to the range (µm)")
+    ax.set(xlim=(0, 45), xlabel="incidence (°)", ylabel="to add to the range (µm)")
     ax.set_title("Change of range")
-    beside = ax.twinx()
-    beside.spines["right"].set_visible(True)
-    beside.grid(visible=False)
-    beside.plot(
-        angles, _appendix_b(given, solid, incidence) * 1e6, ":", color=SERIES[3], lw=1.6,
-        label="appendix B less that (right axis)",
+    second_axis = ax.twinx()
+    second_axis.spines["right"].set_visible(True)
+    second_axis.grid(visible=False)
+    second_axis.plot(
+        angles, _appendix_b(sizes, solid, incidence) * 1e6, ":", color=SERIES[3], lw=1.6,
+        label="appendix B minus that (right axis)",
     )  # fmt: skip
-    beside.set(ylabel="µm", ylim=(0.0, None))
+    second_axis.set(ylabel="µm", ylim=(0.0, None))
     handles, labels = ax.get_legend_handles_labels()
-    more, texts = beside.get_legend_handles_labels()
+    more, texts = second_axis.get_legend_handles_labels()
     ax.legend(handles + more, labels + texts, loc="center left")
 
 
 def _draw_light(ax: Any, ball: BallCatsEye, beam_radius: float) -> dict[str, float]:
-    """Share of the beam that comes back into the receiver, against the mirror's radius; at R2 as it is, by distance."""
+    """Draw the share of the beam returned into the receiver by the mirror's radius; at R2, by distance."""
     focus = float(focal_radius(ball.r1, ball.phase))
     radii = np.linspace(min(0.96 * focus, 0.995 * ball.r2), max(1.01 * focus, 1.005 * ball.r2), 121)
     collected = {}
@@ -198,6 +200,6 @@ def _draw_light(ax: Any, ball: BallCatsEye, beam_radius: float) -> dict[str, flo
         collected[f"at_{distance:g}_m"] = ball.collected_share(distance, **at)
     ax.axvline(ball.r2 * 1e3, color=FAINT, lw=0.8, ls=":")
     ax.set(xlabel="R2 (mm)", ylabel=f"share within {RECEIVER * 1e3:g} mm, by rays", ylim=(0, 1.19))
-    ax.set_title("Light that comes back")
+    ax.set_title("Returned light")
     ax.legend(loc="upper center", ncols=3, handlelength=1.2, columnspacing=0.9)
     return collected

@@ -1,4 +1,4 @@
-"""Laser safety of a beam as one object for programs and as words for people."""
+"""Laser safety of a beam as JSON and text."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -23,14 +23,14 @@ DURATIONS = (AVERSION, 10.0, 100.0, 3e4)  # s, of the table
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked of a beam.
+    """Beam and viewing conditions to assess.
 
-    beam                 the laser's
+    beam                 of the laser
     edition              a name in EDITIONS
     duration             s, of the exposure; None for 0.25 s of visible light, 100 s of infrared
-    aided                what follows is for an eye behind binoculars
+    aided                True for viewing through binoculars
     subtense             rad, of the apparent source
-    scan, period         rad/s that the beam turns by, s from one pass to the next; None for none
+    scan, period         rad/s of the beam, s from one pass to the next; None for none
     reflector_distance   m, and diameter, m, of a retroreflector; None for none
     """
 
@@ -46,39 +46,39 @@ class Question:
 
     @property
     def seconds(self) -> float:
-        """The exposure's duration."""
+        """Duration of the exposure."""
         if self.duration is not None:
             return self.duration
         return AVERSION if self.beam.wavelength_um < 0.7 else TIME_BASE
 
 
-def safety_object(asked: Question) -> dict[str, Any]:
-    """What `catseye safety --json` gives; SI units unless a key says otherwise."""
-    beam, seconds = asked.beam, asked.seconds
-    viewer = BINOCULARS if asked.aided else NAKED
-    outcome = classify(beam, edition=asked.edition, subtense=asked.subtense)
-    others = {name: classify(beam, edition=name, subtense=asked.subtense).laser_class for name in EDITIONS}
-    limits = eye_limits(beam.wavelength_um, seconds, asked.subtense, edition=asked.edition)
-    governing = eye_mpe(beam.wavelength_um, seconds, asked.subtense, edition=asked.edition)
+def safety_object(question: Question) -> dict[str, Any]:
+    """Object that `catseye safety --json` prints; SI units unless a key says otherwise."""
+    beam, seconds = question.beam, question.seconds
+    viewer = BINOCULARS if question.aided else NAKED
+    outcome = classify(beam, edition=question.edition, subtense=question.subtense)
+    classes = {name: classify(beam, edition=name, subtense=question.subtense).laser_class for name in EDITIONS}
+    limits = eye_limits(beam.wavelength_um, seconds, question.subtense, edition=question.edition)
+    governing = eye_mpe(beam.wavelength_um, seconds, question.subtense, edition=question.edition)
     skin = skin_limit(beam.wavelength_um, seconds)
-    known = factors(beam.wavelength_um, seconds, asked.subtense)
+    correction_factors = factors(beam.wavelength_um, seconds, question.subtense)
     return {
         "verdict": _verdict(outcome.laser_class).to_object(),
         "notice": NOTICE,
-        "edition": asked.edition,
+        "edition": question.edition,
         "power": beam.power,
         "wavelength_um": beam.wavelength_um,
         "diameter": beam.diameter,
         "divergence": beam.divergence,
         "beam_quality": beam.quality,
         "duration": seconds,
-        "subtense": asked.subtense,
-        "factors": {name: getattr(known, name) for name in ("c_a", "c_b", "c_c", "c_e", "t_1", "t_2")},
+        "subtense": question.subtense,
+        "factors": {name: getattr(correction_factors, name) for name in ("c_a", "c_b", "c_c", "c_e", "t_1", "t_2")},
         "mpe_eye": governing.irradiance,
         "mpe_eye_protects_from": governing.name,
         "mpe_skin": skin.irradiance,
         "class": outcome.laser_class,
-        "class_by_edition": others,
+        "class_by_edition": classes,
         "reasons": list(outcome.reasons),
         "emissions": outcome.emissions,
         "class_limits": outcome.limits,
@@ -87,23 +87,23 @@ def safety_object(asked: Question) -> dict[str, Any]:
         "nohd": hazard_zone(beam, limits)[1],
         "nohd_aided": hazard_zone(beam, limits, BINOCULARS)[1],
         "skin_hazard_distance": hazard_zone(beam, (skin,))[1],
-        "scan": _scan(asked),
-        "returned": _returned(asked),
-        "what_if": [_what_if(asked, t) for t in DURATIONS],
+        "scan": _scan(question),
+        "returned": _returned(question),
+        "what_if": [_what_if(question, t) for t in DURATIONS],
     }
 
 
 def _verdict(laser_class: str) -> Verdict:
-    """Never more than that nothing is exceeded: this is a warning, and no certificate."""
+    """Verdict; at best that no limit is exceeded: a warning, never a certificate."""
     if laser_class == "1":
         return Verdict("good", "class 1 as described; this is a computation, never a certificate")
-    return Verdict("doubtful", f"class {laser_class}: a hazard, as described; a warning, never a certificate")
+    return Verdict("doubtful", f"class {laser_class}: a hazard as described; this is a warning, never a certificate")
 
 
-def _what_if(asked: Question, seconds: float) -> dict[str, float]:
-    """One duration of the table."""
-    beam = asked.beam
-    limits = eye_limits(beam.wavelength_um, seconds, asked.subtense, edition=asked.edition)
+def _what_if(question: Question, seconds: float) -> dict[str, float]:
+    """Row of the table for one duration."""
+    beam = question.beam
+    limits = eye_limits(beam.wavelength_um, seconds, question.subtense, edition=question.edition)
     skin = skin_limit(beam.wavelength_um, seconds)
     return {
         "duration": seconds,
@@ -115,34 +115,36 @@ def _what_if(asked: Question, seconds: float) -> dict[str, float]:
     }
 
 
-def _scan(asked: Question) -> dict[str, Any] | None:
-    if asked.scan is None:
+def _scan(question: Question) -> dict[str, Any] | None:
+    if question.scan is None:
         return None
-    given: dict[str, Any] = {
-        "duration": asked.seconds,
-        "period": asked.period,
-        "subtense": asked.subtense,
-        "edition": asked.edition,
+    conditions: dict[str, Any] = {
+        "duration": question.seconds,
+        "period": question.period,
+        "subtense": question.subtense,
+        "edition": question.edition,
     }
-    far = sweep_hazard_distance(asked.beam, asked.scan, viewer=BINOCULARS if asked.aided else NAKED, **given)
-    return {"rate": asked.scan, "period": asked.period, "hazard_distance": far}
+    far = sweep_hazard_distance(
+        question.beam, question.scan, viewer=BINOCULARS if question.aided else NAKED, **conditions
+    )
+    return {"rate": question.scan, "period": question.period, "hazard_distance": far}
 
 
-def _returned(asked: Question) -> dict[str, Any] | None:
-    distance = asked.reflector_distance
+def _returned(question: Question) -> dict[str, Any] | None:
+    distance = question.reflector_distance
     if distance is None:
         return None
-    viewer = BINOCULARS if asked.aided else NAKED
-    size: dict[str, Any] = {"reflector": asked.reflector_diameter, "viewer": viewer}
+    viewer = BINOCULARS if question.aided else NAKED
+    size: dict[str, Any] = {"reflector": question.reflector_diameter, "viewer": viewer}
 
     def within(aperture: float) -> float:
-        return returned_power(asked.beam, distance, aperture=aperture, **size)
+        return returned_power(question.beam, distance, aperture=aperture, **size)
 
-    limits = eye_limits(asked.beam.wavelength_um, asked.seconds, asked.subtense, edition=asked.edition)
+    limits = eye_limits(question.beam.wavelength_um, question.seconds, question.subtense, edition=question.edition)
     times, governing = max(((within(m.aperture) / m.power, m) for m in limits), key=lambda row: row[0])
     return {
         "distance": distance,
-        "diameter": asked.reflector_diameter,
+        "diameter": question.reflector_diameter,
         "power_into_eye": within(PUPIL),
         "limit": governing.power,
         "limit_aperture": governing.aperture,
@@ -152,7 +154,7 @@ def _returned(asked: Question) -> dict[str, Any] | None:
 
 
 def safety_passages(answer: dict[str, Any]) -> list[tuple[str, str]]:
-    """The same in words: title and text."""
+    """Title and text of each passage."""
     passages = [
         ("Class", f"{answer['class']} by {answer['edition']}" + _disagreement(answer)),
         *(("", reason) for reason in answer["reasons"]),
@@ -162,7 +164,7 @@ def safety_passages(answer: dict[str, Any]) -> list[tuple[str, str]]:
     ]
     if answer["class"] in ("1", "2") and answer["nohd"] > 0.0:
         passages.append(
-            ("", f"class {answer['class']}, and yet within that distance more than the limit for this exposure")
+            ("", f"class {answer['class']}, but the limit for this exposure is exceeded within that distance")
         )
     if answer["subtense"] > ALPHA_MIN:
         width = f"distances are for a source that looks {answer['subtense'] * 1e3:g} mrad wide from everywhere"
@@ -170,11 +172,11 @@ def safety_passages(answer: dict[str, Any]) -> list[tuple[str, str]]:
             ("", f"{width}; one of a fixed size looks smaller farther away, and is a hazard farther than that")
         )
     if answer["hazard_from"] > 0.0:
-        passages.append(("", f"{answer['viewer']}: only from {answer['hazard_from']:.3g} m on, about the waist"))
+        passages.append(("", f"{answer['viewer']}: only from {answer['hazard_from']:.3g} m, around the waist"))
     if scan := answer["scan"]:
         often = "one pass" if scan["period"] is None else f"a pass every {scan['period']:g} s"
         far = f"{answer['viewer']} {_as_far(scan['hazard_distance'])}"
-        text = f"at {scan['rate']:g} rad/s, {often}: {far}; counts only where nothing can stop the sweep"
+        text = f"at {scan['rate']:g} rad/s, {often}: {far}; valid only if the sweep cannot stop"
         passages.append(("Sweeping", text))
     if back := answer["returned"]:
         where = f"by {back['diameter'] * 1e3:g} mm at {back['distance']:g} m"
@@ -189,7 +191,7 @@ def safety_passages(answer: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def safety_table(answer: dict[str, Any]) -> str:
-    """The table of durations as text."""
+    """Table of durations as text."""
     head = f"{'exposure':>10} {'eye W/m²':>10} {'skin W/m²':>10} {'naked eye':>12} {'binoculars':>12} {'skin':>9}"
     rows = [
         f"{row['duration']:>8g} s {row['mpe_eye']:>10.4g} {row['mpe_skin']:>10.4g} {row['nohd']:>10.4g} m "

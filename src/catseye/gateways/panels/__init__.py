@@ -1,1 +1,1 @@
-"""The panel setting instrument on the way out."""
+"""Output of panel setting."""

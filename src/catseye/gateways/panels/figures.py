@@ -1,4 +1,4 @@
-"""Figures of a crew's work as SVG text: maps of the dish, how corners lie, control chart, what turning did."""
+"""Figures of panel setting as SVG text: dish maps, corners, control chart, effect of turning."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from catseye.reduction.panels.heights import PanelHeights
     from catseye.reduction.panels.job import PanelWork
 
-OUTSIDE = 1.03  # of the limits, so that edges are not cut
+OUTSIDE = 1.03  # times the limits, so that edges are not cut
 
 
 def panel_figures(work: "PanelWork") -> dict[str, str]:
-    """Every figure by its name."""
+    """SVG text of each figure, by name."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
@@ -36,7 +36,7 @@ def _views(work: "PanelWork") -> list[tuple[str, "PanelHeights"]]:
 
 
 def _quads(heights: "PanelHeights", shrink: float = 0.0) -> np.ndarray:
-    """(p, 4, 4, 2) m, the quarter of each panel that belongs to each of its corners."""
+    """Quarter of each panel that belongs to each of its corners, (p, 4, 4, 2) m."""
     four = heights.layout.xy[heights.layout.quad]
     middle = four.mean(axis=1, keepdims=True)
     before, after = 0.5 * (four + np.roll(four, 1, axis=1)), 0.5 * (four + np.roll(four, -1, axis=1))
@@ -47,12 +47,14 @@ def _quads(heights: "PanelHeights", shrink: float = 0.0) -> np.ndarray:
 def _patches(ax: Any, outlines: np.ndarray, values: np.ndarray, limit: float) -> Any:
     from matplotlib.collections import PolyCollection
 
-    known = np.isfinite(values)
-    if not known.all():
-        ax.add_collection(PolyCollection(list(outlines[~known]), facecolor="#e9edf0", edgecolor="none"))
-    patches = PolyCollection(list(outlines[known]), array=values[known], cmap="RdBu_r", edgecolor="face", linewidth=0.1)
+    finite = np.isfinite(values)
+    if not finite.all():
+        ax.add_collection(PolyCollection(list(outlines[~finite]), facecolor="#e9edf0", edgecolor="none"))
+    patches = PolyCollection(
+        list(outlines[finite]), array=values[finite], cmap="RdBu_r", edgecolor="face", linewidth=0.1
+    )
     patches.set_clim(-limit, limit)
-    patches.set_rasterized(True)  # thousands of pieces: as a picture a tenth of the size
+    patches.set_rasterized(True)  # thousands of pieces: rasterised a tenth of the size
     ax.add_collection(patches)
     low, high = outlines.reshape(-1, 2).min(axis=0), outlines.reshape(-1, 2).max(axis=0)
     pad = 0.02 * float(np.max(high - low))
@@ -66,8 +68,8 @@ def _patches(ax: Any, outlines: np.ndarray, values: np.ndarray, limit: float) ->
 
 
 def _limit(values: np.ndarray) -> float:
-    known = np.abs(values[np.isfinite(values)])
-    return max(float(np.quantile(known, 0.98)), 1e-3) if len(known) else 1.0
+    sizes = np.abs(values[np.isfinite(values)])
+    return max(float(np.quantile(sizes, 0.98)), 1e-3) if len(sizes) else 1.0
 
 
 def _corners(work: "PanelWork") -> Figure:
@@ -81,12 +83,12 @@ def _corners(work: "PanelWork") -> Figure:
         patches = _patches(ax, quarters, values.ravel(), limit)
         ax.set_title(name)
         bar = figure.colorbar(patches, ax=ax, orientation="horizontal", shrink=0.8, extend="both", pad=0.02)
-        bar.set_label("corner over its neighbours' mean (µm)")
+        bar.set_label("corner above the mean of its neighbours (µm)")
     return figure
 
 
 def _shape(heights: "PanelHeights") -> float:
-    """Width over height of what is drawn."""
+    """Width over height of the drawing."""
     size = np.ptp(heights.layout.xy, axis=0)
     return float(np.clip(size[0] / max(size[1], 1e-9), 0.5, 3.0))
 
@@ -94,28 +96,28 @@ def _shape(heights: "PanelHeights") -> float:
 def _surface(heights: "PanelHeights") -> Figure:
     wide = _shape(heights)
     figure = Figure(figsize=(9.4, 4.6 / max(wide, 0.7) + 0.7), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    rms, rest = surface_rms(heights, heights.departure)
-    values = rest.mean(axis=1) * 1e6
+    surface, quality = figure.subplots(1, 2)
+    rms, departures = surface_rms(heights, heights.departure)
+    values = departures.mean(axis=1) * 1e6
     outline = heights.layout.xy[heights.layout.quad]
-    patches = _patches(left, outline, values, _limit(values))
-    left.set_title(f"Panels' mean departure, {rms * 1e6:.0f} µm rms of corners")
-    figure.colorbar(patches, ax=left, orientation="horizontal", shrink=0.8, extend="both", pad=0.02).set_label(
-        "from the best fit, towards the focus (µm)"
+    patches = _patches(surface, outline, values, _limit(values))
+    surface.set_title(f"Panels' mean departure, {rms * 1e6:.0f} µm rms of corners")
+    figure.colorbar(patches, ax=surface, orientation="horizontal", shrink=0.8, extend="both", pad=0.02).set_label(
+        "departure from the best fit, towards the focus (µm)"
     )
     u = heights.u_fit[:, 0] * 1e6
     from matplotlib.collections import PolyCollection
 
     spread = PolyCollection(list(outline), array=u, cmap="viridis", edgecolor="face", linewidth=0.1, rasterized=True)
     spread.set_clim(0.0, float(np.quantile(u, 0.98)))
-    right.add_collection(spread)
-    right.set_xlim(left.get_xlim())
-    right.set_ylim(left.get_ylim())
-    right.set_aspect("equal")
-    right.grid(False)
-    right.set_xlabel("x (m)")
-    right.set_title("How well it is known")
-    figure.colorbar(spread, ax=right, orientation="horizontal", shrink=0.8, extend="max", pad=0.02).set_label(
+    quality.add_collection(spread)
+    quality.set_xlim(surface.get_xlim())
+    quality.set_ylim(surface.get_ylim())
+    quality.set_aspect("equal")
+    quality.grid(False)
+    quality.set_xlabel("x (m)")
+    quality.set_title("Standard uncertainty")
+    figure.colorbar(spread, ax=quality, orientation="horizontal", shrink=0.8, extend="max", pad=0.02).set_label(
         "standard uncertainty of a panel's piston (µm)"
     )
     return figure
@@ -123,27 +125,27 @@ def _surface(heights: "PanelHeights") -> Figure:
 
 def _lie(work: "PanelWork") -> Figure:
     figure = Figure(figsize=(9.4, 3.2), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    plot, right = figure.subplots(1, 2)
     goal = work.sheet.goal_um
     for (name, heights), colour in zip(_views(work), SERIES, strict=False):
         size = np.sort(np.abs(heights.relative[heights.known])) * 1e6
         if len(size):
-            left.step(np.maximum(size, 0.1), np.arange(1, len(size) + 1) / len(size), color=colour, label=name)
+            plot.step(np.maximum(size, 0.1), np.arange(1, len(size) + 1) / len(size), color=colour, label=name)
         right.hist(
             np.clip(heights.u_relative[heights.known] * 1e6, 0.0, 2.0 * goal), np.linspace(0.0, 2.0 * goal, 51),
             color=colour, histtype="step", lw=1.3, label=name,
         )  # fmt: skip
-    left.axvline(goal, color=BAD, lw=1.0, label=f"goal {goal:g} µm")
-    left.set_xscale("log")
-    left.set_ylim(0.0, OUTSIDE)
-    left.set_xlabel("corner off its neighbours' mean (µm)")
-    left.set_ylabel("share of corners below")
-    left.set_title("How corners lie")
-    left.legend(loc="best")
+    plot.axvline(goal, color=BAD, lw=1.0, label=f"goal {goal:g} µm")
+    plot.set_xscale("log")
+    plot.set_ylim(0.0, OUTSIDE)
+    plot.set_xlabel("distance from the mean of its neighbours (µm)")
+    plot.set_ylabel("share of corners below")
+    plot.set_title("Corners")
+    plot.legend(loc="best")
     right.axvline(goal, color=BAD, lw=1.0)
-    right.set_xlabel("standard uncertainty of it (µm)")
+    right.set_xlabel("standard uncertainty of the distance (µm)")
     right.set_ylabel("corners")
-    right.set_title("How well that is known")
+    right.set_title("Standard uncertainty")
     right.legend(loc="best")
     return figure
 
@@ -162,7 +164,7 @@ def _control(work: "PanelWork") -> Figure:
             low, high = np.array([r.low for r in readers]), np.array([r.high for r in readers])
             ax.fill_between(
                 np.repeat(at, 2) + np.tile([-0.5, 0.5], len(at)), np.repeat(low, 2), np.repeat(high, 2),
-                color="#dfe9f3", lw=0, label="99.7 % of good ones",
+                color="#dfe9f3", lw=0, label="99.7 % of readings in control",
             )  # fmt: skip
             good = np.array([r.in_control for r in readers])
             ax.plot(at[good], value[good], "o", color=SERIES[0], ms=4)
@@ -179,24 +181,24 @@ def _control(work: "PanelWork") -> Figure:
 
 
 def _turning(work: "PanelWork") -> Figure:
-    done = work.setting
-    assert done is not None
+    setting = work.setting
+    assert setting is not None
     figure = Figure(figsize=(9.4, 3.6), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    wanted, got = done.wanted * 1e6, done.got * 1e6
-    left.plot(wanted, got, ".", color=SERIES[0], ms=2.5, alpha=0.5, rasterized=True)
-    ends = np.array([wanted.min(), wanted.max()])
-    left.plot(ends, ends, color=FAINT, lw=1.0, label="asked")
-    left.plot(ends, done.gain * ends, color=SERIES[1], lw=1.0, label=f"came: {done.gain:.3f} of it")
-    left.set_xlabel("change asked for (µm)")
-    left.set_ylabel("change that came (µm)")
-    left.set_title("What turning did")
-    left.legend(loc="best")
-    rest = got - done.gain * wanted
-    limit = max(float(np.quantile(np.abs(rest), 0.995)), 1.0)
-    right.hist(np.clip(rest, -limit, limit), 40, color=SERIES[0], alpha=0.8)
+    change, right = figure.subplots(1, 2)
+    demand, got = setting.wanted * 1e6, setting.got * 1e6
+    change.plot(demand, got, ".", color=SERIES[0], ms=2.5, alpha=0.5, rasterized=True)
+    ends = np.array([demand.min(), demand.max()])
+    change.plot(ends, ends, color=FAINT, lw=1.0, label="requested")
+    change.plot(ends, setting.gain * ends, color=SERIES[1], lw=1.0, label=f"achieved: {setting.gain:.3f}")
+    change.set_xlabel("requested change (µm)")
+    change.set_ylabel("achieved change (µm)")
+    change.set_title("Effect of turning")
+    change.legend(loc="best")
+    remainder = got - setting.gain * demand
+    limit = max(float(np.quantile(np.abs(remainder), 0.995)), 1.0)
+    right.hist(np.clip(remainder, -limit, limit), 40, color=SERIES[0], alpha=0.8)
     right.axvline(0.0, color=INK, lw=0.8)
-    right.set_xlabel("came less expected (µm)")
+    right.set_xlabel("achieved minus expected (µm)")
     right.set_ylabel("corners")
-    right.set_title(f"Scatter {done.scatter * 1e6:.1f} µm rms")
+    right.set_title(f"Scatter {setting.scatter * 1e6:.1f} µm rms")
     return figure

@@ -1,4 +1,4 @@
-"""A crew's work as plain objects for JSON, and as passages for people."""
+"""Panel setting as JSON and text."""
 
 from collections.abc import Iterable
 from dataclasses import asdict
@@ -21,7 +21,7 @@ FORMAT = "catseye-panels-1"
 
 
 class Screw(NamedTuple):
-    """A row of the list of screws; SI but for what says its unit."""
+    """Row of the list of screws; SI unless the name has a unit."""
 
     panel: str
     corner: str
@@ -39,7 +39,7 @@ class Screw(NamedTuple):
 
 
 def screws(heights: "PanelHeights") -> Iterable[Screw]:
-    """Every panel corner of the panels read, in the layout's order."""
+    """Screws of the panels read, in the layout's order."""
     layout, verdict = heights.layout, verdicts(heights)
     for i, panel in enumerate(layout.panels):
         for k in range(4):
@@ -62,16 +62,16 @@ def screws(heights: "PanelHeights") -> Iterable[Screw]:
 
 
 def panels_verdict(work: "PanelWork") -> Verdict:
-    """Whether the readings are in control; how many screws are to be turned is the answer, not its worth."""
+    """Verdict from the control of the readings, not from the number of screws to turn."""
     if work.notes:
         return Verdict("doubtful", work.notes[0].rstrip("."))
-    told = list(screws(work.latest))
-    turn = sum(screw.verdict == "turn" for screw in told)
-    return Verdict("good", f"{turn} of {len(told)} screws are to be turned, and the readings are in control")
+    rows = list(screws(work.latest))
+    turn = sum(screw.verdict == "turn" for screw in rows)
+    return Verdict("good", f"{turn} of {len(rows)} screws are to be turned, and the readings are in control")
 
 
 def panels_object(work: "PanelWork") -> dict[str, Any]:
-    """What `catseye panels --json` prints: SI units."""
+    """Object that `catseye panels --json` prints: SI units."""
     last = work.latest
     return {
         "format": FORMAT,
@@ -120,17 +120,17 @@ def _reader_object(reader: "Reader") -> dict[str, Any]:
     return {**asdict(reader), "in_control": reader.in_control}
 
 
-def _setting_object(done: "Setting") -> dict[str, Any]:
+def _setting_object(setting: "Setting") -> dict[str, Any]:
     return {
-        "corners": len(done.names),
-        "gain": done.gain,
-        "u_gain": done.u_gain,
-        "scatter": done.scatter,
+        "corners": len(setting.names),
+        "gain": setting.gain,
+        "u_gain": setting.u_gain,
+        "scatter": setting.scatter,
     }
 
 
 def micrometres(value: float, form: str = ".1f") -> str:
-    """A length in µm for people; a dash for what is not known.
+    """Length in µm as text; a dash if unknown.
 
     >>> micrometres(2.54e-5)
     '25.4'
@@ -140,18 +140,18 @@ def micrometres(value: float, form: str = ".1f") -> str:
 
 def standing_text(one: "CornerStanding", goal_um: float) -> str:
     if not one.corners:
-        return "no corner where two panels were read"
+        return "no corner with two panels read"
     true = micrometres(one.rms_true)
     return (
         f"{one.corners} panel corners lie {micrometres(one.rms)} µm rms about their neighbours' mean "
-        f"({true} µm without what the measurement scatters; median u {micrometres(one.median_u)} µm); "
-        f"{100 * one.within:.1f} % within ± {goal_um:g} µm as measured, {100 * one.expected_within:.1f} % expected in "
-        f"truth; surely within {one.surely}, surely not {one.surely_not}, undecided {one.undecided}"
+        f"({true} µm without the scatter of the measurement; median u {micrometres(one.median_u)} µm); "
+        f"{100 * one.within:.1f} % within ± {goal_um:g} µm as measured, {100 * one.expected_within:.1f} % expected "
+        f"truly; surely within {one.surely}, surely not {one.surely_not}, undecided {one.undecided}"
     )
 
 
 def doubt_text(one: "Doubt") -> str:
-    also = f"; {' or '.join(one.rivals)} would explain it as well" if one.rivals else ""
+    also = f"; {' or '.join(one.rivals)} would also explain it" if one.rivals else ""
     return (
         f"{one.where}, {one.gauge}_mm by {one.member} at {one.corner} on {one.panel}: {micrometres(one.error, '+.0f')} "
         f"µm off, w = {one.w:+.1f}{also}{'; left out' if one.out else ''}"
@@ -159,7 +159,7 @@ def doubt_text(one: "Doubt") -> str:
 
 
 def passages(work: "PanelWork") -> list[Passage]:
-    """What the command tells people."""
+    """Passages of the command's output."""
     heights, last = work.found, work.latest
     goal = work.sheet.goal_um
     passages = [
@@ -174,12 +174,12 @@ def passages(work: "PanelWork") -> list[Passage]:
     if work.left is not None:
         passages.append(Passage("As left", standing_text(standing(work.left), goal)))
     if work.setting is not None:
-        done = work.setting
+        setting = work.setting
         passages.append(
             Passage(
                 "The turning",
-                f"{len(done.names)} corners moved {done.gain:.3f} (u {done.u_gain:.3f}) of what was asked; scatter "
-                f"{micrometres(done.scatter)} µm rms, turning and reading together",
+                f"{len(setting.names)} corners moved {setting.gain:.3f} (u {setting.u_gain:.3f}) of the request; "
+                f"scatter {micrometres(setting.scatter)} µm rms, of turning and reading",
             )
         )
     verdict = verdicts(last)
@@ -189,8 +189,8 @@ def passages(work: "PanelWork") -> list[Passage]:
         Passage(
             "The screws",
             f"turn {int(turn.sum())}, leave {int((verdict == 'leave').sum())}, read first "
-            f"{int((verdict == 'read').sum())}; {int((verdict == 'alone').sum())} have no neighbour, so that only "
-            f"their actuator sets them; the largest turn is {largest:.2f}",
+            f"{int((verdict == 'read').sum())}; {int((verdict == 'alone').sum())} have no neighbour and "
+            f"are set by their actuator only; the largest turn is {largest:.2f}",
         )
     )
     rms = surface_rms(last, last.departure)[0]
@@ -198,7 +198,7 @@ def passages(work: "PanelWork") -> list[Passage]:
         Passage(
             "The surface",
             f"panel corners depart {rms * 1e6:.0f} µm rms from the best fit of the design, shift and tilt free"
-            + ("" if last.surveyed else "; without a survey this says little"),
+            + ("" if last.surveyed else "; of little significance without a survey"),
         )
     )
     for when, one in (("found", heights), ("left", work.left)):

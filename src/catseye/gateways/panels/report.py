@@ -1,4 +1,4 @@
-"""All files of a crew's work: list of screws, tables, object, and a report of one HTML page."""
+"""Files of panel setting: list of screws, tables, JSON and an HTML report."""
 
 from collections.abc import Callable
 from datetime import UTC, datetime
@@ -30,26 +30,25 @@ if TYPE_CHECKING:
     from catseye.reduction.panels.job import PanelWork
 
 Progress = Callable[[str, int, int], None]
-SHOWN = 200  # screws in the report; screws.csv has all
+MOST_LISTED = 200  # screws in the report; screws.csv has all
 CAPTIONS = {
-    "corners": "Each quarter of a panel is the height of its corner over the mean of those that meet there: what "
-    "screws set. Grey was not read. The colours end at 98 % of all.",
-    "surface": "Left: each panel's mean departure from design and map, the best shift and tilt of the whole dish "
-    "taken off: what actuators set. Right: how well it is known.",
-    "lie": "Left: share of corners that lie nearer to their neighbours' mean than so much. Right: standard "
-    "uncertainties.",
-    "control": "Control chart: how readings scatter beside what the sheet claims, by session and by member. Red is out "
+    "corners": "Each quarter of a panel shows the height of its corner above the mean of those that meet there, which "
+    "screws adjust. Grey: not read. The colours end at 98 % of all.",
+    "surface": "Left: each panel's mean departure from design and map, after the best shift and tilt of the complete "
+    "dish, which actuators adjust. Right: its standard uncertainty.",
+    "lie": "Left: share of corners within a distance from their neighbours' mean. Right: standard uncertainties.",
+    "control": "Control chart: scatter of the readings against the sheet's claim, by session and by member. Red: out "
     "of control.",
-    "turning": "What turning did: change of relative heights between the two tables over what was asked for.",
+    "turning": "Effect of turning: change of relative heights between the two tables against the requested change.",
 }
 
 
 def write_panels(work: "PanelWork", directory: Path, progress: Progress | None = None) -> None:
-    """Tables, object, report, and last the provenance with the hashes of the others.
+    """Write tables, JSON, report, and the provenance with their hashes.
 
     work        as reduced
-    directory   exists, and is ours to fill: see `writers.output.whole_directory`
-    progress    told of each file
+    directory   existing, from `writers.output.whole_directory`
+    progress    called for each file
     """
     when = datetime.now(UTC)
     files: Files = {
@@ -57,7 +56,7 @@ def write_panels(work: "PanelWork", directory: Path, progress: Progress | None =
         "actuators.csv": lambda: actuators_csv(work.latest),
         "panels.csv": lambda: panels_csv(work),
         "readings.csv": lambda: readings_csv(work.found),
-        **({} if work.left is None else {"readings-as-left.csv": lambda: _left(work)}),
+        **({} if work.left is None else {"readings-as-left.csv": lambda: _as_left_csv(work)}),
         "crew.csv": lambda: crew_csv(work),
         "panels.json": lambda: json_page(panels_object(work)),
         "report.html": lambda: panels_report(work, when),
@@ -67,16 +66,22 @@ def write_panels(work: "PanelWork", directory: Path, progress: Progress | None =
     join_tables(directory, frame="of each corner or panel: z the normal towards the focus")
 
 
-def _left(work: "PanelWork") -> str:
+def _as_left_csv(work: "PanelWork") -> str:
     assert work.left is not None
     return readings_csv(work.left)
 
 
 def panels_report(work: "PanelWork", when: datetime) -> str:
-    """The whole page; `when` is UTC."""
+    """HTML report; `when` is UTC."""
     from catseye.gateways.panels.figures import panel_figures
 
-    names = {"result": "Result", "screws": "Screws", "crew": "Crew", "doubts": "In doubt", "provenance": "Provenance"}
+    names = {
+        "result": "Result",
+        "screws": "Screws",
+        "crew": "Crew",
+        "doubts": "Doubtful readings",
+        "provenance": "Provenance",
+    }
     links = "".join(f'<a href="#{key}">{name}</a>' for key, name in names.items())
     header = (
         f'<header><h1>Panel setting</h1><div class="faint">{escape(work.sheet.name)}, reduced by catseye on '
@@ -92,12 +97,12 @@ def panels_report(work: "PanelWork", when: datetime) -> str:
         section("result", "Result", f"<dl>{words}</dl>", *(figures[n] for n in ("corners", "lie", "surface"))),
         section("screws", "Screws", _screws(work)),
         section("crew", "Crew", *(figures[n] for n in ("turning", "control") if n in figures), _crew(work)),
-        section("doubts", "Readings in doubt", _doubts(work)),
+        section("doubts", "Doubtful readings", _doubts(work)),
         section(
             "provenance",
             "Provenance",
             table(("file read", "SHA-256"), list(work.inputs.items()), "th"),
-            table(("what", "value"), [("made (UTC)", f"{when:%Y-%m-%d %H:%M:%S}"), *versions().items()], "tt"),
+            table(("item", "value"), [("made (UTC)", f"{when:%Y-%m-%d %H:%M:%S}"), *versions().items()], "tt"),
         ),
     ]
     return page("catseye: panel setting", "\n".join(body))
@@ -114,7 +119,7 @@ def _cards(work: "PanelWork") -> str:
             card(name, f"{micrometres(one.rms)} µm rms", f"{one.corners} corners about their neighbours' mean")
         )
         share = f"{100 * one.expected_within:.1f} %" if one.corners else "-"
-        cards.append(card(f"{name}: within {goal:g} µm", share, "expected in truth, uncertainty counted"))
+        cards.append(card(f"{name}: within {goal:g} µm", share, "expected truly, with the uncertainty"))
     return f'<div class="cards">{"".join(cards)}</div>'
 
 
@@ -123,12 +128,12 @@ def _screws(work: "PanelWork") -> str:
     cells = [
         (s.corner, s.panel, micrometres(s.relative, "+.1f"), micrometres(s.u_relative), f"{s.turns:+.3f}",
          f"{360 * s.turns:+.0f}", f"{s.probability_within:.3f}")
-        for s in rows[:SHOWN]
+        for s in rows[:MOST_LISTED]
     ]  # fmt: skip
     if not cells:
         return paragraph("No screw needs a turn.")
     columns = ("corner", "panel", "height (µm)", "u (µm)", "turns", "degrees", "within the goal (probability)")
-    note = f"The {len(cells)} largest of {len(rows)} turns; clockwise above zero. All are in screws.csv."
+    note = f"The {len(cells)} largest of {len(rows)} turns; clockwise is positive. All are in screws.csv."
     return paragraph(note) + table(columns, cells, "ttnnnnn")
 
 
@@ -170,4 +175,4 @@ def _doubts(work: "PanelWork") -> str:
         if heights is not None and heights.doubts:
             rows = [(d.where, d.corner, doubt_text(d)) for d in heights.doubts]
             parts.append(f"<h3>{escape(name.capitalize())}</h3>" + table(("place", "corner", "what"), rows, "ttw"))
-    return "".join(parts) or paragraph("No reading is contradicted by the others beyond what chance does.")
+    return "".join(parts) or paragraph("No reading is in significant contradiction to the others.")

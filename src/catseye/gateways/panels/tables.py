@@ -1,4 +1,4 @@
-"""A crew's work as CSV tables: the list of screws, actuators, panels, readings."""
+"""Panel setting as CSV tables: screws, actuators, panels, readings."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -24,7 +24,7 @@ READINGS = (
 
 
 def screws_csv(heights: "PanelHeights") -> str:
-    """Every screw of the panels read: where its corner is, and how to turn it."""
+    """Table of screws of the panels read: positions and turns."""
     rows = [
         (s.panel, s.corner, f"{s.x:.4f}", f"{s.y:.4f}", s.readings, _um(s.departure), _um(s.u_departure),
          _um(s.relative), _um(s.u_relative), cell(s.probability_within, ".4f"), cell(s.turns, "+.3f"),
@@ -35,7 +35,7 @@ def screws_csv(heights: "PanelHeights") -> str:
 
 
 def actuators_csv(heights: "PanelHeights") -> str:
-    """Every corner read: mean departure of its panels, which the actuator takes away, and the shaft's height."""
+    """Table of corners read: mean departure, which the actuator removes, and the shaft's height."""
     at = heights.model.columns
     shaft, u_shaft = heights.value(at.shaft(np.arange(len(heights.layout.corners))))
     rows = [
@@ -48,7 +48,7 @@ def actuators_csv(heights: "PanelHeights") -> str:
 
 
 def panels_csv(work: "PanelWork") -> str:
-    """Every panel read: the best fit's piston and slopes, and what its map says."""
+    """Table of panels read: piston and slopes of the best fit, and data of the map."""
     heights = work.latest
     rows = []
     for p, name in enumerate(heights.layout.panels):
@@ -66,7 +66,7 @@ def panels_csv(work: "PanelWork") -> str:
 
 
 def readings_csv(heights: "PanelHeights") -> str:
-    """Every reading with its residual and test."""
+    """Table of readings with residual and test."""
     tips, readings = heights.model.tips, heights.readings
     rows: list[Sequence[Any]] = []
     for fit, block in zip(heights.solution.fits, heights.model.blocks, strict=False):
@@ -84,7 +84,7 @@ def readings_csv(heights: "PanelHeights") -> str:
 
 
 def crew_csv(work: "PanelWork") -> str:
-    """Members and sessions, as found and as left: the points of the control chart."""
+    """Table of members and sessions, as found and as left, for the control chart."""
     from catseye.reduction.panels.crew import members, sessions
 
     rows = []

@@ -1,1 +1,1 @@
-"""Poses and pointing models on the way out."""
+"""Output of poses and pointing models."""

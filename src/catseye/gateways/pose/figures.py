@@ -1,4 +1,4 @@
-"""Figures of a pose: what the points do beside moving as one, and what makes the pointing offset."""
+"""Figures of a pose: residuals of the points, and terms of the pointing offset."""
 
 from typing import Any
 
@@ -9,12 +9,12 @@ from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, Figure, ni
 from catseye.reduction.pose.pointing_offsets import PointingOffset
 from catseye.reduction.pose.verdicts import PoseFindings
 
-NAMED = 14  # points up to which each is named
-LENGTH = 0.12  # of the group's size, drawn for the largest residual
+NAMED = 14  # most points with names
+LENGTH = 0.12  # length of the largest residual's arrow over the group's size
 
 
 def pose_figures(result: PoseFindings) -> dict[str, Figure]:
-    """Every figure of the report by its name."""
+    """Figures of the report, by name."""
     with styled():
         drawn = {"residuals": _residuals(result)}
         if result.beam is not None:
@@ -23,7 +23,7 @@ def pose_figures(result: PoseFindings) -> dict[str, Figure]:
 
 
 def _residuals(result: PoseFindings) -> Figure:
-    """Arrows in the two longer extents of the group, colour across them."""
+    """Residuals as arrows in the group's two longer extents, and as colour across them."""
     pose, places = result.pose.pose, result.pose.places
     residual = pose.motion.residual / MILLIMETRE
     extent = np.ptp(places, axis=0)
@@ -68,7 +68,7 @@ def _residuals(result: PoseFindings) -> Figure:
 
 
 def _terms(beam: PointingOffset) -> Figure:
-    """Bars: each term's part of azimuth times cos E and of elevation, and the sum with its uncertainty."""
+    """Bars of each term's part of azimuth times cos E and elevation, and the sum with its u."""
     figure = Figure(figsize=(9.4, 2.2 + 0.34 * len(beam.terms)), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
     names = [*beam.terms, "together"]

@@ -1,4 +1,4 @@
-"""The files of a pose: pose.json, points.csv, report.html, provenance.json."""
+"""Files of a pose: pose.json, points.csv, report.html, provenance.json."""
 
 import csv
 import io
@@ -50,13 +50,13 @@ def write_pose(
     settings: Mapping[str, Any],
     progress: Progress | None = None,
 ) -> None:
-    """Every file, and last the provenance.
+    """Write the files, and last the provenance.
 
     result      a pose
-    directory   exists, and is ours to fill: see `writers.output.whole_directory`
-    inputs      SHA-256 of each file read, by its name
-    settings    what was asked for
-    progress    told of each file
+    directory   existing, from `writers.output.whole_directory`
+    inputs      SHA-256 of each input file, by name
+    settings    settings of the command
+    progress    called for each file
     """
     when = datetime.now(UTC)
     files: Files = {
@@ -83,7 +83,7 @@ def write_pose(
 
 
 def points_csv(result: PoseFindings) -> str:
-    """Each point: first place, what the pose moves it by, what is left, its largest |w|."""
+    """Table of points: first position, motion by the pose, residual, largest |w|."""
     pose, places = result.pose.pose, result.pose.places
     moved, _ = pose.displacement(places)
     stream = io.StringIO()
@@ -96,7 +96,7 @@ def points_csv(result: PoseFindings) -> str:
 
 
 def pose_report(result: PoseFindings, when: datetime, inputs: Mapping[str, str]) -> str:
-    """The whole page of a pose, HTML."""
+    """Complete HTML report of a pose."""
     from catseye.gateways.pose.figures import pose_figures  # matplotlib is heavy
     from catseye.gateways.writers.drawing import svgs
 
@@ -106,7 +106,7 @@ def pose_report(result: PoseFindings, when: datetime, inputs: Mapping[str, str])
     header = (
         f"<header><h1>{escape(title)}</h1>"
         f'<div class="faint">fitted by catseye on {when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ; second = '
-        f"pivot + translation + rotation (first − pivot), turns right-handed</div></header>"
+        f"pivot + translation + rotation (first − pivot), rotations right-handed</div></header>"
     )
     words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in pose_words(result))
     body = [
@@ -117,15 +117,15 @@ def pose_report(result: PoseFindings, when: datetime, inputs: Mapping[str, str])
             "pose",
             "Six degrees of freedom",
             table(("component", "value", "u", "unit"), pose_rows(result), "tnnt"),
-            paragraph("The full covariance is in pose.json; about another pivot, in another frame it follows exactly."),
+            paragraph("The full covariance is in pose.json; it transforms exactly to another pivot or frame."),
         ),
         section(
             "residuals",
-            "What is left",
+            "Residuals",
             picture(
                 drawn["residuals"],
-                "Residuals of the points: second place less first place moved by the pose. Arrows lie in the plane of "
-                "the drawing, the colour is across it.",
+                "Residuals of the points: second position minus first position moved by the pose. Arrows lie in "
+                "the plane of the drawing; the colour is the component across it.",
             ),
         ),
     ]
@@ -137,7 +137,7 @@ def pose_report(result: PoseFindings, when: datetime, inputs: Mapping[str, str])
             "provenance",
             "Provenance",
             table(("file read", "SHA-256"), list(inputs.items()), "th"),
-            table(("what", "value"), facts, "tt"),
+            table(("item", "value"), facts, "tt"),
         )
     )
     return page(f"catseye: {title}", "\n".join(body))
@@ -162,6 +162,6 @@ def _beam_section(beam: PointingOffset, figure: str) -> str:
         "pointing",
         "Beam and focus",
         table(("component", "value", "u", "unit"), beam_rows(beam), "tnnt"),
-        picture(figure, "What the pointing offset is made of; a correction is its opposite."),
+        picture(figure, "Terms of the pointing offset; a correction is its opposite."),
         table(("term", "azimuth × cos E (″)", "elevation (″)", "focus (mm)"), terms, "tnnn"),
     )

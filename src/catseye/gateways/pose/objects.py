@@ -1,4 +1,4 @@
-"""Poses and pointing offsets as plain objects for JSON, and as text for people."""
+"""Poses and pointing offsets as JSON and text."""
 
 from typing import Any, NamedTuple
 
@@ -18,7 +18,7 @@ FORMAT = "catseye-pose-1"
 
 
 def pose_result_object(result: PoseFindings) -> dict[str, Any]:
-    """A pose as `catseye pose --json` gives it: m and rad."""
+    """Object that `catseye pose --json` prints: m and rad."""
     group, pose = result.pose, result.pose.pose
     posture = group.epoch.posture
     moved, _ = pose.displacement(group.places)
@@ -55,7 +55,7 @@ def pose_result_object(result: PoseFindings) -> dict[str, Any]:
 
 
 def beam_object(beam: PointingOffset) -> dict[str, Any]:
-    """Beam and focus: rad, rad, m, in that order everywhere."""
+    """Beam and focus: rad, rad, m, always in this order."""
     return {
         "optics": beam.optics,
         "order": list(BEAM),
@@ -73,7 +73,7 @@ def beam_object(beam: PointingOffset) -> dict[str, Any]:
 
 
 def pose_rows(result: PoseFindings) -> list[tuple[str, str, str, str]]:
-    """Component, value, standard uncertainty, unit, as people read them."""
+    """Component, value, standard uncertainty and unit as text."""
     pose = result.pose.pose
     values = [*(pose.translation / MILLIMETRE), *(pose.rotation / ARCSECOND)]
     us = [*(pose.u[:3] / MILLIMETRE), *(pose.u[3:] / ARCSECOND)]
@@ -82,7 +82,7 @@ def pose_rows(result: PoseFindings) -> list[tuple[str, str, str, str]]:
 
 
 def beam_rows(beam: PointingOffset) -> list[tuple[str, str, str, str]]:
-    """The same of the beam, then its terms without uncertainty."""
+    """The same for the beam, then its terms without uncertainty."""
     u = np.sqrt(np.maximum(np.diag(beam.covariance), 0.0))
     scale = (ARCSECOND, ARCSECOND, MILLIMETRE)
     units = ("arcsec", "arcsec", "mm")
@@ -93,15 +93,15 @@ def beam_rows(beam: PointingOffset) -> list[tuple[str, str, str, str]]:
 
 
 def pose_words(result: PoseFindings) -> list[tuple[str, str]]:
-    """Titles and sentences for people, in order."""
+    """Title and text of each passage, in order."""
     group, pose = result.pose, result.pose.pose
     pivot = ", ".join(f"{v:.3f}" for v in pose.pivot)
     passages = [
         ("Group", f"{group.group}: {len(pose.names)} points, against {group.against}"),
-        ("Frame", f"{pose.frame}, turned about the pivot ({pivot}) m"),
+        ("Frame", f"{pose.frame}, rotations about the pivot ({pivot}) m"),
     ]
     if pose.motion.degrees_of_freedom:
-        fits = "moves as one" if pose.p >= RIGID else "does not move as one: look at the residuals"
+        fits = "moves as one" if pose.p >= RIGID else "does not move as one: check the residuals"
         passages.append(
             (
                 "Rigid",
@@ -112,24 +112,24 @@ def pose_words(result: PoseFindings) -> list[tuple[str, str]]:
     if pose_status(result) != "converged":
         passages.append(("Status", pose_status(result)))
     for name, w in pose.left_out.items():
-        passages.append(("Left out", f"{name}: |w| {w:.1f}, it moved on its own"))
+        passages.append(("Left out", f"{name}: |w| {w:.1f}, it moved separately"))
     if group.missing:
         some = ", ".join(group.missing[:6]) + (" ..." if len(group.missing) > 6 else "")
-        passages.append(("Missing", f"{len(group.missing)} points of the group are not in both: {some}"))
+        passages.append(("Missing", f"{len(group.missing)} points of the group are not in both epochs: {some}"))
     if result.beam is not None:
         across, along = result.beam.beam_deviation
         passages.append(
             (
                 "Optics",
-                f"{result.beam.optics}; plate scale {result.beam.plate_scale * MILLIMETRE / ARCSECOND:.3f} arcsec a "
-                f"mm, of which a shift across comes to {across:.3f}, one in the plane of symmetry to {along:.3f}",
+                f"{result.beam.optics}; plate scale {result.beam.plate_scale * MILLIMETRE / ARCSECOND:.3f} arcsec per "
+                f"mm, times {across:.3f} for a shift across, {along:.3f} for one in the plane of symmetry",
             )
         )
     return passages
 
 
 class TiltOfPose(NamedTuple):
-    """What a track profile takes from a written pose: file, azimuth (rad), turn (2,), covariance (2, 2), verdict."""
+    """Part of a pose for a track profile: file, azimuth (rad), turn (2,), covariance (2, 2), verdict."""
 
     file: str
     azimuth: float
@@ -139,7 +139,7 @@ class TiltOfPose(NamedTuple):
 
 
 def tilt_of_pose(folder: Folder, name: str) -> TiltOfPose:
-    """The turns about the alidade's x and y of a pose.json written by `catseye pose`; InputError for another file."""
+    """Rotations about the alidade's x and y from a pose.json of `catseye pose`; or InputError."""
     import json
 
     try:
@@ -147,7 +147,7 @@ def tilt_of_pose(folder: Folder, name: str) -> TiltOfPose:
     except (ValueError, RecursionError) as problem:
         raise InputError(f"{name}: is not JSON: {problem}") from problem
     if not isinstance(stored, dict) or stored.get("format") != FORMAT:
-        raise InputError(f"{name}: is no pose (expected format '{FORMAT}', as catseye pose --out writes it)")
+        raise InputError(f"{name}: is not a pose (expected format '{FORMAT}', as catseye pose --out writes it)")
     if stored.get("frame") != "alidade" or not stored.get("posture"):
         raise InputError(f"{name}: is in the frame {stored.get('frame')!r} (expected 'alidade', with its posture)")
     try:
@@ -157,5 +157,5 @@ def tilt_of_pose(folder: Folder, name: str) -> TiltOfPose:
     except (KeyError, TypeError, ValueError, IndexError) as problem:
         raise InputError(f"{name}: rotation, covariance or posture cannot be read: {problem}") from problem
     if turn.shape != (2,) or spread.shape != (2, 2) or not np.isfinite([*turn, *spread.ravel(), azimuth]).all():
-        raise InputError(f"{name}: rotation and covariance have other sizes (expected 3 and 6 x 6 numbers)")
+        raise InputError(f"{name}: rotation and covariance have wrong sizes (expected 3 and 6 x 6 numbers)")
     return TiltOfPose(name, azimuth, turn, spread, stored_verdict(name, stored))

@@ -13,7 +13,7 @@ TITLES = ("azimuth times cos E", "elevation")
 
 
 def fit_figures(fit: PointingFit) -> dict[str, str]:
-    """Residuals by azimuth and elevation, on the sky, and the correlations of the terms."""
+    """Residuals by azimuth and elevation, on the sky, and correlations of the terms."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
@@ -34,25 +34,25 @@ def _residuals(fit: PointingFit) -> Figure:
             ax.axhline(0.0, color=FAINT, lw=0.8)
             ax.scatter(x[fit.used], residual[fit.used, row], s=16, color=SERIES[row], lw=0)
             out = ~fit.used
-            shown = np.clip(residual[out, row], -limit, limit)
-            ax.scatter(x[out], shown, s=22, marker="x", color=BAD, lw=1.1)
+            clipped = np.clip(residual[out, row], -limit, limit)
+            ax.scatter(x[out], clipped, s=22, marker="x", color=BAD, lw=1.1)
             ax.set_title(title)
             ax.set_xlabel(label)
         panels[row, 0].set_ylabel("residual (arcsec)")
     panels[0, 0].set_ylim(-1.1 * limit, 1.1 * limit)
     if (~fit.used).any():
-        figure.supxlabel("crosses: left out, at the margin where they lie beyond it", fontsize=8, color=BAD)
+        figure.supxlabel("crosses: excluded; those outside the range are at the margin", fontsize=8, color=BAD)
     return figure
 
 
 def _sky(fit: PointingFit) -> Figure:
-    """Residual arrows at their place: north up, east to the right, the zenith in the middle."""
+    """Residual arrows on the sky: north up, east to the right, the zenith in the middle."""
     figure = Figure(figsize=(6.4, 6.2), layout="constrained")
     ax = figure.add_subplot()
     z = 90.0 - fit.elevation / DEGREE
     east, north = z * np.sin(fit.azimuth), z * np.cos(fit.azimuth)
     used, r = fit.used, fit.residual / ARCSECOND
-    # right of who looks at it is along rising azimuth; up is towards the zenith, the drawing's middle
+    # right for the viewer is increasing azimuth; up is towards the zenith, the drawing's middle
     dx = r[:, 0] * np.cos(fit.azimuth) - r[:, 1] * np.sin(fit.azimuth)
     dy = -r[:, 0] * np.sin(fit.azimuth) - r[:, 1] * np.cos(fit.azimuth)
     turn = np.linspace(0, 2 * np.pi, 181)
@@ -97,11 +97,11 @@ def _correlation(fit: PointingFit) -> Figure:
 
 
 def track_figures(profile: TrackProfile) -> dict[str, str]:
-    """Tilt by azimuth with its uncertainty and the observations, and what is left."""
+    """Tilt by azimuth with uncertainty and observations, and residuals."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
-        return {"tilt": svg(_tilt(profile)), "left": svg(_left(profile))}
+        return {"tilt": svg(_tilt(profile)), "left": svg(_residual_tilts(profile))}
 
 
 def _tilt(profile: TrackProfile) -> Figure:
@@ -123,7 +123,7 @@ def _tilt(profile: TrackProfile) -> Figure:
     return figure
 
 
-def _left(profile: TrackProfile) -> Figure:
+def _residual_tilts(profile: TrackProfile) -> Figure:
     figure = Figure(figsize=(9.4, 4.0), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
     x = np.mod(profile.azimuth, 2 * np.pi) / DEGREE

@@ -1,4 +1,4 @@
-"""The files of a pointing fit and of a track profile."""
+"""Files of a pointing fit and of a track profile."""
 
 from collections.abc import Mapping
 from datetime import UTC, datetime
@@ -46,7 +46,7 @@ def write_fit(
     directory: Path,
     settings: Mapping[str, Any],
 ) -> None:
-    """Table, object, model, report, and last the provenance."""
+    """Write table, JSON, model, report, and last the provenance."""
     when = datetime.now(UTC)
     files: Files = {
         "observations.csv": lambda: observations_csv(fit, observed),
@@ -61,21 +61,21 @@ def write_fit(
         {
             "TERM": SamplerColumn("", np.array(fit.series.terms)),
             "VALUE": SamplerColumn("rad", fit.series.values),
-            "COVARIANCE": SamplerColumn("rad2", fit.series.covariance, "a row a term"),
+            "COVARIANCE": SamplerColumn("rad2", fit.series.covariance, "one row per term"),
         },
-        comment="pointing series, encoders less sky",
+        comment="pointing series, encoders minus sky",
     )
     join_tables(directory, tables={"SERIES": series})
 
 
 def write_model(fit: PointingFit, path: Path) -> None:
-    """The series alone, whole or not at all."""
+    """Write the series alone, atomically."""
     with whole_file(path, "--write", f'format = "{MODEL}"') as pieces:
         pieces.append(record_toml(model_record(fit, path.stem)))
 
 
 def observations_csv(fit: PointingFit, observed: Observed) -> str:
-    """Every observation with what the fit leaves of it."""
+    """Table of observations with residuals."""
     rows = [
         (
             where,
@@ -91,7 +91,7 @@ def observations_csv(fit: PointingFit, observed: Observed) -> str:
 
 
 def fit_report(fit: PointingFit, observed: Observed, compared: SeriesComparison | None, *, when: datetime) -> str:
-    """The whole page of a pointing model's fit, HTML."""
+    """HTML report of a pointing fit."""
     from catseye.gateways.pose.pointing_series_figures import fit_figures  # matplotlib is heavy
 
     drawn = fit_figures(fit)
@@ -101,7 +101,7 @@ def fit_report(fit: PointingFit, observed: Observed, compared: SeriesComparison 
         card(term, f"{value:+.2f}″", f"u = {w:.2f}″")
         for term, value, w in zip(fit.series.terms, fit.series.values / ARCSECOND, u, strict=True)
     ]
-    heads = ["term", "arcsec", "u"] + (["less the other", "u"] if compared is not None else [])
+    heads = ["term", "arcsec", "u"] + (["minus the other", "u"] if compared is not None else [])
     body = [
         _header(f"Pointing series from {observed.source}", when),
         verdict_line(fit_verdict(fit)),
@@ -111,13 +111,13 @@ def fit_report(fit: PointingFit, observed: Observed, compared: SeriesComparison 
             "Terms",
             table(heads, fit_rows(fit, compared), "t" + "n" * (len(heads) - 1)),
             paragraph("ΔA cos E = CA + NPAE sin E + IA cos E + AW cos A sin E + AN sin A sin E;"),
-            paragraph("ΔE = −IE − AW sin A + AN cos A + HZCZ sin E + HZSZ cos E: encoders less sky."),
-            picture(drawn["correlation"], "Correlations: terms near ±1 cannot be told apart by these directions."),
+            paragraph("ΔE = −IE − AW sin A + AN cos A + HZCZ sin E + HZSZ cos E: encoders minus sky."),
+            picture(drawn["correlation"], "Correlations: terms near ±1 cannot be separated by these directions."),
         ),
         section(
             "residuals",
             "Residuals",
-            picture(drawn["residuals"], "What the series leaves, by azimuth and elevation."),
+            picture(drawn["residuals"], "Residuals by azimuth and elevation."),
             picture(drawn["sky"], "The same on the sky, the zenith in the middle."),
         ),
         _provenance(observed.hashes, when),
@@ -139,12 +139,12 @@ def _provenance(hashes: Mapping[str, str], when: datetime) -> str:
         "provenance",
         "Provenance",
         table(("file read", "SHA-256"), list(hashes.items()), "th"),
-        table(("what", "value"), facts, "tt"),
+        table(("item", "value"), facts, "tt"),
     )
 
 
 def write_track(profile: TrackProfile, directory: Path, hashes: Mapping[str, str]) -> None:
-    """Table, object, report, and last the provenance."""
+    """Write table, JSON, report, and last the provenance."""
     when = datetime.now(UTC)
     files: Files = {
         "tilt.csv": lambda: tilt_csv(profile),
@@ -154,11 +154,11 @@ def write_track(profile: TrackProfile, directory: Path, hashes: Mapping[str, str
     settings = {"harmonics": profile.series.harmonics}
     provenance = {"format": TRACK, "made_by": "catseye pointing track", "settings": settings}
     write_files(files, directory, {**provenance, **origin(when, hashes)})
-    join_tables(directory, frame="alidade turned about east and north of the ground")
+    join_tables(directory, frame="alidade rotated about east and north of the ground")
 
 
 def tilt_csv(profile: TrackProfile) -> str:
-    """The tilt every five degrees; its columns name what is not determined and so not in it."""
+    """Table of the tilt every five degrees; columns name undetermined parts, which are excluded."""
     azimuth = np.arange(0.0, 360.0, 5.0)
     tilt, spread = profile.series.at(azimuth * DEGREE)
     rows = [
@@ -171,7 +171,7 @@ def tilt_csv(profile: TrackProfile) -> str:
 
 
 def track_rows(profile: TrackProfile) -> list[tuple[str, str, str]]:
-    """Coefficient, value, u in arcsec; dashes where it is not determined."""
+    """Coefficient, value and u in arcsec; dashes if undetermined."""
     u = np.sqrt(np.diag(profile.series.covariance)) / ARCSECOND
     return [
         (name, f"{v / ARCSECOND:+.3f}", f"{w:.3f}") if np.isfinite(v) else (name, "-", "-")
@@ -180,7 +180,7 @@ def track_rows(profile: TrackProfile) -> list[tuple[str, str, str]]:
 
 
 def track_words(profile: TrackProfile) -> list[tuple[str, str]]:
-    """Titles and sentences for people, in order."""
+    """Title and text of each passage, in order."""
     (an, aw), spread = profile.series.axis
     readings = len(profile.azimuth) - profile.poses
     passages = [
@@ -188,7 +188,7 @@ def track_words(profile: TrackProfile) -> list[tuple[str, str]]:
         (
             "Axis",
             f"AN {an / ARCSECOND:+.2f} ± {spread[0, 0] ** 0.5 / ARCSECOND:.2f}, "
-            f"AW {aw / ARCSECOND:+.2f} ± {spread[1, 1] ** 0.5 / ARCSECOND:.2f} arcsec: leans north, west above zero",
+            f"AW {aw / ARCSECOND:+.2f} ± {spread[1, 1] ** 0.5 / ARCSECOND:.2f} arcsec: positive leans north, west",
         ),
     ]
     if profile.zero is not None:
@@ -198,8 +198,8 @@ def track_words(profile: TrackProfile) -> list[tuple[str, str]]:
         )
     if profile.series.undetermined:
         names = ", ".join(profile.series.undetermined)
-        text = f"{names}: an inclinometer's zero does the same; poses of the alidade tell them apart"
-        passages.append(("Not known", text))
+        text = f"{names}: an inclinometer's zero has the same effect; poses of the alidade separate them"
+        passages.append(("Undetermined", text))
     if profile.degrees_of_freedom:
         passages.append(
             (
@@ -212,11 +212,11 @@ def track_words(profile: TrackProfile) -> list[tuple[str, str]]:
 
 def _tilt_caption(profile: TrackProfile) -> str:
     without = " Without the wave of one turn, which is not determined." if profile.series.undetermined else ""
-    return f"Turn of the alidade about east and north; dotted: the mean, the axis's lean.{without}"
+    return f"Rotation of the alidade about east and north; dotted: the mean, the axis's tilt.{without}"
 
 
 def track_report(profile: TrackProfile, hashes: Mapping[str, str], when: datetime) -> str:
-    """The whole page of a series along a track, HTML."""
+    """HTML report of a track profile."""
     from catseye.gateways.pose.pointing_series_figures import track_figures  # matplotlib is heavy
 
     drawn = track_figures(profile)
@@ -230,7 +230,7 @@ def track_report(profile: TrackProfile, hashes: Mapping[str, str], when: datetim
             "Tilt by azimuth",
             picture(drawn["tilt"], _tilt_caption(profile)),
             table(("coefficient", "arcsec", "u"), track_rows(profile), "tnn"),
-            picture(drawn["left"], "What the series leaves of poses and inclinometer."),
+            picture(drawn["left"], "Residuals of poses and inclinometer."),
         ),
         _provenance(hashes, when),
     ]

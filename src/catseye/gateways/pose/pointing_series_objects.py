@@ -1,4 +1,4 @@
-"""Pointing fits, comparisons and track profiles as plain objects for JSON and as text for people; what they read."""
+"""Pointing fits, comparisons and track profiles as JSON and text, and readers of their inputs."""
 
 import json
 from collections.abc import Sequence
@@ -33,9 +33,9 @@ class Observed:
     source      "stars" or "metrology"
     azimuth, elevation  (n,) rad
     correction  (n, 2) rad
-    covariance  (2n, 2n) rad^2 of metrology; None of stars
+    covariance  (2n, 2n) rad^2 of metrology; None for stars
     where       n places for messages
-    stars       the file's, where it is one
+    stars       of the file, if it is one
     hashes      SHA-256 by name
     sources     verdicts of poses
     """
@@ -52,7 +52,7 @@ class Observed:
 
 
 def read_observed(files: Sequence[Path]) -> Observed:
-    """One TPOINT file, or several pose.json with pointing in them; InputError for a mixture."""
+    """Corrections of one TPOINT file or several pose.json with pointing; InputError for a mixture."""
     json_files = [f for f in files if f.suffix == ".json"]
     if not json_files:
         if len(files) != 1:
@@ -62,8 +62,8 @@ def read_observed(files: Sequence[Path]) -> Observed:
         hashes = {stars.file: stars.digest}
         return Observed("stars", stars.azimuth, stars.elevation, stars.correction, None, where, stars, hashes)
     if len(json_files) != len(files):
-        other = next(f for f in files if f not in json_files)
-        raise InputError(f"{other}: is no .json beside poses (expected one TPOINT file, or poses only)")
+        foreign = next(f for f in files if f not in json_files)
+        raise InputError(f"{foreign}: is not .json like the poses (expected one TPOINT file, or poses only)")
     folders = [Folder(f.parent) for f in files]
     rows = [_pose(folder, f) for folder, f in zip(folders, files, strict=True)]
     q = np.zeros((2 * len(rows), 2 * len(rows)))
@@ -78,13 +78,13 @@ def read_observed(files: Sequence[Path]) -> Observed:
 
 
 def _pose(folder: Folder, path: Path) -> tuple[tuple[float, float], np.ndarray, np.ndarray, Verdict | None]:
-    """Azimuth and elevation (rad), correction (2,), covariance (2, 2) and verdict of a pose.json with pointing."""
+    """Azimuth and elevation (rad), correction (2,), covariance (2, 2) and verdict of a pose.json."""
     try:
         stored = json.loads(folder.text(path.name))
     except (ValueError, RecursionError) as problem:
         raise InputError(f"{path}: is not JSON: {problem}") from problem
     if not isinstance(stored, dict) or stored.get("format") != POSE:
-        raise InputError(f"{path}: is no pose (expected format '{POSE}', as catseye pose --out writes it)")
+        raise InputError(f"{path}: is not a pose (expected format '{POSE}', as catseye pose --out writes it)")
     if not stored.get("pointing") or not stored.get("posture"):
         raise InputError(f"{path}: has no pointing or no posture (expected both: catseye pose --pointing prime --out)")
     try:
@@ -95,12 +95,12 @@ def _pose(folder: Folder, path: Path) -> tuple[tuple[float, float], np.ndarray, 
     except (KeyError, TypeError, ValueError, IndexError) as problem:
         raise InputError(f"{path}: pointing cannot be read: {problem}") from problem
     if value.shape != (2,) or spread.shape != (2, 2) or not np.isfinite([*angles, *value, *spread.ravel()]).all():
-        raise InputError(f"{path}: pointing has other sizes (expected 3 numbers and 3 x 3, finite)")
+        raise InputError(f"{path}: pointing has wrong sizes (expected 3 numbers and 3 x 3, finite)")
     return angles, value, spread, stored_verdict(str(path), stored)
 
 
 def read_series(text: str) -> tuple[PointingSeries, dict[str, str], Verdict | None]:
-    """A series by name ("published") or from its TOML file, the SHA-256 of what was read, the file's verdict."""
+    """Series by name ("published") or from its TOML file, input hashes and verdict of the file."""
     if text == PUBLISHED:
         return published(), {}, None
     path = Path(text)
@@ -110,24 +110,24 @@ def read_series(text: str) -> tuple[PointingSeries, dict[str, str], Verdict | No
 
 
 def series_object(series: PointingSeries) -> dict[str, Any]:
-    """Terms in arcsec with covariance; null where nothing is known of it."""
-    known = bool(np.any(series.covariance != 0.0))
+    """Terms in arcsec with covariance; null if unknown."""
+    has_covariance = bool(np.any(series.covariance != 0.0))
     u = np.sqrt(np.diag(series.covariance)) / ARCSECOND
     return {
         "terms": list(series.terms),
         "values_arcsec": dict(zip(series.terms, series.values / ARCSECOND, strict=True)),
-        "u_arcsec": dict(zip(series.terms, u, strict=True)) if known else None,
-        "covariance_arcsec2": series.covariance / ARCSECOND**2 if known else None,
+        "u_arcsec": dict(zip(series.terms, u, strict=True)) if has_covariance else None,
+        "covariance_arcsec2": series.covariance / ARCSECOND**2 if has_covariance else None,
     }
 
 
 def fit_object(fit: PointingFit, observed: Observed, compared: SeriesComparison | None) -> dict[str, Any]:
-    """A fit as `catseye pointing fit --json` gives it."""
+    """Object that `catseye pointing fit --json` prints."""
     return {
         "format": FORMAT,
         "verdict": fit_verdict(fit).to_object(),
         "source": observed.source,
-        "sign": "correction: encoders less sky; azimuth times cos E and elevation",
+        "sign": "correction: encoders minus sky; azimuth times cos E and elevation",
         **series_object(fit.series),
         "correlation": fit.correlation,
         "observations": len(fit.azimuth),
@@ -148,7 +148,7 @@ def fit_object(fit: PointingFit, observed: Observed, compared: SeriesComparison 
 
 
 def comparison_object(comparison: SeriesComparison) -> dict[str, Any]:
-    """This fit less the other."""
+    """Object of this fit minus the other."""
     u = np.sqrt(np.maximum(np.diag(comparison.covariance), 0.0)) / ARCSECOND
     return {
         "difference_arcsec": dict(zip(comparison.terms, comparison.difference / ARCSECOND, strict=True)),
@@ -162,7 +162,7 @@ def comparison_object(comparison: SeriesComparison) -> dict[str, Any]:
 
 
 def fit_words(fit: PointingFit, observed: Observed, compared: SeriesComparison | None) -> list[tuple[str, str]]:
-    """Titles and sentences for people, in order."""
+    """Title and text of each passage, in order."""
     used_text = f"{int(fit.used.sum())} of {len(fit.used)} observations used, from {observed.source}"
     passages = [("Observed", used_text)]
     passages += [("Left out", where) for where, used in zip(observed.where, fit.used, strict=True) if not used]
@@ -184,7 +184,7 @@ def fit_words(fit: PointingFit, observed: Observed, compared: SeriesComparison |
 
 
 def fit_rows(fit: PointingFit, compared: SeriesComparison | None) -> list[tuple[str, ...]]:
-    """Term, value, u, and where compared the difference with its u; arcsec."""
+    """Term, value, u, and the difference with its u if compared; arcsec."""
     u = np.sqrt(np.diag(fit.series.covariance)) / ARCSECOND
     rows: list[tuple[str, ...]] = []
     for k, term in enumerate(fit.series.terms):
@@ -198,7 +198,7 @@ def fit_rows(fit: PointingFit, compared: SeriesComparison | None) -> list[tuple[
 
 
 def model_record(fit: PointingFit, name: str) -> PointingModel:
-    """The fit as a record, rounded to a micro arc second."""
+    """Record of the fit, rounded to a micro arc second."""
     q, judged = fit.series.covariance / ARCSECOND**2, fit_verdict(fit)
     return PointingModel(
         format="catseye-pointing-series-1",
@@ -213,30 +213,30 @@ def model_record(fit: PointingFit, name: str) -> PointingModel:
 
 
 def track_verdict(profile: TrackProfile) -> Verdict:
-    """Scatter of poses and readings against what they claim, what they do not determine, the poses' own verdicts."""
+    """Verdict from the scatter against the claim, undetermined parts, and the poses' verdicts."""
     return _track_verdict(profile).resting_on(profile.sources)
 
 
 def _track_verdict(profile: TrackProfile) -> Verdict:
     degrees = profile.degrees_of_freedom
     if degrees < 1:
-        return Verdict("doubtful", "as many readings as coefficients: nothing checks the profile")
+        return Verdict("doubtful", "as many readings as coefficients: the profile is unchecked")
     factor, without = profile.pvv / degrees, ""
     if profile.series.undetermined:
-        without = "; without the wave of one turn, which an inclinometer alone cannot tell from its zero"
+        without = "; without the wave of one turn, which an inclinometer alone cannot separate from its zero"
     if factor > 1.0 + 3.0 * (2.0 / degrees) ** 0.5:
         return Verdict("doubtful", f"readings scatter more than claimed (variance factor {factor:.2f}){without}")
     return Verdict("good", f"readings scatter about the profile as claimed (variance factor {factor:.2f}){without}")
 
 
 def track_object(profile: TrackProfile) -> dict[str, Any]:
-    """A track profile as `catseye pointing track --json` gives it: rad."""
+    """Object that `catseye pointing track --json` prints: rad."""
     series = profile.series
     axis, spread = series.axis
     return {
         "format": TRACK,
         "verdict": track_verdict(profile).to_object(),
-        "frame": "ground: turns of the alidade about east and north",
+        "frame": "ground: rotations of the alidade about east and north",
         "harmonics": series.harmonics,
         "coefficients": dict(zip(series.names, series.values, strict=True)),
         "u_coefficients": dict(zip(series.names, np.sqrt(np.diag(series.covariance)), strict=True)),

@@ -1,1 +1,1 @@
-"""Mirrors, servos, tracks and the sky on the way out."""
+"""Output of mirrors, servos, tracks and the sky."""

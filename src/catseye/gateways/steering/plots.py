@@ -1,4 +1,4 @@
-"""Figures that `catseye plot` draws from records: what they show, composed; the drawing is in their own files."""
+"""Figures of `catseye plot` made from records; the drawing is in separate files."""
 
 from pathlib import Path
 from typing import Any
@@ -21,8 +21,8 @@ from catseye.reduction.steering.sighting import place_of_monument
 from catseye.simulator.servo.motor import AxisDesign
 from catseye.simulator.servo.tuning import Filter, design_filter, margins, plant_of, ready_axis, step_metrics
 
-USUAL_COUNTS_PER_S, USUAL_COUNTS_PER_S2 = 12_000.0, 40_000.0  # of axes whose record does not say
-LONGEST_MOVE = 120.0  # s, of a drawn move: a few seconds of computing
+USUAL_COUNTS_PER_S, USUAL_COUNTS_PER_S2 = 12_000.0, 40_000.0  # of axes without these in their record
+LONGEST_MOVE = 120.0  # s, of a drawn move: takes a few seconds to compute
 
 
 def sky_plot(
@@ -35,13 +35,13 @@ def sky_plot(
     latitude_deg: float | None,
     longitude_deg: float | None,
 ) -> tuple[Svg, dict[str, Any]]:
-    """The sky of a ranger as SVG text, and what it says in words and numbers.
+    """Sky of a ranger as SVG text, and its summary.
 
     monument, mirror   records
     mjd                UTC
-    way                counts from and to of a slew asked for; None without
+    way                counts from and to of the requested slew; None for none
     keep_out           boxes; none if None
-    latitude_deg, longitude_deg   of the site, where the monument's record does not say
+    latitude_deg, longitude_deg   of the site, if not in the monument's record
     """
     stands, head = read_record(monument, MonumentGeometry), read_record(mirror, MirrorGeometry)
     zones = KeepOut() if keep_out is None else read_record(keep_out, KeepOut)
@@ -57,12 +57,12 @@ def sky_plot(
     )
     if way is None:
         return sky_figure(guard, mjd), {"pace": "of the record" if recorded else "assumed"}
-    asked, way_round = guard.slew(mjd, *way), route(guard, mjd, *way)
+    requested, way_round = guard.slew(mjd, *way), route(guard, mjd, *way)
     return sky_figure(guard, mjd, slew=way, route=way_round if way_round.found else None), {
         "pace": "of the record" if recorded else f"assumed, {USUAL_COUNTS_PER_S:g} counts/s",
-        "slew_allowed": asked.allowed,
-        "slew_refused": asked.reason or None,
-        "free_at_mjd": asked.free_at_mjd,
+        "slew_allowed": requested.allowed,
+        "slew_refused": requested.reason or None,
+        "free_at_mjd": requested.free_at_mjd,
         "route": str(way_round.status),
         "waypoints": way_round.waypoints.tolist(),
         "duration": way_round.duration,
@@ -71,9 +71,9 @@ def sky_plot(
 
 
 def servo_plot(mirror: Path | None, axis: int, counts: int) -> tuple[Svg, dict[str, Any]]:
-    """A move of the assumed axis as SVG text, and what it says in words and numbers.
+    """Move of the assumed axis as SVG text, with summary.
 
-    mirror   record whose settings to take; those of the tuning study if None
+    mirror   record with the settings; those of the tuning study if None
     axis     0 azimuth, 1 elevation
     counts   length of the move
     """
@@ -104,7 +104,7 @@ def servo_plot(mirror: Path | None, axis: int, counts: int) -> tuple[Svg, dict[s
     trace = servo.run(samples)
     stability, came = margins(plant, chosen), step_metrics(trace.time, trace.actual, target=counts)
     return move_figure(trace, target=counts, plant=plant), {
-        "axis": "assumed: nothing public says inertia, torque and friction of the ZY's",
+        "axis": "assumed: inertia, torque and friction of the ZY's axis are not published",
         "kp": chosen.kp,
         "ki": chosen.ki,
         "kd": chosen.kd,

@@ -1,4 +1,4 @@
-"""Counts of a mirror for people, for programs, and as CAL.EQ printed them."""
+"""Counts of a mirror as text, JSON, and in the format of CAL.EQ."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ UNITS = ("m", "m", "m", "m", "counts", "counts", "counts", "counts", "counts", "
 def point_verdict(
     pointings: Pointings, sightings: list[Sighting], visibility: Visibility | None, point: int
 ) -> Verdict:
-    """Whether a mirror may look at one of the points, and sees what stands there."""
+    """Verdict on one of the points: mirror position allowed and target visible."""
     if not (pointings.allowed[point] or pointings.prime_allowed[point]):
         return Verdict("failed", "beyond the mirror's stops in both pointings")
     if sightings:
@@ -32,25 +32,25 @@ def point_verdict(
     if unusual := pointings.unusual(point):
         return Verdict("doubtful", unusual)
     which = "direct" if pointings.allowed[point] else "prime"
-    unknown = "; u of the counts is unknown: the records lack what it needs" if pointings.lacking else ""
+    unknown = "; u of the counts is unknown: the records lack its inputs" if pointings.lacking else ""
     return Verdict("good", f"allowed in the {which} pointing{unknown}")
 
 
 def pointing_verdict(pointings: Pointings, sightings: list[Sighting], visibility: Visibility | None) -> Verdict:
-    """The worst of all points, with its place where there are several."""
-    each = [point_verdict(pointings, sightings, visibility, k) for k in range(len(pointings.to))]
-    found = worst(each)
-    if len(each) < 2 or found.word == "good":
-        return found
-    place = ", ".join(f"{v:g}" for v in pointings.to[each.index(found)])
-    bad = sum(v.word == found.word for v in each)
-    return Verdict(found.word, f"{bad} of {len(each)} points, first ({place}): {found.why}")
+    """Worst verdict of all points, with its place if there are several."""
+    verdicts = [point_verdict(pointings, sightings, visibility, k) for k in range(len(pointings.to))]
+    verdict = worst(verdicts)
+    if len(verdicts) < 2 or verdict.word == "good":
+        return verdict
+    place = ", ".join(f"{v:g}" for v in pointings.to[verdicts.index(verdict)])
+    bad = sum(v.word == verdict.word for v in verdicts)
+    return Verdict(verdict.word, f"{bad} of {len(verdicts)} points, first ({place}): {verdict.why}")
 
 
 def pointing_objects(
     pointings: Pointings, sightings: list[Sighting], visibility: Visibility | None = None
 ) -> list[dict[str, Any]]:
-    """One object a point, SI keys; `sun`, `keep_out` and `visibility` where they were asked for."""
+    """Objects of the points, SI keys; `sun`, `keep_out` and `visibility` if requested."""
     answer = []
     for k, to in enumerate(pointings.to):
         item: dict[str, Any] = {
@@ -112,7 +112,7 @@ def _answer_object(answer: GuardAnswer) -> dict[str, Any]:
 
 
 def pointing_table(pointings: Pointings) -> str:
-    """Counts and sights as columns of text for people."""
+    """Table of counts and sights as text."""
     rows: list[tuple[str, ...]] = [HEADINGS, UNITS]
     for k, to in enumerate(pointings.to):
         counts = (*pointings.counts[k], pointings.autocollimation[k], pointings.back_retro[k], *pointings.prime[k])
@@ -132,7 +132,7 @@ def _allowed(direct: bool, prime: bool) -> str:
 
 
 def pointing_remarks(pointings: Pointings, sightings: list[Sighting], visible: Visibility | None = None) -> list[str]:
-    """What the table does not show, one line each."""
+    """Remarks beyond the table, one line each."""
     remarks = []
     if pointings.lacking:
         remarks.append(f"u of the counts unknown: the records do not have {', '.join(pointings.lacking)}")
@@ -157,7 +157,7 @@ def pointing_remarks(pointings: Pointings, sightings: list[Sighting], visible: V
 
 
 def output_dat(pointings: Pointings, name: str) -> str:
-    """CAL.EQ's output.dat: x y z in mm, N_a, N_e, and N_e to autocollimate, counts with one decimal as it had."""
+    """CAL.EQ's output.dat: x y z in mm, N_a, N_e, and N_e of autocollimation, with one decimal."""
     lines = [f"{MARK} {name}: x y z (mm), azimuth, elevation, elevation to autocollimate (counts)"]
     for to, counts, face in zip(pointings.to / MILLIMETRE, pointings.counts, pointings.autocollimation, strict=True):
         lines.append(" ".join([*(f"{v:11.1f}" for v in to), *(f"{v:9.1f}" for v in (*counts, face))]))

@@ -1,4 +1,4 @@
-"""Figures of a servo axis as SVG text: a move with its following error, and step responses beside linear theory."""
+"""Figures of a servo axis as SVG text: moves with following error, and step responses."""
 
 from collections.abc import Mapping
 
@@ -17,7 +17,7 @@ def move_figure(trace: AxisTrace, *, target: float, plant: Plant | None = None) 
 
     trace    of the move, from its start
     target   counts
-    plant    of the axis, to draw the drive that the profile asks for; None without
+    plant    of the axis, to draw the drive that the profile requires; None for none
     """
     with mpl.rc_context():
         mpl.rcdefaults()
@@ -37,9 +37,9 @@ def move_figure(trace: AxisTrace, *, target: float, plant: Plant | None = None) 
         velocity.legend(loc="upper right")
         error.plot(t, trace.error, color=SERIES[2], lw=0.8)
         error.set_title(f"Following error, counts: at most {np.max(np.abs(trace.error)):.1f}")
-        drive.plot(t, trace.output, color=SERIES[3], lw=0.5, label="filter's output")
+        drive.plot(t, trace.output, color=SERIES[3], lw=0.5, label="filter output")
         if plant is not None:
-            drive.plot(t, _asked(trace, plant), color=INK, lw=1.1, label="what the profile asks for", zorder=3)
+            drive.plot(t, _required_drive(trace, plant), color=INK, lw=1.1, label="required by the profile", zorder=3)
             drive.legend(loc="upper right")
         drive.set_title("Drive, converter steps")
         drive.set_xlabel("time since the start, s")
@@ -49,11 +49,11 @@ def move_figure(trace: AxisTrace, *, target: float, plant: Plant | None = None) 
 def step_figure(
     responses: Mapping[str, AxisTrace], *, target: float, linear: Mapping[str, NDArray[np.float64]] | None = None
 ) -> Svg:
-    """Step responses beside one another, as SVG text: the first moments, and what is left at the end.
+    """Step responses compared, as SVG text: the first moments and the final error.
 
-    responses   traces by name, each from its step at zero
+    responses   traces by name, with the step at time zero
     target      of the step, counts
-    linear      what linear theory says, counts sample by sample, by the same names; None without
+    linear      response by linear theory, counts by sample, with the same names; None for none
     """
     with mpl.rc_context():
         mpl.rcdefaults()
@@ -74,9 +74,9 @@ def step_figure(
         first.set_ylabel("position, counts")
         last.axhspan(-1.0, 1.0, color=BAD, alpha=0.12, lw=0)
         last.set_ylim(-8.0, 8.0)
-        last.set_title("What is left; within a count: shaded")
+        last.set_title("Final error; shaded: within one count")
         last.set_xlabel("time since the step, s")
-        last.set_ylabel("actual less target, counts")
+        last.set_ylabel("actual minus target, counts")
         figure.legend(*first.get_legend_handles_labels(), loc="outside lower center", ncols=3)
         return svg(figure)
 
@@ -89,7 +89,7 @@ def _speed(trace: AxisTrace) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return 0.5 * (trace.time[n:] + trace.time[:-n]), speed
 
 
-def _asked(trace: AxisTrace, plant: Plant) -> NDArray[np.float64]:
-    """Converter steps that an axis needs to do as its profile says."""
+def _required_drive(trace: AxisTrace, plant: Plant) -> NDArray[np.float64]:
+    """Converter steps required by an axis to follow its profile."""
     acceleration = np.gradient(trace.velocity, trace.time[1] - trace.time[0])
     return (acceleration + plant.decay * trace.velocity) / plant.gain + plant.friction * np.sign(trace.velocity)

@@ -1,7 +1,7 @@
-"""A ranger's sky: the Sun with its cone and its way over the day, the boxes, a slew that is refused and the way round.
+"""Sky of a ranger: the Sun's path and cone, boxes, a refused slew and its detour.
 
-Left the sky as on a map, north up and east to the right, the zenith in the middle; right the same in encoder counts,
-where the mirror moves. Zones are drawn where the guard's own clearance is used up, the servo's margin as a thin line.
+Left: map of the sky, north up, east to the right, the zenith in the middle. Right: the same in encoder counts, in
+which the mirror moves. Zones are filled where the guard's clearance is zero, with the servo's margin as a thin line.
 """
 
 from collections.abc import Iterator
@@ -22,7 +22,7 @@ from catseye.reduction.steering.guard import Guard
 from catseye.reduction.steering.reroute import Route
 
 EDGE = 100.0  # degrees from the zenith to the rim of the map
-CELLS = 241  # of a panel along each side
+CELLS = 241  # per side of a panel
 SUN, SUN_FILL, BOX_FILL = "#e09a12", "#fbe3ad", "#cdd6dd"
 EXACT_BELOW = 0.1  # rad: only lines near the zones are drawn
 STEPS = 200  # of a drawn move
@@ -32,12 +32,12 @@ PLATE = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.7
 def sky_figure(
     guard: Guard, mjd: float, *, slew: tuple[ArrayLike, ArrayLike] | None = None, route: Route | None = None
 ) -> Svg:
-    """SVG text: the sky of a ranger and its counts at a time.
+    """SVG text: sky of a ranger and its counts at a time.
 
     guard    of the ranger
     mjd      UTC
-    slew     counts (2,) from and to: the slew asked for, drawn to its first entry
-    route    what `reduction.steering.reroute.route` found instead
+    slew     counts (2,) from and to of the requested slew, drawn to its first entry
+    route    alternative found by `reduction.steering.reroute.route`
     """
     with mpl.rc_context():
         mpl.rcdefaults()
@@ -63,7 +63,7 @@ def _drawn(guard: Guard, mjd: float, slew: tuple[ArrayLike, ArrayLike] | None, r
 
 
 def _map(ax, guard: Guard, mjd: float) -> None:
-    """Horizon, rings, the Sun's way over the day, and the zones."""
+    """Draw horizon, rings, the Sun's path over the day, and the zones."""
     side = np.linspace(-EDGE, EDGE, CELLS)
     x, y = np.meshgrid(side, side)
     radius = np.hypot(x, y)
@@ -89,13 +89,13 @@ def _map(ax, guard: Guard, mjd: float) -> None:
     ax.set(xlim=(-EDGE, EDGE), ylim=(-EDGE, EDGE), aspect="equal")
     ax.axis("off")
     if guard.place is not None:
-        _sun_way(ax, guard.place, mjd)
+        _sun_path(ax, guard.place, mjd)
 
 
-def _sun_way(ax, place: FramePlace, mjd: float) -> None:
-    """The Sun from half a day before to half a day after, a dot and its hour (UTC) at each full hour."""
-    way = _on_map(sun_at(mjd + np.linspace(-0.5, 0.5, 289), place).direction)
-    ax.plot(way[:, 0], way[:, 1], color=SUN, lw=1.0, alpha=0.8, zorder=3)
+def _sun_path(ax, place: FramePlace, mjd: float) -> None:
+    """Draw the Sun from half a day before to half a day after, with hours (UTC)."""
+    path = _on_map(sun_at(mjd + np.linspace(-0.5, 0.5, 289), place).direction)
+    ax.plot(path[:, 0], path[:, 1], color=SUN, lw=1.0, alpha=0.8, zorder=3)
     hours = np.arange(np.ceil((mjd - 0.5) * 24.0), np.floor((mjd + 0.5) * 24.0) + 1)
     places = _on_map(sun_at(hours / 24.0, place).direction)
     for hour, spot in zip(hours, places, strict=True):
@@ -109,7 +109,7 @@ def _sun_way(ax, place: FramePlace, mjd: float) -> None:
 
 
 def _counts(ax, guard: Guard, mjd: float) -> None:
-    """The zones between the stops, direct and prime pointings."""
+    """Draw the zones between the stops, direct and prime pointings."""
     ne0 = float(guard.station.zeros[1])
     low, high = guard.azimuth_limits
     reach = 0.25 * COUNTS_PER_TURN
@@ -127,7 +127,7 @@ def _counts(ax, guard: Guard, mjd: float) -> None:
 
 
 def _zones(ax, x: NDArray, y: NDArray, clearance: NDArray, guard: Guard, named_above: float = -np.inf) -> None:
-    """Each zone filled, and the line where the margin begins; boxes named in their middle above some y."""
+    """Draw each zone and the line where the margin begins; box names only above some y."""
     fills = [SUN_FILL, *[BOX_FILL] * len(guard.boxes)]
     edges = [SUN, *[SERIES[5]] * len(guard.boxes)]
     names = ["the Sun's cone", *[box.name for box in guard.boxes]]
@@ -135,7 +135,7 @@ def _zones(ax, x: NDArray, y: NDArray, clearance: NDArray, guard: Guard, named_a
         gap = clearance[..., i]
         if not np.isfinite(gap).any() or gap.min() > 0.0:
             continue
-        inside = 1e-9 + 0.2 * DEGREE * (i > 0)  # a box has no clearance below zero: half a pixel wide of it
+        inside = 1e-9 + 0.2 * DEGREE * (i > 0)  # a box's clearance is never below zero: take half a pixel
         ax.contourf(x, y, gap, levels=[-np.pi, inside], colors=[fill], zorder=1)
         ax.contour(x, y, gap, levels=[inside], colors=[edge], linewidths=1.0, zorder=2)
         ax.contour(x, y, gap, levels=[guard.margin + TOUCH + inside], colors=[edge], linewidths=0.5, zorder=2)
@@ -150,20 +150,20 @@ def _zones(ax, x: NDArray, y: NDArray, clearance: NDArray, guard: Guard, named_a
 def _ways(
     guard: Guard, mjd: float, slew: tuple[ArrayLike, ArrayLike] | None, route: Route | None
 ) -> Iterator[tuple[NDArray[np.float64], dict]]:
-    """Counts (n, 2) of what is drawn over both panels, and how."""
+    """Counts (n, 2) of the lines drawn over both panels, with their style."""
     if slew is not None:
         move = trapezoid(slew[0], slew[1], guard.pace)
-        yield _along(move), {"color": BAD, "lw": 1.2, "ls": (0, (4, 2)), "zorder": 4, "label": "the slew asked for"}
+        yield _along(move), {"color": BAD, "lw": 1.2, "ls": (0, (4, 2)), "zorder": 4, "label": "requested slew"}
         entered = guard.entries(mjd, move)
         if entered.status:
             entry = move.position(entered.time)[None]
             style = {"marker": "X", "ms": 8, "color": BAD, "mec": "white", "ls": "", "zorder": 8}
-            yield entry, {**style, "label": "enters here"}
+            yield entry, {**style, "label": "entry"}
     if route is not None and route.found:
         legs = trapezoid(route.waypoints[:-1], route.waypoints[1:], guard.pace)
-        way = np.concatenate([_along(legs[i]) for i in range(len(route.waypoints) - 1)])
-        label = f"verified way, {route.duration:.1f} s"
-        yield way, {"color": SERIES[0], "lw": 1.8, "zorder": 5, "label": label}
+        path = np.concatenate([_along(legs[i]) for i in range(len(route.waypoints) - 1)])
+        label = f"verified path, {route.duration:.1f} s"
+        yield path, {"color": SERIES[0], "lw": 1.8, "zorder": 5, "label": label}
         dots = {"marker": "o", "ms": 4.5, "color": SERIES[0], "mec": "white", "mew": 0.8, "ls": "", "zorder": 6}
         yield route.waypoints, {**dots, "label": "waypoints"}
     ends = route.waypoints[[0, -1]] if route is not None and route.found else slew

@@ -1,4 +1,4 @@
-"""Figures of following, finding and seeing: misses over time, a search and its spot, who sees what."""
+"""Figures of tracking, searching and visibility."""
 
 import numpy as np
 
@@ -16,16 +16,16 @@ SIGHTS = {
     Sight.TOO_NEAR: (SERIES[5], "too near"),
     Sight.BEYOND_STOPS: (BAD, "beyond the stops"),
 }
-MOST_LABELS = 60  # on an axis
+MOST_LABELS = 60  # on one axis
 ELLIPSE = 3.0  # standard deviations drawn
 
 
 def miss_figure(track: CountTrack, misses: np.ndarray, shares: np.ndarray, *, limit: float = 1e-3) -> Figure:
-    """How far the beams pass their targets, over the track; the worst pair, the median, and the limit.
+    """Distance by which beams miss their targets over the track: worst pair, median, limit.
 
-    track     that was followed
+    track     followed track
     misses    (s, k, r, p) m, of `reduction.steering.tracking.misses`
-    shares    (k,) of each interval
+    shares    (k,) position within each interval
     limit     m, drawn as a line
     """
     good = track.status == Following.FOLLOWED
@@ -34,48 +34,48 @@ def miss_figure(track: CountTrack, misses: np.ndarray, shares: np.ndarray, *, li
         figure = Figure(figsize=(8.6, 3.2), layout="constrained")
         ax = figure.subplots()
         if good.any():
-            shown = 1e3 * misses[:, :, good].reshape(len(when), -1)
-            ax.plot(when, shown.max(axis=1), color=SERIES[1], lw=1.1, label=f"worst of {int(good.sum())} pairs")
-            ax.plot(when, np.median(shown, axis=1), color=SERIES[0], lw=1.1, label="median")
+            distances_mm = 1e3 * misses[:, :, good].reshape(len(when), -1)
+            ax.plot(when, distances_mm.max(axis=1), color=SERIES[1], lw=1.1, label=f"worst of {int(good.sum())} pairs")
+            ax.plot(when, np.median(distances_mm, axis=1), color=SERIES[0], lw=1.1, label="median")
         ax.axhline(1e3 * limit, color=BAD, lw=0.9, ls="--", label=f"{1e3 * limit:g} mm")
         ax.set_yscale("log")
         ax.set_xlabel("time (s)")
-        ax.set_ylabel("beam past the target (mm)")
+        ax.set_ylabel("miss of the target (mm)")
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         return figure
 
 
 def search_figure(spot: Spot, zeros: tuple[float, float], title: str = "") -> Figure:
-    """The places that a search looked at, in order, coloured by what came back, and the spot's centre if found.
+    """Places visited by a search, in order, coloured by return, and the spot's centre if found.
 
     spot     of `reduction.steering.finding.find`
-    zeros    (na0, ne0) counts, for the size of counts on the sky: the picture is as the sky is
-    title    instead of the status
+    zeros    (na0, ne0) counts, for the size of counts on the sky: the figure has the sky's proportions
+    title    replaces the status
     """
     with styled():
         figure = Figure(figsize=(7.4, 5.2), layout="constrained")
         ax = figure.subplots()
         na, ne = spot.looked_at.T if len(spot.looked_at) else (np.zeros(0), np.zeros(0))
         ax.plot(na, ne, color=GRID, lw=0.7, zorder=1)
-        known = np.isfinite(spot.seen)
-        drawn = ax.scatter(na[known], ne[known], c=spot.seen[known], s=16, cmap="viridis", linewidths=0, zorder=2)
-        ax.plot(na[~known], ne[~known], "x", ms=4, color=FAINT, zorder=2)
+        reached = np.isfinite(spot.seen)
+        drawn = ax.scatter(na[reached], ne[reached], c=spot.seen[reached], s=16, cmap="viridis", linewidths=0, zorder=2)
+        ax.plot(na[~reached], ne[~reached], "x", ms=4, color=FAINT, zorder=2)
         figure.colorbar(drawn, ax=ax, label="return (V)", shrink=0.85)
         if spot.found:
             _mark(ax, spot)
         if len(spot.looked_at):
             across, up = count_size(np.median(spot.looked_at, axis=0), zeros)
-            ax.set_aspect(up / max(across, 0.02 * up))  # near the azimuth axis a count is nothing
+            ax.set_aspect(up / max(across, 0.02 * up))  # near the azimuth axis a count is tiny
         ax.set_xlabel("azimuth counts")
         ax.set_ylabel("elevation counts")
         ax.ticklabel_format(useOffset=False)
-        shown = title or (spot.status if len(spot.status) < 90 else f"{spot.status[:87]}...")
-        ax.set_title(f"{shown}: {_centre_text(spot)}" if spot.found else shown, fontsize=8.5)
+        heading = title or (spot.status if len(spot.status) < 90 else f"{spot.status[:87]}...")
+        ax.set_title(f"{heading}: {_centre_text(spot)}" if spot.found else heading, fontsize=8.5)
         return figure
 
 
 def _mark(ax, spot: Spot) -> None:
-    """Centre and ellipse of three standard deviations."""
+    """Draw the centre and the ellipse of three standard deviations."""
     values, vectors = np.linalg.eigh(spot.covariance)
     turn = np.linspace(0.0, 2.0 * np.pi, 120)
     ring = vectors @ (np.sqrt(values)[:, None] * ELLIPSE * np.stack([np.cos(turn), np.sin(turn)]))
@@ -89,7 +89,7 @@ def _centre_text(spot: Spot) -> str:
 
 
 def visibility_figure(visibility: Visibility) -> Figure:
-    """Rangers by retroreflectors, each cell coloured by whether it is seen, or why not."""
+    """Chart of rangers by retroreflectors, coloured by visibility or the reason against it."""
     rangers, targets = visibility.code.shape
     with styled():
         figure = Figure(figsize=(min(12.0, 3.2 + 0.16 * targets), 1.6 + 0.22 * rangers), layout="constrained")
@@ -107,8 +107,8 @@ def visibility_figure(visibility: Visibility) -> Figure:
         if targets <= MOST_LABELS:
             ax.grid(which="minor", color="white", lw=0.8)
         ax.tick_params(which="both", length=0)
-        there = [sight for sight in SIGHTS if np.any(visibility.code == sight)]
-        counts = {sight: int(np.sum(visibility.code == sight)) for sight in there}
-        handles = [mpl.patches.Patch(color=SIGHTS[s][0], label=f"{SIGHTS[s][1]}: {counts[s]}") for s in there]
+        present = [sight for sight in SIGHTS if np.any(visibility.code == sight)]
+        counts = {sight: int(np.sum(visibility.code == sight)) for sight in present}
+        handles = [mpl.patches.Patch(color=SIGHTS[s][0], label=f"{SIGHTS[s][1]}: {counts[s]}") for s in present]
         figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
         return figure

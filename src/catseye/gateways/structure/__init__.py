@@ -1,1 +1,1 @@
-"""A flexible telescope on the way out."""
+"""Output of a flexible telescope's structural model."""

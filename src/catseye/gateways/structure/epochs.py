@@ -1,4 +1,4 @@
-"""Epochs of a structure: reductions in folders, a list of them, or the solutions of a journal; ranges at full rate."""
+"""Epochs of a structure from reductions, a list, or a journal; ranges at full rate."""
 
 import hashlib
 import json
@@ -25,21 +25,21 @@ from catseye.verdict import Verdict
 RESULT, POSE = "coordinates.json", "pose.json"
 REQUIRED = ("reduction", "azimuth_deg", "elevation_deg")
 OPTIONAL = ("temperature_c", "mjd_utc")
-RECENT = 1800.0 / SECONDS_PER_DAY  # d: weather older or younger than this says nothing of an epoch
-CARRIED = (
-    "A journal's solutions carry one another on: they are not independent, and the model's own uncertainty is too "
-    "small; the epochs left out show by how much. Take one in some minutes with --every-s."
+RECENT = 1800.0 / SECONDS_PER_DAY  # d, largest time between weather and epoch
+CORRELATED = (
+    "A journal's solutions build on each other: they are not independent, and the model's claimed uncertainty is too "
+    "small; the epochs left out show by how much. Take one every few minutes with --every-s."
 )
-AIR = "Temperatures are the air's at the weather stations, which the steel follows late."
+AIR = "Temperatures are those of the air at the weather stations; the steel lags behind."
 
 
 @dataclass(frozen=True, eq=False)
 class ReadEpochs:
-    """Epochs, where they came from, and what people should know.
+    """Epochs with their sources, notes and doubts.
 
-    inputs   SHA-256 of each file read, by its name
-    notes    for people
-    doubts   notes that the epochs make a model claim too much
+    inputs   SHA-256 of each input file, by name
+    notes    for the reader
+    doubts   notes on epochs that make a model's uncertainty too small
     """
 
     epochs: tuple[PlacesEpoch, ...]
@@ -54,13 +54,13 @@ class ReadEpochs:
 
 
 def read_epochs(sources: Sequence[Path], listed: Path | None = None) -> ReadEpochs:
-    """Epochs of reductions.
+    """Read epochs of reductions.
 
-    sources   directories that `catseye reduce` wrote, or that hold such directories; coordinates.json files
-    listed    CSV with the columns reduction, azimuth_deg, elevation_deg and perhaps temperature_c and mjd_utc: a
-              directory or file, relative to it, and how the telescope stood; it counts before what the files say
+    sources   output directories of `catseye reduce`, or directories of these; coordinates.json files
+    listed    CSV with the columns reduction, azimuth_deg, elevation_deg and optionally temperature_c and mjd_utc: a
+              directory or file, relative to it, and the telescope's position; it overrides the files'
 
-    Raises InputError for a file that is missing, is no reduction, or has no posture.
+    Raises InputError for a file that is missing, not a reduction, or without posture.
     """
     inputs: dict[str, str] = {}
     epochs = [_epoch(place, {}, inputs) for source in sources for place in _results(source)]
@@ -81,12 +81,12 @@ def read_epochs(sources: Sequence[Path], listed: Path | None = None) -> ReadEpoc
             (place,) = _results(listed.parent / name)[:1] or [listed.parent / name]
             epochs.append(_epoch(place, {key: float(v[row]) for key, v in columns.items()}, inputs, name))
     if not epochs:
-        raise InputError("there is no epoch (expected directories of `catseye reduce`, or --epochs LIST.csv)")
+        raise InputError("no epoch found (expected directories of `catseye reduce`, or --epochs LIST.csv)")
     return ReadEpochs(tuple(epochs), inputs)
 
 
 def _results(source: Path) -> list[Path]:
-    """The coordinates.json that a path stands for."""
+    """Paths of the coordinates.json for a source."""
     if source.is_file():
         return [source]
     if (source / RESULT).is_file():
@@ -94,18 +94,18 @@ def _results(source: Path) -> list[Path]:
     places = sorted(source.glob(f"*/{RESULT}")) if source.is_dir() else []
     if not places:
         what = "holds no coordinates.json, nor do its directories" if source.is_dir() else "missing"
-        raise InputError(f"{source}: {what} (expected what `catseye reduce` wrote)")
+        raise InputError(f"{source}: {what} (expected the output of `catseye reduce`)")
     return places
 
 
 def _epoch(place: Path, numbers: Mapping[str, float], inputs: dict[str, str], label: str = "") -> PlacesEpoch:
-    """One reduction, with its posture."""
+    """Epoch of one reduction, with its posture."""
     document = _object(place, inputs)
     posture = dict(numbers)
     pose = place.parent / POSE
     if "azimuth_deg" not in posture:
         if not pose.is_file():
-            raise InputError(f"{place}: no {POSE} beside it says the posture (expected one, or --epochs LIST.csv)")
+            raise InputError(f"{place}: no {POSE} with the posture beside it (expected one, or --epochs LIST.csv)")
         nominal = _object(pose, inputs).get("nominal_posture")
         if not isinstance(nominal, dict) or not {"azimuth_deg", "elevation_deg"} <= set(nominal):
             raise InputError(f"{pose}: nominal_posture is missing (expected azimuth_deg and elevation_deg)")
@@ -152,23 +152,23 @@ def _places(document: Mapping[str, Any], place: Path) -> tuple[tuple[str, ...], 
     names = tuple(points)
     try:
         x = np.array([[points[name][axis] for axis in "xyz"] for name in names], dtype=float)
-        whole = covariance if isinstance(covariance, np.ndarray) else np.array(covariance, dtype=float)
+        matrix = covariance if isinstance(covariance, np.ndarray) else np.array(covariance, dtype=float)
         at = [order.index(f"{name} {axis}") for name in names for axis in "xyz"]
     except (KeyError, TypeError, ValueError) as problem:
         raise InputError(f"{place}: points and covariance do not fit: {problem} (expected three each)") from problem
-    if whole.shape != (len(order), len(order)) or not np.isfinite(whole).all() or not np.isfinite(x).all():
-        raise InputError(f"{place}: covariance {whole.shape} of {len(order)} rows (expected a finite square)")
-    return names, x, np.array(whole[np.ix_(at, at)], dtype=float)
+    if matrix.shape != (len(order), len(order)) or not np.isfinite(matrix).all() or not np.isfinite(x).all():
+        raise InputError(f"{place}: covariance {matrix.shape} of {len(order)} rows (expected a finite square)")
+    return names, x, np.array(matrix[np.ix_(at, at)], dtype=float)
 
 
 def read_journal_epochs(journal: str, *, run: int | str | None = None, every_s: float = 0.0) -> ReadEpochs:
-    """The solutions of a run as epochs, with the mean of the stations' temperatures about them.
+    """Solutions of a run as epochs, with the mean of the stations' temperatures around them.
 
     journal   file or URL
-    run       number or beginning of its uuid; the last
-    every_s   s, least between two epochs; 0 takes all
+    run       number or beginning of its uuid; None for the last
+    every_s   s, least time between two epochs; 0 takes all
 
-    Raises InputError for no such run, and where no solution has points with a covariance.
+    Raises InputError for an unknown run, or if no solution has points with a covariance.
     """
     with JournalReader(journal) as reader:
         number = reader.run(run).run
@@ -192,7 +192,7 @@ def read_journal_epochs(journal: str, *, run: int | str | None = None, every_s: 
     if without:
         notes.append(f"{without} solutions gave no points and were left out.")
     times, warm = (np.array(v) for v in zip(*weather, strict=True)) if weather else (np.zeros(0), np.zeros(0))
-    return ReadEpochs(tuple(_warmed(epoch, times, warm) for epoch in epochs), hashes, tuple(notes), (CARRIED,))
+    return ReadEpochs(tuple(_warmed(epoch, times, warm) for epoch in epochs), hashes, tuple(notes), (CORRELATED,))
 
 
 def _solved(entry: EpochSolution, mjd: float) -> PlacesEpoch | None:
@@ -219,14 +219,14 @@ def _warmed(epoch: PlacesEpoch, times: np.ndarray, warm: np.ndarray) -> PlacesEp
 def read_range_series(
     journal: str, points: Sequence[str], *, run: int | str | None = None, least: int = 64
 ) -> tuple[tuple[RangeSeries, ...], dict[str, str], float]:
-    """The used ranges of a run by ranger and target, the hashes of its files, and the MJD of 0 s.
+    """Used ranges of a run by ranger and target, hashes of its files, and the MJD of 0 s.
 
     journal   file or URL
     points    names of targets, or patterns
-    run       number or beginning of its uuid; the last
-    least     ranges: shorter series are left out
+    run       number or beginning of its uuid; None for the last
+    least     smallest number of ranges of a series
 
-    Raises InputError for no such run, no such target.
+    Raises InputError for an unknown run or target.
     """
     with JournalReader(journal) as reader:
         number = reader.run(run).run
@@ -240,17 +240,17 @@ def read_range_series(
                 rows.setdefault((shot.ranger, shot.target), []).append(
                     (shot.ticks, 0.5 * shot.duration, entry.range_, entry.u_range)
                 )
-    kept = {key: np.array(sorted(ranges)) for key, ranges in rows.items() if len(ranges) >= least}
-    if not kept:
+    long_series = {key: np.array(sorted(ranges)) for key, ranges in rows.items() if len(ranges) >= least}
+    if not long_series:
         some = ", ".join(sorted(targets)[:8])
         most = max((len(ranges) for ranges in rows.values()), default=0)
         raise InputError(
             f"journal {journal}: run {number} has no target {', '.join(points)} with {least} used ranges of one ranger "
             f"(the most is {most}; its targets are {some})"
         )
-    zero = min(int(ranges[0, 0]) for ranges in kept.values())
+    zero = min(int(ranges[0, 0]) for ranges in long_series.values())
     series = []
-    for (ranger, target), ranges in sorted(kept.items()):
+    for (ranger, target), ranges in sorted(long_series.items()):
         seconds = (ranges[:, 0] - zero) * (SECONDS_PER_DAY / TICKS_PER_DAY) + ranges[:, 1]
         good = np.isfinite(ranges[:, 2:]).all(axis=1) & np.concatenate([[True], np.diff(seconds) > 0.0])
         window = 2.0 * float(np.median(ranges[:, 1]))

@@ -1,4 +1,4 @@
-"""Figures of a structure: how its group moves with elevation, what is left, and spectra."""
+"""Figures of a structure: motion with elevation, residuals, spectra."""
 
 import numpy as np
 
@@ -13,14 +13,14 @@ BAND = 2.0  # standard uncertainties shown
 
 
 def motion_figure(fit: StructureFit) -> str:
-    """Shift and turn of the group with elevation, its uncertainty, each epoch's residual motion about it."""
+    """Shift and rotation of the group with elevation, with u and each epoch's residual motion."""
     from catseye.estimation.harmonic.body import rigid_part
 
     series = fit.series
     e = np.asarray(series.posture.elevation, dtype=float)
     grid = np.linspace(e.min(), e.max(), 121)
     predicted = fit.predict(grid)
-    at = fit.predict(e)  # with temperature and way taken off
+    at = fit.predict(e)  # without temperature and direction terms
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9.2, 5.4), layout="constrained")
         axes = figure.subplots(2, 3, sharex=True)
@@ -30,13 +30,13 @@ def motion_figure(fit: StructureFit) -> str:
             u = BAND * np.sqrt(np.maximum(predicted.six_covariance[:, c, c], 0.0)) / scale
             panel.fill_between(grid / DEGREE, value - u, value + u, color=SERIES[0], alpha=0.18, linewidth=0)
             panel.plot(grid / DEGREE, value, color=SERIES[0])
-            left = np.full(len(e), np.nan)
+            residual_motion = np.full(len(e), np.nan)
             for t, residual in enumerate(fit.fit.residual):
-                there = np.isfinite(residual).all(axis=1)
-                part = rigid_part(fit.arms[there]) if there.sum() >= 3 else None
+                measured = np.isfinite(residual).all(axis=1)
+                part = rigid_part(fit.arms[measured]) if measured.sum() >= 3 else None
                 if part is not None:
-                    left[t] = float(np.einsum("ni,ni->", part[c], residual[there])) / scale
-            panel.plot(e / DEGREE, at.six[:, c] / scale + left, "o", color=INK, markersize=2.6)
+                    residual_motion[t] = float(np.einsum("ni,ni->", part[c], residual[measured])) / scale
+            panel.plot(e / DEGREE, at.six[:, c] / scale + residual_motion, "o", color=INK, markersize=2.6)
             panel.set_title(f"{'shift' if c < 3 else 'turn about'} {AXES[c % 3]}, {unit}")
             if c >= 3:
                 panel.set_xlabel("elevation, degrees")
@@ -44,7 +44,7 @@ def motion_figure(fit: StructureFit) -> str:
 
 
 def residual_figure(fit: StructureFit, check: LeaveOut | None) -> str:
-    """Map of the residuals, points down, epochs in order of elevation; and those left out over their claim."""
+    """Map of residuals, points downwards, epochs by elevation; and left-out epochs over their claim."""
     order = np.argsort(np.asarray(fit.series.posture.elevation))
     residual = fit.fit.residual[order] / MILLIMETRE
     limit = float(np.nanquantile(np.abs(residual), 0.98)) or 1.0
@@ -53,7 +53,7 @@ def residual_figure(fit: StructureFit, check: LeaveOut | None) -> str:
         grid = figure.add_gridspec(2, 3, height_ratios=[1.6, 1.0])
         for i, axis in enumerate(AXES):
             panel = figure.add_subplot(grid[0, i])
-            shown = panel.imshow(
+            image = panel.imshow(
                 residual[:, :, i].T, aspect="auto", cmap="RdBu_r", vmin=-limit, vmax=limit, interpolation="nearest"
             )
             panel.set_title(f"residual {axis}")
@@ -65,7 +65,7 @@ def residual_figure(fit: StructureFit, check: LeaveOut | None) -> str:
                 panel.set_yticks([])
             else:
                 panel.set_ylabel("point" if i == 0 else "")
-        figure.colorbar(shown, ax=figure.axes, label="mm", pad=0.01)
+        figure.colorbar(image, ax=figure.axes, label="mm", pad=0.01)
         below = figure.add_subplot(grid[1, :])
         if check is None:
             below.hist(residual[np.isfinite(residual)], bins=40, color=SERIES[0])
@@ -77,15 +77,15 @@ def residual_figure(fit: StructureFit, check: LeaveOut | None) -> str:
             below.hist(np.clip(ratio, -5.0, 5.0), bins=50, range=(-5, 5), density=True, color=SERIES[0], alpha=0.75)
             below.plot(x, np.exp(-0.5 * x**2) / np.sqrt(2.0 * np.pi), color=BAD)
             below.set_xlabel(
-                "epochs left out: measured less foretold, in claimed standard uncertainties (beyond 5 at 5)"
+                "epochs left out: measured minus predicted, in claimed standard uncertainties (clipped at 5)"
             )
         below.set_yticks([])
-        below.set_title("Honest when the bars fill the red curve" if check is not None else "Residuals")
+        below.set_title("Claims are correct if the bars match the red curve" if check is not None else "Residuals")
         return svg(figure)
 
 
 def spectrum_figure(vibration: Vibration) -> str:
-    """Densities of all series with the first one's band, peaks named."""
+    """Densities of all series with the first one's confidence band, peaks named."""
     f, density = vibration.spectrum.frequency_hz, vibration.spectrum.density / MILLIMETRE**2
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9.2, 4.2), layout="constrained")

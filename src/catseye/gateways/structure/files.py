@@ -1,4 +1,4 @@
-"""All files of a structure's model or of its vibration: tables, object, report, samplers, provenance."""
+"""Files of a structure's model or of its vibration: tables, JSON, report, samplers, provenance."""
 
 from collections.abc import Mapping
 from datetime import UTC, datetime
@@ -35,16 +35,16 @@ def write_structure(
     inputs: Mapping[str, str],
     progress: Progress | None = None,
 ) -> None:
-    """The files of a fit.
+    """Write the files of a fit.
 
     fit, check, predicted   as for `structure_object`
-    directory               ours to fill: see `writers.output.whole_directory`
-    answer                  what `structure_object` gave
-    inputs                  SHA-256 of each file read, by its name
-    progress                told of each file
+    directory               existing, from `writers.output.whole_directory`
+    answer                  object from `structure_object`
+    inputs                  SHA-256 of each input file, by name
+    progress                called for each file
     """
     when = datetime.now(UTC)
-    asked = answer.get("prediction") or {}
+    request = answer.get("prediction") or {}
     files: Files = {
         "coefficients.csv": lambda: coefficients_csv(fit),
         "residuals.csv": lambda: residuals_csv(fit, check),
@@ -52,14 +52,14 @@ def write_structure(
         "report.html": lambda: _structure_page(fit, answer, check, predicted),
     }
     if predicted is not None:
-        files = {"prediction.csv": lambda: prediction_csv(predicted, asked), **files}
+        files = {"prediction.csv": lambda: prediction_csv(predicted, request), **files}
     provenance = {
         "format": FORMAT,
         "made_by": "catseye structure",
         "model": vars(fit.model) | {"group": fit.series.group},
     }
     write_files(files, directory, {**provenance, **origin(when, inputs)}, progress=progress)
-    join_samplers(directory, SAMPLERS, structure_samplers(fit, check, predicted, asked=asked))
+    join_samplers(directory, SAMPLERS, structure_samplers(fit, check, predicted, request=request))
 
 
 def write_vibration(
@@ -70,7 +70,7 @@ def write_vibration(
     inputs: Mapping[str, str],
     progress: Progress | None = None,
 ) -> None:
-    """The files of a vibration; arguments as for `write_structure`; zero_mjd is the MJD of 0 s."""
+    """Write the files of a vibration; arguments as for `write_structure`; zero_mjd: MJD of 0 s."""
     when = datetime.now(UTC)
     files: Files = {
         "spectra.csv": lambda: spectra_csv(vibration),
@@ -83,7 +83,7 @@ def write_vibration(
 
 
 def coefficients_csv(fit: StructureFit) -> str:
-    """The group's shift and turn for a unit of each function."""
+    """Table of the group's shift and rotation per unit of each function."""
     six, q = fit.six_of()
     u = np.sqrt(np.maximum(np.diag(q), 0.0)).reshape(-1, 6).T
     names = [f"shift_{a}_mm" for a in "xyz"] + [f"turn_{a}_arcsec" for a in "xyz"]
@@ -96,7 +96,7 @@ def coefficients_csv(fit: StructureFit) -> str:
 
 
 def residuals_csv(fit: StructureFit, check: LeaveOut | None) -> str:
-    """Every point in every epoch against the model; and against one that did not see the epoch."""
+    """Table of residuals of every point and epoch, with and without the epoch in the fit."""
     s = fit.series
     e, warm = (np.asarray(v, dtype=float) for v in (s.posture.elevation, s.posture.temperature_c))
     head = ["epoch", "mjd_utc", "elevation_deg", "temperature_c", "way", "point"]
@@ -119,20 +119,20 @@ def residuals_csv(fit: StructureFit, check: LeaveOut | None) -> str:
     return csv_text(head, rows)
 
 
-def prediction_csv(predicted: Prediction, asked: Mapping[str, Any]) -> str:
-    """Where the points will be."""
+def prediction_csv(predicted: Prediction, request: Mapping[str, Any]) -> str:
+    """Table of predicted points."""
     rows = []
-    for k, e in enumerate(asked["elevation_deg"]):
+    for k, e in enumerate(request["elevation_deg"]):
         for i, name in enumerate(predicted.names):
             u = np.sqrt(np.diag(predicted.covariance[k, i])) / MILLIMETRE
             place = (f"{v:.7f}" for v in predicted.place[k, i])
-            rows.append((f"{e:.6f}", cell(asked["temperature_c"], ".3f"), name, *place, *(f"{v:.4f}" for v in u)))
+            rows.append((f"{e:.6f}", cell(request["temperature_c"], ".3f"), name, *place, *(f"{v:.4f}" for v in u)))
     head = ("elevation_deg", "temperature_c", "point", "x_m", "y_m", "z_m", "u_x_mm", "u_y_mm", "u_z_mm")
     return csv_text(head, rows)
 
 
 def spectra_csv(vibration: Vibration) -> str:
-    """Densities with their bands."""
+    """Table of densities with their confidence bands."""
     f, density, band = vibration.spectrum.frequency_hz, vibration.spectrum.density, vibration.spectrum.interval(0.95)
     rows = [
         (s.name, f"{x:.6f}", f"{density[k, a]:.6e}", f"{band[k, a, 0]:.6e}", f"{band[k, a, 1]:.6e}")
@@ -150,13 +150,13 @@ def _structure_page(
         card("Epochs", str(len(s)), f"{len(s.names)} points of {s.group}, frame {s.frame}"),
         card("Variance factor", f"{fit.fit.variance_factor:.2f}", f"{fit.fit.degrees_of_freedom} degrees of freedom"),
         card(
-            "New in each epoch",
+            "Scatter between epochs",
             f"{1e3 * np.linalg.norm(fit.scatter.u_six[:3]):.2f} mm",
-            f"of the group's shift, and {fit.scatter.u_point * 1e3:.3f} mm of each coordinate: not foretold",
+            f"of the group's shift, and {fit.scatter.u_point * 1e3:.3f} mm of each coordinate: not predictable",
         ),
     ]
     if check is not None:
-        cards.append(card("Epochs left out", f"{check.rms * 1e3:.3f} mm rms", f"{check.ratio:.2f} of what was claimed"))
+        cards.append(card("Epochs left out", f"{check.rms * 1e3:.3f} mm rms", f"{check.ratio:.2f} of the claim"))
     six, q = fit.six_of()
     u = np.sqrt(np.maximum(np.diag(q), 0.0)).reshape(-1, 6).T
     units = np.repeat([MILLIMETRE, ARCSECOND], 3)
@@ -172,31 +172,31 @@ def _structure_page(
         *(paragraph(note) for note in answer["notes"]),
         section(
             "motion",
-            "How the group moves",
+            "Motion of the group",
             picture(
                 motion_figure(fit),
-                "Shift and turn about the pivot from the mean of the epochs, at the reference temperature; the band is "
-                "two standard uncertainties of an epoch to come. Points are the epochs, temperature and way taken off.",
+                "Shift and rotation about the pivot from the mean of the epochs, at the reference temperature. Band: "
+                "two standard uncertainties of a future epoch. Points: epochs without temperature and direction terms.",
             ),
             table(head, rows, "tnnnnnn"),
         ),
         section(
             "residuals",
-            "What is left",
-            picture(residual_figure(fit, check), "Measured less model, of each point in each epoch, 98 % within."),
+            "Residuals",
+            picture(residual_figure(fit, check), "Measured minus model, for each point and epoch; colours cover 98 %."),
         ),
     ]
     if predicted is not None:
-        asked = answer["prediction"]
+        request = answer["prediction"]
         lines = [
             [f"{e:g}", name, *(f"{v:.5f}" for v in predicted.place[k, i]),
              *(f"{v * 1e3:.3f}" for v in np.sqrt(np.diag(predicted.covariance[k, i])))]
-            for k, e in enumerate(asked["elevation_deg"])
+            for k, e in enumerate(request["elevation_deg"])
             for i, name in enumerate(predicted.names)
         ]  # fmt: skip
         warned = [paragraph(text, "bad") for text in predicted.outside]
         columns = ["elevation, degrees", "point", "x, m", "y, m", "z, m", "u x, mm", "u y, mm", "u z, mm"]
-        parts.append(section("prediction", "Where the points will be", *warned, table(columns, lines, "ntnnnnnn")))
+        parts.append(section("prediction", "Predicted points", *warned, table(columns, lines, "ntnnnnnn")))
     return page(f"Structure: {s.group}", "\n".join(parts))
 
 
@@ -217,7 +217,7 @@ def _vibration_page(vibration: Vibration) -> str:
          f"{np.sqrt(m.covariance[0, 0]) * 1e6:.1f}"]
         for m in vibration.modes
     ]  # fmt: skip
-    head = ["shown at, Hz", "is at, Hz", "may be, Hz", "times the background", "largest rms in the band, µm"]
+    head = ["observed, Hz", "true, Hz", "possible, Hz", "times the background", "largest rms in the band, µm"]
     parts = [
         "<header><h1>Vibration</h1></header>",
         *(paragraph(note) for note in vibration.notes),
@@ -226,8 +226,8 @@ def _vibration_page(vibration: Vibration) -> str:
             "Spectra",
             picture(
                 spectrum_figure(vibration),
-                "One-sided density of each range; the band holds the first one's true density with 95 %. Red: half the "
-                "rate. A question mark: it may be an alias.",
+                "One-sided density of each range; the band is the 95 % interval of the first one's density. Red: half "
+                "the rate. A question mark: it may be an alias.",
             ),
             table(head, rows, "nntnt"),
         ),

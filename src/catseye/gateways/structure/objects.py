@@ -1,4 +1,4 @@
-"""A structure's model and its vibration as plain objects and as tables of samplers; SI unless a key says otherwise."""
+"""Structural model and vibration as JSON and sampler tables; SI unless a key says otherwise."""
 
 from typing import Any
 
@@ -25,14 +25,14 @@ def structure_object(
     notes: tuple[str, ...],
     verdict: Verdict,
 ) -> dict[str, Any]:
-    """A fit as `catseye structure --json` gives it.
+    """Object that `catseye structure --json` prints.
 
     fit         the model
-    check       epochs left out, if asked for
-    predicted   what was foretold, if asked for
-    asked       the prediction's elevation_deg, temperature_c and way
-    notes       for people
-    verdict     `reduction.structure.verdict.structure_verdict`'s
+    check       cross-validation, if requested
+    predicted   prediction, if requested
+    asked       elevation_deg, temperature_c and way of the prediction
+    notes       for the reader
+    verdict     from `reduction.structure.verdict.structure_verdict`
     """
     six, covariance = fit.six_of()
     u = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(-1, 6).T
@@ -74,19 +74,19 @@ def _range(values: Any) -> list[float]:
 
 def _check(check: LeaveOut) -> dict[str, Any]:
     inside = ~check.extrapolated
-    each = check.normalised
+    ratios = check.normalised
     return {
         "rms": check.rms,
         "ratio": check.ratio,
-        "ratio_inside": float(np.sqrt(np.nanmean(each[inside]) / 3.0)) if inside.any() else float("nan"),
+        "ratio_inside": float(np.sqrt(np.nanmean(ratios[inside]) / 3.0)) if inside.any() else float("nan"),
         "folds": int(check.fold.max()) + 1,
         "extrapolated_epochs": int(check.extrapolated.sum()),
     }
 
 
-def _prediction(predicted: Prediction, asked: dict[str, Any]) -> dict[str, Any]:
+def _prediction(predicted: Prediction, request: dict[str, Any]) -> dict[str, Any]:
     return {
-        **asked,
+        **request,
         "points": {
             name: {"place": predicted.place[:, i], "covariance": predicted.covariance[:, i]}
             for i, name in enumerate(predicted.names)
@@ -98,9 +98,9 @@ def _prediction(predicted: Prediction, asked: dict[str, Any]) -> dict[str, Any]:
 
 
 def structure_samplers(
-    fit: StructureFit, check: LeaveOut | None, predicted: Prediction | None, *, asked: dict[str, Any]
+    fit: StructureFit, check: LeaveOut | None, predicted: Prediction | None, *, request: dict[str, Any]
 ) -> dict[str, SamplerTable]:
-    """The fit as FITS tables: residuals by epoch and point, coefficients, what was foretold."""
+    """Tables of a fit for FITS: residuals, coefficients, prediction."""
     series = fit.series
     words: dict[str, Any] = {"frame": f"{series.frame}, as the rigid telescope carries it", "pivot": _pivot(fit)}
     t, p = np.nonzero(np.isfinite(fit.fit.residual).all(axis=2))
@@ -109,10 +109,10 @@ def structure_samplers(
         "POINT": SamplerColumn("", np.array([series.names[i] for i in p]), "name"),
         "ELEVATION": SamplerColumn("deg", np.asarray(series.posture.elevation)[t] / DEGREE, "of the telescope"),
         "TEMPERATURE": SamplerColumn("K", np.asarray(series.posture.temperature_c)[t] + ZERO_CELSIUS_K, "structure"),
-        "RESIDUAL": SamplerColumn("m", fit.fit.residual[t, p], "x, y, z: measured less model"),
+        "RESIDUAL": SamplerColumn("m", fit.fit.residual[t, p], "x, y, z: measured minus model"),
     }
     if check is not None:
-        columns["LEFTOUT"] = SamplerColumn("m", check.residual[t, p], "x, y, z: measured less foretold, epoch left out")
+        columns["LEFTOUT"] = SamplerColumn("m", check.residual[t, p], "measured minus predicted, epoch left out")
         u = np.sqrt(np.einsum("tnii->tni", check.covariance))[t, p]
         columns["U_LEFTOUT"] = SamplerColumn("m", u, "claimed standard uncertainty")
     mjd = series.mjd[t] if np.isfinite(series.mjd).all() else None
@@ -123,8 +123,8 @@ def structure_samplers(
         "COEFFICIENTS",
         {
             "FUNCTION": SamplerColumn("", np.array(fit.model.functions), "of elevation E, temperature t, way up"),
-            "SHIFT": SamplerColumn("m", six[:3].T, "x, y, z for a unit of the function"),
-            "TURN": SamplerColumn("rad", six[3:].T, "about x, y, z for a unit of the function"),
+            "SHIFT": SamplerColumn("m", six[:3].T, "x, y, z per unit of the function"),
+            "TURN": SamplerColumn("rad", six[3:].T, "about x, y, z per unit of the function"),
             "U_SHIFT": SamplerColumn("m", u[:, :3], "standard uncertainty"),
             "U_TURN": SamplerColumn("rad", u[:, 3:], "standard uncertainty"),
         },
@@ -136,12 +136,12 @@ def structure_samplers(
         tables["PREDICTION"] = SamplerTable(
             "PREDICTION",
             {
-                "ELEVATION": SamplerColumn("deg", np.array(asked["elevation_deg"], dtype=float)[k], "asked for"),
+                "ELEVATION": SamplerColumn("deg", np.array(request["elevation_deg"], dtype=float)[k], "requested"),
                 "POINT": SamplerColumn("", np.array([predicted.names[i] for i in n]), "name"),
                 "PLACE": SamplerColumn("m", predicted.place[k, n], "x, y, z"),
                 "COVARIANCE": SamplerColumn("m2", predicted.covariance[k, n], "of x, y, z"),
             },
-            comment="Where points will be.",
+            comment="Predicted points.",
             **words,
         )
     return tables
@@ -152,7 +152,7 @@ def _pivot(fit: StructureFit) -> str:
 
 
 def vibration_object(vibration: Vibration) -> dict[str, Any]:
-    """Vibration as `catseye structure --vibration --json` gives it."""
+    """Object that `catseye structure --vibration --json` prints."""
     names = [s.name for s in vibration.series]
     return {
         "series": {
@@ -201,7 +201,7 @@ def vibration_object(vibration: Vibration) -> dict[str, Any]:
 
 
 def vibration_samplers(vibration: Vibration, zero_mjd: float) -> dict[str, SamplerTable]:
-    """Densities with their bands, and the ranges themselves.
+    """Tables of densities with confidence bands, and of the ranges.
 
     vibration   vibration
     zero_mjd    MJD of 0 s of the series
@@ -220,7 +220,7 @@ def vibration_samplers(vibration: Vibration, zero_mjd: float) -> dict[str, Sampl
             "LOW": SamplerColumn(PSD, band[..., 0].T.ravel(), "95 percent, chi-square"),
             "HIGH": SamplerColumn(PSD, band[..., 1].T.ravel(), "95 percent, chi-square"),
         },
-        comment="Spectra of ranges, the mean over each buffer not undone.",
+        comment="Spectra of ranges, not corrected for the mean over each buffer.",
         header={"FREEDOM": vibration.spectrum.degrees},
     )
     ranges = SamplerTable(

@@ -1,1 +1,1 @@
-"""A dish's surface on the way out."""
+"""Output of a dish's surface."""

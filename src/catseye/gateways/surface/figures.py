@@ -13,30 +13,30 @@ from catseye.reduction.surface.lookup import HYSTERESIS, Lookup
 from catseye.reduction.surface.shape import Expansion, LitAperture, ShapeSettings, SurfaceShape
 
 LEVELS = 21
-MOST_NAMED = 60  # prisms whose names fit
+MOST_NAMED = 60  # most prisms with names
 PANELS = 6  # terms of an elevation figure
 
 
 def surface_map(
     local: np.ndarray, value: np.ndarray, aperture: LitAperture, *, label: str, names: tuple[str, ...] = ()
 ) -> Figure:
-    """Values at prisms, and between them by plain triangles.
+    """Map of values at prisms, interpolated linearly in triangles.
 
     local      (k, 2 or 3) m, dish's frame
     value      (k,) m
-    label      of the scale, with mm
-    names      of the prisms, where there are few
+    label      label of the scale, in mm
+    names      names of the prisms, shown if few
     """
     with styled():
         figure = Figure(figsize=(9.0, 6.8), layout="constrained")
         ax = figure.add_subplot()
-        x, y, shown = local[:, 0], local[:, 1], value / MILLIMETRE
-        limit = max(float(np.max(np.abs(shown))), 1e-6)
+        x, y, value_mm = local[:, 0], local[:, 1], value / MILLIMETRE
+        limit = max(float(np.max(np.abs(value_mm))), 1e-6)
         levels = np.linspace(-limit, limit, LEVELS)
         scale: Any = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}
-        ax.tricontourf(x, y, shown, levels, extend="both", alpha=0.75, **scale)
+        ax.tricontourf(x, y, value_mm, levels, extend="both", alpha=0.75, **scale)
         size = 60.0 if len(x) <= MOST_NAMED else 7.0
-        dots = ax.scatter(x, y, c=shown, s=size, edgecolors=FAINT, linewidths=0.4 if size > 10 else 0.0, **scale)
+        dots = ax.scatter(x, y, c=value_mm, s=size, edgecolors=FAINT, linewidths=0.4 if size > 10 else 0.0, **scale)
         if len(names) <= MOST_NAMED:
             for name, px, py in zip(names, x, y, strict=False):
                 ax.annotate(name, (px, py), xytext=(0, -6), textcoords="offset points", ha="center", va="top",
@@ -49,20 +49,20 @@ def surface_map(
 
 
 def shape_map(shape: SurfaceShape) -> Figure:
-    """Half-path errors of one epoch, off its fitted paraboloid."""
+    """Map of half-path errors of one epoch relative to its fitted paraboloid."""
     fit = shape.fit
     return surface_map(fit.local, fit.half_path, shape.aperture, label="half-path error (mm)", names=shape.prisms.names)
 
 
 def change_map(change: Change) -> Figure:
-    """Change of the half path between two epochs."""
+    """Map of the half-path change between two epochs."""
     return surface_map(
         change.local, change.half_path, change.aperture, label="change of half path (mm)", names=change.names
     )
 
 
 def actuator_map(actuators: Actuators, aperture: LitAperture) -> Figure:
-    """Corrections of all actuators, and their standard uncertainty."""
+    """Maps of actuator corrections and their standard uncertainty."""
     with styled():
         figure = Figure(figsize=(11.0, 5.2), layout="constrained")
         correction, u = actuators.correction / MILLIMETRE, actuators.u_correction / MILLIMETRE
@@ -86,20 +86,20 @@ def _edge(ax: Any, aperture: LitAperture) -> None:
     (x, y), radius = aperture.centre, aperture.radius
     ax.plot(x + radius * np.cos(angle), y + radius * np.sin(angle), color=FAINT, lw=0.9, ls="--")
     ax.set_aspect("equal")
-    ax.use_sticky_edges = False  # of filled contours, which would cut prisms at the edge
+    ax.use_sticky_edges = False  # sticky edges of filled contours would cut prisms at the edge
     ax.margins(0.04)
 
 
 def zernike_bars(expansion: Expansion, settings: ShapeSettings) -> Figure:
-    """Terms with their standard uncertainties, piston and tilts left to the table."""
+    """Bars of Zernike terms with standard uncertainties, without piston and tilts."""
     with styled():
-        shown = [k for k, term in enumerate(expansion.terms) if term.n >= 2] or list(range(len(expansion.terms)))
-        figure = Figure(figsize=(9.4, 0.9 + 0.27 * len(shown)), layout="constrained")
+        chosen = [k for k, term in enumerate(expansion.terms) if term.n >= 2] or list(range(len(expansion.terms)))
+        figure = Figure(figsize=(9.4, 0.9 + 0.27 * len(chosen)), layout="constrained")
         ax = figure.add_subplot()
-        rows = np.arange(len(shown))
-        value, u = expansion.value[shown] / MILLIMETRE, np.sqrt(np.diag(expansion.covariance))[shown] / MILLIMETRE
+        rows = np.arange(len(chosen))
+        value, u = expansion.value[chosen] / MILLIMETRE, np.sqrt(np.diag(expansion.covariance))[chosen] / MILLIMETRE
         ax.barh(rows, value, xerr=u, color=SERIES[0], ecolor=INK, error_kw={"lw": 1.0, "capsize": 2.5}, height=0.65)
-        labels = [f"{number(expansion.terms[k], settings.numbering)}  {expansion.terms[k].name}" for k in shown]
+        labels = [f"{number(expansion.terms[k], settings.numbering)}  {expansion.terms[k].name}" for k in chosen]
         ax.set_yticks(rows, labels)
         ax.invert_yaxis()
         ax.axvline(0.0, color=FAINT, lw=0.8)
@@ -108,7 +108,7 @@ def zernike_bars(expansion: Expansion, settings: ShapeSettings) -> Figure:
 
 
 def elevation_terms(lookup: Lookup) -> Figure:
-    """The terms that move most, measured and modelled, up and down apart."""
+    """Curves of the terms that change most, measured and modelled, up and down separately."""
     with styled():
         span = np.ptp(lookup.table[:, :, 1], axis=0)
         order = [k for k in np.argsort(span)[::-1] if lookup.models[k].term.n >= 2][:PANELS] or [0]
@@ -129,18 +129,18 @@ def elevation_terms(lookup: Lookup) -> Figure:
 
 def _elevation_panel(ax: Any, lookup: Lookup, k: int) -> None:
     at, ways = lookup.elevation_deg, (lookup.rising > 0.0, lookup.rising < 0.0)
-    both = HYSTERESIS in lookup.columns
-    for way, (chosen, mark, name) in enumerate(zip(ways, "^v", ("going up", "going down"), strict=True)):
-        color = SERIES[way]
+    directional = HYSTERESIS in lookup.columns
+    for direction, (chosen, mark, name) in enumerate(zip(ways, "^v", ("going up", "going down"), strict=True)):
+        color = SERIES[direction]
         if chosen.any():
             ax.errorbar(
                 at[chosen], lookup.measured[chosen, k] / MILLIMETRE, lookup.u_measured[chosen, k] / MILLIMETRE,
                 fmt=mark, ms=4.5, color=color, lw=0.9, capsize=2, label=name,
             )  # fmt: skip
-        if both:
-            line = lookup.table[:, k, 2 * way] / MILLIMETRE
+        if directional:
+            line = lookup.table[:, k, 2 * direction] / MILLIMETRE
             ax.plot(lookup.table_deg, line, color=color, lw=1.1)
-    if not both:
+    if not directional:
         ax.plot(lookup.table_deg, lookup.table[:, k, 1] / MILLIMETRE, color=FAINT, lw=1.1)
     band = lookup.u_table[:, k, 1] / MILLIMETRE
     mean = lookup.table[:, k, 1] / MILLIMETRE

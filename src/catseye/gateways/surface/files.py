@@ -1,4 +1,4 @@
-"""All files of a surface, and the table of its actuators."""
+"""Files of a surface, and the table of its actuators."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -34,7 +34,7 @@ from catseye.reduction.surface.verdict import SurfaceFindings, surface_verdict
 
 
 def surface_object(result: SurfaceFindings) -> dict[str, Any]:
-    """A surface as `catseye surface --json` gives it: the epoch's keys, or `epochs`, `change`, `lookup`."""
+    """Object that `catseye surface --json` prints: one epoch's keys, or `epochs`, `change`, `lookup`."""
     answer: dict[str, Any] = {"format": FORMAT, "verdict": surface_verdict(result).to_object()}
     if len(result.shapes) == 1:
         answer |= shape_object(result.shapes[0])
@@ -49,11 +49,11 @@ def surface_object(result: SurfaceFindings) -> dict[str, Any]:
 def write_surface(
     result: SurfaceFindings, directory: Path, inputs: Mapping[str, str], *, progress: Progress | None = None
 ) -> None:
-    """Tables, object, report, and last the provenance with the hashes of the others.
+    """Write tables, JSON, report, and the provenance with their hashes.
 
-    directory   exists, and is ours to fill: see `writers.output.whole_directory`
-    inputs      SHA-256 of each file read, by its name
-    progress    told of each file
+    directory   existing, from `writers.output.whole_directory`
+    inputs      SHA-256 of each input file, by name
+    progress    called for each file
     """
     when = datetime.now(UTC)
     files: dict[str, Any] = {}
@@ -72,19 +72,19 @@ def write_surface(
         files["actuators.csv"] = lambda: actuators_csv(rows_of(actuators))
     files["surface.json"] = lambda: json_page(surface_object(result))
     files["report.html"] = lambda: surface_report(result, when, inputs)
-    made: Files = files
+    outputs: Files = files
     provenance = {"format": FORMAT, "made_by": "catseye surface", "settings": asdict(result.shapes[-1].settings)}
-    write_files(made, directory, {**provenance, **origin(when, inputs)}, progress=progress)
+    write_files(outputs, directory, {**provenance, **origin(when, inputs)}, progress=progress)
     join_tables(directory, frame="fitted paraboloid: vertex at its origin, axis along z")
 
 
 def write_actuators(result: SurfaceFindings, path: Path) -> None:
-    """The actuators' table by the ending of its name, .csv or .fits; whole or not at all.
+    """Write the table of actuators as .csv or .fits by its suffix, atomically.
 
-    Raises InputError for another ending and where another's file would be lost.
+    Raises InputError for another suffix, or if a foreign file would be overwritten.
     """
     if result.actuators is None:
-        raise InputError(f"--actuators {path}: nothing was computed for them")
+        raise InputError(f"--actuators {path}: no actuator corrections were computed")
     rows = rows_of(result.actuators)
     ending = path.suffix.lower()
     if ending == ".csv":

@@ -1,4 +1,4 @@
-"""Prisms of a dish from what a user has: a directory that `catseye reduce` wrote, or a table of coordinates."""
+"""Prisms of a dish from an output directory of `catseye reduce` or a table of coordinates."""
 
 import json
 from collections.abc import Sequence
@@ -27,12 +27,12 @@ AXES = "xyz"
 PLACES = ("point", "x_m", "y_m", "z_m")
 SPREADS = ("u_x_mm", "u_y_mm", "u_z_mm")
 PAIRS = {"cov_xy_mm2": (0, 1), "cov_xz_mm2": (0, 2), "cov_yz_mm2": (1, 2)}
-OTHERS = ("kind", "shots", "from_approximate_mm", "u_mm")
+EXTRAS = ("kind", "shots", "from_approximate_mm", "u_mm")
 SURFACE = ("point", "x_dish_m", "y_dish_m", "z_dish_m", "deviation_mm", "u_deviation_mm")
 DISH = "dish prism"  # the kind, in coordinates.csv
 LARGEST_U_MM = 100.0
 FARTHEST_M = 1000.0
-HELD_F = 1e-6  # m, by which a reduction's focal length may differ from the site's
+HELD_F = 1e-6  # m, largest difference of a reduction's focal length from the site's
 
 
 def read_prisms(
@@ -44,12 +44,12 @@ def read_prisms(
     elevation_deg: float | None = None,
     temperature_c: float | None = None,
 ) -> tuple[Prisms, dict[str, str]]:
-    """The prisms of one epoch, and the SHA-256 of each file read.
+    """Prisms of one epoch, and SHA-256 of each input file.
 
     source          directory of `catseye reduce --out`, or a CSV of docs/formats/surface.md
-    site            the telescope's
+    site            of the telescope
     frame           of a CSV's coordinates
-    azimuth_deg, elevation_deg   posture; needed for a CSV in the ground frame, a directory knows its own
+    azimuth_deg, elevation_deg   posture; needed for a CSV in the ground frame; a directory has its own
     temperature_c   of the structure, if known
 
     Raises InputError for files that cannot be used.
@@ -60,13 +60,13 @@ def read_prisms(
         raise InputError(f"{source}: cannot be read: {problem.strerror or problem}") from problem
     if folder:
         if azimuth_deg is not None:
-            raise InputError(f"{source}: knows its own azimuth (expected --azimuth-deg with tables only)")
+            raise InputError(f"{source}: has its own azimuth (expected --azimuth-deg with tables only)")
         return _reduced(source, site, elevation_deg, temperature_c)
     return _table(source, site, frame, (azimuth_deg, elevation_deg), temperature_c)
 
 
 def prisms_of(reduction: Reduction) -> Prisms:
-    """The dish prisms of a reduced night; InputError where it saw no dish."""
+    """Dish prisms of a reduced night; InputError if it has no dish."""
     surface, coordinates, campaign = reduction.surface, reduction.coordinates, reduction.campaign
     name = campaign.site.campaign.name
     if surface is None:
@@ -95,14 +95,14 @@ def _object(folder: Folder, file: str) -> dict[str, Any]:
     except (ValueError, RecursionError) as problem:
         raise refusal(file, f"cannot be read as JSON: {problem}") from problem
     if not isinstance(stored, dict):
-        raise refusal(file, f"holds {type(stored).__name__} (expected an object, as catseye reduce writes it)")
+        raise refusal(file, f"holds {type(stored).__name__} (expected an object from catseye reduce)")
     return stored
 
 
 def _reduced(
     source: Path, site: SiteFolder, elevation_deg: float | None, temperature_c: float | None
 ) -> tuple[Prisms, dict[str, str]]:
-    """The dish prisms of a reduction, with their part of its full covariance."""
+    """Dish prisms of a reduction, with their part of its full covariance."""
     folder = Folder(source)
     answer, pose = _object(folder, "coordinates.json"), _object(folder, "pose.json")
     try:
@@ -119,10 +119,10 @@ def _reduced(
         focal = float(surface["focal_length"])
     except (KeyError, TypeError, ValueError, IndexError) as problem:
         raise refusal(
-            f"{source}/coordinates.json", f"is not a reduction's: {problem!r} (expected what catseye reduce writes)"
+            f"{source}/coordinates.json", f"is not a reduction: {problem!r} (expected the output of catseye reduce)"
         ) from problem
     if not (np.isfinite(points).all() and np.isfinite(block).all()):
-        raise refusal(f"{source}/coordinates.json", "holds a coordinate or covariance that is no number")
+        raise refusal(f"{source}/coordinates.json", "has a coordinate or covariance that is not a number")
     designed = site.site.paraboloid.focal_length_mm * MILLIMETRE
     if abs(focal - designed) > HELD_F:
         raise InputError(
@@ -159,7 +159,7 @@ def _table(
     else:
         single = "u_mm" in [cell.strip() for cell in text.partition("\n")[0].split(",")]
         needed = (*PLACES, "u_mm") if single else (*PLACES, *SPREADS)
-        columns = columns_of(text, source.name, needed, optional=(*PAIRS, *OTHERS, *(SPREADS if single else ())))
+        columns = columns_of(text, source.name, needed, optional=(*PAIRS, *EXTRAS, *(SPREADS if single else ())))
         if "kind" in columns.cells:
             columns = _of_kind(columns)
         points = np.column_stack([columns.numbers(f"{axis}_m") for axis in AXES])
@@ -172,7 +172,7 @@ def _table(
         )
     if frame == "ground":
         if azimuth is None or elevation is None:
-            raise refusal(source.name, "is in the ground frame: say --azimuth-deg and --elevation-deg of the telescope")
+            raise refusal(source.name, "is in the ground frame: give the telescope's --azimuth-deg and --elevation-deg")
         nominal = _frame(site, azimuth, elevation)
     else:
         nominal = Transform("reflector", "reflector", np.eye(3), np.zeros(3))
@@ -181,7 +181,7 @@ def _table(
 
 
 def _of_kind(columns: TextColumns) -> TextColumns:
-    """The rows of a reduction's coordinates that are prisms of the dish."""
+    """Rows of a reduction's coordinates that are dish prisms."""
     rows = [k for k, kind in enumerate(columns.cells["kind"]) if kind == DISH]
     if not rows:
         raise refusal(columns.file, f"has no row of kind {DISH!r} (expected prisms of the dish)")
@@ -191,11 +191,11 @@ def _of_kind(columns: TextColumns) -> TextColumns:
 
 def _names(columns: TextColumns) -> tuple[str, ...]:
     names = columns.cells["point"]
-    taken: set[str] = set()
+    used: set[str] = set()
     for row, name in enumerate(names):
-        if not name or name in taken:
-            raise columns.refuse(row, f"point = {shown(name)} (expected a name, each once)")
-        taken.add(name)
+        if not name or name in used:
+            raise columns.refuse(row, f"point = {shown(name)} (expected a unique name)")
+        used.add(name)
     return tuple(names)
 
 

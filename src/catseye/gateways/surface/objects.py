@@ -1,4 +1,4 @@
-"""Surfaces as plain objects for JSON, and as text for people; SI, with the unit in the key elsewhere."""
+"""Surfaces as JSON and text; SI units unless a key says otherwise."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -15,17 +15,17 @@ from catseye.reduction.surface.shape import Expansion, Gain, MeanSquare, Surface
 from catseye.reduction.surface.verdict import SurfaceFindings, stands_out
 
 FORMAT = "catseye-surface-1"
-TAKEN = 0.5  # share of a term's square from which a note is due
+ABSORBED = 0.5  # share of a term's square above which a note is given
 UNOBSERVED = "rotation about the dish's own axis: a paraboloid does not show it"
 
 
 def root(square: float) -> float | None:
-    """m; null where a noise that was taken off leaves less than nothing."""
+    """Square root, m; null if subtracting the noise left a negative square."""
     return float(np.sqrt(square)) if square >= 0.0 else None
 
 
 def shape_object(shape: SurfaceShape) -> dict[str, Any]:
-    """One epoch's shape as a plain object for JSON."""
+    """Shape of one epoch as an object for JSON."""
     fit = shape.fit
     u = np.sqrt(np.diag(fit.deviation_covariance))
     return {
@@ -59,7 +59,7 @@ def shape_object(shape: SurfaceShape) -> dict[str, Any]:
 
 
 def change_object(change: Change) -> dict[str, Any]:
-    """Second epoch less first."""
+    """Second epoch minus first."""
     u = np.sqrt(np.diag(change.deviation_covariance))
     return {
         "sources": [change.first.source, change.second.source],
@@ -80,12 +80,12 @@ def change_object(change: Change) -> dict[str, Any]:
 
 
 def _square(square: MeanSquare) -> dict[str, Any]:
-    own = root(square.own)
+    surface_rms = root(square.own)
     return {
         "half_path_rms_measured": root(square.measured),
         "half_path_rms_noise": root(square.noise),
-        "half_path_rms": own,
-        "u_half_path_rms": square.u / (2.0 * own) if own else None,
+        "half_path_rms": surface_rms,
+        "u_half_path_rms": square.u / (2.0 * surface_rms) if surface_rms else None,
         "half_path_mean_square": square.own,
         "u_half_path_mean_square": square.u,
     }
@@ -130,13 +130,13 @@ def zernike_object(expansion: Expansion, numbering: Numbering) -> dict[str, Any]
 
 
 def lookup_object(lookup: Lookup) -> dict[str, Any]:
-    """Terms by elevation as a plain object for JSON."""
+    """Terms by elevation as an object for JSON."""
     numbering = lookup.shapes[0].settings.numbering
     return {
         "columns": list(lookup.columns),
         "left_out": lookup.left_out,
         "elevation_deg": lookup.elevation_deg,
-        "rising": [way > 0.0 for way in lookup.rising],
+        "rising": [direction > 0.0 for direction in lookup.rising],
         "terms": [
             {
                 "number": number(model.term, numbering),
@@ -161,7 +161,7 @@ def lookup_object(lookup: Lookup) -> dict[str, Any]:
 
 
 def actuators_object(actuators: Actuators) -> dict[str, Any]:
-    """How many, how sure, how far."""
+    """Number, uncertainty and size of actuator corrections."""
     return {
         "actuators": len(actuators.names),
         "measured": int(actuators.measured.sum()),
@@ -178,7 +178,7 @@ def actuators_object(actuators: Actuators) -> dict[str, Any]:
 
 
 def shape_passages(shape: SurfaceShape) -> list[Passage]:
-    """What a person should know of one epoch, in order."""
+    """Passages on one epoch, in order."""
     fit, square = shape.fit, shape.square
     u = np.sqrt(np.diag(fit.deviation_covariance)) / MILLIMETRE
     passages = [
@@ -191,17 +191,17 @@ def shape_passages(shape: SurfaceShape) -> list[Passage]:
         Passage("Half path", _rms(square, shape.settings.taper_db)),
     ]
     passages += [_gain_passage(g) for g in shape.gains]
-    taken = [
+    absorbed = [
         t.name
         for t, s in zip(shape.expansion.terms, shape.expansion.share, strict=True)
-        if t.n >= 2 and s > TAKEN and not (t == (2, 0) and "focal-length" in fit.free)
+        if t.n >= 2 and s > ABSORBED and not (t == (2, 0) and "focal-length" in fit.free)
     ]
-    if taken:
+    if absorbed:
         passages.append(
             Passage(
                 "Note",
-                f"the free paraboloid takes most of {', '.join(taken)} for a turn of the offset dish; hold the axis "
-                "(--free vertex,focal-length), ask for fewer terms and read `joint`, or compare two epochs",
+                f"the free paraboloid absorbs most of {', '.join(absorbed)} as a rotation of the offset dish; fix "
+                "the axis (--free vertex,focal-length), fit fewer terms and use `joint`, or compare two epochs",
             )
         )
     return passages
@@ -219,28 +219,28 @@ def _pose(shape: SurfaceShape) -> str:
         turned = ", ".join(
             f"{v / ARCSECOND:+.2f} ± {s / ARCSECOND:.2f}" for v, s in zip(fit.rotation, u[3:], strict=True)
         )
-        parts.append(f"turned by {turned}″")
+        parts.append(f"rotated by {turned}″")
     if "focal-length" in fit.free:
         parts.append(f"focal length {fit.focal_length:.5f} ± {fit.u_focal_length:.5f} m")
     return "; ".join(parts)
 
 
 def _rms(square: MeanSquare, taper_db: float) -> str:
-    own = root(square.own)
+    surface_rms = root(square.own)
     lit = f"weighted for an edge taper of {taper_db:g} dB" if taper_db else "uniform weight over the aperture"
     text = f"{(root(square.measured) or 0.0) * 1e3:.4f} mm rms as measured, {lit}; "
-    if not own or not stands_out(square):
-        return text + "not above the measurement's own noise"
-    return text + f"{own * 1e3:.4f} ± {square.u / (2.0 * own) * 1e3:.4f} mm without the measurement's noise"
+    if not surface_rms or not stands_out(square):
+        return text + "not above the measurement noise"
+    return text + f"{surface_rms * 1e3:.4f} ± {square.u / (2.0 * surface_rms) * 1e3:.4f} mm without measurement noise"
 
 
 def _gain_passage(gain: Gain) -> Passage:
     text = f"{gain.frequency / 1e9:g} GHz: {gain.ruze:.4f} ± {gain.u_ruze:.4f} of the perfect surface's (Ruze)"
-    return Passage("Gain", text + f"; {gain.coherent:.4f} by the aperture's integral with the noise in it")
+    return Passage("Gain", text + f"; {gain.coherent:.4f} by the aperture integral, including noise")
 
 
 def change_passages(change: Change) -> list[Passage]:
-    """What a person should know of a difference, in order."""
+    """Passages on a difference, in order."""
     u = np.sqrt(np.diag(change.motion_covariance))
     shift = ", ".join(f"{v * 1e3:+.3f} ± {s * 1e3:.3f}" for v, s in zip(change.motion[:3], u[:3], strict=True))
     turn = ", ".join(
@@ -250,8 +250,8 @@ def change_passages(change: Change) -> list[Passage]:
     return [
         Passage(
             "Change",
-            f"{change.second.source} less {change.first.source}, {len(change.names)} prisms: the surface by "
-            f"{rms * 1e3:.3f} mm rms along its normals, after the dish's own motion against its posture",
+            f"{change.second.source} minus {change.first.source}, {len(change.names)} prisms: the surface by "
+            f"{rms * 1e3:.3f} mm rms along its normals, after removing the dish's motion relative to its posture",
         ),
         Passage("Motion", f"{shift} mm; {turn}″, reflector axes, about the nominal vertex"),
         Passage("Half path", _rms(change.square, change.settings.taper_db)),
@@ -260,7 +260,7 @@ def change_passages(change: Change) -> list[Passage]:
 
 
 def lookup_passages(lookup: Lookup) -> list[Passage]:
-    """What a person should know of an elevation series."""
+    """Passages on an elevation series."""
     low, high = lookup.elevation_deg.min(), lookup.elevation_deg.max()
     rising = int((lookup.rising > 0).sum())
     text = (
@@ -273,20 +273,20 @@ def lookup_passages(lookup: Lookup) -> list[Passage]:
 
 
 def actuators_passage(actuators: Actuators) -> Passage:
-    """What a person should know of the actuators."""
-    beyond, rough = int((~actuators.within).sum()), actuators.roughness
+    """Passage on the actuators."""
+    outside, rough = int((~actuators.within).sum()), actuators.roughness
     u = actuators.u_correction * 1e3
     return Passage(
         "Actuators",
-        f"{len(actuators.names)}, {int(actuators.measured.sum())} with a measured prism of their own; corrections to "
+        f"{len(actuators.names)}, {int(actuators.measured.sum())} with their own measured prism; corrections to "
         f"{np.abs(actuators.correction).max() * 1e3:.3f} mm, u {np.median(u):.3f} mm (median) to {u.max():.3f} mm; "
-        f"{beyond or 'none'} beyond their limits. Beside the trend the surface has {rough.smooth * 1e3:.3f} mm over "
-        f"{rough.length:.0f} m and {rough.own * 1e3:.3f} mm of each point's own",
+        f"{outside or 'none'} beyond their limits. Besides the trend the surface has {rough.smooth * 1e3:.3f} mm over "
+        f"{rough.length:.0f} m and {rough.own * 1e3:.3f} mm per point",
     )
 
 
 def surface_passages(result: SurfaceFindings) -> list[Passage]:
-    """The shapes or the look-up table, then the change and the actuators, where there are such."""
+    """Passages on the shapes or the look-up table, then on change and actuators if present."""
     passages: list[Passage] = []
     if result.lookup is not None:
         passages += lookup_passages(result.lookup)
@@ -301,7 +301,7 @@ def surface_passages(result: SurfaceFindings) -> list[Passage]:
 
 
 def term_lines(shapes: Sequence[SurfaceShape], change: Change | None, lookup: Lookup | None) -> list[str]:
-    """A line a Zernike term: of the change, of the model with elevation, or of the only epoch; mm."""
+    """One line per Zernike term: of the change, the elevation model or the only epoch; mm."""
     shape = shapes[0]
     numbering = shape.settings.numbering
     if lookup is not None:

@@ -1,4 +1,4 @@
-"""The report of a surface: one HTML page that needs nothing else."""
+"""Report of a surface, one self-contained HTML page."""
 
 from collections.abc import Mapping
 from datetime import datetime
@@ -29,10 +29,10 @@ from catseye.reduction.surface.verdict import SurfaceFindings, surface_verdict
 
 
 def surface_report(result: SurfaceFindings, when: datetime, inputs: Mapping[str, str]) -> str:
-    """The whole page.
+    """HTML report.
 
     when     UTC
-    inputs   SHA-256 of each file read, by its name
+    inputs   SHA-256 of each input file, by name
     """
     body = [_header(result, when), verdict_line(surface_verdict(result))]
     if result.lookup is not None:
@@ -52,8 +52,8 @@ def _header(result: SurfaceFindings, when: datetime) -> str:
     names = ", ".join(shape.prisms.source for shape in result.shapes)
     return (
         f"<header><h1>The surface</h1><div class='faint'>{escape(names)}; by catseye on {when:%Y-%m-%d %H:%M} UTC; "
-        "deviations along the normal, above zero towards the focus; half-path errors are half of what they shorten the "
-        "path by; u = standard uncertainty, 1σ</div></header>"
+        "deviations along the normal, positive towards the focus; half-path errors are half of the "
+        "path's shortening; u = standard uncertainty, 1σ</div></header>"
     )
 
 
@@ -62,9 +62,9 @@ def _definitions(passages: list[Passage]) -> str:
 
 
 def _cards(square: MeanSquare, extra: list[str]) -> str:
-    own = root(square.own)
-    text = "not above the noise" if own is None else f"{own / MILLIMETRE:.3f} mm"
-    first = card("Half-path rms", text, "under the illumination, without the measurement's noise")
+    surface_rms = root(square.own)
+    text = "not above the noise" if surface_rms is None else f"{surface_rms / MILLIMETRE:.3f} mm"
+    first = card("Half-path rms", text, "weighted by the illumination, without measurement noise")
     return f'<div class="cards">{first}{"".join(extra)}</div>'
 
 
@@ -82,8 +82,8 @@ def _shape(shape: SurfaceShape, epoch: int, of: int) -> str:
         _definitions(shape_passages(shape)),
         picture(
             svg(shape_map(shape)),
-            f"Half-path errors off the fitted paraboloid, u of a deviation {u:.3f} mm (median); colours between "
-            "prisms are plain interpolation in triangles. Dashed: the aperture.",
+            f"Half-path errors from the fitted paraboloid, u of a deviation {u:.3f} mm (median); colours between "
+            "prisms are linear interpolation in triangles. Dashed: the aperture.",
         ),
         *_terms(shape.expansion, shape.settings),
     )
@@ -97,7 +97,7 @@ def _change(change: Change) -> str:
         _definitions(change_passages(change)),
         picture(
             svg(change_map(change)),
-            "Second epoch less first, after the dish's motion as its prisms show it in all three coordinates.",
+            "Second epoch minus first, after removing the dish's motion, fitted in all three coordinates.",
         ),
         *_terms(change.expansion, change.settings),
     )
@@ -116,16 +116,14 @@ def _terms(expansion: Expansion, settings: ShapeSettings) -> list[str]:
         )
         for k, term in enumerate(expansion.terms)
     ]
-    columns = (settings.numbering, "term", "left (mm)", "u (mm)", "taken by the fit", "term itself (mm)", "u (mm)")
+    columns = (settings.numbering, "term", "residual (mm)", "u (mm)", "absorbed by the fit", "term (mm)", "u (mm)")
     return [
-        picture(
-            svg(zernike_bars(expansion, settings)), "Zernike terms of the half-path errors as the fit leaves them."
-        ),
+        picture(svg(zernike_bars(expansion, settings)), "Zernike terms of the half-path errors after the fit."),
         table(columns, rows, "ntnnnnn"),
         paragraph(
-            "Left: what the errors hold of a term. Taken: what of the term's square the fitted paraboloid, or the "
-            "dish's motion, takes for itself. The term itself: estimated together with the paraboloid; empty where the "
-            "paraboloid stands for it.",
+            "Residual: coefficient of the errors after the fit. Absorbed: share of the term's square absorbed by the "
+            "fitted paraboloid or the dish's motion. Term: estimated together with the paraboloid; empty where the "
+            "paraboloid absorbs it completely.",
             "faint",
         ),
     ]
@@ -156,12 +154,12 @@ def _lookup(lookup: Lookup) -> str:
         _definitions(lookup_passages(lookup)),
         picture(
             svg(elevation_terms(lookup)),
-            "The terms that elevation moves most. Triangles: epochs, up and down; lines: the model; grey: its 1σ.",
+            "Terms that change most with elevation. Triangles: epochs, up and down; lines: the model; grey: its 1σ.",
         ),
         table(columns, rows, "nt" + "n" * (len(lookup.columns) + 1)),
         paragraph(
-            "Thermal: mm for a degree. Hysteresis: what a term is more when elevation rises than when it falls. Where "
-            "epochs scatter more than they claim (variance factor above 1), u is raised by its root.",
+            "Thermal: mm per degree. Hysteresis: the term going up minus going down. Where "
+            "epochs scatter more than claimed (variance factor above 1), u is increased by its root.",
             "faint",
         ),
     )
@@ -172,5 +170,5 @@ def _actuators(actuators: Actuators, shape: SurfaceShape) -> str:
         "actuators",
         "Actuators",
         _definitions([actuators_passage(actuators)]),
-        picture(svg(actuator_map(actuators, shape.aperture)), "Corrections, and how well they are known."),
+        picture(svg(actuator_map(actuators, shape.aperture)), "Corrections and their standard uncertainty."),
     )

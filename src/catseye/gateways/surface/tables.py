@@ -1,4 +1,4 @@
-"""Tables of a surface: prisms, Zernike terms, look-up table, actuators; CSV with the unit in each name, and FITS."""
+"""Tables of a surface: prisms, Zernike terms, look-up table, actuators; CSV and FITS."""
 
 from collections.abc import Iterable, Sequence
 
@@ -18,11 +18,11 @@ ZERNIKE = (
     *("number", "n", "m", "name", "value_mm", "u_mm", "share_taken"),
     *("joint_mm", "u_joint_mm", "orthonormal_mm", "u_orthonormal_mm"),
 )
-ACTUATOR_MARK = ",".join(ActuatorCorrection.model_fields)  # the header, by which a file is known as ours
+ACTUATOR_MARK = ",".join(ActuatorCorrection.model_fields)  # the header, which identifies a file of catseye
 
 
 def prisms_csv(shape: SurfaceShape) -> str:
-    """A row a prism, in the fitted paraboloid's frame; the weight is its share of the illumination."""
+    """One row per prism, in the fitted paraboloid's frame; the weight is its share of illumination."""
     u = np.sqrt(np.diag(shape.fit.deviation_covariance)) / MILLIMETRE
     cells = zip(
         shape.prisms.names,
@@ -37,7 +37,10 @@ def prisms_csv(shape: SurfaceShape) -> str:
 
 
 def change_csv(change: Change) -> str:
-    """A row a prism of both epochs, second less first; places of the first epoch, nominal paraboloid's frame."""
+    """One row per prism of both epochs, second minus first.
+
+    Places are those of the first epoch, in the nominal paraboloid's frame.
+    """
     u = np.sqrt(np.diag(change.deviation_covariance)) / MILLIMETRE
     cells = zip(
         change.names,
@@ -52,7 +55,7 @@ def change_csv(change: Change) -> str:
 
 
 def zernike_csv(expansion: Expansion, numbering: Numbering) -> str:
-    """Zernike terms as CSV text, a row a term."""
+    """Zernike terms as CSV, one row per term."""
     u, u_joint = np.sqrt(np.diag(expansion.covariance)), np.sqrt(np.diag(expansion.joint_covariance))
     columns = [
         values / MILLIMETRE
@@ -67,15 +70,15 @@ def zernike_csv(expansion: Expansion, numbering: Numbering) -> str:
 
 
 def lookup_csv(lookup: Lookup) -> str:
-    """A row an elevation and a term: rising, mean, falling, each with its u."""
-    header = [f"{u}{way}_mm" for way in ("rising", "mean", "falling") for u in ("", "u_")]
+    """One row per elevation and term: rising, mean, falling, u."""
+    header = [f"{u}{direction}_mm" for direction in ("rising", "mean", "falling") for u in ("", "u_")]
     numbering = lookup.shapes[0].settings.numbering
     rows = [
         (
             float(elevation),
             number(model.term, numbering),
             model.term.name,
-            *(float(v[e, k, way]) / MILLIMETRE for way in range(3) for v in (lookup.table, lookup.u_table)),
+            *(float(v[e, k, direction]) / MILLIMETRE for direction in range(3) for v in (lookup.table, lookup.u_table)),
         )
         for e, elevation in enumerate(lookup.table_deg)
         for k, model in enumerate(lookup.models)
@@ -84,7 +87,7 @@ def lookup_csv(lookup: Lookup) -> str:
 
 
 def epochs_csv(lookup: Lookup) -> str:
-    """A row an epoch and a term: measured, its residual to the model."""
+    """One row per epoch and term: measured value and residual to the model."""
     header = ("epoch", "source", "elevation_deg", "rising", "number", "name", "value_mm", "u_mm", "residual_mm", "w")
     numbering = lookup.shapes[0].settings.numbering
     rows = [
@@ -107,12 +110,12 @@ def epochs_csv(lookup: Lookup) -> str:
 
 
 def actuators_csv(rows: Iterable[ActuatorCorrection]) -> str:
-    """A row an actuator, which `read_corrections` reads back without the loss of a bit."""
+    """One row per actuator, as read exactly by `read_corrections`."""
     return csv_text(tuple(ActuatorCorrection.model_fields), (tuple(row.model_dump().values()) for row in rows))
 
 
 def actuators_table(rows: Sequence[ActuatorCorrection]) -> SamplerTable:
-    """The same as a table ACTUATORS of FITS samplers; the unit of each column is in TUNIT, not in its name."""
+    """The same as a table ACTUATORS of FITS samplers; units are in TUNIT, not in the names."""
     columns = {}
     for name in ActuatorCorrection.model_fields:
         unit = "mm" if name.endswith("_mm") else "m" if name.endswith("_m") else ""

@@ -1,1 +1,1 @@
-"""Triplet units on the way out."""
+"""Output of triplet units."""

@@ -1,4 +1,4 @@
-"""The placements of a triplet's calibration, drawn."""
+"""Figure of the placements in a triplet's calibration."""
 
 from typing import Any
 
@@ -8,17 +8,17 @@ from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, Figure, styled
 from catseye.reduction.triplet.result import TOLERANCE, TripletReduction
 
 MICROMETRES = 1e6
-NEAREST, FARTHEST = 1.6, 4.0  # tolerances from L_MPBC to the edge; what is farther off is named there
-MANY = 12  # placements from which on the axis has no room for their spacers
+NEAREST, FARTHEST = 1.6, 4.0  # tolerances from L_MPBC to the edge; points further off are named there
+MANY = 12  # most placements with spacers on the axis
 
 
 def triplet_figure(reduction: TripletReduction) -> Figure:
-    """H_corr of each placement against the surface plate and the limits, and the budget of the best."""
+    """H_corr of each placement against the surface plate and the limits, and the best one's budget."""
     with styled():
         figure = Figure(figsize=(9.4, 4.0), layout="constrained")
-        left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
-        _draw_placements(left, reduction)
-        _draw_budget(right, reduction)
+        placements, budget = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
+        _draw_placements(placements, reduction)
+        _draw_budget(budget, reduction)
         return figure
 
 
@@ -38,7 +38,7 @@ def _draw_placements(ax: Any, reduction: TripletReduction) -> None:
     span = max(NEAREST * limit, 1.15 * float(reach))
     near = np.abs(h - plate) < span
     odd = np.isin(np.arange(len(h)), reduction.suspects)
-    for rows, colour, name in ((near & ~odd, SERIES[0], "placement, ± u"), (near & odd, BAD, "contradicted, kept")):
+    for rows, colour, name in ((near & ~odd, SERIES[0], "placement, ± u"), (near & odd, BAD, "contradicted, retained")):
         if rows.any():
             ax.errorbar(
                 number[rows], h[rows], u_h[rows], fmt="o", color=colour, ms=5, elinewidth=1.2, capsize=3, label=name
@@ -55,11 +55,11 @@ def _draw_placements(ax: Any, reduction: TripletReduction) -> None:
         )  # fmt: skip
     ax.set_xlim(*edge)
     ax.set_ylim(plate - span, plate + span)
-    spacers = [f"\n{each.spacer_mm:g}" if len(h) <= MANY else "" for each in reduction.measurement.placement]
+    spacers = [f"\n{placement.spacer_mm:g}" if len(h) <= MANY else "" for placement in reduction.measurement.placement]
     step = 1 + len(h) // (2 * MANY)
     ax.set_xticks(number[::step], [f"{k}{spacer}" for k, spacer in zip(number, spacers, strict=True)][::step])
     ax.set_xlabel("placement" + (", and its spacer (mm)" if len(h) <= MANY else ""))
-    ax.set_ylabel("ball above the prisms' mid-point (µm)")
+    ax.set_ylabel("ball above the prisms' midpoint (µm)")
     ax.set_title("Placements")
     ax.get_figure().legend(*ax.get_legend_handles_labels(), loc="outside lower left", ncols=3)
 

@@ -1,4 +1,4 @@
-"""All files of the calibration of some triplets: a sheet each as text, page and object, and one table of all."""
+"""Files of triplet calibrations: a sheet for each as text, page and JSON, and one table."""
 
 import csv
 import io
@@ -32,14 +32,14 @@ def write_triplets(
     *,
     progress: Progress | None = None,
 ) -> None:
-    """NAME.txt, NAME.html, NAME.json for each sheet NAME.toml, triplets.csv, and the provenance with their hashes.
+    """Write text, page and JSON for each sheet NAME.toml, triplets.csv, and the provenance.
 
     units       calibrations by the file of their sheet
-    directory   exists, and is ours to fill: see `writers.output.whole_directory`
+    directory   existing, from `writers.output.whole_directory`
     hashes      SHA-256 of each file
-    progress    told of each file
+    progress    called for each file
 
-    Raises InputError where two sheets have one name, or one has the name of the provenance.
+    Raises InputError if two sheets have the same name, or one has the name of the provenance.
     """
     refuse_namesakes(list(units))
     when = datetime.now(UTC)
@@ -59,7 +59,7 @@ def _object_page(reduction: TripletReduction, name: str) -> str:
 
 
 def refuse_namesakes(paths: list[Path]) -> None:
-    """Two sheets of one name would write over each other, one sheet twice is a slip; PROVENANCE is ours."""
+    """Raise InputError for sheets of the same name, which would overwrite each other, or PROVENANCE."""
     by_stem: dict[str, Path] = {}
     for path in paths:
         if f"{path.stem}.json" == PROVENANCE:
@@ -72,7 +72,7 @@ def refuse_namesakes(paths: list[Path]) -> None:
 
 
 def triplets_csv(units: Mapping[str, TripletReduction]) -> str:
-    """A row a unit, lengths in mm; an empty cell is unknown.
+    """One row per unit, lengths in mm; an empty cell is unknown.
 
     units   calibrations by the name of their sheet
     """

@@ -1,4 +1,4 @@
-"""The blank form of a triplet's calibration, to print and to fill in by hand in the laboratory."""
+"""Blank form of a triplet's calibration, to print and fill in by hand in the laboratory."""
 
 from collections.abc import Iterable
 from html import escape
@@ -6,7 +6,7 @@ from html import escape
 from catseye.gateways.writers.page import page
 
 TITLE = "Triplet calibration, blank sheet"
-MARK = f"<title>{TITLE}"  # by which a page is known as ours
+MARK = f"<title>{TITLE}"  # identifies a page of catseye
 PLACEMENTS = 3
 BOXES = """<style>
 table.form { table-layout: fixed; margin: .3rem 0 .9rem; } table.form th { background: var(--soft); }
@@ -22,7 +22,7 @@ h2 { margin: 1.1rem 0 .3rem; } ol { margin: .3rem 0; padding-left: 1.3rem; font-
 HEAD = (
     ("triplet", "unit, as TR01", ""),
     ("measured_on", "day, as 2003-05-14", ""),
-    ("by", "who measures", ""),
+    ("by", "person measuring", ""),
     ("air_model", "formula of the ranger's index program", ""),
     ("modulation_hz", "modulation", "Hz"),
     ("wavelength_um", "laser, in vacuum", "µm"),
@@ -41,7 +41,7 @@ DATA_SHEET = (
     ("ball.r2_mm", "R₂, large ball-cap", "mm"),
     ("ball.pc_b_mm", "Pc_B, below 0", "mm"),
     ("d12_mm", "D₁₂, between T₁ and T₂", "mm"),
-    ("u_d12_mm", "its standard uncertainty", "mm"),
+    ("u_d12_mm", "standard uncertainty of D₁₂", "mm"),
 )
 PLATE = (
     ("l1_mm", "L₁, pole point of the left prism, prisms up", "mm"),
@@ -49,11 +49,11 @@ PLATE = (
     ("l_bt_mm", "L_BT, vertex of the ball, facing the plate", "mm"),
     ("l_post_mm", "L_post, half-length of the fixture", "mm"),
     ("u_height_mm", "standard uncertainty of a height", "mm"),
-    ("top_surface_mm", "painted top plate, some places (optional)", "mm"),
+    ("top_surface_mm", "painted top plate, several places (optional)", "mm"),
 )
 RANGES = (
     ("spacer_mm", "spacer in front of the rear stops", "mm"),
-    ("d_toppl_mm", "D_TOPPL: S to back stops, less L_post and spacer", "mm"),
+    ("d_toppl_mm", "D_TOPPL: S to back stops, minus L_post and spacer", "mm"),
     ("h_s_mm", "h_S, beam above the line of the prisms", "mm"),
     ("phi_1_rad", "Φ₁, left prism", "rad"),
     ("phi_2_rad", "Φ₂, right prism", "rad"),
@@ -79,7 +79,7 @@ STEPS = (
 
 
 def blank_form() -> str:
-    """The form as a page that stands alone; every box carries the key of the file that it belongs to."""
+    """Form as a self-contained page; each box shows its key in the file."""
     placements = [f"no. {k + 1}" for k in range(PLACEMENTS)]
     body = [
         BOXES,

@@ -1,4 +1,4 @@
-"""A triplet's calibration as one plain object, SI units, for `catseye triplet --json`."""
+"""Calibration of a triplet as an object for `catseye triplet --json`, SI units."""
 
 from typing import Any
 
@@ -8,12 +8,12 @@ from catseye.gateways.triplet.symbols import PLACEMENT, PLATE, UNIT, point_place
 from catseye.gateways.writers.verdict import Verdict
 from catseye.reduction.triplet.result import TOLERANCE, TripletReduction
 
-LIKELY = 0.95  # probability of conformity from which on an acceptance is not doubted
-OWN = ("N_1", "N_2", "N_BC", "margin")  # told under `cycles`
+LIKELY = 0.95  # least probability of conformity of an undoubted acceptance
+CYCLES = ("N_1", "N_2", "N_BC", "margin")  # listed under `cycles`
 
 
 def triplet_verdict(reduction: TripletReduction) -> Verdict:
-    """Accepted or not by the memo's limit, and how likely the unit conforms."""
+    """Verdict by the memo's limit and the probability of conformity."""
     if not np.isfinite(reduction.difference):
         return Verdict("failed", "no placement gave a height to compare with the surface plate's")
     limit = f"{1e3 * abs(reduction.difference):.3f} mm against a limit of {1e3 * TOLERANCE:.2f}"
@@ -28,10 +28,12 @@ def triplet_verdict(reduction: TripletReduction) -> Verdict:
 
 
 def triplet_object(reduction: TripletReduction, file: str) -> dict[str, Any]:
-    """The calibration; lengths in metres, what is not says its unit. One placement: numbers; several: lists of them.
+    """Object of the calibration; lengths in metres, other units in the keys.
+
+    With one placement values are numbers, with several lists.
 
     reduction   the calibration of a unit
-    file        its sheet's name
+    file        name of its sheet
     """
     m, plate = reduction.measurement, reduction.plate
     return {
@@ -86,7 +88,7 @@ def _cycles(reduction: TripletReduction) -> list[dict[str, Any]]:
 
 
 def _memo_cycles(reduction: TripletReduction) -> list[dict[str, Any]]:
-    """The memo's integers; null where its rule 3.4b is broken."""
+    """Integers of the memo; null where its rule 3.4b is violated."""
     names = (("N_1", reduction.memo.n_1), ("N_2", reduction.memo.n_2), ("N_BC", reduction.memo.n_bc))
     return [
         {name: int(values[k]) if np.isfinite(values[k]) else None for name, values in names}
@@ -96,17 +98,17 @@ def _memo_cycles(reduction: TripletReduction) -> list[dict[str, Any]]:
 
 def _symbols(reduction: TripletReduction) -> dict[str, Any]:
     single = {symbol.name: symbol_values(symbol, reduction)[0] for symbol in (*UNIT, *PLATE)}
-    each = {
-        symbol.name: _one_or_all(symbol_values(symbol, reduction)) for symbol in PLACEMENT if symbol.name not in OWN
+    per_placement = {
+        symbol.name: _one_or_all(symbol_values(symbol, reduction)) for symbol in PLACEMENT if symbol.name not in CYCLES
     }
-    return single | each
+    return single | per_placement
 
 
 def _placements(reduction: TripletReduction) -> list[dict[str, Any]]:
     post = reduction.readings.l_post - 0.5 * (reduction.plate.height[0] + reduction.plate.height[1])
     return [
         {
-            "spacer": each.spacer_mm * 1e-3,
+            "spacer": placement.spacer_mm * 1e-3,
             "status": reduction.status[k],
             "h_corr": reduction.h[k],
             "u_h_corr": reduction.u[k],
@@ -122,5 +124,5 @@ def _placements(reduction: TripletReduction) -> list[dict[str, Any]]:
             "scan_point_along": reduction.lengths.along[k],
             "scan_point_up": reduction.lengths.up[k],
         }
-        for k, each in enumerate(reduction.measurement.placement)
+        for k, placement in enumerate(reduction.measurement.placement)
     ]

@@ -1,4 +1,4 @@
-"""The sheet of a triplet's calibration, text and HTML, in place of the spreadsheet TRPCAL; and the blank form."""
+"""Sheet of a triplet's calibration, text and HTML, replacing the spreadsheet TRPCAL."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -16,7 +16,7 @@ from catseye.reduction.triplet.unit import NOT_A_TRIANGLE, SLIPPED
 
 TITLE = "Triplet calibration"
 SIDE_BY_SIDE = 3  # placements in one table
-WHOLE = "<style>.scroll { max-height: none; } td.w { min-width: 12rem; }</style>"  # a sheet is read and printed whole
+UNCLIPPED = "<style>.scroll { max-height: none; } td.w { min-width: 12rem; }</style>"  # to print complete sheets
 SHORT = {NOT_A_TRIANGLE: "no triangle", SLIPPED: "cycles doubted"}  # status in a column of the text
 PLACES = {"mm": 4, "rad": 6, "°C": 2, "hPa": 2, "%": 1}
 FINE = {"alpha": 6, "n": 6, "eta_A": 9, "eta_A_fp": 9, "eta_G": 6, "HWLV": 6, "HWLA": 6, "HWLA_fp": 6,
@@ -24,7 +24,7 @@ FINE = {"alpha": 6, "n": 6, "eta_A": 9, "eta_A_fp": 9, "eta_G": 6, "HWLV": 6, "H
 
 
 def results(reduction: TripletReduction) -> list[tuple[str, str]]:
-    """(title, text) of each paragraph about a calibration, for a terminal or the head of a page, after the verdict."""
+    """Title and text of each paragraph on a calibration, after the verdict."""
     u_h = _plain(reduction.u_h_corr * 1e3, ".4f")
     low, high = reduction.plate.paint or (math.nan, math.nan)
     lines = [
@@ -76,7 +76,7 @@ def _agreement(reduction: TripletReduction) -> str:
 
 
 def cell(symbol: Symbol, value: Any) -> str:
-    """A value as printed: lengths in mm.
+    """Value as printed: lengths in mm.
 
     >>> from catseye.gateways.triplet.symbols import UNIT
     >>> cell(UNIT[4], 0.635)
@@ -91,10 +91,10 @@ def cell(symbol: Symbol, value: Any) -> str:
 
 
 def text_sheet(reduction: TripletReduction, file: str) -> str:
-    """The whole sheet as lines of text.
+    """Sheet as lines of text.
 
     reduction   the calibration of a unit
-    file        its sheet's name
+    file        name of its sheet
     """
     m = reduction.measurement
     lines = [
@@ -128,8 +128,8 @@ def text_sheet(reduction: TripletReduction, file: str) -> str:
     lines += ["", "POINTS (mm from S: along the prisms, up, towards the ranger)"]
     for name, at in point_places(reduction).items():
         for k, place in enumerate(at, start=1):
-            shown = "".join(f"{_plain(1e3 * x, '.4f'):>15}" for x in place)
-            lines.append(f"{name if k == 1 else '':<13}no.{k:>3}{shown}  {POINTS[name] if k == 1 else ''}".rstrip())
+            cells = "".join(f"{_plain(1e3 * x, '.4f'):>15}" for x in place)
+            lines.append(f"{name if k == 1 else '':<13}no.{k:>3}{cells}  {POINTS[name] if k == 1 else ''}".rstrip())
     return "\n".join(lines) + "\n"
 
 
@@ -138,14 +138,14 @@ def _text_rows(symbols: Sequence[Symbol], reduction: TripletReduction, rows: sli
         values = symbol_values(symbol, reduction)
         values = values * (rows.stop - rows.start) if len(values) == 1 else values[rows]
         cells = "".join(f"{cell(symbol, value):>15}" for value in values)
-        yield f"{symbol.shown:<14}{symbol.unit:<5}{cells}  {symbol.meaning}"
+        yield f"{symbol.label:<14}{symbol.unit:<5}{cells}  {symbol.meaning}"
 
 
 def html_sheet(reduction: TripletReduction, file: str, when: datetime, digest: str) -> str:
-    """The whole sheet as a page that stands alone, with the figure of the placements.
+    """Self-contained page of the sheet, with a figure of placements.
 
     reduction   the calibration of a unit
-    file        its sheet's name; `digest` its SHA-256
+    file        name of its sheet; `digest` its SHA-256
     when        UTC, of the computation
     """
     from catseye.gateways.triplet.figure import triplet_figure  # matplotlib is heavy
@@ -154,7 +154,7 @@ def html_sheet(reduction: TripletReduction, file: str, when: datetime, digest: s
     m = reduction.measurement
     words = "".join(f"<dt>{escape(title)}</dt><dd>{escape(text)}</dd>" for title, text in results(reduction))
     body = [
-        WHOLE,
+        UNCLIPPED,
         f"<header><h1>{TITLE}: {escape(m.triplet)}</h1>"
         f'<div class="faint">prisms {m.left_prism.serial} (left) and {m.right_prism.serial} (right); measured on '
         f"{m.measured_on} by {escape(m.by)}; air by {m.air_model}; u = standard uncertainty, 1σ</div></header>",
@@ -193,25 +193,25 @@ def _cards(reduction: TripletReduction) -> Iterator[str]:
 
 def _table(symbols: Sequence[Symbol], reduction: TripletReduction) -> str:
     rows = [
-        (s.shown, s.meaning, s.design or "–", cell(s, symbol_values(s, reduction)[0]), s.unit or "–") for s in symbols
+        (s.label, s.meaning, s.design or "–", cell(s, symbol_values(s, reduction)[0]), s.unit or "–") for s in symbols
     ]
     return table(("symbol", "description", "design value", "value", "unit"), rows, "twtnt")
 
 
 def _placement_tables(reduction: TripletReduction) -> Iterator[str]:
     for start in range(0, len(reduction.h), SIDE_BY_SIDE):
-        here = range(start, min(start + SIDE_BY_SIDE, len(reduction.h)))
-        spacers = (f"{reduction.measurement.placement[k].spacer_mm:.3f}" for k in here)
+        batch = range(start, min(start + SIDE_BY_SIDE, len(reduction.h)))
+        spacers = (f"{reduction.measurement.placement[k].spacer_mm:.3f}" for k in batch)
         rows: list[tuple[str, ...]] = [("spacer", "in front of the rear stops", "–", *spacers, "mm")]
         for s in PLACEMENT:
             values = symbol_values(s, reduction)
-            shown = [cell(s, values[k if len(values) > 1 else 0]) for k in here]
-            rows.append((s.shown, s.meaning, s.design or "–", *shown, s.unit or "–"))
-        rows.append(("u(H_corr)", "of one placement", "–", *(_plain(reduction.u[k] * 1e3, ".4f") for k in here), "mm"))
-        rows.append(("w", "standardised residual", "–", *(_plain(reduction.statistics[k], ".2f") for k in here), "–"))
-        rows.append(("status", "", "", *(reduction.status[k] for k in here), ""))
-        heads = [f"no. {k + 1}" for k in here]
-        yield table(("symbol", "description", "design value", *heads, "unit"), rows, "twt" + "n" * len(here) + "t")
+            cells = [cell(s, values[k if len(values) > 1 else 0]) for k in batch]
+            rows.append((s.label, s.meaning, s.design or "–", *cells, s.unit or "–"))
+        rows.append(("u(H_corr)", "of one placement", "–", *(_plain(reduction.u[k] * 1e3, ".4f") for k in batch), "mm"))
+        rows.append(("w", "standardised residual", "–", *(_plain(reduction.statistics[k], ".2f") for k in batch), "–"))
+        rows.append(("status", "", "", *(reduction.status[k] for k in batch), ""))
+        heads = [f"no. {k + 1}" for k in batch]
+        yield table(("symbol", "description", "design value", *heads, "unit"), rows, "twt" + "n" * len(batch) + "t")
 
 
 def _plain(value: float, form: str) -> str:
@@ -230,7 +230,7 @@ def _paint(reduction: TripletReduction) -> str:
     design = reduction.plate.paint_from_design * 1e3
     text = f"Paint that would put the mean of the three in the bare top plate: {design:.4f} mm."
     if reduction.plate.sampled:
-        low, mean, high = (1e3 * each for each in reduction.plate.sampled)
+        low, mean, high = (1e3 * height for height in reduction.plate.sampled)
         text += f" Painted surface above the synthetic plane: {low:+.4f} to {high:+.4f} mm, mean {mean:+.4f} mm."
     heads = ("point above the bare top plate", "paint 0.05 mm: mm", "paint 0.15 mm: mm")
     return table(heads, rows, "tnn") + paragraph(text)

@@ -1,7 +1,7 @@
-"""Every symbol of the triplet memo's section 3.4, with its meaning and its value in a calibration.
+"""Symbols of the triplet memo's section 3.4, with meanings and values in a calibration.
 
 `prism_D_1` and `prism_D_2` are the memo's bold D, the prisms' heights; `I_1` its gothic I; `dPc_1` its delta Pc. Psi,
-D_0 and I are by the memo's formulas; what H_corr rests on is by the ranges (see `reduction.triplet.geometry`).
+D_0 and I follow the memo's formulas; H_corr is based on the ranges (see `reduction.triplet.geometry`).
 """
 
 from collections.abc import Callable
@@ -19,18 +19,18 @@ Value = Callable[[TripletReduction], Any]
 
 @dataclass(frozen=True)
 class Symbol:
-    """One symbol.
+    """Symbol of the memo.
 
     name      as in the JSON
-    shown     as printed
-    meaning   in words, the memo's formula where it has one
+    label     as printed
+    meaning   in words, with the memo's formula if any
     unit      of the printed sheet: mm, rad, °C, hPa, % or none; the JSON has metres
-    value     of a calibration, SI: one number, or one for each placement
+    value     function from a calibration to one number, or one per placement, SI
     design    the memo's design value, as printed
     """
 
     name: str
-    shown: str
+    label: str
     meaning: str
     unit: str
     value: Value
@@ -65,12 +65,12 @@ def _half(after: bool) -> Value:
     return lambda reduction: half_wavelengths(reduction.readings)[after]
 
 
-def _whole(name: str, after: bool = False) -> Value:
+def _whole_cycles_length(name: str, after: bool = False) -> Value:
     return lambda reduction: getattr(reduction.cycles, name) * half_wavelengths(reduction.readings)[after]
 
 
 def _less_delta(name: str) -> Value:
-    return lambda reduction: getattr(reduction.lengths, name) - _whole("n_1")(reduction)
+    return lambda reduction: getattr(reduction.lengths, name) - _whole_cycles_length("n_1")(reduction)
 
 
 def _weather(quantity: str, unit: str, after: bool = False) -> Value:
@@ -87,7 +87,7 @@ UNIT = (
     Symbol("R_2", "R₂", "radius of its large ball-cap", "mm", lambda f: f.measurement.ball.r2_mm * 1e-3, "3.799 in"),
     Symbol("D_12", "D₁₂", "distance from T₁ to T₂", "mm", _reading("d_12"), "635.00"),
     Symbol("Pc_B", "Pc_B", "range constant of the ball's glass", "mm", lambda f: f.measurement.ball.pc_b_mm * 1e-3,
-           "≈ -173.6"),  # as printed; its own radii and index give -173.7
+           "≈ -173.6"),  # as printed; its radii and index give -173.7
     Symbol("Pc_T1", "Pc(T₁)", "range constant of the left prism, normal incidence", "mm",
            lambda f: f.measurement.left_prism.pc_mm * 1e-3, "≈ -33.5"),
     Symbol("Pc_T2", "Pc(T₂)", "range constant of the right prism, normal incidence", "mm",
@@ -108,7 +108,7 @@ PLATE = (
     Symbol("L_MPBC", "L_MPBC", "ball's centre above the mid-point, L_BC - L_MP", "mm", lambda f: f.l_mpbc, "≈ 0.0"),
     Symbol("L_post", "L_post", "half-length of the fixture: synthetic plane above the plate", "mm",
            _reading("l_post"), "88.900"),
-    Symbol("delta_dsp", "δ_dsp", "2 L_post - 2 L_MP - L_MPBC: δ_range as the plate foretells it", "mm",
+    Symbol("delta_dsp", "δ_dsp", "2 L_post - 2 L_MP - L_MPBC: δ_range predicted by the plate", "mm",
            lambda f: 2.0 * f.readings.l_post - 2.0 * _middle(f) - f.l_mpbc),
     Symbol("HWLV", "HWLV", "half wavelength of the modulation in vacuum, c / 2f", "mm",
            lambda f: 0.5 * SPEED_OF_LIGHT / f.measurement.modulation_hz, "99.930819"),
@@ -140,12 +140,12 @@ PLACEMENT = (
     Symbol("N_1", "N₁", "whole half wavelengths, scan point to T₁", "", _cycles("n_1"), "182"),
     Symbol("N_2", "N₂", "whole half wavelengths, scan point to T₂", "", _cycles("n_2"), "182"),
     Symbol("N_BC", "N_BC", "whole half wavelengths, scan point to BC, after the flip", "", _cycles("n_bc"), "184"),
-    Symbol("margin", "margin", "how much further D_TOPPL could be off before one of these changes", "mm",
+    Symbol("margin", "margin", "additional error of D_TOPPL before one of these changes", "mm",
            _cycles("margin")),
-    Symbol("Delta_1", "Δ₁", "HWLA N₁", "mm", _whole("n_1")),
-    Symbol("Delta_2", "Δ₂", "HWLA N₂", "mm", _whole("n_2")),
-    Symbol("Delta_BC", "Δ_BC", "HWLA fp N_BC", "mm", _whole("n_bc", True)),
-    Symbol("Delta", "Δ", "HWLA N₁", "mm", _whole("n_1")),
+    Symbol("Delta_1", "Δ₁", "HWLA N₁", "mm", _whole_cycles_length("n_1")),
+    Symbol("Delta_2", "Δ₂", "HWLA N₂", "mm", _whole_cycles_length("n_2")),
+    Symbol("Delta_BC", "Δ_BC", "HWLA fp N_BC", "mm", _whole_cycles_length("n_bc", True)),
+    Symbol("Delta", "Δ", "HWLA N₁", "mm", _whole_cycles_length("n_1")),
     Symbol("D_1", "D₁", "distance from S to T₁", "mm", _length("d_1")),
     Symbol("D_2", "D₂", "distance from S to T₂", "mm", _length("d_2")),
     Symbol("D_BCfp", "D_BCfp", "distance from S to the ball's centre, after the flip", "mm", _length("d_bcfp")),
@@ -162,7 +162,7 @@ PLACEMENT = (
            "small"),
     Symbol("dPc_2", "δPc(ℑ₂)", "change of the right prism's constant with incidence", "mm", _length("dpc_2"), "small"),
     Symbol("Psi", "Ψ", "arcsin((0.5 - α) D₁₂ / D₀): S-MP against the normal", "rad", _memo("psi")),
-    Symbol("delta_range", "δ_range", "depth of MP less depth of BC fp along the normal, by ranging", "mm",
+    Symbol("delta_range", "δ_range", "depth of MP minus depth of BC fp along the normal, by ranging", "mm",
            _length("delta_range")),
     Symbol("H_corr", "H_corr", "2 L_post - 2 L_MP - δ_range: distance from MP to BC", "mm", _length("h_corr")),
     Symbol("memo_D_MP", "D_MP memo", "the memo's series (3.19b), not used", "mm", _memo("d_mp")),
@@ -186,12 +186,12 @@ POINTS = {
 
 
 def symbol_values(symbol: Symbol, reduction: TripletReduction) -> list[Any]:
-    """One value, or one for each placement, SI."""
-    return [each.item() if isinstance(each, np.generic) else each for each in np.ravel(symbol.value(reduction))]
+    """One value, or one per placement, SI."""
+    return [item.item() if isinstance(item, np.generic) else item for item in np.ravel(symbol.value(reduction))]
 
 
 def point_places(reduction: TripletReduction) -> dict[str, np.ndarray]:
-    """Where the points are in each placement, (k, 3) m from S, (1, 3): along the prisms, up, towards the ranger."""
+    """Positions of the points per placement, (k, 3) m from S, (1, 3): along the prisms, up, to the ranger."""
     x, r = reduction.lengths, reduction.readings
     rise = r.l_2 - r.hrp_2 - r.l_1 + r.hrp_1
     step = np.array([0.5 * np.sqrt(r.d_12**2 - rise**2), 0.0, 0.5 * rise])

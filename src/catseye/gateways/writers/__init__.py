@@ -1,1 +1,1 @@
-"""How anything is written: pages, figures, JSON, FITS, tables, whole or not at all. Knows no subject."""
+"""Writers for pages, figures, JSON, FITS and tables; files are written atomically."""

@@ -1,10 +1,12 @@
-"""Cells of tables that other programs open."""
+"""Table cells that are safe to open in other programs."""
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # with which a spreadsheet begins to compute
 
 
 def harmless(text: str) -> str:
-    """A text that no spreadsheet takes for a formula: an apostrophe before one that begins like it; numbers stay.
+    """Text that no spreadsheet evaluates as a formula.
+
+    A leading apostrophe is added where needed; numbers stay.
 
     >>> harmless("=1+1"), harmless("-0.5"), harmless("ZY101")
     ("'=1+1", '-0.5', 'ZY101')

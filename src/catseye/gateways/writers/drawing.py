@@ -1,4 +1,4 @@
-"""How figures look, and how they become SVG text, drawn without a display."""
+"""Figure style and SVG output, drawn without a display."""
 
 import io
 import logging
@@ -71,7 +71,7 @@ STYLE: Any = {
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Within the block figures look like catseye's, whatever the user's own settings are."""
+    """Apply catseye's figure style within the block, ignoring user settings."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
@@ -79,13 +79,13 @@ def styled() -> Iterator[None]:
 
 
 class Svg(str):
-    """SVG text of a figure, and the figure itself for other formats."""
+    """SVG text of a figure, with the figure itself for other formats."""
 
     figure: Figure
 
 
 def svg(figure: Figure) -> Svg:
-    """A figure as SVG text, the same for the same figure."""
+    """Figure as SVG text, reproducible byte for byte."""
     stream = io.StringIO()
     with styled():
         FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None, "Creator": None})
@@ -95,11 +95,11 @@ def svg(figure: Figure) -> Svg:
 
 
 def picture_file(text: Svg, path: Path, option: str, *, mark: str) -> bytes:
-    """A figure in the format that a file's suffix says, with our mark in it.
+    """Figure in the format of the file's suffix, marked as catseye's.
 
     path     .svg, .pdf or .png
-    option   that named it, for messages
-    mark     by which the file is known as ours
+    option   command option that named the file, for messages
+    mark     text that identifies the file as catseye's
 
     Raises InputError for another suffix.
     """
@@ -110,7 +110,7 @@ def picture_file(text: Svg, path: Path, option: str, *, mark: str) -> bytes:
     if path.is_dir():
         raise InputError(f"{option} {path}: is a directory (expected the name of a file)")
     if suffix not in PICTURES:
-        raise InputError(f"{option} {path}: no figure is written as {suffix or 'nothing'!r} (expected {PICTURES_TEXT})")
+        raise InputError(f"{option} {path}: unknown figure format {suffix or 'nothing'!r} (expected {PICTURES_TEXT})")
     if suffix == ".svg":
         return text.replace("<svg ", f"<!-- {mark} -->\n<svg ", 1).encode("utf-8")
     with styled():
@@ -124,11 +124,11 @@ def picture_file(text: Svg, path: Path, option: str, *, mark: str) -> bytes:
 
 
 def svgs(figures: Mapping[str, Figure]) -> dict[str, str]:
-    """Each figure as SVG text, by the same names."""
+    """Each figure as SVG text, under the same name."""
     return {name: svg(figure) for name, figure in figures.items()}
 
 
 def nice(value: float) -> float:
-    """The number 1, 2 or 5 times a power of ten that is nearest below."""
+    """Largest 1, 2 or 5 times a power of ten not above the value."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(power * max(step for step in (1.0, 2.0, 5.0) if step <= value / power * (1 + 1e-9)))

@@ -1,10 +1,10 @@
-"""Ctrl-C and termination at any moment: undo what is half done, leave at once, without a traceback.
+"""Undo unfinished output on Ctrl-C or termination, then exit without a traceback.
 
-The handler leaves the process itself instead of raising an exception: libraries lose, wrap or print exceptions that
-arrive while they are being imported or are cleaning up. What must not be cut in two is put under `deferred`.
+The handler exits the process instead of raising an exception: libraries lose, wrap or print exceptions that arrive
+while they are being imported or are cleaning up. Steps that must not be interrupted are put under `deferred`.
 
-A handler waits for a long call of a compiled library. Where this process is supervised, the supervisor hears of
-`Unfinished` output while it is made, ends the process, and undoes it in its stead.
+A handler cannot run during a long call of a compiled library. Where this process is supervised, the supervisor is
+told of `Unfinished` output while it is written; it ends the process and undoes the output.
 """
 
 import json
@@ -26,11 +26,11 @@ _supervisor: int | None = None  # descriptor that the supervisor reads
 
 
 class Unfinished(NamedTuple):
-    """Output that is being made; calling it undoes what there is of it.
+    """Output in progress; calling it undoes the output.
 
-    fresh   file or directory that takes the output's place in the end
-    where   that place, and
-    old     where an earlier output waits until then; "" of none
+    fresh   temporary file or directory, renamed to `where` at the end
+    where   final path
+    old     path to which an earlier output is moved meanwhile; "" for none
     """
 
     fresh: str
@@ -39,7 +39,7 @@ class Unfinished(NamedTuple):
 
     def __call__(self) -> None:
         if self.old and os.path.lexists(self.old) and not os.path.lexists(self.where):
-            os.rename(self.old, self.where)  # between two renames: the old tree is all there is
+            os.rename(self.old, self.where)  # interrupted between two renames: restore the old tree
         for path in filter(None, (self.fresh, self.old)):
             if os.path.isdir(path):
                 shutil.rmtree(path, ignore_errors=True)
@@ -58,62 +58,65 @@ class UnfinishedWork:
         self._text, self._open = b"", list[Unfinished]()
 
     def hear(self, data: bytes) -> None:
-        """Take in what came through the pipe."""
+        """Parse data from the pipe."""
         *lines, self._text = (self._text + data).split(b"\n")
         for line in lines:
-            begun, *paths = json.loads(line)
+            started, *paths = json.loads(line)
             output = Unfinished(*paths)
-            if begun:
+            if started:
                 self._open.append(output)
             elif output in self._open:
                 self._open.remove(output)
 
     def undo(self) -> None:
-        """Leave nothing half-made."""
+        """Undo all unfinished output."""
         for output in reversed(self._open):
             with suppress(OSError):
                 output()
 
 
 def tell_supervisor(descriptor: int) -> None:
-    """From now on unfinished output is said there."""
+    """Report unfinished output to this descriptor from now on."""
     global _supervisor
     _supervisor = descriptor
 
 
 def leave_on_signals() -> None:
-    """From now on SIGINT leaves with status 130 and SIGTERM with 143."""
+    """Exit with status 130 on SIGINT and 143 on SIGTERM from now on."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _handle)
 
 
 def ignore_signals() -> None:
-    """The work is done and the interpreter about to end: an interruption would change nothing but the status."""
+    """Ignore interruptions: the work is done and they would only change the exit status."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
 
 
 @contextmanager
 def undone_when_interrupted(undo: Callable[[], None] | Unfinished) -> Iterator[None]:
-    """Calls `undo` when the process is interrupted inside; it must not raise for what is not there."""
+    """Call `undo` if the process is interrupted in the block.
+
+    `undo` must not raise if there is nothing to undo.
+    """
     _undo.append(undo)
-    _say(undo, begun=True)
+    _say(undo, started=True)
     try:
         yield
     finally:
         _undo.remove(undo)
-        _say(undo, begun=False)
+        _say(undo, started=False)
 
 
-def _say(undo: Callable[[], None] | Unfinished, *, begun: bool) -> None:
+def _say(undo: Callable[[], None] | Unfinished, *, started: bool) -> None:
     if _supervisor is not None and isinstance(undo, Unfinished):
-        with suppress(OSError):  # it is gone: this process hears of that by a signal
-            os.write(_supervisor, json.dumps([begun, *undo]).encode() + b"\n")
+        with suppress(OSError):  # the supervisor is gone; a signal will follow
+            os.write(_supervisor, json.dumps([started, *undo]).encode() + b"\n")
 
 
 @contextmanager
 def deferred() -> Iterator[None]:
-    """Steps that belong together: an interruption waits until they are done, but never longer than three seconds."""
+    """Delay interruptions until the block ends, at most 3 s."""
     global _deferrals
     _deferrals += 1
     try:

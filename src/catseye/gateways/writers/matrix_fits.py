@@ -1,18 +1,18 @@
-"""A large matrix as a FITS image, row by row, so that it need not be in memory."""
+"""Large matrix as a FITS image, written row by row to save memory."""
 
 from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-BLOCK = 2880  # bytes, in which FITS counts
+BLOCK = 2880  # bytes of a FITS block
 
 
 def matrix_pages(parts: Iterable[np.ndarray], size: int, cards: Mapping[str, tuple[str, str]]) -> Iterator[bytes]:
-    """A square matrix of doubles as the primary image of a FITS file.
+    """Square matrix of doubles as the primary image of a FITS file.
 
-    parts   rows, some at a time, (k, size)
-    size    of the matrix
-    cards   further ones of the header: value and comment by keyword
+    parts   blocks of rows, each (k, size)
+    size    number of rows and columns
+    cards   additional header cards: value and comment by keyword
     """
     from astropy.io import fits
 

@@ -1,4 +1,4 @@
-"""What every answer of a program shares: JSON's own types, one line or one page, and the versions that made it."""
+"""JSON conversion and formatting, and the versions of the software."""
 
 import json
 import math
@@ -14,7 +14,7 @@ PACKAGES = ("numpy", "scipy", "pydantic", "matplotlib", "threadpoolctl", "typer"
 
 
 def plain(value: Any) -> Any:
-    """The value in JSON's own types; NaN and infinity become null.
+    """Value in JSON's own types; NaN and infinity become null.
 
     >>> plain({"a": np.float64(1.5), "b": [float("nan")]})
     {'a': 1.5, 'b': [None]}
@@ -33,12 +33,12 @@ def plain(value: Any) -> Any:
 
 
 def json_line(value: Any) -> str:
-    """One JSON text on one line, for programs."""
+    """JSON text on one line, for programs."""
     return json.dumps(plain(value), allow_nan=False)
 
 
 def json_page(value: dict[str, Any]) -> str:
-    """One JSON text with a line for each entry, two levels deep: readable in an editor and by line tools."""
+    """JSON text with one line per entry, two levels deep, readable in an editor."""
     lines = []
     for key, item in plain(value).items():
         start = f"  {json.dumps(key)}: "

@@ -1,4 +1,4 @@
-"""An output directory that appears whole or not at all."""
+"""Output directories and files, written atomically."""
 
 import json
 import os
@@ -13,7 +13,7 @@ from catseye.gateways.writers.interruption import Unfinished, deferred, undone_w
 
 PROVENANCE = "provenance.json"
 PAGES = (".html", ".htm")
-FORMAT = "catseye-reduction-1"  # marks a directory as ours, so that it may be replaced; as do the next
+FORMAT = "catseye-reduction-1"  # identifies a directory of catseye, which may be replaced; so do the next
 FORMATS = (
     FORMAT,
     "catseye-adjustment-1",
@@ -36,19 +36,19 @@ FORMATS = (
 
 
 def refuse_output(out: Path, *read: Path) -> Path:
-    """The directory that `out` stands for, links resolved, when it can be made or replaced; or InputError.
+    """Output directory with links resolved; InputError if it cannot be made or replaced.
 
-    out    as the user wrote it; missing, empty, or an earlier output of catseye and of nobody else
-    read   the directories and files that are read, which must be neither in it nor around it
+    out    as the user wrote it: missing, empty, or holding only an earlier output of catseye
+    read   input directories and files; none may lie in it or contain it
     """
     where = out.resolve()
-    here = Path.cwd().resolve()
-    if where == here or where in here.parents:
+    current = Path.cwd().resolve()
+    if where == current or where in current.parents:
         raise InputError(f"--out {out}: is the current directory or holds it (expected a directory of its own)")
-    for each in read:
-        source = each.resolve()
+    for path in read:
+        source = path.resolve()
         if where == source or where in source.parents or source in where.parents:
-            raise InputError(f"--out {out}: is, holds or lies in the input {each} (expected a place outside it)")
+            raise InputError(f"--out {out}: is, holds or lies in the input {path} (expected a place outside it)")
     if not where.parent.is_dir():
         raise InputError(f"--out {out}: {out.parent} is not a directory (expected an existing one)")
     if not os.access(where.parent, os.W_OK | os.X_OK):
@@ -56,26 +56,26 @@ def refuse_output(out: Path, *read: Path) -> Path:
     if where.exists():
         if not where.is_dir():
             raise InputError(f"--out {out}: exists and is not a directory (expected a new or an empty one)")
-        _refuse_strangers(out, where)
+        _refuse_foreign(out, where)
     return where
 
 
-def _refuse_strangers(out: Path, where: Path) -> None:
-    """Nothing is replaced but what catseye wrote itself."""
+def _refuse_foreign(out: Path, where: Path) -> None:
+    """Raise InputError if the directory holds a file that catseye did not write."""
     names = sorted(entry.name for entry in where.iterdir())
     if not names:
         return
-    known = {PROVENANCE, *_written(where)}
-    strangers = [name for name in names if name not in known] if len(known) > 1 else names
-    if strangers:
-        more = f" and {len(strangers) - 1} more" if len(strangers) > 1 else ""
+    own_names = {PROVENANCE, *_written(where)}
+    foreign = [name for name in names if name not in own_names] if len(own_names) > 1 else names
+    if foreign:
+        more = f" and {len(foreign) - 1} more" if len(foreign) > 1 else ""
         raise InputError(
-            f"--out {out}: holds {strangers[0]!r}{more}, which catseye did not write (expected a new or an empty one)"
+            f"--out {out}: holds {foreign[0]!r}{more}, which catseye did not write (expected a new or an empty one)"
         )
 
 
 def _written(where: Path) -> set[str]:
-    """The files that a directory's provenance says catseye wrote there; none without our mark."""
+    """File names in the directory's provenance; empty without catseye's mark."""
     try:
         provenance: Any = json.loads((where / PROVENANCE).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
@@ -88,9 +88,9 @@ def _written(where: Path) -> set[str]:
 
 @contextmanager
 def whole_directory(out: Path, *read: Path) -> Iterator[Path]:
-    """A directory to write into, which takes the place of `out` when the block ends well and vanishes otherwise.
+    """Yield a directory to write into; it replaces `out` on success and is removed on failure.
 
-    It is a neighbour of `out`, so that putting it in place is a rename.
+    It lies beside `out`, so that a rename puts it in place.
     """
     where = refuse_output(out, *read)
     fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
@@ -111,9 +111,9 @@ def whole_directory(out: Path, *read: Path) -> Iterator[Path]:
 
 @contextmanager
 def new_directory(directory: Path) -> Iterator[Path]:
-    """A directory to write into, which becomes a new one, or takes an empty one's place, when the block ends well.
+    """Yield a directory to write; on success it becomes `directory`.
 
-    Raises InputError where it holds something or something cannot be written, with the file's name in it.
+    Raises InputError where `directory` is not empty or a file cannot be written, naming the file.
     """
     where = directory.resolve()
     if where.exists() and (not where.is_dir() or any(where.iterdir())):
@@ -138,7 +138,7 @@ def new_directory(directory: Path) -> Iterator[Path]:
 
 
 def _replace(where: Path, fresh: Path, old: Path) -> None:
-    """Two renames: the old tree aside, the new one in its place; when the second fails the first is taken back."""
+    """Move the old tree aside and the new one in; undo the first if the second fails."""
     if not where.exists():
         os.rename(fresh, where)
         return
@@ -152,13 +152,13 @@ def _replace(where: Path, fresh: Path, old: Path) -> None:
 
 @contextmanager
 def whole_file(path: Path, option: str, mark: str) -> Iterator[list[str]]:
-    """A text file that appears whole or not at all: what the block puts into the list.
+    """Write a text file atomically from the pieces that the block appends to the list.
 
     path     as the user wrote it: new, or an earlier file of catseye, one that holds `mark` in its first 4096 bytes
-    option   that named it, for messages
-    mark     text that tells our files from others', such as format = "catseye-baseline-1"
+    option   command option that named the file, for messages
+    mark     text that identifies catseye's files, such as format = "catseye-baseline-1"
 
-    Raises InputError where another's file would be lost or nothing can be written.
+    Raises InputError where a foreign file would be overwritten or nothing can be written.
     """
     where = path.resolve()
     fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
@@ -170,7 +170,7 @@ def whole_file(path: Path, option: str, mark: str) -> Iterator[list[str]]:
             if where.exists():
                 with where.open("rb") as stream:
                     if mark.encode() not in stream.read(4096):
-                        raise InputError(f"{option} {path}: exists and is not catseye's (expected a new name)")
+                        raise InputError(f"{option} {path}: exists and is not a catseye file (expected a new name)")
             yield pieces
             fresh.write_text("".join(pieces), encoding="utf-8")
             with deferred():
@@ -182,7 +182,7 @@ def whole_file(path: Path, option: str, mark: str) -> Iterator[list[str]]:
 
 
 def refuse_suffix(path: Path, option: str) -> None:
-    """InputError for the name of a page that says another format than HTML."""
+    """Raise InputError for a page's name whose suffix is not HTML."""
     suffix = path.suffix.lower()
     if suffix not in PAGES and not path.is_dir():
         hint = "; a browser prints a page as PDF" if suffix == ".pdf" else ""
@@ -190,14 +190,14 @@ def refuse_suffix(path: Path, option: str) -> None:
 
 
 def write_whole(path: Path, content: bytes, *, option: str, ours: Callable[[bytes], bool]) -> None:
-    """A file that appears whole or not at all.
+    """Write a file atomically.
 
     path      new, or an earlier file of catseye
-    content   all of it
-    option    that named the file, for messages
-    ours      whether what stands there is catseye's
+    content   complete content
+    option    command option that named the file, for messages
+    ours      True for the content of an existing file that is catseye's
 
-    Raises InputError where another's file would be lost, and where nothing can be written.
+    Raises InputError where a foreign file would be overwritten or nothing can be written.
     """
     where = path.resolve()
     fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
@@ -206,7 +206,7 @@ def write_whole(path: Path, content: bytes, *, option: str, ours: Callable[[byte
             if where.is_dir():
                 raise InputError(f"{option} {path}: is a directory (expected the name of a file)")
             if where.exists() and not ours(where.read_bytes()):
-                raise InputError(f"{option} {path}: exists and is not catseye's (expected a new name)")
+                raise InputError(f"{option} {path}: exists and is not a catseye file (expected a new name)")
             fresh.write_bytes(content)
             with deferred():
                 os.replace(fresh, where)

@@ -1,4 +1,4 @@
-"""The pieces of a page that stands alone: style, tables, pictures, all escaped."""
+"""Parts of self-contained HTML pages: style, tables, pictures, all escaped."""
 
 import base64
 from collections.abc import Iterable, Sequence
@@ -46,7 +46,7 @@ summary { cursor: pointer; color: var(--accent); margin: .6rem 0; }
 
 
 def page(title: str, body: str) -> str:
-    """A whole HTML document: no script, nothing to fetch."""
+    """Complete HTML document without scripts or external resources."""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
@@ -81,7 +81,7 @@ def card(name: str, value: str, remark: str) -> str:
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[str]], kinds: str) -> str:
-    """A table that scrolls in its box; `kinds` has a letter a column: n number, t text, w wide text, h hash."""
+    """Scrolling table; `kinds` has a letter per column: n number, t text, w wide text, h hash."""
     head = "".join(f'<th class="{kind}">{escape(name)}</th>' for name, kind in zip(columns, kinds, strict=True))
     lines = (
         "<tr>"

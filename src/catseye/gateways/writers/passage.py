@@ -1,10 +1,10 @@
-"""What a report says in words: the same sentences on a terminal, on a page and in a program's answer."""
+"""Sentences of a report, shared by terminals, pages and JSON."""
 
 from typing import NamedTuple
 
 
 class Passage(NamedTuple):
-    """A few sentences under a word or two."""
+    """A few sentences under a short title."""
 
     title: str
     text: str

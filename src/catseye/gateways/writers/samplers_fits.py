@@ -1,9 +1,9 @@
-"""Results as FITS binary tables in the manner of a telescope's samplers: one table a quantity, time as MJD.
+"""FITS binary tables in the style of a telescope's samplers: one table per quantity, time as MJD.
 
-Every table is one extension, named after its quantity. Its first column is MJD (unit d, UTC, the middle of what was
-measured), where the quantity has a time; the others say their unit in TUNITn and what they are in TCOMMn. The header
-says TIMESYS, MJDREF, ORIGIN, the version of catseye, and in words the frame and the pivot that the numbers refer to.
-Doubles, whole numbers, truth values and ASCII text are stored as they are: what is read back is the same bit for bit.
+Each table is one extension, named after its quantity. Its first column is MJD (unit d, UTC, middle of the measurement)
+where the quantity has a time; the others have their unit in TUNITn and a description in TCOMMn. The header holds
+TIMESYS, MJDREF, ORIGIN, the version of catseye, and in words the frame and the pivot of the numbers.
+Doubles, integers, booleans and ASCII text are stored unchanged: they are read back bit for bit.
 """
 
 import csv
@@ -24,7 +24,7 @@ from catseye.gateways.writers.output import PROVENANCE, write_whole
 from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD
 from catseye.version import __version__
 
-MARK = "CATSEYE"  # keyword of the version, by which a file is known as ours
+MARK = "CATSEYE"  # keyword of the version; identifies a file of catseye
 TIME = "MJD"
 SAMPLERS = "samplers.fits"
 UNITS = {
@@ -47,11 +47,11 @@ FORMS = {"f": ("D", np.float64), "i": ("K", np.int64), "u": ("K", np.int64), "b"
 
 @dataclass(frozen=True, eq=False)
 class SamplerColumn:
-    """A column of a table.
+    """Column of a table.
 
-    unit      as the FITS standard writes it ("m", "rad", "mm", "deg", "arcsec", "K", "m2 / Hz"); "" of none
-    values    (n, ...) numbers, truth values, or (n,) text; a row of an array column has its shape in TDIMn
-    comment   what it is, a few words
+    unit      as the FITS standard writes it ("m", "rad", "mm", "deg", "arcsec", "K", "m2 / Hz"); "" for none
+    values    (n, ...) numbers, booleans, or (n,) text; the row shape of an array column is written as TDIMn
+    comment   short description
     """
 
     unit: str
@@ -61,15 +61,15 @@ class SamplerColumn:
 
 @dataclass(frozen=True, eq=False)
 class SamplerTable:
-    """A quantity as a table.
+    """Table of one quantity.
 
-    name      of the extension: capital letters, digits and _
+    name      extension name: capital letters, digits and _
     columns   by name: capital letters, digits and _
-    mjd       (n,) d, UTC; None for what has no time, as coefficients have none
-    comment   what the table holds, in a sentence
-    frame     of its numbers, in words: "ground", "reflector frame at rest"; "" where none is meant
-    pivot     about which its turns are, in words or numbers with their unit; "" where none is meant
-    header    more keywords, of at most 8 characters, with numbers or text
+    mjd       (n,) d, UTC; None for a quantity without time, such as coefficients
+    comment   description, one sentence
+    frame     frame of the numbers, in words: "ground", "reflector frame at rest"; "" for none
+    pivot     pivot of rotations, in words or numbers with their unit; "" for none
+    header    additional keywords, of at most 8 characters, with numbers or text
     """
 
     name: str
@@ -82,9 +82,9 @@ class SamplerTable:
 
 
 def sampler_tables(tables: Mapping[str, SamplerTable]) -> bytes:
-    """A whole FITS file of some tables, checked by astropy against the standard.
+    """FITS file of the tables, verified by astropy.
 
-    tables   in order; the keys are the names of the extensions
+    tables   in order, by extension name
 
     Raises InputError for names, units, lengths or values that FITS cannot hold.
 
@@ -95,39 +95,39 @@ def sampler_tables(tables: Mapping[str, SamplerTable]) -> bytes:
     from astropy.io import fits
 
     if not tables:
-        raise InputError("a FITS file of samplers needs one table at least")
+        raise InputError("a FITS file of samplers needs at least one table")
     pages = [fits.PrimaryHDU()]
     pages[0].header["ORIGIN"] = "catseye"
     pages[0].header[MARK] = (__version__, "version of catseye")
     for name, table in tables.items():
         if name != table.name:
-            raise InputError(f"table {table.name!r} stands under the key {name!r} (expected the same)")
+            raise InputError(f"table {table.name!r} has the key {name!r} (expected its name)")
         pages.append(_page(table))
-    whole = io.BytesIO()
+    stream = io.BytesIO()
     hdus = fits.HDUList(pages)
     hdus.verify("exception")
-    hdus.writeto(whole, checksum=True, output_verify="exception")
-    return whole.getvalue()
+    hdus.writeto(stream, checksum=True, output_verify="exception")
+    return stream.getvalue()
 
 
 def write_samplers(path: Path, tables: Mapping[str, SamplerTable], *, option: str = "--fits") -> None:
-    """The tables as a file that appears whole or not at all.
+    """Write the tables to a FITS file atomically.
 
     path     new, or an earlier file of catseye
     tables   as for `sampler_tables`
-    option   that named the file, for messages
+    option   command option that named the file, for messages
 
-    Raises InputError where another's file would be lost, nothing can be written, or FITS cannot hold a value.
+    Raises InputError where a foreign file would be overwritten, nothing can be written, or FITS cannot hold a value.
     """
     mark = f"{MARK:<8}=".encode()
     write_whole(path, sampler_tables(tables), option=option, ours=lambda content: mark in content[:2880])
 
 
 def join_samplers(directory: Path, name: str, tables: Mapping[str, SamplerTable]) -> None:
-    """The tables as one more file of an output directory, named in its provenance with its hash.
+    """Add the tables as a file to an output directory and to its provenance.
 
-    directory   that `output.whole_directory` gave and `written.write_files` has filled
-    name        of the file, such as "samplers.fits"
+    directory   from `output.whole_directory`, filled by `written.write_files`
+    name        file name, such as "samplers.fits"
     tables      as for `sampler_tables`
     """
     content = sampler_tables(tables)
@@ -141,11 +141,11 @@ def join_samplers(directory: Path, name: str, tables: Mapping[str, SamplerTable]
 def join_tables(
     directory: Path, *, frame: str = "", pivot: str = "", tables: Mapping[str, SamplerTable] | None = None
 ) -> None:
-    """All CSV tables of an output directory once more, as samplers.fits, with the same numbers.
+    """Add all CSV tables of an output directory as samplers.fits, with the same numbers.
 
     directory      as for `join_samplers`
     frame, pivot   of the tables, as in `SamplerTable`
-    tables         more, which stand first
+    tables         additional tables, written first
     """
     joined = dict(tables or {})
     for path in sorted(directory.glob("*.csv")):
@@ -155,7 +155,7 @@ def join_tables(
 
 
 def _of_csv(name: str, text: str, frame: str, pivot: str) -> SamplerTable:
-    """A table by its CSV: units by the ends of its columns' names, blanks as NaN, text where a cell is no number."""
+    """Table of a CSV: units from column names, NaN for blanks, text for non-numeric columns."""
     header, *rows = csv.reader(io.StringIO(text))
     columns = {}
     for k, title in enumerate(header):
@@ -177,9 +177,9 @@ def _as_ascii(text: str) -> str:
 
 
 def read_samplers(path: Path) -> dict[str, SamplerTable]:
-    """The tables of a file that `write_samplers` made, bit for bit.
+    """Tables of a file written by `write_samplers`, bit for bit.
 
-    Raises InputError for a file that is missing, damaged (its checksums are proved) or not catseye's.
+    Raises InputError for a file that is missing, damaged (checksums are verified) or not catseye's.
     """
     import warnings
 
@@ -187,10 +187,10 @@ def read_samplers(path: Path) -> dict[str, SamplerTable]:
 
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error")  # a checksum that does not hold is a warning of astropy's
+            warnings.simplefilter("error")  # astropy warns of a wrong checksum
             with fits.open(io.BytesIO(path.read_bytes()), checksum=True) as pages:
                 if MARK not in pages[0].header:
-                    raise InputError(f"{path}: is not a file of catseye's samplers (no keyword {MARK})")
+                    raise InputError(f"{path}: is not a samplers file of catseye (no keyword {MARK})")
                 return {page.name: _read(page) for page in pages[1:]}
     except (OSError, TypeError, ValueError, Warning) as problem:
         reason = str(getattr(problem, "strerror", None) or problem).splitlines()[0]
@@ -209,7 +209,7 @@ def _page(table: SamplerTable) -> Any:
     fields = [_column(table.name, name, column) for name, column in columns.items()]
     lengths = {name: len(np.asarray(column.values)) for name, column in columns.items()}
     if len(set(lengths.values())) > 1:
-        raise InputError(f"table {table.name}: columns have unlike lengths {lengths} (expected one)")
+        raise InputError(f"table {table.name}: columns have different lengths {lengths} (expected one length)")
     page = fits.BinTableHDU.from_columns(fields, name=table.name)
     header = page.header
     header["TIMESYS"] = ("UTC", "time scale of MJD")
@@ -230,7 +230,7 @@ def _page(table: SamplerTable) -> Any:
 
 
 def _column(table: str, name: str, column: SamplerColumn) -> Any:
-    """A column in the form of FITS that loses nothing."""
+    """FITS column, without loss of precision."""
     from astropy.io import fits
 
     values = np.asarray(column.values)
@@ -239,27 +239,27 @@ def _column(table: str, name: str, column: SamplerColumn) -> Any:
     if values.dtype.kind == "U" and values.ndim == 1:
         text = [str(v) for v in values]
         if any(v != v.rstrip(" \0") for v in text):
-            raise InputError(f"{where}: a text ends in a blank, which FITS would lose (expected none)")
+            raise InputError(f"{where}: a text ends in a blank, which FITS would drop (expected none)")
         raw = np.array([_ascii(where, v).encode("ascii") for v in text] or [b""])[: len(text)]
         return fits.Column(name, f"{max(1, raw.dtype.itemsize)}A", unit=unit, array=raw)
     if values.ndim < 1 or values.dtype.kind not in FORMS:
         raise InputError(
-            f"{where}: {values.dtype} in {values.ndim} dimensions (expected rows of numbers, truth values or text)"
+            f"{where}: {values.dtype} in {values.ndim} dimensions (expected rows of numbers, booleans or text)"
         )
     letter, dtype = FORMS[values.dtype.kind]
     stored: NDArray[Any] = values.astype(dtype)
     if values.dtype.kind == "u" and np.any(stored < 0):
-        raise InputError(f"{where}: holds {values.max()} (expected whole numbers below 2^63)")
+        raise InputError(f"{where}: holds {values.max()} (expected integers below 2^63)")
     inner = values.shape[1:]
     count = int(np.prod(inner)) if inner else 1
     if count == 0:
-        raise InputError(f"{where}: its rows are empty, shape {values.shape} (expected one value at least)")
+        raise InputError(f"{where}: its rows are empty, shape {values.shape} (expected at least one value)")
     dims = "(" + ",".join(str(n) for n in inner[::-1]) + ")" if len(inner) > 1 else None
     return fits.Column(name, f"{count if inner else ''}{letter}", unit=unit, dim=dims, array=stored)
 
 
 def _unit(where: str, unit: str) -> str | None:
-    """The unit as given, when the FITS standard knows it."""
+    """Unit as given, if the FITS standard has it."""
     if not unit:
         return None
     from astropy import units
@@ -267,8 +267,8 @@ def _unit(where: str, unit: str) -> str | None:
     try:
         units.Unit(unit, format="fits", parse_strict="raise")
     except ValueError as problem:
-        hint = ": FITS has no degree Celsius, give K" if unit in ("degC", "deg_C", "Celsius") else ""
-        raise InputError(f"{where}: unit {unit!r} is none of the FITS standard{hint}") from problem
+        hint = ": FITS has no degree Celsius, use K" if unit in ("degC", "deg_C", "Celsius") else ""
+        raise InputError(f"{where}: unit {unit!r} is not in the FITS standard{hint}") from problem
     return unit
 
 
@@ -282,27 +282,29 @@ def _refuse_times(table: SamplerTable) -> None:
 
 
 def _refuse_names(table: SamplerTable, columns: Mapping[str, SamplerColumn]) -> None:
-    """Names that every reader of FITS takes; keywords that do not hide the file's own."""
+    """Raise InputError for names not portable in FITS or keywords that would hide the file's own."""
     for name in (table.name, *columns):
         if not name or not name.isascii() or not name.replace("_", "A").isalnum() or name != name.upper():
             raise InputError(f"table {table.name!r}: the name {name!r} (expected capital letters, digits and _)")
     if not columns:
-        raise InputError(f"table {table.name}: has no column (expected one at least)")
+        raise InputError(f"table {table.name}: has no column (expected at least one)")
     if TIME in table.columns and table.mjd is not None:
-        raise InputError(f"table {table.name}: the column {TIME} is made of `mjd` (expected another name)")
+        raise InputError(f"table {table.name}: the column {TIME} is reserved for `mjd` (expected another name)")
     for key in table.header:
         if len(key) > 8 or key != key.upper() or key in STANDARD | OURS or key.startswith(OF_COLUMNS):
-            raise InputError(f"table {table.name}: the keyword {key!r} (expected up to 8 capitals, none of FITS's own)")
+            raise InputError(
+                f"table {table.name}: the keyword {key!r} (expected up to 8 capitals, none reserved by FITS)"
+            )
 
 
 def _ascii(where: str, text: str) -> str:
     if text.isascii() and text.isprintable():
         return text
-    raise InputError(f"{where}: {text!r} is not printable ASCII, and FITS holds nothing else (expected ASCII)")
+    raise InputError(f"{where}: {text!r} is not printable ASCII, as FITS requires")
 
 
 def _read(page: Any) -> SamplerTable:
-    """A table as it was given to the writer."""
+    """Table as it was passed to the writer."""
     header, columns, mjd = page.header, {}, None
     for number, column in enumerate(page.columns, start=1):
         values = np.array(page.data[column.name])
@@ -316,5 +318,5 @@ def _read(page: Any) -> SamplerTable:
 
 
 def _more(header: Any) -> dict[str, Any]:
-    """The keywords that are nobody's but the table's own."""
+    """Keywords specific to the table."""
     return {key: header[key] for key in header if key not in STANDARD | OURS and not key.startswith(OF_COLUMNS)}

@@ -1,4 +1,4 @@
-"""The files of a result, written one by one, and last the provenance with the hashes of all."""
+"""Write the files of a result, and last the provenance with their hashes."""
 
 import csv
 import hashlib
@@ -17,10 +17,10 @@ Progress = Callable[[str, int, int], None]
 
 
 def origin(when: datetime, inputs: Mapping[str, str]) -> dict[str, Any]:
-    """When and by what a result was made, and from which files.
+    """Provenance of a result: time, versions and input hashes.
 
     when     UTC
-    inputs   SHA-256 of each file read, by its name
+    inputs   SHA-256 of each input file, by name
     """
     return {"when_utc": when.isoformat(timespec="seconds"), "versions": versions(), "inputs_sha256": dict(inputs)}
 
@@ -28,17 +28,17 @@ def origin(when: datetime, inputs: Mapping[str, str]) -> dict[str, Any]:
 def write_files(
     files: Files, directory: Path, provenance: Mapping[str, Any], *, progress: Progress | None = None
 ) -> None:
-    """Each file as text or piece by piece, text or bytes, so that a large one needs no more memory than its columns.
+    """Write each file piece by piece, so that a large one needs little memory.
 
-    files        name -> what gives its text, in the order of writing
-    directory    exists, and is ours to fill: see `output.whole_directory`
-    provenance   what is said of them: at least `format`; their hashes are added
-    progress     told of each file
+    files        name -> function that returns its text or bytes, whole or in pieces, in the order of writing
+    directory    existing, from `output.whole_directory`
+    provenance   at least `format`; the files' hashes are added
+    progress     called for each file
     """
     outputs: dict[str, str] = {}
-    for done, (name, page) in enumerate(files.items()):
+    for count, (name, page) in enumerate(files.items()):
         if progress is not None:
-            progress(f"writing {name}", done, len(files))
+            progress(f"writing {name}", count, len(files))
         digest = hashlib.sha256()
         text = page()
         with (directory / name).open("wb") as stream:
@@ -53,15 +53,15 @@ def write_files(
 
 
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """A table's text; a number that is none is an empty cell."""
+    """CSV text; NaN becomes an empty cell."""
     stream = io.StringIO(newline="")
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(header)
     for row in rows:
-        writer.writerow(["" if isinstance(each, float) and math.isnan(each) else each for each in row])
+        writer.writerow(["" if isinstance(value, float) and math.isnan(value) else value for value in row])
     return stream.getvalue()
 
 
 def cell(value: Any, form: str) -> str:
-    """A number as a cell; empty where there is none."""
+    """Number as a cell; empty if None or not finite."""
     return "" if value is None or not math.isfinite(value) else format(float(value), form)

@@ -1,1 +1,1 @@
-"""What a record is, how files are read, and how a bad one is refused."""
+"""Record types, file readers, and error messages for invalid files."""

@@ -1,6 +1,6 @@
-"""Tables of many rows, read by column: fast where all is well, precise where it is not.
+"""Tables of many rows, read by column: fast if valid, with precise errors if not.
 
-Lines are counted from 1, the header is line 1.
+Lines count from 1; the header is line 1.
 """
 
 import csv
@@ -18,12 +18,12 @@ Check = Callable[[list[str]], None]
 
 @dataclass(frozen=True)
 class TextColumns:
-    """A CSV table by column, all cells text without spaces around them.
+    """CSV table by column; cells are text without surrounding spaces.
 
-    file     its name, for refusals
-    cells    column name -> cells, one a row
-    lines    where each row stands in the file
-    comma    decimals may stand behind a comma: semicolons are between the cells
+    file     file name, for messages
+    cells    column name -> cells, one per row
+    lines    line of each row in the file
+    comma    True if cells are separated by semicolons, so that decimal commas are allowed
     """
 
     file: str
@@ -35,11 +35,11 @@ class TextColumns:
         return len(self.lines)
 
     def refuse(self, row: int, problem: str) -> InputError:
-        """The error of one row, counted from 0."""
+        """Error for one row, counted from 0."""
         return refusal(self.file, f"line {self.lines[row]}, {problem}")
 
     def numbers(self, name: str, blank: float | None = None) -> np.ndarray:
-        """A column as finite numbers (rows,); a blank cell is `blank`, refused if None."""
+        """Column as finite numbers (rows,); a blank cell is `blank`, or an error if None."""
         cells = self.cells[name]
         if self.comma:
             cells = list(map(pointed, cells))
@@ -52,7 +52,7 @@ class TextColumns:
         bad = ~np.isfinite(values)
         if blank is not None:
             bad &= [cell != "" for cell in self.cells[name]]
-        if "_" in "".join(cells):  # which Python's float takes for a separator
+        if "_" in "".join(cells):  # a digit separator for Python's float
             bad |= ["_" in cell for cell in cells]
         if bad.any():
             row = int(np.argmax(bad))
@@ -60,18 +60,18 @@ class TextColumns:
         return values
 
     def check(self, name: str, good: np.ndarray, expected: str) -> None:
-        """Refuses the first row (of a bool a row) that is not good, with its cell."""
+        """Raise InputError for the first row with False in `good`, with its cell."""
         if not good.all():
             row = int(np.argmin(good))
             raise self.refuse(row, f"{name} = {shown(self.cells[name][row])} (expected {expected})")
 
     def where(self) -> tuple[str, ...]:
-        """The place of every row, in words."""
+        """Place of every row, in words."""
         return tuple(map("line {}".format, self.lines))
 
 
 def pointed(cell: str) -> str:
-    """A cell with its decimal comma as a point, where it has one and no point.
+    """Cell with a decimal comma replaced by a point, unless it has a point.
 
     >>> pointed("1,5"), pointed("1,500.0")
     ('1.5', '1,500.0')
@@ -80,14 +80,14 @@ def pointed(cell: str) -> str:
 
 
 def columns_of(text: str, file: str, required: Sequence[str], *, optional: Sequence[str] = ()) -> TextColumns:
-    """The columns of a CSV text with a header, in any order.
+    """Columns of a CSV text with header, in any order.
 
-    text       the whole file; where its header has semicolons and no comma, these are between its cells
-    file       its name, for refusals
-    required   columns that must be there
-    optional   columns that may
+    text       content of the file; cells are separated by semicolons if its header has these and no comma
+    file       file name, for messages
+    required   required columns
+    optional   optional columns
 
-    Raises InputError for another or a missing or double column, a row of another width, a table without rows.
+    Raises InputError for an unknown, missing or repeated column, a row of wrong width, a table without rows.
 
     >>> columns_of("to,from\\nT1,S1\\n", "r.csv", ["from", "to"]).cells["from"]
     ['S1']
@@ -108,24 +108,29 @@ def columns_of(text: str, file: str, required: Sequence[str], *, optional: Seque
 
 
 def _check_header(file: str, header: list[str], required: Sequence[str], optional: Sequence[str]) -> None:
-    wanted = f"(expected the header {','.join(required)}" + (f", perhaps {','.join(optional)})" if optional else ")")
+    expected = f"(expected the header {','.join(required)}" + (
+        f", optionally {','.join(optional)})" if optional else ")"
+    )
     strange = [name for name in header if name not in required and name not in optional]
     if strange:
-        verb = "is not known" if len(strange) == 1 else "are not known"
-        raise refusal(file, f"line 1, column {', '.join(map(shown, strange))} {verb} {wanted}")
+        verb = "is unknown" if len(strange) == 1 else "are unknown"
+        raise refusal(file, f"line 1, column {', '.join(map(shown, strange))} {verb} {expected}")
     for name in header:
         if header.count(name) > 1:
-            raise refusal(file, f"line 1, column {shown(name)} is there {header.count(name)} times {wanted}")
+            raise refusal(file, f"line 1, column {shown(name)} occurs {header.count(name)} times {expected}")
     for name in required:
         if name not in header:
-            raise refusal(file, f"line 1, column {name!r} is missing {wanted}")
+            raise refusal(file, f"line 1, column {name!r} is missing {expected}")
 
 
 def _plain(text: str, file: str, check: Check, between: str) -> tuple[list[str], list[str], Sequence[int]]:
-    """Header, all cells row by row, and the rows' lines; one split of the whole text, as no list a row is made."""
+    """Header, all cells row by row, and the rows' lines.
+
+    One split of the complete text, since a list per row would be slow.
+    """
     text = text.rstrip()
     if not text:
-        raise refusal(file, "holds no text: empty")
+        raise refusal(file, "is empty")
     first, _, body = text.partition("\n")
     header = [cell.strip() for cell in first.split(between)]
     check(header)

@@ -1,6 +1,6 @@
-"""From files to records, or to a refusal in one line.
+"""Readers from files to records; errors in one line.
 
-Rows of a table are counted from 1, the header not counted; a number in brackets counts from 0.
+Rows of a table count from 1 without the header; a number in brackets counts from 0.
 """
 
 import csv
@@ -21,18 +21,18 @@ from catseye.records.files.refusal import NUMBER, explained, refusal, shown, unr
 
 R = TypeVar("R", bound=Record)
 
-WHOLE = re.compile(r"[+-]?[0-9]{1,18}")
+INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
 
 
 @dataclass(frozen=True)
 class Folder:
-    """A directory of input files; `hashes` collects the SHA-256 of each file read, by its relative path."""
+    """Directory of input files; `hashes` collects the SHA-256 of each file read, by relative path."""
 
     directory: Path
     hashes: dict[str, str] = field(default_factory=dict)
 
     def path(self, file: str) -> Path:
-        """Where the file is, which must be there."""
+        """Path of the file; InputError if missing."""
         path = self.directory / file
         try:
             if path.is_file():
@@ -40,12 +40,12 @@ class Folder:
             state = "is not a file" if path.exists() else "missing"
         except OSError as problem:
             raise unreadable(file, problem) from problem
-        if not file:  # of a path such as . or /
+        if not file:  # a path such as . or /
             raise refusal(str(path), f"{state} (expected one)")
         raise refusal(file, f"{state} in {self.directory}")
 
     def records_in(self, file: str) -> list[str]:
-        """The TOML files of a subdirectory, which must be there, in order."""
+        """TOML files of a subdirectory, sorted; InputError if missing."""
         try:
             if not (self.directory / file).is_dir():
                 raise refusal(file, f"missing in {self.directory} (expected a directory)")
@@ -70,7 +70,7 @@ class Folder:
         return text
 
     def record(self, file: str, kind: type[R]) -> R:
-        """The record that a whole TOML file is."""
+        """Record of a complete TOML file."""
         document = toml_of(self.text(file), file)
         try:
             return kind.model_validate(document)
@@ -78,7 +78,7 @@ class Folder:
             raise refusal(file, explained(problem, document, kind)) from problem
 
     def table(self, file: str, kind: type[R]) -> list[R]:
-        """The rows of a CSV file with a header, each a record."""
+        """Rows of a CSV file with a header, as records."""
         header, rows = cells_of(self.text(file), file)
         columns = list(kind.model_fields)
         refuse_header(file, header, columns)
@@ -100,17 +100,17 @@ class Folder:
         return records
 
 
-NUMBERS: dict[Any, tuple[re.Pattern[str], Any]] = {int: (WHOLE, int), float: (NUMBER, float)}
+NUMBERS: dict[Any, tuple[re.Pattern[str], Any]] = {int: (INTEGER, int), float: (NUMBER, float)}
 
 
 def read_record(path: Path | str, kind: type[R]) -> R:
-    """One TOML file anywhere, as a record of the kind."""
+    """Record of one TOML file at any path."""
     path = Path(path)
     return Folder(path.parent).record(path.name, kind)
 
 
 def column(values: Sequence[float], kind: type[np.number]) -> np.ndarray:
-    """One column of a table as a read-only array."""
+    """Column of a table as a read-only array."""
     array = np.array(values, dtype=kind)
     array.setflags(write=False)
     return array
@@ -131,7 +131,7 @@ def toml_of(text: str, file: str) -> dict[str, Any]:
 
 
 def cells_of(text: str, file: str) -> tuple[list[str], list[list[str]]]:
-    """The header and the rows of a table; empty lines at the end do not count."""
+    """Header and rows of a table; empty lines at the end are ignored."""
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     rows: list[list[str]] = []
     try:
@@ -144,12 +144,12 @@ def cells_of(text: str, file: str) -> tuple[list[str], list[list[str]]]:
 
 
 def refuse_header(file: str, header: list[str], columns: list[str]) -> None:
-    wanted = f"(expected the header {','.join(columns)})"
+    expected = f"(expected the header {','.join(columns)})"
     for name in header:
         if name not in columns:
-            raise refusal(file, f"header, column {shown(name)} is not known {wanted}")
+            raise refusal(file, f"header, column {shown(name)} is unknown {expected}")
         if header.count(name) > 1:
-            raise refusal(file, f"header, column {shown(name)} is there {header.count(name)} times {wanted}")
+            raise refusal(file, f"header, column {shown(name)} occurs {header.count(name)} times {expected}")
     for name in columns:
         if name not in header:
-            raise refusal(file, f"header, column {name!r} is missing {wanted}")
+            raise refusal(file, f"header, column {name!r} is missing {expected}")

@@ -1,8 +1,8 @@
-"""A table of readings and the sheet beside it: READINGS.csv holds numbers, READINGS.toml who, when, with what.
+"""Table of readings READINGS.csv and its sheet READINGS.toml: who, when, with what.
 
-A column and a key of the sheet may stand for each other: a temperature that did not change is a key, one that did is a
-column, and a column wins. Every table may have the columns `mjd_utc` and `left_out`; a reading with a text in the
-second takes no part and is shown with that text.
+A value may be a column or a key of the sheet: a constant temperature is a key, a varying one a column; a column takes
+precedence. Every table may have the columns `mjd_utc` and `left_out`; a reading with a text in the second is excluded
+and shown with that text.
 """
 
 import math
@@ -25,19 +25,19 @@ Words = Annotated[str, Field(min_length=1)]
 Share = Annotated[float, Within(0, 1, above=True)]
 TIME = "mjd_utc"
 LEFT_OUT = "left_out"
-TEXT = None  # the limits of a column of words
+TEXT = None  # limits of a text column
 
 
 class Sheet(Record):
-    """What every calibration says about its readings.
+    """Sheet common to all calibrations.
 
-    kind                     of calibration, as the command calls it
-    instrument               what was calibrated: "ZP103", "EDM 7"
-    serial                   of it
+    kind                     kind of calibration, by its name in the command
+    instrument               calibrated instrument: "ZP103", "EDM 7"
+    serial                   serial number
     measured_on, valid_until dates
-    by                       who measured
-    report                   where it is written up
-    level                    of the tests: chance of any false alarm among the readings
+    by                       person who measured
+    report                   reference to the report
+    level                    of the tests: probability of any false alarm among the readings
     """
 
     format: Annotated[int | str, Version("readings")] = 1
@@ -68,12 +68,12 @@ class Sheet(Record):
 
 @dataclass(frozen=True)
 class SheetLayout:
-    """The columns and the sheet of one kind of calibration.
+    """Columns and sheet of one kind of calibration.
 
-    kind       its name
+    kind       name of the kind
     sheet      type of its sheet
-    required   columns that must be there: name -> limits of a number, TEXT for words
-    optional   columns that may be
+    required   required columns: name -> limits of a number, TEXT for text
+    optional   optional columns
     """
 
     kind: str
@@ -84,14 +84,14 @@ class SheetLayout:
 
 @dataclass(frozen=True, eq=False)
 class SheetReadings:
-    """A table with its sheet, every number finite and within its limits.
+    """Table with its sheet; all numbers are finite and within their limits.
 
     file       name of the table
-    sheet      record beside it; sheet_file is its name
+    sheet      its sheet; sheet_file is the sheet's name
     numbers    columns (m,)
     words      columns of text
     where      place of each reading in the file: "line 2"
-    left_out   why a reading takes no part, "" where it does
+    left_out   reason for excluding a reading, "" if used
     hashes     SHA-256 of both files
     """
 
@@ -109,15 +109,15 @@ class SheetReadings:
 
     @property
     def active(self) -> np.ndarray:
-        """Whether each reading takes part, (m,) bool."""
+        """Mask of the readings in use, (m,) bool."""
         return np.array([not reason for reason in self.left_out])
 
     def has(self, name: str) -> bool:
-        """A column or a key of that name is given."""
+        """True if a column or a key of this name is given."""
         return name in self.numbers or getattr(self.sheet, name, None) is not None
 
     def get(self, name: str) -> np.ndarray:
-        """(m,) of a column, or of the key of the sheet repeated; InputError where neither is given."""
+        """Column (m,), or the sheet's key repeated; InputError if neither is given."""
         if name in self.numbers:
             return self.numbers[name]
         value = getattr(self.sheet, name, None)
@@ -128,34 +128,34 @@ class SheetReadings:
         return np.full(len(self), float(value))
 
     def hours(self) -> np.ndarray:
-        """(m,) h since the first reading; the column mjd_utc must be there."""
+        """Hours since the first reading, (m,); requires the column mjd_utc."""
         if TIME not in self.numbers:
             raise refusal(self.file, f"line 1, column {TIME!r} is missing (needed to follow the drift)")
         return (self.numbers[TIME] - self.numbers[TIME].min()) * 24.0
 
     def refuse(self, row: int, problem: str) -> InputError:
-        """The error of one reading, counted from 0."""
+        """Error for one reading, counted from 0."""
         return refusal(self.file, f"{self.where[row]}, {problem}")
 
 
 def read_readings(path: Path | str, layout: SheetLayout, sheet: Path | str | None = None) -> SheetReadings:
-    """A table and its sheet.
+    """Read a table and its sheet.
 
     path      of the table, CSV with a header, columns in any order
-    layout    what is expected in both
-    sheet     path of the sheet; the table's with the ending .toml if None
+    layout    expected columns and sheet
+    sheet     path of the sheet; None for the table's with the suffix .toml
 
-    Raises InputError, one line with file, place, value and what was expected.
+    Raises InputError, one line with file, place, value and expectation.
     """
     path = Path(path)
-    beside = path.with_suffix(".toml") if sheet is None else Path(sheet)
-    if beside.resolve() == path.resolve():
+    sheet_path = path.with_suffix(".toml") if sheet is None else Path(sheet)
+    if sheet_path.resolve() == path.resolve():
         raise refusal(path.name, "is given as the table and as its sheet (expected a table .csv and a sheet .toml)")
-    page = Folder(beside.parent)
-    record = page.record(beside.name, layout.sheet)
+    page = Folder(sheet_path.parent)
+    record = page.record(sheet_path.name, layout.sheet)
     if record.kind != layout.kind:
         raise refusal(
-            beside.name, f"kind = {record.kind!r} is a sheet of another calibration (expected {layout.kind!r})"
+            sheet_path.name, f"kind = {record.kind!r} is the sheet of another calibration (expected {layout.kind!r})"
         )
     folder = Folder(path.parent)
     text = folder.text(path.name)
@@ -173,7 +173,7 @@ def read_readings(path: Path | str, layout: SheetLayout, sheet: Path | str | Non
     if all(reasons):
         raise refusal(path.name, f"every reading has a reason in {LEFT_OUT!r} (expected some without)")
     hashes = {**folder.hashes, **page.hashes}
-    return SheetReadings(path.name, record, beside.name, numbers, words, table.where(), reasons, hashes)
+    return SheetReadings(path.name, record, sheet_path.name, numbers, words, table.where(), reasons, hashes)
 
 
 def _within(table: TextColumns, name: str, bounds: Within) -> np.ndarray:

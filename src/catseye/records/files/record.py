@@ -1,9 +1,9 @@
-"""What a record is: a frozen table of values that are never converted, each with the range in which it can be meant.
+"""Record base class: a frozen table of values without conversion, each with its plausible range.
 
-    Record             any table of a file; a whole file has a `format` too
+    Record             any table of a file; a complete file also has a `format`
     └── Certificate    a calibration: with the provenance serial, measured_on, valid_until, by, report
 
-A range catches a wrong unit, not an unusual instrument: metres for millimetres are refused, another telescope is not.
+A range detects a wrong unit, not an unusual instrument: metres for millimetres are refused, another telescope is not.
 """
 
 import math
@@ -17,22 +17,22 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchema
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
-EARLIEST_MJD, LATEST_MJD = 40_000.0, 100_000.0  # 1968 to 2132: a Julian Date or Unix time lies outside
+EARLIEST_MJD, LATEST_MJD = 40_000.0, 100_000.0  # 1968 to 2132: excludes Julian Dates and Unix times
 
 
 class Record(BaseModel):
-    """Frozen, unknown keys forbidden, no infinities, no conversion but whole numbers where a number is wanted."""
+    """Frozen; no unknown keys, infinities or conversions other than integers to numbers."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
 
 class Certificate(Record):
-    """A calibration and who says so; in format version 1 missing provenance reads as None, unknown.
+    """Calibration with its provenance; missing provenance in format version 1 reads as None.
 
     serial                  of the calibrated part
     measured_on, valid_until  dates
-    by                      who measured
-    report                  where it is written up
+    by                      person who measured
+    report                  reference to the report
     """
 
     serial: int | str | None = None
@@ -44,7 +44,7 @@ class Certificate(Record):
 
 @dataclass(frozen=True)
 class Within:
-    """The range, both ends included, in which a number can be meant; with `above` the low end is excluded.
+    """Plausible range of a number, both ends included; `above` excludes the lower end.
 
     >>> from pydantic import TypeAdapter
     >>> TypeAdapter(Annotated[float, Within(50, 1000)]).validate_python(180.685)
@@ -70,7 +70,7 @@ class Within:
 
 @dataclass(frozen=True)
 class Length:
-    """The range of the length of a vector; with `or_zero` the null vector is welcome too."""
+    """Plausible range of a vector's length; `or_zero` also allows the null vector."""
 
     low: float
     high: float
@@ -88,15 +88,15 @@ class Length:
 
 @dataclass(frozen=True)
 class Version:
-    """The `format` of a kind of file: 1, or the text `catseye-KIND-1`."""
+    """Format of a file kind: 1, or the text `catseye-KIND-1`."""
 
     kind: str
 
     def check(self, value: object) -> int | str:
         if (type(value) is int and value == 1) or (type(value) is str and value == f"catseye-{self.kind}-1"):
             return value
-        known = f"1 or 'catseye-{self.kind}-1', the versions known here"
-        raise PydanticCustomError("version", "expected {expected}", {"expected": known})
+        supported = f"1 or 'catseye-{self.kind}-1', the supported versions"
+        raise PydanticCustomError("version", "expected {expected}", {"expected": supported})
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.check)
@@ -106,20 +106,20 @@ class Version:
 
 
 def out_of_range(kind: str, bounds: Within | Length, *, size: float, before: str) -> PydanticCustomError:
-    """The error of a number or a vector, with what a refusal needs to guess at another unit."""
+    """Error for a number or a vector, with the data for guessing another unit."""
     expected = f"{before}{bounds.low:.10g} to {bounds.high:.10g}"
-    floated = float(min(max(size, -1e300), 1e300))  # a whole number may be too large for a float
+    floated = float(min(max(size, -1e300), 1e300))  # an integer may be too large for a float
     context = {"low": bounds.low, "high": bounds.high, "size": floated, "expected": expected}
     return PydanticCustomError(kind, "expected {expected}", context)
 
 
 def broken_rule(text: str) -> PydanticCustomError:
-    """The error of a rule that joins several values of a record; the text names them."""
+    """Error for a rule on several values of a record; the text names them."""
     return PydanticCustomError("rule", "{text}", {"text": text})
 
 
 def plain_name(value: str) -> str:
-    """A name that is safe as a file's name: letters, digits and _ . - only, no '..'."""
+    """Name that is safe as a file name: only letters, digits and _ . -, no '..'."""
     if NAME.fullmatch(value) and ".." not in value:
         return value
     raise PydanticCustomError("name", "expected letters, digits, _ . - and no '..'")
@@ -128,15 +128,15 @@ def plain_name(value: str) -> str:
 Name = Annotated[str, AfterValidator(plain_name), Field(json_schema_extra={"pattern": f"^{NAME.pattern}$"})]
 Mjd = Annotated[float, Within(EARLIEST_MJD, LATEST_MJD)]
 
-# A vector may come as a list, as TOML gives it; its numbers stay strict.
+# A vector may be a list, as in TOML; its numbers stay strict.
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 Vector = Annotated[tuple[float, float, float], Field(strict=False)]
 Position = Annotated[Vector, Length(500, 1e7)]  # mm
 UnitVector = Annotated[Vector, Length(0.999, 1.001)]
 
 Coordinate = Annotated[float, Within(-1e7, 1e7)]  # mm
-Uncertainty = Annotated[float, Within(0, 100, above=True)]  # mm; a zero would weigh infinitely
+Uncertainty = Annotated[float, Within(0, 100, above=True)]  # mm; zero would give infinite weight
 Elevation = Annotated[float, Within(-500, 9000)]  # m above sea level
 Latitude = Annotated[float, Within(-90, 90)]  # degrees
-TelescopeAzimuth = Annotated[float, Within(-540, 540)]  # degrees: cable wraps count beyond a turn
+TelescopeAzimuth = Annotated[float, Within(-540, 540)]  # degrees: cable wraps exceed one turn
 TelescopeElevation = Annotated[float, Within(-5, 95)]  # degrees

@@ -1,4 +1,4 @@
-"""Refusals in words: one line of file, place, value and what was expected, and perhaps what the value looks like."""
+"""Error messages: one line with file, place, value and expectation, and a guess at the unit."""
 
 import difflib
 import math
@@ -12,11 +12,11 @@ from catseye.constants import DEGREE, ZERO_CELSIUS_K
 from catseye.errors import InputError
 from catseye.records.files.record import Record
 
-MANY = 20  # other invalid keys, from which rows of a table are not told apart
-LONGEST_VALUE = 60  # characters of an offending value that a refusal repeats
+MANY = 20  # other invalid keys above which rows of a table are merged
+LONGEST_VALUE = 60  # characters of an invalid value in a message
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
 
-# A value outside its range that factor and shift bring inside was probably written in another unit.
+# A value that factor and shift bring into its range was probably given in another unit.
 OTHER_UNITS = (
     ("_mm", 1e3, 0.0, "metres"),
     ("_m", 1e-3, 0.0, "millimetres"),
@@ -43,7 +43,7 @@ EXPECTED = {
 
 
 def refusal(file: str, problem: str) -> InputError:
-    """The error whose text is one line, whatever the names and values in it hold."""
+    """Error with a one-line text, whatever names it contains."""
     text = f"{file}: {problem}"
     return InputError("".join(c if c.isprintable() else ascii(c)[1:-1] for c in text))
 
@@ -53,7 +53,7 @@ def unreadable(file: str, problem: OSError) -> InputError:
 
 
 def shown(value: object) -> str:
-    """A value as a refusal repeats it: on one line, shortened.
+    """Value as repeated in a message: on one line, shortened.
 
     >>> shown("two\\nlines")
     "'two\\\\nlines'"
@@ -62,7 +62,7 @@ def shown(value: object) -> str:
         return value.isoformat()
     try:
         text = repr(value)
-    except ValueError:  # a whole number of thousands of digits, which Python declines to print
+    except ValueError:  # an integer of thousands of digits, which Python does not print
         return "a number of thousands of digits"
     except RecursionError:
         return "a deeply nested value"
@@ -70,9 +70,9 @@ def shown(value: object) -> str:
 
 
 def explained(problem: ValidationError, document: dict[str, Any], kind: type[Record]) -> str:
-    """The first of a validation's errors in words, and every other invalid key by its name.
+    """First validation error in words, and the names of all other invalid keys.
 
-    An unknown version explains all others; an unknown key comes before a missing one, which it may explain.
+    An unknown version comes first; an unknown key comes before a missing one, which it may explain.
     """
     errors = problem.errors(include_url=False)
     version = [error for error in errors if error["type"] == "version"]
@@ -82,15 +82,15 @@ def explained(problem: ValidationError, document: dict[str, Any], kind: type[Rec
     first = errors[0]
     place, key, parent = placed(first["loc"], document)
     text = f"{place}{worded(first, key, parent, kind)}"
-    others = dict.fromkeys(placed(error["loc"], document)[0] or error["type"] for error in errors[1:])
-    others.pop(place, None)
-    if len(others) > MANY:  # one key of many rows is named once
-        others = dict.fromkeys(re.sub(r"\[[^]]*\]", "[...]", name) for name in others)
-    return f"{text}; invalid or missing, too: {', '.join(others)}" if others else text
+    further = dict.fromkeys(placed(error["loc"], document)[0] or error["type"] for error in errors[1:])
+    further.pop(place, None)
+    if len(further) > MANY:  # one key of many rows is named once
+        further = dict.fromkeys(re.sub(r"\[[^]]*\]", "[...]", name) for name in further)
+    return f"{text}; also invalid or missing: {', '.join(further)}" if further else text
 
 
 def placed(loc: tuple[int | str, ...], document: Any) -> tuple[str, str, Any]:
-    """The path of a place in a document, its last named key, and the table or cell that it leads to."""
+    """Path of a place in a document, its last key, and the table or cell that contains it."""
     path, key = "", ""
     for step in loc:
         if isinstance(document, list) and isinstance(step, int):
@@ -107,7 +107,7 @@ def placed(loc: tuple[int | str, ...], document: Any) -> tuple[str, str, Any]:
 
 
 def worded(error: Any, key: str, parent: Any, kind: type[Record]) -> str:
-    """What is wrong with the value found at a place, and what was expected."""
+    """Description of an invalid value and of the expected one."""
     name, context, value = error["type"], error.get("ctx", {}), error["input"]
     if name == "missing":
         return " is missing (expected a value)"
@@ -116,8 +116,8 @@ def worded(error: Any, key: str, parent: Any, kind: type[Record]) -> str:
     cell = isinstance(parent, str) and isinstance(value, int | float)
     written = f" = {parent if cell and NUMBER.fullmatch(parent) else shown(value)}"
     if name == "extra_forbidden":
-        known = all_keys(kind)
-        close = difflib.get_close_matches(key[:LONGEST_VALUE], known, n=1)
+        keys = all_keys(kind)
+        close = difflib.get_close_matches(key[:LONGEST_VALUE], keys, n=1)
         return f"{written} is not a known key (expected {f'perhaps {close[0]}' if close else 'no such key'})"
     if name in ("range", "length"):
         size = f" has the length {context['size']:.6g}" if name == "length" else ""
@@ -130,11 +130,11 @@ def worded(error: Any, key: str, parent: Any, kind: type[Record]) -> str:
         limit = context.get("max_length", context.get("min_length"))
         return f"{written} has {context['actual_length']} values (expected {limit})"
     message = error["msg"]
-    return f"{written} ({message if message.startswith('expected') else f'expected otherwise: {message}'})"
+    return f"{written} ({message if message.startswith('expected') else f'expected: {message}'})"
 
 
 def other_unit(key: str, context: dict[str, Any]) -> str:
-    """What a value out of its range looks like, as ' looks like metres', or nothing."""
+    """Guess at a value out of range, such as ' looks like metres', or ""."""
     if context["high"] < 0 <= -context["high"] <= context["size"] <= -context["low"]:
         return " has the wrong sign"
     if context["size"] == 0.0:
@@ -147,7 +147,7 @@ def other_unit(key: str, context: dict[str, Any]) -> str:
 
 
 def all_keys(kind: Any) -> list[str]:
-    """Every key that a kind of file may hold, at any depth."""
+    """Keys allowed in a kind of file, at any depth."""
     schema = kind.model_json_schema()
     tables = [schema, *schema.get("$defs", {}).values()]
     return sorted({key for table in tables for key in table.get("properties", {})})

@@ -1,4 +1,4 @@
-"""A table of our TOML, taken key by key: units are in the keys, and a key that nothing takes is refused."""
+"""Table of a TOML file, read key by key; unused keys are refused. Units are in the keys."""
 
 import difflib
 import math
@@ -34,29 +34,29 @@ DMS = re.compile(r"([+-]?)([0-9]+)-([0-9]+)-([0-9]+(?:\.[0-9]*)?)")
 class Fields:
     """One table of a file.
 
-    file     its name, for refusals
-    place    where the table stands
-    values   its keys and values
-    taken    keys that something asked for
+    file      file name, for messages
+    place     place of the table
+    values    keys and values
+    used      keys that were read
     """
 
     file: str
     place: str
     values: dict[str, Any]
-    taken: set[str] = field(default_factory=set)
-    asked: set[str] = field(default_factory=set)
+    used: set[str] = field(default_factory=set)
+    requested: set[str] = field(default_factory=set)
 
     def refuse(self, problem: str) -> InputError:
         return refusal(self.file, f"{self.place}, {problem}")
 
     def has(self, key: str) -> bool:
-        self.asked.add(key)
+        self.requested.add(key)
         return key in self.values
 
     def take(self, key: str, kind: type | tuple[type, ...], expected: str, default: Any = None) -> Any:
-        """A value of some type; the default where the key is not there, which None forbids."""
-        self.asked.add(key)
-        self.taken.add(key)
+        """Value of a type; the default if the key is absent, or an error if that is None."""
+        self.requested.add(key)
+        self.used.add(key)
         if key not in self.values:
             if default is None:
                 raise self.refuse(f"{key} is missing (expected {expected})")
@@ -70,23 +70,23 @@ class Fields:
         return str(self.take(key, str, "some text", default))
 
     def tables(self, key: str) -> list["Fields"]:
-        """Tables within this one, none if the key is not there."""
+        """Tables within this one; empty if the key is absent."""
         tables = self.take(key, list, "tables", [])
         if not all(isinstance(table, dict) for table in tables):
             raise self.refuse(f"{key} = {shown(tables)} (expected tables)")
         return [Fields(self.file, f"{self.place}, {key} {i}", table) for i, table in enumerate(tables, start=1)]
 
     def keyed(self, stem: str, units: dict[str, float]) -> tuple[str, float] | None:
-        """The one key of a stem and its unit's size in SI, or None; refused if there are two."""
+        """Present key of a stem and its unit's size in SI, or None; an error for two."""
         keys = [f"{stem}_{unit}" if stem else unit for unit in units]
-        self.asked.update(keys)
+        self.requested.update(keys)
         present = [key for key in keys if key in self.values]
         if len(present) > 1:
-            raise self.refuse(f"{present[0]} and {present[1]} say the same (expected one of them)")
+            raise self.refuse(f"{present[0]} and {present[1]} give the same quantity (expected one of them)")
         return (present[0], units[present[0].removeprefix(f"{stem}_")]) if present else None
 
     def quantity(self, stem: str, units: dict[str, float], default: float | None = None) -> float:
-        """A number in SI, by whichever unit its key says; angles also as stem_dms = "ddd-mm-ss.s"."""
+        """Number in SI, in the unit of its key; angles also as stem_dms = "ddd-mm-ss.s"."""
         if units is ANGLE and f"{stem}_dms" in self.values:
             return self._dms(f"{stem}_dms")
         key = self.keyed(stem, units)
@@ -103,7 +103,7 @@ class Fields:
         return value
 
     def array(self, key: str, shape: tuple[int, ...]) -> np.ndarray:
-        """Numbers of a shape, 0 in it for any size."""
+        """Numbers of a shape, with 0 for any size."""
         value = self.take(key, list, "numbers")
         try:
             array = np.array(value, dtype=float)
@@ -111,8 +111,8 @@ class Fields:
             array = np.full(1, np.nan)
         fits = array.ndim == len(shape) and all(s in (0, n) for s, n in zip(shape, array.shape, strict=True))
         if not fits or not np.isfinite(array).all():
-            wanted = " x ".join(str(s) if s else "any number" for s in shape)
-            raise self.refuse(f"{key} = {shown(value)} (expected {wanted} finite numbers)")
+            size_text = " x ".join(str(s) if s else "any number" for s in shape)
+            raise self.refuse(f"{key} = {shown(value)} (expected {size_text} finite numbers)")
         return array
 
     def vector(self, stem: str, units: dict[str, float], default: Sequence[float] | None = None) -> np.ndarray:
@@ -125,29 +125,29 @@ class Fields:
         return self.array(key[0], (3,)) * key[1]
 
     def uncertainties(self, size: int, *, or_zero: bool = False) -> np.ndarray | None:
-        """Covariance (size, size) m^2 from covariance_mm2, or from u_mm and its like, one or each; None without."""
+        """Covariance (size, size) m^2 from covariance_mm2, or from u_mm etc., one or each; or None."""
         key = self.keyed("u", LENGTH)
         if self.has("covariance_mm2"):
             if key is not None:
-                raise self.refuse(f"{key[0]} and covariance_mm2 say the same (expected one of them)")
+                raise self.refuse(f"{key[0]} and covariance_mm2 give the same quantity (expected one of them)")
             return self.array("covariance_mm2", (size, size)) * MILLIMETRE**2
         if key is None:
             return None
         one = not isinstance(self.values[key[0]], list)
         u = np.full(size, self.number(key[0])) if one else self.array(key[0], (size,))
         if not np.all(u >= 0.0 if or_zero else u > 0.0):
-            limit = "0 or above" if or_zero else "above 0: nothing is measured without error"
+            limit = "0 or above" if or_zero else "above 0: no measurement is exact"
             raise self.refuse(f"{key[0]} = {shown(self.values[key[0]])} (expected {limit})")
         return np.diag((u * key[1]) ** 2)
 
-    def done(self) -> None:
-        """Refuses the keys that nothing took, all of them at once."""
-        strange = [key for key in self.values if key not in self.taken]
+    def refuse_unused(self) -> None:
+        """Raise InputError for all unused keys at once."""
+        strange = [key for key in self.values if key not in self.used]
         if not strange:
             return
         hints = []
         for key in strange:
-            close = difflib.get_close_matches(key, sorted(self.asked - set(self.values)), n=1)
+            close = difflib.get_close_matches(key, sorted(self.requested - set(self.values)), n=1)
             hints.append(f"perhaps {close[0]}" if close else "no such key")
         named, verb = ", ".join(map(shown, strange)), "is not a known key" if len(strange) == 1 else "are no known keys"
         expected = hints[0] if len(set(hints)) == 1 else ", ".join(hints)

@@ -1,4 +1,4 @@
-"""Records and values as TOML text, which the records' readers read back without the loss of a bit."""
+"""Records and values as TOML text, exact when read back."""
 
 import json
 from datetime import date
@@ -8,12 +8,12 @@ from catseye.records.files.record import Record
 
 
 def record_toml(record: Record) -> str:
-    """A record as TOML, keys in the order of its definition; a key that holds its default is left out."""
+    """Record as TOML, keys in the order of definition; defaults are omitted."""
     return "\n".join(_table(record.model_dump(exclude_defaults=True), "")).strip("\n") + "\n"
 
 
 def _table(values: dict[str, Any], place: str) -> list[str]:
-    """Lines of a table: its own keys first, as TOML wants it, then the tables in it."""
+    """Lines of a table: its own keys first, as TOML requires, then subtables."""
     inner = {key: value for key, value in values.items() if isinstance(value, dict) or _is_tables(value)}
     lines = [f"{key} = {toml_value(value)}" for key, value in values.items() if key not in inner]
     for key, value in inner.items():
@@ -28,13 +28,13 @@ def _is_tables(value: Any) -> bool:
 
 
 def toml_value(value: Any) -> str:
-    """A value as TOML writes it.
+    """Value in TOML syntax.
 
     >>> toml_value((1.5, 2, "x"))
     '[1.5, 2, "x"]'
     """
     if isinstance(value, tuple):
         return f"[{', '.join(map(toml_value, value))}]"
-    if isinstance(value, str):  # a JSON string is a basic string of TOML but for one character
+    if isinstance(value, str):  # JSON and TOML basic strings differ in one character
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     return value.isoformat() if isinstance(value, date) else repr(value)

@@ -1,4 +1,4 @@
-"""Verdicts of written results, for what rests on them."""
+"""Verdicts of written results, for results based on them."""
 
 import hashlib
 import json
@@ -15,12 +15,12 @@ EXPORT = "catseye-journal-export-1"  # format of the provenance of an exported c
 
 
 def stored_verdict(file: str, document: Mapping[str, Any]) -> Verdict | None:
-    """The verdict that a written result carries; None of an older one that has none.
+    """Verdict in a written result; None for older ones without.
 
-    file       for messages
-    document   the object in the file
+    file       file name, for messages
+    document   object in the file
 
-    Raises InputError for a verdict with another word or without its reason.
+    Raises InputError for a verdict with an unknown word or without reason.
     """
     stored = document.get("verdict")
     if stored is None:
@@ -32,32 +32,32 @@ def stored_verdict(file: str, document: Mapping[str, Any]) -> Verdict | None:
 
 
 def verdict_of_table(path: Path) -> Verdict | None:
-    """The verdict of the reduction that wrote a table; None of a table that no reduction beside it wrote so.
+    """Verdict of the reduction that wrote a table; None for other tables.
 
-    path   CSV that stands, unchanged, beside coordinates.json and provenance.json of the same `catseye reduce`
+    path   CSV, unchanged, with coordinates.json and provenance.json of the same `catseye reduce`
     """
     folder = Folder(path.parent)
     if not all((path.parent / name).is_file() for name in (PROVENANCE, RESULT)):
         return None
     try:
         outputs = json.loads(folder.text(PROVENANCE)).get("outputs", {})
-        same = outputs.get(path.name) == hashlib.sha256(path.read_bytes()).hexdigest()
-        document = json.loads(folder.text(RESULT)) if same else {}
-    except (ValueError, RecursionError, AttributeError):  # other people's files of these names say nothing
+        unchanged = outputs.get(path.name) == hashlib.sha256(path.read_bytes()).hexdigest()
+        document = json.loads(folder.text(RESULT)) if unchanged else {}
+    except (ValueError, RecursionError, AttributeError):  # foreign files of these names
         return None
     return stored_verdict(str(path.parent / RESULT), document) if isinstance(document, dict) else None
 
 
 def verdict_of_export(folder: Folder) -> Verdict | None:
-    """The verdict of the export that wrote a campaign; None where another hand wrote it.
+    """Verdict of the export that wrote a campaign; None for other campaigns.
 
-    folder   the campaign's
+    folder   of the campaign
     """
     if not (folder.directory / PROVENANCE).is_file():
         return None
     try:
         document = json.loads(folder.text(PROVENANCE))
-    except (ValueError, RecursionError):  # other people's file of this name says nothing
+    except (ValueError, RecursionError):  # a foreign file of this name
         return None
     if not isinstance(document, dict) or document.get("format") != EXPORT:
         return None

@@ -1,4 +1,4 @@
-"""EDM baselines: the tables of observations and heights, and BASELINE.toml, the record of known pillars."""
+"""EDM baselines: observations, heights, and the record BASELINE.toml."""
 
 import re
 from datetime import date
@@ -36,12 +36,12 @@ SPANS = {
 class BaselineShots:
     """Shots of one instrument on a baseline, each column (m,).
 
-    names              of the pillars, in the order of their first appearance
-    start, end         numbers in `names`
+    names              of the pillars, in order of first appearance
+    start, end         indices in `names`
     instrument, target heights above the pillar, m
-    slope              slope distance as shown, m
+    slope              slope distance as displayed, m
     temperature_c, pressure_hpa, humidity_percent
-    direction, u_rounding   clockwise circle reading and what its printing leaves open, rad; nan where there is none
+    direction, u_rounding   clockwise circle reading and u of its printed rounding, rad; nan if missing
     set, setup         shots in a row on one target; shots in a row from one pillar
     where              place in the file
     """
@@ -74,24 +74,24 @@ class BaselineShots:
 
 
 def _directions(table: TextColumns) -> tuple[np.ndarray, np.ndarray]:
-    """A cell with an exponent was rounded to its last digit by whoever printed it; others have all theirs."""
+    """Circle readings and rounding; only cells with an exponent count as rounded to the last digit."""
     if DIRECTION not in table.cells:
         return np.full(len(table), np.nan), np.full(len(table), np.nan)
     cells = table.cells[DIRECTION]
     value = table.numbers(DIRECTION, blank=0.0)
     table.check(DIRECTION, (value > -360.0) & (value < 720.0), "degrees, above -360 and below 720")
     last = [float(Decimal(c).as_tuple().exponent) if ROUNDED.fullmatch(c) else -8.0 for c in cells]
-    given = np.array([c != "" for c in cells])
+    present = np.array([c != "" for c in cells])
     rounding = 10.0 ** np.array(last) / 12.0**0.5
-    return np.where(given, value, np.nan) * DEGREE, np.where(given, rounding, np.nan) * DEGREE
+    return np.where(present, value, np.nan) * DEGREE, np.where(present, rounding, np.nan) * DEGREE
 
 
 def read_observations(path: Path) -> BaselineShots:
-    """A CSV table of shots, columns as in docs/formats/baseline.md.
+    """Shots of a CSV table, columns as in docs/formats/baseline.md.
 
     path   of the file
 
-    Raises InputError in one line for what cannot be used.
+    Raises InputError in one line for invalid input.
     """
     folder, file = Folder(path.parent), path.name
     table = columns_of(folder.text(file), str(path), REQUIRED, optional=(DIRECTION,))
@@ -102,7 +102,7 @@ class Heights:
     """Heights of pillars.
 
     height   pillar -> height of its top, m
-    u        pillar -> standard uncertainty, m; 0 for the one that the others refer to
+    u        pillar -> standard uncertainty, m; 0 for the reference pillar
     """
 
     def __init__(self, table: TextColumns, digest: str) -> None:
@@ -119,11 +119,11 @@ class Heights:
 
 
 def read_heights(path: Path) -> Heights:
-    """A CSV table of pillars' heights, columns as in docs/formats/baseline.md.
+    """Heights of a CSV table, columns as in docs/formats/baseline.md.
 
     path   of the file
 
-    Raises InputError in one line for what cannot be used.
+    Raises InputError in one line for invalid input.
     """
     folder, file = Folder(path.parent), path.name
     return Heights(columns_of(folder.text(file), str(path), HEIGHTS), folder.hashes[file])
@@ -134,11 +134,11 @@ Metres = Annotated[float, Within(-1e5, 1e5)]
 
 
 class Baseline(Certificate):
-    """Known pillars; `BASELINE.toml`.
+    """Calibrated pillars; `BASELINE.toml`.
 
     format                "catseye-baseline-1"
     name                  of the baseline
-    reference_height_m    the height at which distances are horizontal; absent where no heights were known
+    reference_height_m    height at which distances are horizontal; absent without heights
     pillars               names, the first with x = y = 0
     x_m, y_m              along the line from the first pillar to the last, and to its left
     known                 rows and columns of the covariance: "x NAME", "y NAME"
@@ -146,7 +146,7 @@ class Baseline(Certificate):
     s_mm                  experimental standard deviation of a single distance (full test procedure)
     degrees_of_freedom    of s
     zero_mm, u_zero_mm    of the instrument that measured it: observed minus true
-    inputs_sha256         by the file's name
+    inputs_sha256         by file name
     """
 
     format: Annotated[int | str, Version("baseline")]
@@ -167,16 +167,16 @@ class Baseline(Certificate):
     def _joined(self) -> "Baseline":
         n, r = len(self.pillars), len(self.known)
         if len(set(self.pillars)) != n:
-            raise broken_rule("pillars names one twice (expected each once)")
+            raise broken_rule("pillars names one twice (expected unique names)")
         for key in ("x_m", "y_m"):
             if len(getattr(self, key)) != n:
-                raise broken_rule(f"{key} has {len(getattr(self, key))} values for {n} pillars (expected one each)")
+                raise broken_rule(f"{key} has {len(getattr(self, key))} values for {n} pillars (expected {n})")
         places = {f"{axis} {pillar}" for axis in "xy" for pillar in self.pillars}
         for entry in self.known:
             if entry not in places:
                 raise broken_rule(f"known names {shown(entry)} (expected x or y and the name of a pillar)")
         if len(set(self.known)) != r:
-            raise broken_rule("known names one twice (expected each once)")
+            raise broken_rule("known names one twice (expected unique names)")
         if len(self.covariance_mm2) != r or any(len(row) != r for row in self.covariance_mm2):
             raise broken_rule(f"covariance_mm2 is not {r} x {r} (expected a row and a column for each of known)")
         c = np.array(self.covariance_mm2)
@@ -195,12 +195,12 @@ class Baseline(Certificate):
 
 
 def read_baseline(path: Path) -> Baseline:
-    """Known pillars from BASELINE.toml, or InputError in one line."""
+    """Calibrated pillars of BASELINE.toml; or InputError in one line."""
     return read_record(path, Baseline)
 
 
 def baseline_text(baseline: Baseline) -> str:
-    """The record of a baseline as TOML text."""
+    """Record of a baseline as TOML text."""
     lines = ["# Pillars of an EDM baseline, by catseye baseline: observed = (1 + scale) distance + zero"]
     for key, value in baseline.model_dump(exclude_none=True).items():
         if key == "inputs_sha256":
@@ -227,11 +227,11 @@ def _toml(value: object) -> str:
 
 
 def numbers_of(baseline: Baseline, names: tuple[str, ...], file: str) -> dict[str, int]:
-    """The number of each pillar of a baseline; refuses an observed pillar that it does not have."""
+    """Index of each pillar of a baseline; InputError for observed pillars that it lacks."""
     number = {name: i for i, name in enumerate(baseline.pillars)}
     for name in names:
         if name not in number:
-            raise refusal(file, f"pillar {shown(name)} is not one of the known ({', '.join(baseline.pillars)})")
+            raise refusal(file, f"pillar {shown(name)} is unknown (expected one of {', '.join(baseline.pillars)})")
     return number
 
 

@@ -1,4 +1,4 @@
-"""RECORD.toml of a calibration: what was found, with full covariance, tests, readings and where it all came from."""
+"""RECORD.toml of a calibration: results, full covariance, tests, readings, provenance."""
 
 from datetime import date
 from typing import Annotated, Any
@@ -10,13 +10,13 @@ from catseye.records.files.record import Name, Record, Version, broken_rule
 
 Words = Annotated[str, Field(min_length=1)]
 Positive = Annotated[float, Field(ge=0.0)]
-AGREES = 1e-9  # relative: u² and the diagonal are two roundings of one number
+AGREES = 1e-9  # relative: u² and the diagonal are roundings of one number
 
 
 class CalibratedQuantity(Record):
-    """One number: its key with the unit in it, value and standard uncertainty in that unit, and what it means.
+    """Quantity: key with its unit, value, standard uncertainty, and meaning.
 
-    coverage   factor of u for an interval of 95.45 %; 2 where the record does not say
+    coverage   factor of u for an interval of 95.45 %; default 2
     """
 
     key: Words
@@ -28,17 +28,17 @@ class CalibratedQuantity(Record):
 
 
 class CovarianceTable(Record):
-    """The full matrix, rows and columns in the order of the keys; in the product of their units."""
+    """Full covariance matrix in the order of the keys, in the product of their units."""
 
     order: Annotated[tuple[str, ...], Field(strict=False)]
     matrix: Annotated[tuple[Annotated[tuple[float, ...], Field(strict=False)], ...], Field(strict=False)]
 
 
 class DecisionTable(Record):
-    """A test; statistic, limit and passed are missing where the readings did not allow it.
+    """Test; statistic, limit and passed are missing if the readings did not allow it.
 
-    least   the limit is the least that passes, not the most
-    grave   a failure rejects the answer; otherwise it casts doubt on it
+    least   True if the limit is a minimum, not a maximum
+    grave   True if a failure rejects the result; else it makes it doubtful
     """
 
     name: Words
@@ -51,14 +51,14 @@ class DecisionTable(Record):
 
 
 class ReadingsTable(Record):
-    """The readings with their residuals, as the certificate shows them."""
+    """Readings with residuals, as on the certificate."""
 
     columns: Annotated[tuple[str, ...], Field(strict=False)]
     rows: Annotated[tuple[Annotated[tuple[float | int | str, ...], Field(strict=False)], ...], Field(strict=False)]
 
 
 class CalibrationRecord(Record):
-    """The whole of a record; `record` holds what can be copied into the record of the instrument."""
+    """Complete record; `record` holds the values to copy into the instrument's record."""
 
     format: Annotated[str, Version("calibration")]
     kind: Name
@@ -100,7 +100,7 @@ class CalibrationRecord(Record):
         if np.any(np.abs(matrix - matrix.T) > AGREES * bound):
             raise broken_rule("covariance.matrix is not symmetric")
         if np.any(np.abs(np.diag(matrix) - scale**2) > AGREES * scale**2):
-            raise broken_rule("covariance.matrix does not hold the squares of u on its diagonal")
+            raise broken_rule("covariance.matrix does not have the squares of u on its diagonal")
         safe = np.where(scale > 0.0, scale, 1.0)
         if np.linalg.eigvalsh(matrix / np.outer(safe, safe)).min() < -1e-9:
             raise broken_rule("covariance.matrix is not positive: a combination of quantities would have u² below 0")

@@ -1,4 +1,4 @@
-"""coord.dat: the points of CAL.EQ, a line each, `x y z` in mm; `#` begins a comment."""
+"""coord.dat: points of CAL.EQ, one `x y z` in mm per line; `#` begins a comment."""
 
 from pathlib import Path
 
@@ -12,9 +12,9 @@ FARTHEST_MM = 1e7
 
 
 def read_coordinates(path: Path | str) -> np.ndarray:
-    """Points (n, 3), m, of a file; n at least 1.
+    """Points (n, 3), m, of a file; n ≥ 1.
 
-    Raises InputError with file, line and value for whatever is not three numbers up to 1e7.
+    Raises InputError with file, line and value for anything but three numbers up to 1e7.
     """
     path = Path(path)
     points = []
@@ -32,5 +32,5 @@ def read_coordinates(path: Path | str) -> np.ndarray:
                 raise refusal(path.name, f"{where}: {word} mm (expected -1e7 to 1e7)")
         points.append([float(word) for word in words])
     if not points:
-        raise refusal(path.name, "holds no point (expected lines of x y z in mm)")
+        raise refusal(path.name, "has no points (expected lines of x y z in mm)")
     return np.array(points) * MILLIMETRE

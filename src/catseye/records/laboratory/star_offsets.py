@@ -1,6 +1,6 @@
-"""Star offsets as TPOINT text: where sources were and what the encoders read when the beam was on them.
+"""Star offsets as TPOINT text: places of sources, and encoder readings on them.
 
-What is accepted, exactly: docs/formats/star-offsets.md. Angles become radians; azimuth is clockwise from north.
+Format: docs/formats/star-offsets.md. Angles become radians; azimuth is clockwise from north.
 """
 
 import hashlib
@@ -17,23 +17,23 @@ from catseye.records.files.refusal import NUMBER, refusal, shown
 
 COMMENT, OPTION, END = "!", ":", "END"
 MARK = "! azimuth clockwise from north and elevation in degrees: of the source, then of the encoders"  # of our files
-LARGEST_OFFSET = 5.0 * DEGREE  # between sky and encoders: more is another column order or unit
+LARGEST_OFFSET = 5.0 * DEGREE  # largest difference of sky and encoders; more indicates another column order or unit
 
 
 @dataclass(frozen=True, eq=False)
 class StarOffsets:
-    """Observed sources of an altazimuth telescope, one a row, as read-only columns.
+    """Observed sources of an altazimuth telescope, one per row, as read-only columns.
 
     file                 name, for messages
     caption              first line
-    options              words after the colons, as NODA
+    options              words after the colons, such as NODA
     latitude             rad
-    run                  words of the run's line after the latitude, as they stand: date, weather, ...
+    run                  words of the run's line after the latitude, unchanged: date, weather, ...
     azimuth, elevation   (n,) rad, of the source on the sky, refracted ("observed place")
-    azimuth_encoder, elevation_encoder   (n,) rad, as the telescope read them with the beam on the source
+    azimuth_encoder, elevation_encoder   (n,) rad, encoder readings with the beam on the source
     auxiliary            (n, k) further readings of each line, in their own units
-    line                 (n,) where each stands in the file
-    digest               SHA-256 of the file, "" where there is none
+    line                 (n,) line number in the file
+    digest               SHA-256 of the file, "" without one
     """
 
     file: str
@@ -54,13 +54,13 @@ class StarOffsets:
 
     @property
     def correction(self) -> np.ndarray:
-        """(n, 2) rad: encoders less sky, azimuth (brought within half a turn) times cos E of the sky, and elevation."""
+        """Encoders minus sky, (n, 2) rad: azimuth (within half a turn) times cos E, and elevation."""
         across = (self.azimuth_encoder - self.azimuth + math.pi) % (2.0 * math.pi) - math.pi
         return np.column_stack([across * np.cos(self.elevation), self.elevation_encoder - self.elevation])
 
 
 def read_star_offsets(path: Path | str) -> StarOffsets:
-    """A TPOINT file of an altazimuth telescope; InputError names file, line, value and what was expected."""
+    """Star offsets of a TPOINT file; InputError names file, line, value and expectation."""
     path = Path(path)
     text = Folder(path.parent).text(path.name)
     return parsed(text, path.name, hashlib.sha256(path.read_bytes()).hexdigest())
@@ -69,18 +69,18 @@ def read_star_offsets(path: Path | str) -> StarOffsets:
 def parsed(text: str, file: str, digest: str = "") -> StarOffsets:
     """Star offsets from the text of a file.
 
-    text     whole
-    file     its name, for refusals
+    text     complete
+    file     file name, for messages
     digest   SHA-256, if known
     """
     lines = [(k, row.strip()) for k, row in enumerate(text.replace("\r\n", "\n").split("\n"), start=1)]
     numbered = [(k, row) for k, row in lines if row and not row.startswith(COMMENT)]
     if not numbered:
         raise refusal(file, "holds comments only (expected a caption line)")
-    caption, rest = numbered[0][1], numbered[1:]
-    options = [(k, word) for k, row in rest if row.startswith(OPTION) for word in row.lstrip(": ").split()]
+    caption, remainder = numbered[0][1], numbered[1:]
+    options = [(k, word) for k, row in remainder if row.startswith(OPTION) for word in row.lstrip(": ").split()]
     mount = _refuse_options(file, options)
-    body = [(k, row) for k, row in rest if not row.startswith(OPTION)]
+    body = [(k, row) for k, row in remainder if not row.startswith(OPTION)]
     ends = [i for i, (_, row) in enumerate(body) if row.upper() == END]
     body = body[: ends[0]] if ends else body
     if not body:
@@ -113,7 +113,7 @@ def parsed(text: str, file: str, digest: str = "") -> StarOffsets:
 
 
 def _refuse_options(file: str, options: Sequence[tuple[int, str]]) -> str:
-    """The mount's word; an equatorial telescope is refused."""
+    """Mount option; InputError for an equatorial telescope."""
     for k, word in options:
         if word.upper() == "EQUAT":
             raise refusal(file, f"line {k}, option EQUAT is an equatorial mount (expected ALTAZ)")
@@ -124,7 +124,7 @@ def _refuse_options(file: str, options: Sequence[tuple[int, str]]) -> str:
 
 
 def _refuse_missing_run(file: str, body: Sequence[tuple[int, str]]) -> None:
-    """Raises InputError where the line in the place of the latitude is an observation like those after it."""
+    """Raise InputError if the line in the place of the latitude is an observation."""
     (line, row), words = body[0], body[0][1].split()
     if len(body) < 2 or len(words) != len(body[1][1].split()) or not all(NUMBER.fullmatch(word) for word in words):
         return
@@ -138,7 +138,7 @@ def _refuse_missing_run(file: str, body: Sequence[tuple[int, str]]) -> None:
 
 
 def _run(file: str, line: int, row: str) -> tuple[float, tuple[str, ...]]:
-    """Latitude, rad, from degrees, minutes, seconds, and the words after."""
+    """Latitude, rad, from degrees, minutes, seconds; words after it."""
     words = row.split()
     if len(words) < 3 or not all(NUMBER.fullmatch(w) for w in words[:3]):
         raise refusal(file, f"line {line}, {shown(row)} (expected the latitude: degrees minutes seconds)")
@@ -163,8 +163,8 @@ def _numbers(file: str, line: int, row: str) -> list[float]:
 
 def _refuse_row(file: str, line: int, row: Sequence[float], width: int) -> None:
     if len(row) < 4 or len(row) != width:
-        wanted = "4 or more: azimuth, elevation, azimuth, elevation" if width < 4 else f"{width} as in the first"
-        raise refusal(file, f"line {line} has {len(row)} numbers (expected {wanted})")
+        expected = "4 or more: azimuth, elevation, azimuth, elevation" if width < 4 else f"{width} as in the first"
+        raise refusal(file, f"line {line} has {len(row)} numbers (expected {expected})")
     for value, name, low, high in zip(row, ("azimuth", "elevation") * 2, (-540, -5) * 2, (540, 95) * 2, strict=False):
         if not low <= value <= high:
             raise refusal(file, f"line {line}, {name} = {value} (expected {low} to {high} degrees)")
@@ -182,7 +182,7 @@ def _refuse_far(offsets: StarOffsets) -> None:
 
 
 def star_offsets_text(offsets: StarOffsets) -> str:
-    """The same as TPOINT text, angles in degrees to 1e-7, 0.4 milliarcseconds."""
+    """Star offsets as TPOINT text, angles in degrees to 1e-7, 0.4 milliarcseconds."""
     total = round(abs(offsets.latitude) / DEGREE * 36_000.0)
     sign = "-" if offsets.latitude < 0.0 else ""
     place = f"{sign}{total // 36_000:02d} {total % 36_000 // 600:02d} {total % 600 / 10:04.1f}"

@@ -1,4 +1,4 @@
-"""Readings of inclinometers on the alidade: a CSV table, `mjd,azimuth_deg,tilt_x_arcsec,tilt_y_arcsec,u_arcsec`."""
+"""Inclinometer readings on the alidade, a CSV: `mjd,azimuth_deg,tilt_x_arcsec,tilt_y_arcsec,u_arcsec`."""
 
 import hashlib
 from dataclasses import dataclass
@@ -12,16 +12,16 @@ from catseye.records.files.reading import Folder
 from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD
 
 COLUMNS = ("mjd", "azimuth_deg", "tilt_x_arcsec", "tilt_y_arcsec", "u_arcsec")
-LARGEST = 7200.0  # arcsec: two degrees; an instrument that leans further hangs loose
+LARGEST = 7200.0  # arcsec: two degrees; larger tilts indicate a loose instrument
 
 
 @dataclass(frozen=True, eq=False)
 class TiltReadings:
-    """Readings in the order of the file.
+    """Readings in file order.
 
     mjd       (n,) UTC
     azimuth   (n,) rad, of the telescope, clockwise from north
-    tilt      (n, 2) rad, turns about the alidade's x and y axes, right-hand rule, the instrument's zero included
+    tilt      (n, 2) rad, rotations about the alidade's x and y axes, right-hand rule, including the instrument's zero
     u         (n,) rad, standard uncertainty of each
     digest    SHA-256 of the file
     """
@@ -37,7 +37,7 @@ class TiltReadings:
 
 
 def read_tilts(path: Path | str) -> TiltReadings:
-    """A table of inclinometer readings; InputError names file, line, value and what was expected."""
+    """Inclinometer readings of a table; InputError names file, line, value."""
     path = Path(path)
     table = columns_of(Folder(path.parent).text(path.name), path.name, COLUMNS)
     mjd, azimuth, x, y, u = (table.numbers(name) for name in COLUMNS)

@@ -1,6 +1,6 @@
-"""A triplet unit measured in the laboratory: heights on the surface plate, phases of ranges before and after the flip.
+"""Triplet unit measured in the laboratory: heights, and phases before and after the flip.
 
-The layout is docs/formats/triplet.md, the quantities are those of [GOLDMAN00] sections 2.2 and 2.3.
+Format: docs/formats/triplet.md; quantities: [GOLDMAN00] sections 2.2 and 2.3.
 """
 
 import math
@@ -26,12 +26,12 @@ from catseye.records.files.record import (
 
 INCH_MM = 25.4
 KIND = "triplet-measurement"
-CONSTANT_MM = 0.05  # data sheet against its own height and index: a third of the 0.15 mm that the calibration decides
-REACH_MM = 20.0  # of a fiducial from the synthetic plane, and of d_toppl + spacer between placements of one set-up
+CONSTANT_MM = 0.05  # data sheet against its height and index: a third of the 0.15 mm decided by the calibration
+REACH_MM = 20.0  # largest distance of a fiducial from the synthetic plane, and change of d_toppl + spacer in one set-up
 
-A_TURN = 7.0  # rad: a phase somewhat beyond a turn is not in degrees
+A_TURN = 7.0  # rad: a phase slightly over a turn is not in degrees
 PRINTED = {"percent": "%", "mm": "mm", "c": "°C", "hpa": "hPa", "rad": "rad"}
-# what a value outside its range becomes in the unit that the key asks for, if it was written in another
+# factor, shift and name of other units a value may have been given in
 MISTAKEN = {
     "mm": ((INCH_MM, 0.0, "inches"), (1e3, 0.0, "metres"), (304.8, 0.0, "feet"), (1e-3, 0.0, "micrometres")),
     "c": ((1.0, -273.15, "kelvin"), (5.0 / 9.0, -160.0 / 9.0, "degrees Fahrenheit")),
@@ -43,11 +43,11 @@ MISTAKEN = {
 
 @dataclass(frozen=True)
 class ReadingRange:
-    """The range of a reading in its unit, and which other units to suspect of a value outside it.
+    """Range of a reading in its unit, and other units to suspect for a value outside it.
 
     unit        mm, c, hpa, percent or rad
-    low, high   both included, but a phase stays below `high`
-    zero        0 is welcome, too, below `low`
+    low, high   both included; a phase stays below `high`
+    zero        True if 0 is also allowed, below `low`
     """
 
     unit: str
@@ -66,12 +66,12 @@ class ReadingRange:
             else f"{'0 or ' if self.zero else ''}{self.low:g} to {self.high:g} {unit}"
         )
         for factor, shift, name in MISTAKEN[self.unit]:
-            meant = value * factor + shift
+            converted = value * factor + shift
             if self.unit == "rad" and value < A_TURN:
                 continue
-            if self.low <= meant <= self.high:
+            if self.low <= converted <= self.high:
                 text = "expected {expected}; it looks like {name}, which would be {meant} {unit}"
-                words = {"expected": expected, "name": name, "meant": f"{meant:.6g}", "unit": unit}
+                words = {"expected": expected, "name": name, "meant": f"{converted:.6g}", "unit": unit}
                 raise PydanticCustomError("reading", text, words)
         if self.unit == "rad":
             raise PydanticCustomError("reading", "expected {expected}", {"expected": expected})
@@ -94,13 +94,13 @@ Radius = Annotated[float, ReadingRange("mm", 10.0, 1000.0)]
 
 
 class SurfacePlate(Record):
-    """[surface_plate]: heights above the granite plate, prisms up and ball down.
+    """[surface_plate]: heights above the granite plate, prisms up, ball down.
 
     l1_mm, l2_mm      pole points of the left and the right prism
     l_bt_mm           vertex of the ball
     l_post_mm         half-length of the fixture: the synthetic reference plane; u_l_post_mm against gauge blocks
     u_height_mm       of each of the three heights
-    top_surface_mm    painted top plate, sampled at some places; may be missing
+    top_surface_mm    painted top plate, sampled at several places; optional
     """
 
     l1_mm: Height
@@ -132,13 +132,13 @@ class MeasuredBall(Record):
 
 
 class Placement(Record):
-    """[[placement]]: one place of the unit on the range, prisms towards the ranger, then flipped.
+    """[[placement]]: position of the unit on the range, prisms towards the ranger, then flipped.
 
     spacer_mm         thickness in front of the rear stops
-    d_toppl_mm        scan point to back stops along their normal, less l_post_mm and the spacer
+    d_toppl_mm        scan point to back stops along their normal, minus l_post_mm and the spacer
     h_s_mm            scan point (where the beam lands) above the line of the prisms
     phi_*_rad         phases of left and right prism, reference, calibration, and of the ball after the flip
-    *_flipped_*       at the flip, where it was read again; missing means the reading above
+    *_flipped_*       at the flip, if read again; default is the reading above
     u_phase_rad       of each phase reading
     """
 
@@ -161,20 +161,20 @@ class Placement(Record):
     u_phase_rad: Annotated[float, Within(0, 1, above=True)]
 
     def flipped(self, quantity: str, unit: str) -> float:
-        """A reading at the flip: its own, or the one before where none was taken."""
-        own: float | None = getattr(self, f"{quantity}_flipped_{unit}")
+        """Reading at the flip; the earlier one if none was taken."""
+        reading: float | None = getattr(self, f"{quantity}_flipped_{unit}")
         before: float = getattr(self, f"{quantity}_{unit}")
-        return before if own is None else own
+        return before if reading is None else reading
 
 
 class TripletMeasurement(Certificate):
-    """The whole file.
+    """Complete file.
 
-    bk7_to_air_group_index_ratio   n, for which the constants of the glass hold; its u as u_...
-    bk7_group_index                of the glass; where given, the delay in glass follows each placement's air
+    bk7_to_air_group_index_ratio   n, for which the glass constants are valid; its u as u_...
+    bk7_group_index                of the glass; if given, the delay in glass depends on each placement's air
     d12_mm, u_d12_mm               between the prisms' fiducial points
-    u_lateral_mm                   ball centre against the prisms' mid-point, each direction in the plate
-    u_temperature_c and so on      of what a reading adds between prisms and flip, not of the thermometer's offset
+    u_lateral_mm                   ball centre against the prisms' midpoint, each direction in the plate
+    u_temperature_c and so on      of a reading's change between prisms and flip, without the thermometer's offset
     u_d_toppl_mm, u_spacer_mm      coarse distance; thickness of a spacer
     """
 
@@ -207,32 +207,32 @@ class TripletMeasurement(Certificate):
         return self.left_prism, self.right_prism
 
     @model_validator(mode="after")
-    def _has_the_left_prism_on_the_left(self) -> "TripletMeasurement":
-        left, right = self.left_prism.serial, self.right_prism.serial
-        swapped = "; left and right look swapped" if left % 2 == 0 and right % 2 == 1 else ""
-        if left % 2 == 0:
-            raise broken_rule(f"left_prism.serial = {left} is even (expected odd, the left prism's{swapped})")
-        if right % 2 == 1:
-            raise broken_rule(f"right_prism.serial = {right} is odd (expected even, the right prism's)")
+    def _has_correct_prism_sides(self) -> "TripletMeasurement":
+        left_serial, right_serial = self.left_prism.serial, self.right_prism.serial
+        swapped = "; left and right look swapped" if left_serial % 2 == 0 and right_serial % 2 == 1 else ""
+        if left_serial % 2 == 0:
+            raise broken_rule(f"left_prism.serial = {left_serial} is even (expected odd, the left prism's{swapped})")
+        if right_serial % 2 == 1:
+            raise broken_rule(f"right_prism.serial = {right_serial} is odd (expected even, the right prism's)")
         return self
 
     @model_validator(mode="after")
     def _has_constants_of_its_glass(self) -> "TripletMeasurement":
         n = self.bk7_to_air_group_index_ratio
-        wanted = []
-        for table, each in zip(("left_prism", "right_prism"), self.prisms, strict=True):
-            wanted.append((f"{table}.hrp_mm", each.hrp_mm, float(prism.reference_depth(each.height_mm, n))))
-            wanted.append((f"{table}.pc_mm", each.pc_mm, float(prism.range_constant(each.height_mm, n))))
+        constants = []
+        for table, unit in zip(("left_prism", "right_prism"), self.prisms, strict=True):
+            constants.append((f"{table}.hrp_mm", unit.hrp_mm, float(prism.reference_depth(unit.height_mm, n))))
+            constants.append((f"{table}.pc_mm", unit.pc_mm, float(prism.range_constant(unit.height_mm, n))))
         ball = float(cats_eye.range_constant(self.ball.r1_mm, self.ball.r2_mm, n))
-        wanted.append(("ball.pc_b_mm", self.ball.pc_b_mm, ball))
+        constants.append(("ball.pc_b_mm", self.ball.pc_b_mm, ball))
         if self.ball.r2_mm < self.ball.r1_mm:
             raise broken_rule(
                 f"ball.r2_mm = {self.ball.r2_mm} is smaller than r1_mm = {self.ball.r1_mm} (expected the large one)"
             )
-        for key, value, expected in wanted:
+        for key, value, expected in constants:
             if abs(value - expected) > CONSTANT_MM:
                 raise broken_rule(
-                    f"{key} = {value} does not belong to the sizes and the index ratio {n} beside it "
+                    f"{key} = {value} does not match the sizes and the index ratio {n} "
                     f"(expected {expected:.6f}, within {CONSTANT_MM:g} mm)"
                 )
         return self
@@ -256,11 +256,11 @@ class TripletMeasurement(Certificate):
     @model_validator(mode="after")
     def _has_its_spacers_in_millimetres(self) -> "TripletMeasurement":
         first = self.placement[0]
-        for number, each in enumerate(self.placement[1:], start=1):
-            off = each.d_toppl_mm + each.spacer_mm - first.d_toppl_mm - first.spacer_mm
-            if abs(off) > REACH_MM and abs(off + each.spacer_mm * (INCH_MM - 1.0)) < 1.0:
+        for number, place in enumerate(self.placement[1:], start=1):
+            off = place.d_toppl_mm + place.spacer_mm - first.d_toppl_mm - first.spacer_mm
+            if abs(off) > REACH_MM and abs(off + place.spacer_mm * (INCH_MM - 1.0)) < 1.0:
                 raise broken_rule(
-                    f"placement[{number}].spacer_mm = {each.spacer_mm} with d_toppl_mm = {each.d_toppl_mm} puts the "
+                    f"placement[{number}].spacer_mm = {place.spacer_mm} with d_toppl_mm = {place.d_toppl_mm} puts the "
                     f"stops {off:+.1f} mm from where the first placement has them (expected mm; the spacer looks like "
                     "inches)"
                 )

@@ -1,7 +1,7 @@
-"""A network from a file or a folder, whatever program wrote it.
+"""Read a network from a file or a folder in any supported format.
 
 folder        points.csv and ranges.csv                  `folder`
-.toml         our own, `format = "catseye-network-1"`    `toml`
+.toml         catseye, `format = "catseye-network-1"`    `toml`
 .gkf, .xml    GNU Gama                                   `gama`
 .dat          STAR*NET                                   `starnet`
 """
@@ -28,12 +28,12 @@ READERS = {
 def read_network(
     path: Path | str, *, sigma_mm: float | None = None, sigma_ppm: float | None = None, planned: bool = False
 ) -> ObservationNetwork:
-    """The network of a file, by the end of its name, or of a folder.
+    """Network of a file, by suffix, or of a folder.
 
     path       a folder with points.csv and ranges.csv, or a file .toml, .gkf, .xml, .dat
     sigma_mm, sigma_ppm   standard uncertainty a + b D of a distance that has none, of a folder or a .dat; what the file
                           says counts where it says something
-    planned    observed values may be missing in a folder or a file of ours: the network is to be planned
+    planned    True if observed values may be missing in a folder or .toml, for a plan
 
     Raises InputError, one line, for a file that is missing, of another kind, or that cannot be used.
     """
@@ -42,13 +42,13 @@ def read_network(
 
 
 def _read(path: Path, *, sigma_mm: float | None, sigma_ppm: float | None, planned: bool) -> ObservationNetwork:
-    claim = RangeClaim.given(sigma_mm, sigma_ppm)
+    claim = RangeClaim.from_options(sigma_mm, sigma_ppm)
     if path.is_dir():
         return read_network_folder(path, claim, planned=planned)
     if path.suffix.lower() == ".dat":
         return read_starnet(path, claim)
     if claim:
-        raise refusal(path.name, "says every uncertainty itself (expected no --sigma-mm, no --sigma-ppm)")
+        raise refusal(path.name, "contains all uncertainties (expected no --sigma-mm, no --sigma-ppm)")
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         kinds = f"expected a folder with points.csv and ranges.csv, or {' '.join(READERS)}"

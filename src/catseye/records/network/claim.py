@@ -1,4 +1,4 @@
-"""What is claimed of ranges whose file says nothing of it."""
+"""Claimed uncertainty of ranges whose file has none."""
 
 from typing import NamedTuple
 
@@ -7,13 +7,13 @@ import numpy as np
 from catseye.constants import MILLIMETRE, PPM
 from catseye.errors import InputError
 
-LARGEST_MM, LARGEST_PPM = 1e5, 1e4  # beyond it a unit was meant otherwise
+LARGEST_MM, LARGEST_PPM = 1e5, 1e4  # larger values indicate another unit
 
 
 class RangeClaim(NamedTuple):
     """Standard uncertainty a + b D of a range of D metres, as makers state it.
 
-    mm, ppm   a and b; None where it was not given
+    mm, ppm   a and b; None if not given
     """
 
     mm: float | None = None
@@ -32,12 +32,12 @@ class RangeClaim(NamedTuple):
 
     @property
     def terms(self) -> tuple[float, float, float]:
-        """a, b, c of a + b D^c, m."""
+        """Terms a, b, c of a + b D^c, m."""
         return (self.mm or 0.0) * MILLIMETRE, (self.ppm or 0.0) * PPM, 1.0
 
     @classmethod
-    def given(cls, mm: float | None, ppm: float | None) -> "RangeClaim":
-        """The claim of two options; InputError for what is no standard uncertainty."""
+    def from_options(cls, mm: float | None, ppm: float | None) -> "RangeClaim":
+        """Claim of two options; InputError for an invalid standard uncertainty."""
         for name, value, most in (("sigma-mm", mm, LARGEST_MM), ("sigma-ppm", ppm, LARGEST_PPM)):
             if value is not None and not 0.0 <= value <= most:
                 raise InputError(f"--{name} = {value:g} (expected 0 to {most:g})")

@@ -1,4 +1,4 @@
-"""A network on its way from a file: points and rows by name, refused in one line where they make no sense."""
+"""Network under construction: points and rows by name, checked with one-line errors."""
 
 import difflib
 import math
@@ -22,7 +22,7 @@ from catseye.records.network.kinds import ANGLES, TOUCHES, Row, blocks_of, group
 from catseye.records.network.plausible import beyond_circle
 
 POSITIVE = ("slope_distance", "horizontal_distance", "fixed_distance")
-SYMMETRY = 1e-12  # of the largest element: what writing and reading a matrix may cost
+SYMMETRY = 1e-12  # of the largest element: error of writing and reading a matrix
 
 # Columns of the x of the points that it names, and of the first parameter after all points -> a group.
 Maker = Callable[[np.ndarray, int], Reported]
@@ -30,13 +30,13 @@ Maker = Callable[[np.ndarray, int], Reported]
 
 @dataclass(eq=False)
 class NetworkDraft:
-    """A network as its file gives it, until `network` makes it whole.
+    """Network as its file gives it, until `network` builds it.
 
-    file         its name, for refusals
+    file         file name, for messages
     axes         (3, 3) signed permutation: coordinates here = axes @ coordinates of the file
-    axis_names   what the file calls its axes
-    implied      points that only observations name are free ones (STAR*NET's way), else they are refused
-    planned      observed values may be missing, nan: the network is yet to be measured
+    axis_names   names of the axes in the file
+    implied      True if points named only in observations are free (as in STAR*NET), else they are refused
+    planned      True if observed values may be missing, nan, before the measurement
     """
 
     file: str
@@ -56,7 +56,7 @@ class NetworkDraft:
     doubts: list[str] = field(default_factory=list)
 
     def refuse(self, place: str, problem: str) -> InputError:
-        """The error of one place in the file."""
+        """Error for one place in the file."""
         return refusal(self.file, f"{place}, {problem}")
 
     def point(
@@ -68,28 +68,28 @@ class NetworkDraft:
         datum: Sequence[bool] | np.ndarray = (False,) * 3,
         place: str,
     ) -> None:
-        """Adds a point.
+        """Add a point.
 
         name     not used before
         xyz      (3,) m in the file's axes, nan where unknown
         fixed    (3,) held at xyz
-        datum    (3,) takes part in the inner constraints
-        place    where it stands in the file
+        datum    (3,) part of the inner constraints
+        place    place in the file
 
-        Raises InputError for an empty or double name, an infinite coordinate, a held one that is unknown.
+        Raises InputError for an empty or repeated name, an infinite coordinate, a held one that is unknown.
         """
         written, name = name, spelled(name)
         if not name:
             raise self.refuse(place, "point without a name (expected some text)")
         if name in self.names:
-            raise self.refuse(place, f"point {shown(written)} is there twice (expected each name once)")
+            raise self.refuse(place, f"point {shown(written)} occurs twice (expected unique names)")
         if written != name:
             self.names.aliases[written] = name
-        for axis, value, held, in_datum in zip(self.axis_names, xyz, fixed, datum, strict=True):
+        for axis, value, is_fixed, in_datum in zip(self.axis_names, xyz, fixed, datum, strict=True):
             if np.isinf(value):
                 raise self.refuse(place, f"point {shown(name)}, {axis} = {value} (expected a finite number)")
-            if (held or in_datum) and np.isnan(value):
-                role = "fixed" if held else "datum"
+            if (is_fixed or in_datum) and np.isnan(value):
+                role = "fixed" if is_fixed else "datum"
                 raise self.refuse(place, f"point {shown(name)}, {axis} is {role} and unknown (expected its value)")
         turn = np.abs(self.axes) > 0.5
         self.names[name] = len(self.xyz)
@@ -98,30 +98,30 @@ class NetworkDraft:
         self.datum.append(turn @ (np.asarray(datum, bool) & ~np.asarray(fixed, bool)))
 
     def parameter(self, name: str, start: float = 0.0, sigma: float = np.inf, unit: str = "1") -> int:
-        """Adds a parameter beside the points; its index among them."""
+        """Add a parameter besides the points; its index among them."""
         self.parameters.append(NetworkParameter(name, start, sigma, unit))
         return len(self.parameters) - 1
 
     def observe(self, row: Row) -> None:
-        """Adds a row; InputError for a value that is not finite, a distance or a sigma that is not positive."""
+        """Add a row; InputError for invalid values, distances or sigmas."""
         wrong = ""
         if not math.isfinite(row.value) and not (self.planned and math.isnan(row.value)):
             wrong = f" = {row.value} (expected a finite number)"
         elif row.value <= 0.0 and row.kind in POSITIVE:
             wrong = f" = {row.value:.10g} m (expected above 0)"
         elif not 0.0 < row.u < math.inf:
-            shame = "nothing is measured without error" if row.u == 0.0 else "a standard uncertainty"
-            wrong = f" has the sigma {row.u:.6g} (expected above 0: {shame})"
+            reason = "no measurement is exact" if row.u == 0.0 else "a standard uncertainty"
+            wrong = f" has the sigma {row.u:.6g} (expected above 0: {reason})"
         elif any(len(set(ends)) < len(ends) for ends in _together(row)):
             wrong = " joins a point with itself (expected points that differ)"
         if not wrong and row.kind in ANGLES and math.isfinite(row.value):
-            wrong = self._beyond(row)
+            wrong = self._angle_problem(row)
         if wrong:
             raise self.refuse(row.place, f"{row.kind} {' to '.join(shown(end) for end in row.ends[:2])}{wrong}")
         self.rows.append(row)
 
-    def _beyond(self, row: Row) -> str:
-        """Why an angle beyond the circle is refused, or nothing; one that is only unlikely becomes a doubt."""
+    def _angle_problem(self, row: Row) -> str:
+        """Error text for an angle beyond the circle, or ""; unlikely angles become doubts."""
         text, impossible = beyond_circle(row.value, row.unit or "rad")
         if not text:
             return ""
@@ -132,7 +132,7 @@ class NetworkDraft:
         return ""
 
     def correlate(self, start: int, covariance: np.ndarray, place: str) -> None:
-        """Gives the rows from `start` on a joint covariance (m, m) in m and rad; InputError where it is none."""
+        """Set a joint covariance (m, m), m and rad, for rows from `start` on; InputError if invalid."""
         m = len(self.rows) - start
         if covariance.shape != (m, m):
             size = " x ".join(map(str, covariance.shape))
@@ -155,13 +155,13 @@ class NetworkDraft:
             self.clusters.append((range(start, len(self.rows)), covariance))
 
     def also(self, points: Sequence[str], place: str, make: Maker) -> None:
-        """Adds a group that is made when all points are known: a body, a surface."""
+        """Add a group built once all points are known: a body, a surface."""
         if len(set(map(name_key, points))) < len(points):
             raise self.refuse(place, "names a point twice (expected points that differ)")
         self.more.append((points, place, make))
 
     def network(self) -> ObservationNetwork:
-        """The network, with the coordinates that do not exist; InputError for a point that the file does not have."""
+        """Network with its absent coordinates; InputError for an unknown point."""
         self._resolve()
         if not self.names:
             raise refusal(self.file, "has no points (expected at least one)")
@@ -186,7 +186,7 @@ class NetworkDraft:
         )
 
     def _resolve(self) -> None:
-        """Every point that is named must be there, or becomes one where names imply points."""
+        """Raise InputError for unknown points, or add them where names imply points."""
         named = [(row.ends, row.place, row.kind) for row in self.rows]
         named += [(tuple(points), place, "table") for points, place, _ in self.more]
         for ends, place, kind in named:
@@ -211,7 +211,7 @@ class NetworkDraft:
         return touched
 
     def _start_orientations(self, xyz: np.ndarray) -> None:
-        """Azimuth of each direction set's zero, from the coordinates that the file gives, if they do."""
+        """Azimuth of each direction set's zero from the file's coordinates, where given."""
         turned: dict[int, complex] = {}
         for row in self.rows:
             if row.kind == "direction" and self.parameters[row.parameters["orientation"]].sigma == np.inf:
@@ -226,7 +226,10 @@ class NetworkDraft:
     def _groups(
         self,
     ) -> tuple[tuple[ObservationGroup, ...], tuple[tuple[str, ...], ...], tuple[np.ndarray | None, ...]]:
-        """Groups, the places of their rows, their claims: independent rows of a kind are one, a correlated set is."""
+        """Groups, places of their rows, and claims.
+
+        Independent rows of a kind form one group, as does a correlated set.
+        """
         first = 3 * len(self.names)
         in_cluster = {i for rows, _ in self.clusters for i in rows}
         kinds: dict[str, list[Row]] = {}

@@ -1,11 +1,11 @@
-"""A folder with points.csv and ranges.csv: rangers, targets and the distances between them, in metres.
+"""Folder with points.csv and ranges.csv: rangers, targets, distances, metres.
 
-    points.csv   point,x,y,z and, where wanted, role (free, fixed or datum) and u_x,u_y,u_z
-    ranges.csv   from,to,distance and sigma, or a claim for those that have none
+    points.csv   point,x,y,z and optionally role (free, fixed or datum) and u_x,u_y,u_z
+    ranges.csv   from,to,distance and sigma, or a claim for those without
 
 A target of ranges.csv that points.csv does not list is an unknown point; a station must be listed. A point without
-coordinates has blank ones. A datum point takes part in the inner constraints, relative to the
-coordinates of the file. u_x, u_y, u_z are standard uncertainties of the coordinates given: a blank is no prior, zero
+coordinates has blank ones. A datum point is part of the inner constraints, relative to the
+coordinates of the file. u_x, u_y, u_z are standard uncertainties of the coordinates: a blank is no prior, zero
 holds the coordinate. All ranges are one group, in the order of the file.
 """
 
@@ -26,17 +26,17 @@ from catseye.records.network.claim import NO_CLAIM, RangeClaim
 POINT_COLUMNS = ("point", "x", "y", "z")
 U_COLUMNS = ("u_x", "u_y", "u_z")
 RANGE_COLUMNS = ("from", "to", "distance")
-FEWEST = 3  # ranges that place a point; a target with fewer whose name is nearly a known one is a slip of the pen
-CLOSE = 0.7  # likeness of two names, 1 the same
+FEWEST = 3  # ranges that determine a point; a target with fewer and a name close to a listed one is a typing error
+CLOSE = 0.7  # similarity of two names, 1 for equal
 ROLES = ("free", "fixed", "datum")
 
 
 def read_network_folder(path: Path, claim: RangeClaim = NO_CLAIM, *, planned: bool = False) -> ObservationNetwork:
-    """The network of a folder; InputError where it cannot be used.
+    """Network of a folder; InputError if invalid.
 
     path    a folder with points.csv and ranges.csv
-    claim   standard uncertainty of a range whose sigma is blank or not there
-    planned distances may be blank or not there, for a plan
+    claim   standard uncertainty of a range whose sigma is blank or missing
+    planned distances may be blank or missing, for a plan
     """
     folder = Folder(path)
     points = columns_of(folder.text("points.csv"), "points.csv", POINT_COLUMNS, optional=("role", *U_COLUMNS))
@@ -73,21 +73,21 @@ def read_network_folder(path: Path, claim: RangeClaim = NO_CLAIM, *, planned: bo
 
 
 def names_of(table: TextColumns, column: str) -> PointIndex:
-    """Name -> row, each name once."""
+    """Row of each name; names are unique."""
     written = table.cells[column]
     cells = list(map(spelled, written))
     names = PointIndex(cells)
-    names.aliases |= {was: now for was, now in zip(written, cells, strict=True) if was != now}
+    names.aliases |= {raw: name for raw, name in zip(written, cells, strict=True) if raw != name}
     if len(set(map(name_key, cells))) < len(cells) or "" in names:
         cells = list(map(name_key, cells))
-        seen: dict[str, int] = {}
+        rows: dict[str, int] = {}
         for row, name in enumerate(cells):
             if not name:
                 raise table.refuse(row, f"{column} is empty (expected a name)")
-            if name in seen:
-                first = table.lines[seen[name]]
+            if name in rows:
+                first = table.lines[rows[name]]
                 raise table.refuse(row, f"{column} {shown(name)} is in line {first} already (expected each name once)")
-            seen[name] = row
+            rows[name] = row
     return names
 
 
@@ -108,13 +108,13 @@ def _places(points: TextColumns) -> tuple[np.ndarray, np.ndarray, np.ndarray, np
     fixed |= u == 0.0
     datum &= ~fixed
     for axis, name in enumerate("xyz"):
-        known = ~(np.isnan(xyz[:, axis]) & (fixed | datum | ~np.isnan(u))[:, axis])
-        points.check(name, known, "its value: it is fixed, datum or has a prior")
+        valid = ~(np.isnan(xyz[:, axis]) & (fixed | datum | ~np.isnan(u))[:, axis])
+        points.check(name, valid, "its value: it is fixed, datum or has a prior")
     return xyz, fixed, datum, np.where(fixed, np.nan, u)
 
 
 def _unlisted(ranges: TextColumns, names: PointIndex) -> list[str]:
-    """Targets that points.csv does not list, in the order of ranges.csv: unknown points."""
+    """Targets missing in points.csv, in ranges.csv order: unknown points."""
     written = Counter(ranges.cells["to"])
     first: dict[str, str] = {}
     counts: Counter[str] = Counter()
@@ -125,7 +125,7 @@ def _unlisted(ranges: TextColumns, names: PointIndex) -> list[str]:
         close = difflib.get_close_matches(name, names, n=1, cutoff=CLOSE) if counts[name] < FEWEST else []
         if close:
             row = ranges.cells["to"].index(name)
-            expected = f"expected perhaps {shown(close[0])}; an unknown point has {FEWEST} ranges at least"
+            expected = f"expected perhaps {shown(close[0])}; an unknown point needs at least {FEWEST} ranges"
             raise ranges.refuse(row, f"to = {shown(name)} is not in points.csv ({expected})")
     return strangers
 
@@ -133,7 +133,7 @@ def _unlisted(ranges: TextColumns, names: PointIndex) -> list[str]:
 def _distances(
     ranges: TextColumns, names: PointIndex, claim: RangeClaim, planned: bool
 ) -> tuple[Distances, np.ndarray | None]:
-    """The ranges, and a, b, c of their claims; distances that are yet to be measured are nan."""
+    """Ranges, and a, b, c of their claims; nan for distances not yet measured."""
     origin, target = (_numbered(ranges, end, names) for end in ("from", "to"))
     ranges.check("to", origin != target, "another point than from")
     distance = np.full(len(ranges), np.nan)
@@ -148,7 +148,7 @@ def _distances(
             raise ranges.refuse(row, "no sigma (expected one, m, or --sigma-mm and --sigma-ppm for ranges without)")
         sigma = np.where(without, claim.of(np.where(np.isnan(distance), 1.0, distance)), sigma)  # of a plan: there
     if "sigma" in ranges.cells:
-        ranges.check("sigma", sigma > 0.0, "above 0 m: nothing is measured without error")
+        ranges.check("sigma", sigma > 0.0, "above 0 m: no measurement is exact")
     claims = np.where(without[:, None], claim.terms, (0.0, 0.0, 1.0))
     return Distances("slope distance", distance, sigma**2, 3 * origin, 3 * target), claims if without.any() else None
 
@@ -161,4 +161,4 @@ def _numbered(ranges: TextColumns, end: str, names: PointIndex) -> np.ndarray:
         row = next(i for i, name in enumerate(cells) if name not in names)
         close = difflib.get_close_matches(cells[row], names, n=1)
         hint = f"perhaps {shown(close[0])}" if close else "a point of points.csv"
-        raise ranges.refuse(row, f"{end} = {shown(cells[row])} is no point (expected {hint})") from None
+        raise ranges.refuse(row, f"{end} = {shown(cells[row])} is not a point (expected {hint})") from None

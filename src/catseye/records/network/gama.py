@@ -1,14 +1,14 @@
-"""GNU Gama's description of a local network in XML (.gkf), as its documentation and schema 1.00 define it.
+"""GNU Gama's description of a local network in XML (.gkf), by its documentation and schema 1.00.
 
 Lengths are in metres, their stdev in mm. Angles are in gon with stdev in cc (1e-4 gon), or written ddd-mm-ss.s with
-stdev in arcseconds; both may stand in one file. A stdev is the a-priori sigma whatever `sigma-apr` says, which enters
-only where a levelled section has its length instead of a stdev: sigma-apr sqrt(km) mm. A cov-mat goes before stdevs.
+stdev in arcseconds; both may occur in one file. A stdev is the a-priori sigma whatever `sigma-apr` is, which is used
+only where a levelled section has its length instead of a stdev: sigma-apr sqrt(km) mm. A cov-mat overrides stdevs.
 
-x points where the first letter of `axes-xy` says, y where the second. `angles="left-handed"` are clockwise.
-Fixed coordinates are held. Upper case in `adj` takes part in the inner constraints of a free network, relative to the
-coordinates of the file; where the file gives none it does not. Coordinates of neither kind are held where the file
-gives them and do not exist where it does not; an observation that depends on either is refused (Gama leaves it out
-without a word). Heights of instruments are along the plumb line:
+x points along the first letter of `axes-xy`, y along the second. `angles="left-handed"` are clockwise.
+Fixed coordinates are held. Upper case in `adj` makes coordinates part of the inner constraints of a free network,
+relative to those of the file, if given there. Coordinates of neither kind are held where the file
+gives them and otherwise absent; an observation that depends on either is refused (Gama omits it
+silently). Heights of instruments are along the plumb line:
 no curvature, no refraction; a file that asks for an ellipsoid is refused.
 """
 
@@ -39,13 +39,13 @@ KINDS = {
     "dh": "height_difference",
 }
 IMPLIED_STDEV = {"direction": "direction", "angle": "angle", "z-angle": "zenith-angle", "azimuth": "azimuth"}
-NEEDS = {"direction": "xy", "distance": "xy", "angle": "xy", "azimuth": "xy", "dh": "z"}  # all three, if not here
+NEEDS = {"direction": "xy", "distance": "xy", "angle": "xy", "azimuth": "xy", "dh": "z"}  # default: all three
 CASES = ("xy", "XY", "z", "Z", "xyz", "XYZ", "XYz", "xyZ")
 SIGMA_APR = 10.0  # Gama's default
 
 
 def read_gama(path: Path) -> ObservationNetwork:
-    """The network of a .gkf file, in the axes of this package; InputError where it cannot be used.
+    """Network of a .gkf file, in the axes of this package; InputError if invalid.
 
     path   the file
 
@@ -59,10 +59,10 @@ def read_gama(path: Path) -> ObservationNetwork:
 
 
 def gama_network(raw: bytes, file: str) -> ObservationNetwork:
-    """The same of the file's content.
+    """Network of the file's content.
 
-    raw    XML, in the encoding that it states
-    file   its name, for refusals
+    raw    XML, in its stated encoding
+    file   file name, for messages
     """
     network = tree_of(raw, file).children[0]
     _check_parameters(network, file)
@@ -88,7 +88,7 @@ def gama_network(raw: bytes, file: str) -> ObservationNetwork:
 
 
 def axes_of(network: XmlElement, file: str) -> np.ndarray:
-    """(3, 3) that turns coordinates of the file into east, north, up."""
+    """Matrix (3, 3) from coordinates of the file to east, north, up."""
     name = network.attributes.get("axes-xy", "ne")
     if name not in AXES:
         raise refusal(file, f"{network.place}, axes-xy = {shown(name)} (expected {' '.join(AXES)})")
@@ -98,7 +98,7 @@ def axes_of(network: XmlElement, file: str) -> np.ndarray:
 
 
 def _check_parameters(network: XmlElement, file: str) -> None:
-    """Values that would change the answer in a way that is not followed here are refused."""
+    """Raise InputError for parameters that would change the result but are not supported."""
     for element in network.children:
         if element.tag != "parameters":
             continue
@@ -111,7 +111,7 @@ def _check_parameters(network: XmlElement, file: str) -> None:
 
 
 class _Reader:
-    """Elements into a draft, with what a network's attributes and points say about them."""
+    """Converter of elements to a draft, with the network's attributes and points."""
 
     def __init__(self, draft: NetworkDraft, network: XmlElement) -> None:
         self.draft, self.network = draft, network
@@ -135,14 +135,14 @@ class _Reader:
         return number_of(self.draft.file, element, name, default=default)
 
     def note_point(self, element: XmlElement, *, observed: bool) -> None:
-        """Coordinates and status of a point; a point may be told in parts, but nothing twice."""
+        """Record coordinates and status of a point, given in parts but each only once."""
         name = element.attributes["id"]
         point = self.points.setdefault(name_key(name), {"place": element.place, "name": name})
         if ("x" in element.attributes) != ("y" in element.attributes):
             raise self.refuse(element, f"{shown(name)} has one of x and y (expected both or none)")
         for key in ("x", "y", "z"):
             if key in element.attributes and not (observed and key in point):
-                self._once(element, name, key)
+                self._refuse_repeated(element, name, key)
                 point[key] = self.number(element, key)
         for key in ("adj", "fix"):
             case = element.attributes.get(key, "").strip()
@@ -150,10 +150,10 @@ class _Reader:
                 raise self.refuse(element, f"{key} = {shown(case)} (expected {' '.join(CASES)})")
             for letter in case:
                 status = "fix" if key == "fix" else "adj" if letter.islower() else "ADJ"
-                if key == "fix" or point.get(f"is {letter.lower()}") != "fix":  # fix goes before adj
+                if key == "fix" or point.get(f"is {letter.lower()}") != "fix":  # fix overrides adj
                     point[f"is {letter.lower()}"] = status
 
-    def _once(self, element: XmlElement, name: str, key: str) -> None:
+    def _refuse_repeated(self, element: XmlElement, name: str, key: str) -> None:
         if key in self.points[name_key(name)]:
             first = self.points[name_key(name)]["place"]
             raise self.refuse(element, f"{shown(name)} has its {key} in {first} already (expected each name once)")
@@ -167,14 +167,14 @@ class _Reader:
             self.draft.point(point["name"].strip(), xyz, fixed=fixed, datum=datum, place=point["place"])
 
     def need(self, element: XmlElement, name: str, axes: str) -> str:
-        """The point's name, which must have a status for each coordinate that the observation depends on."""
+        """Point name; InputError unless all coordinates used by the observation have a status."""
         for axis in axes:
             if f"is {axis}" not in self.points.get(name_key(name), {f"is {axis}": ""}):
                 raise self.refuse(element, f"needs {axis} of {shown(name)}, which is neither fix nor adj there")
         return name
 
     def set_of(self, element: XmlElement, section: XmlElement) -> None:
-        """<obs> and <height-differences>: rows, and their covariance where it is given."""
+        """Add rows of <obs> and <height-differences>, with covariance if given."""
         start, scales = len(self.draft.rows), []
         matrix = next((child for child in element.children if child.tag == "cov-mat"), None)
         orientation = -1
@@ -191,13 +191,13 @@ class _Reader:
     def _row(
         self, child: XmlElement, parent: XmlElement, section: XmlElement, *, orientation: int, has_matrix: bool
     ) -> float:
-        """Adds the row of one element; what a unit of its stdev is, with the sign by which its value turned."""
+        """Add the row of one element; unit of its stdev, with the sign of its value."""
         attributes = child.attributes
         start = attributes.get("from", parent.attributes.get("from", "")).strip()
         if not start:
-            raise self.refuse(child, "says not from where (expected from, here or in obs)")
-        others = ("bs", "fs") if child.tag == "angle" else ("to",)
-        ends = [start, *(attributes[name].strip() for name in others)]
+            raise self.refuse(child, "has no station (expected from, here or in obs)")
+        targets = ("bs", "fs") if child.tag == "angle" else ("to",)
+        ends = [start, *(attributes[name].strip() for name in targets)]
         for name in ends:
             self.need(child, name, NEEDS.get(child.tag, "xyz"))
         if child.tag in ("distance", "s-distance", "dh"):
@@ -209,7 +209,7 @@ class _Reader:
         if child.tag == "z-angle" and not 0.0 < value < np.pi:
             raise self.refuse(child, f"val = {shown(attributes['val'])} (expected the first face, below half a turn)")
         u = 1.0 if has_matrix else self._stdev(child, section, value) * unit
-        heights = tuple(self.number(child, f"{name}_dh", 0.0) for name in others)
+        heights = tuple(self.number(child, f"{name}_dh", 0.0) for name in targets)
         instrument = self.number(child, "from_dh", self.number(parent, "from_dh", 0.0))
         parameters = {"orientation": orientation} if child.tag == "direction" else {}
         claim = (0.0, 0.0, 1.0)
@@ -225,7 +225,7 @@ class _Reader:
         return unit * turned
 
     def _stdev(self, child: XmlElement, section: XmlElement, value: float) -> float:
-        """In the file's unit: the element's own, else what the section implies for its kind."""
+        """Standard deviation in the file's unit: the element's, or the section's for its kind."""
         if "stdev" in child.attributes:
             return self.number(child, "stdev")
         if child.tag == "dh" and "dist" in child.attributes:
@@ -239,16 +239,16 @@ class _Reader:
         return self.number(section, name)
 
     def _distance_stdev(self, section: XmlElement) -> tuple[float, float, float]:
-        """a, b, c of a + b D^c, mm and km."""
+        """Terms a, b, c of a + b D^c, mm and km."""
         words = section.attributes["distance-stdev"].split()
         if not 1 <= len(words) <= 3:
             raise self.refuse(section, f"distance-stdev holds {len(words)} values (expected a, a b or a b c)")
-        given = [number_of(self.draft.file, section, "distance-stdev", word=word) for word in words]
-        a, b, c = [*given, *(0.0, 1.0)[len(given) - 1 :]]
+        terms = [number_of(self.draft.file, section, "distance-stdev", word=word) for word in words]
+        a, b, c = [*terms, *(0.0, 1.0)[len(terms) - 1 :]]
         return a, b, c
 
     def _orientation(self, element: XmlElement) -> int:
-        """The unknown azimuth of a set's zero; `orientation` in the file is its bearing from the x axis."""
+        """Parameter of a set's zero azimuth; `orientation` in the file is its bearing from the x axis."""
         station = element.attributes.get("from", "").strip()
         self.sets[station] = self.sets.get(station, 0) + 1
         start = 0.0
@@ -281,7 +281,7 @@ class _Reader:
             for name in ends:
                 self.need(vec, name, "xyz")
             difference = np.array([self.number(vec, f"d{k}") for k in "xyz"])
-            # what stands on the points is longer by the target's height and shorter by the instrument's
+            # the vector between marks: minus the target's height, plus the instrument's
             difference[2] += self.number(vec, "from_dh", 0.0) - self.number(vec, "to_dh", 0.0)
             self._components(vec, "vector", ends, self.draft.axes @ difference, [0, 1, 2])
             turns.append(self.draft.axes)

@@ -1,4 +1,4 @@
-"""The XML of a .gkf file as a checked tree with line numbers; what GNU Gama's schema does not know is refused."""
+"""Checked XML tree of a .gkf file with line numbers; anything outside Gama's schema is refused."""
 
 import re
 from collections.abc import Callable
@@ -14,7 +14,7 @@ from catseye.records.files.refusal import NUMBER, refusal, shown
 GON = 0.9 * DEGREE
 NAMESPACE = "http://www.gnu.org/software/gama/gama-local"
 SEXAGESIMAL = re.compile(r"([+-]?)([0-9]+)-([0-9]+)-([0-9]+(?:\.[0-9]*)?)")
-MOST_DEEP = 10  # elements within each other; the schema needs 5
+MOST_DEEP = 10  # nested elements; the schema needs 5
 
 OBSERVATIONS = ("direction", "distance", "angle", "s-distance", "z-angle", "azimuth")
 CHILDREN: dict[str, tuple[str, ...]] = {
@@ -28,7 +28,7 @@ CHILDREN: dict[str, tuple[str, ...]] = {
 }
 TO = ("to", "val"), ("stdev", "from_dh", "to_dh", "extern")
 FROM_TO = ("to", "val"), ("from", "stdev", "from_dh", "to_dh", "extern")
-ATTRIBUTES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {  # must be there, may be there
+ATTRIBUTES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {  # required, optional
     "gama-local": ((), ("xmlns", "version")),
     "network": ((), ("axes-xy", "angles", "epoch")),
     "description": ((), ()),
@@ -63,7 +63,7 @@ TEXT = ("description", "cov-mat")
 
 @dataclass(eq=False)
 class XmlElement:
-    """An element of the file and the line where it starts."""
+    """Element of the file and the line where it starts."""
 
     tag: str
     attributes: dict[str, str]
@@ -77,10 +77,10 @@ class XmlElement:
 
 
 def tree_of(raw: bytes, file: str) -> XmlElement:
-    """The root of a .gkf file, every element and attribute known; InputError for anything else.
+    """Root of a .gkf file with only known elements and attributes; else InputError.
 
-    raw    the file's bytes
-    file   its name, for refusals
+    raw    content of the file
+    file   file name, for messages
     """
     if not raw.strip():
         raise refusal(file, f"holds {len(raw)} bytes and no text: empty")
@@ -117,7 +117,7 @@ def tree_of(raw: bytes, file: str) -> XmlElement:
     except expat.ExpatError as problem:
         message = expat.errors.messages.get(problem.code, str(problem))
         raise refusal(file, f"line {problem.lineno}, column {problem.offset + 1}, is not XML: {message}") from problem
-    except (ValueError, LookupError) as problem:  # an encoding that Python does not know
+    except (ValueError, LookupError) as problem:  # an encoding unknown to Python
         raise refusal(file, f"cannot be read as XML: {problem}") from problem
     root = stack[0].children[0]
     if len(root.children) != 1:
@@ -127,10 +127,10 @@ def tree_of(raw: bytes, file: str) -> XmlElement:
 
 def _check(parent: XmlElement, element: XmlElement, refuse: Callable[[str], InputError]) -> None:
     tag = element.tag
-    known = CHILDREN.get(parent.tag, ()) if parent.tag else ("gama-local",)
-    if tag not in known:
+    allowed = CHILDREN.get(parent.tag, ()) if parent.tag else ("gama-local",)
+    if tag not in allowed:
         inside = f"in <{parent.tag}>" if parent.tag else "at the top"
-        raise refuse(f"<{tag}> {inside} is not known (expected {' '.join(known) or 'no element'})")
+        raise refuse(f"<{tag}> {inside} is not known (expected {' '.join(allowed) or 'no element'})")
     if parent.children and parent.children[-1].tag == "cov-mat":
         raise refuse(f"<{tag}> stands after <cov-mat> (expected before it)")
     must, may = ATTRIBUTES[tag]
@@ -147,13 +147,13 @@ def _check(parent: XmlElement, element: XmlElement, refuse: Callable[[str], Inpu
 def number_of(
     file: str, element: XmlElement, name: str, *, default: float | None = None, word: str | None = None
 ) -> float:
-    """An attribute as a number; the default where it is not there.
+    """Attribute as a number; the default if absent.
 
-    file      for refusals
-    element   whose attribute
-    name      the attribute's
-    default   None refuses its absence
-    word      the part of the attribute that is meant, if not all of it
+    file      file name, for messages
+    element   element with the attribute
+    name      name of the attribute
+    default   None makes the attribute required
+    word      part of the attribute to convert; None for all
     """
     if name not in element.attributes and default is not None:
         return default
@@ -164,7 +164,7 @@ def number_of(
 
 
 def angle_of(file: str, element: XmlElement, name: str) -> tuple[float, bool]:
-    """An attribute as an angle in rad, and whether it was written in degrees: 57-32-28.428, or else gon.
+    """Attribute as an angle in rad, and True if written in degrees (57-32-28.428), else gon.
 
     >>> angle, degrees = angle_of("a.gkf", XmlElement("azimuth", {"val": "57-32-28.428"}, 1), "val")
     >>> round(angle / GON, 4), degrees
@@ -182,11 +182,11 @@ def angle_of(file: str, element: XmlElement, name: str) -> tuple[float, bool]:
 
 
 def band_matrix(file: str, element: XmlElement, rows: int) -> np.ndarray:
-    """The symmetric matrix (rows, rows) of a <cov-mat>: the upper band row by row, in the file's units.
+    """Symmetric matrix (rows, rows) of a <cov-mat>: upper band by rows, in the file's units.
 
-    file      for refusals
+    file      file name, for messages
     element   the <cov-mat>
-    rows      how many observations it is of
+    rows      number of observations
     """
 
     def refuse(problem: str) -> InputError:

@@ -1,4 +1,4 @@
-"""Rows of a file as groups of observations: one group a kind, and one a correlated set."""
+"""Rows of a file as groups of observations: one per kind, and one per correlated set."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -24,7 +24,7 @@ from catseye.estimation.observations.kinds import (
     ZenithAngles,
 )
 
-# Axes on which a kind depends at each of its points; all three where it is not here.
+# Axes on which a kind depends at each of its points; default: all three.
 TOUCHES = {
     "horizontal_distance": "xy",
     "direction": "xy",
@@ -38,7 +38,7 @@ LENGTHS = (
     *("coordinates", "vector", "level_plane"),
 )
 ANGLES = ("direction", "angle", "azimuth", "zenith_angle", "inclination")
-ENDS = {  # what a file calls the points of a kind; from and to where it is not here
+ENDS = {  # names of a kind's points in a file; default: from and to
     "angle": ("at", "backsight", "foresight"),
     "distance_difference": ("from", "to", "from_2", "to_2"),
     "coordinates": ("point",),
@@ -50,19 +50,19 @@ SCALING = ("scale", "refractivity")  # and those that multiply it
 
 @dataclass(frozen=True)
 class Row:
-    """One observation by the names of its points.
+    """Observation by the names of its points.
 
     kind         of `catseye.estimation.observations`
-    ends         its points: from, to, third
+    ends         points: from, to, third
     value        m or rad
-    u            its standard uncertainty
-    place        where it stands in the file
+    u            standard uncertainty
+    place        place in the file
     heights      m, of the instrument and of each target above its point, like ends; () for none
     parameters   role -> index among the network's parameters: orientation, zero, scale, refractivity, refraction, level
     claim        a, b, c of a standard uncertainty a + b D^c that grows with the length; b = 0: it is `u` alone
     component    "x", "y" or "z" of coordinates and vectors
     unit         "deg" or "gon" in which an angle was written, or ""
-    known        what is known beside: "index" (what a metre reads), "offset" m, "refraction" (coefficient), "curved"
+    constants    known values: "index" (reading of a metre), "offset" m, "refraction" (coefficient), "curved"
     """
 
     kind: str
@@ -75,12 +75,12 @@ class Row:
     component: str = ""
     claim: tuple[float, float, float] = (0.0, 0.0, 1.0)
     unit: str = ""
-    known: Mapping[str, float] = field(default_factory=dict)
+    constants: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
 class _Arrays:
-    """Rows of one kind as the arrays that constructors want."""
+    """Rows of one kind as arrays for the constructors."""
 
     rows: Sequence[Row]
     names: Mapping[str, int]
@@ -90,14 +90,14 @@ class _Arrays:
         return np.array([3 * self.names[row.ends[which]] for row in self.rows])
 
     def shift(self, which: int = 1) -> np.ndarray | None:
-        """(m, 3) target's height less the instrument's, or None where no row has any."""
+        """Target height minus instrument height, (m, 3), or None if no row has any."""
         if not any(any(row.heights) for row in self.rows):
             return None
         up = [row.heights[which] - row.heights[0] if row.heights else 0.0 for row in self.rows]
         return np.stack([np.zeros(len(up)), np.zeros(len(up)), np.array(up)], axis=1)
 
     def columns(self, role: str) -> np.ndarray | None:
-        """(m,) columns of the parameters in a role, -1 for none; None where no row has one."""
+        """Columns (m,) of the parameters in a role, -1 for none; None if no row has one."""
         if not any(role in row.parameters for row in self.rows):
             return None
         at = [row.parameters.get(role, -1) for row in self.rows]
@@ -107,15 +107,15 @@ class _Arrays:
         columns = [c for c in map(self.columns, roles) if c is not None]
         return np.stack(columns, axis=1) if columns else None
 
-    def known(self, key: str, default: float) -> np.ndarray | float:
-        if not any(key in row.known for row in self.rows):
+    def constant(self, key: str, default: float) -> np.ndarray | float:
+        if not any(key in row.constants for row in self.rows):
             return default
-        return np.array([row.known.get(key, default) for row in self.rows])
+        return np.array([row.constants.get(key, default) for row in self.rows])
 
     def reading(self) -> dict[str, np.ndarray | float | None]:
         return {
-            "scale": self.known("index", 1.0),
-            "offset": self.known("offset", 0.0),
+            "scale": self.constant("index", 1.0),
+            "offset": self.constant("offset", 0.0),
             "nuisance": self.several(ADDING),
             "scaling": self.several(SCALING),
         }
@@ -129,9 +129,9 @@ def _zenith_angles(name: str, observed: np.ndarray, covariance: np.ndarray, a: _
         a.end(0),
         a.end(1),
         shift=a.shift(),
-        refraction=a.known("refraction", 0.0),
+        refraction=a.constant("refraction", 0.0),
         refraction_column=a.columns("refraction"),
-        curved=any(row.known.get("curved") for row in a.rows),
+        curved=any(row.constants.get("curved") for row in a.rows),
     )
 
 
@@ -157,7 +157,7 @@ MAKERS: dict[str, Callable[[str, np.ndarray, np.ndarray, _Arrays], Reported]] = 
     "inclination": lambda n, o, c, a: Inclinations(
         n, o, c, a.end(0), a.end(1), shift=a.shift(), zero=a.columns("zero")
     ),
-    "level_plane": lambda n, o, c, a: LevelPlanes(n, o, c, a.end(0), _column(a, "level"), a.known("height", 0.0)),
+    "level_plane": lambda n, o, c, a: LevelPlanes(n, o, c, a.end(0), _column(a, "level"), a.constant("height", 0.0)),
     "coordinates": lambda n, o, c, a: ObservedCoordinates(n, o, c, a.end(0), _axes(a)),
     "vector": lambda n, o, c, a: Vectors(n, o, c, a.end(0)[::3], a.end(1)[::3]),
 }
@@ -166,12 +166,12 @@ MAKERS: dict[str, Callable[[str, np.ndarray, np.ndarray, _Arrays], Reported]] = 
 def group_of(
     name: str, rows: Sequence[Row], covariance: np.ndarray, *, names: Mapping[str, int], first: int
 ) -> Reported:
-    """The group that some rows are.
+    """Group of some rows.
 
     name         for reports
     rows         of any kinds
     covariance   (m,), (m, m) or blocks (b, 3, 3), m^2, rad^2, m rad
-    names        point -> its number
+    names        point -> index
     first        column of the first parameter after the points
     """
     if len({row.kind for row in rows}) == 1:
@@ -180,8 +180,8 @@ def group_of(
     parts = []
     for begin, end in pairwise(starts):
         some = rows[begin:end]
-        own = np.diag(covariance)[begin:end]
-        parts.append(_of_one_kind(f"{name}: {some[0].kind}", some, own, _Arrays(some, names, first)))
+        variances = np.diag(covariance)[begin:end]
+        parts.append(_of_one_kind(f"{name}: {some[0].kind}", some, variances, _Arrays(some, names, first)))
     return Joint.of(name, tuple(parts), covariance)
 
 
@@ -191,16 +191,16 @@ def _of_one_kind(name: str, rows: Sequence[Row], covariance: np.ndarray, arrays:
 
 
 def blocks_of(correlated: Sequence[tuple[list[Row], np.ndarray]]) -> list[tuple[list[Row], np.ndarray]]:
-    """Correlated sets, those of vectors that are independent of each other joined to one with blocks (b, 3, 3)."""
+    """Correlated sets; independent vectors are joined to one set with blocks (b, 3, 3)."""
     vectors: list[Row] = []
     blocks: list[np.ndarray] = []
-    others: list[tuple[list[Row], np.ndarray]] = []
+    remainder: list[tuple[list[Row], np.ndarray]] = []
     for rows, covariance in correlated:
         b = len(rows) // 3
         apart = np.kron(np.eye(b), np.ones((3, 3))) if all(row.kind == "vector" for row in rows) else None
         if apart is None or np.any(covariance[apart == 0.0]):
-            others.append((rows, covariance))
+            remainder.append((rows, covariance))
             continue
         vectors += rows
         blocks += [covariance[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] for i in range(b)]
-    return [*([(vectors, np.array(blocks))] if vectors else []), *others]
+    return [*([(vectors, np.array(blocks))] if vectors else []), *remainder]

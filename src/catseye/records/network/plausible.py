@@ -1,6 +1,6 @@
-"""Units that were typed otherwise: angles beyond the circle, lengths a thousand times what the coordinates allow.
+"""Checks for wrong units: angles beyond the circle, lengths a thousand times off the coordinates.
 
-What is impossible is refused with both readings; what is only unlikely stays, and the network says its doubt.
+Impossible values are refused with both interpretations; unlikely ones are accepted with a doubt in the network.
 """
 
 import re
@@ -14,20 +14,20 @@ from catseye.estimation.observations.kinds import Distances, FixedDistances, Hor
 from catseye.records.files.refusal import refusal
 
 GON = 0.9 * DEGREE
-CIRCLES = 2.0  # turns from which no angle was read like that; an accumulated one may be beyond the first
-FAR = 100.0  # times what the coordinates allow: beyond it no blunder but a unit
-CLOSED = 0.05  # share of itself by which a length may miss its triangle in the other reading
+CIRCLES = 2.0  # turns above which an angle is impossible; accumulated angles may exceed one turn
+FAR = 100.0  # times the distance by coordinates: beyond it a wrong unit, not a blunder
+CLOSED = 0.05  # relative misclosure of a triangle allowed in the other unit
 THOUSAND = (1e-3, 1e3)  # millimetres typed as metres, and kilometres
-ALIKE = 3.0  # times a thousand, either way: lengths and given coordinates then differ by the unit, most likely
+ALIKE = 3.0  # factor around a thousand within which lengths and coordinates most likely differ by the unit
 PACKED = re.compile(r"([0-9]{1,3})([0-5][0-9])([0-5][0-9](?:\.[0-9]+)?)")
 LENGTHS = Distances | HorizontalDistances | FixedDistances
 
 
 def beyond_circle(value: float, unit: str) -> tuple[str, bool]:
-    """Both readings of an angle beyond the circle, "" for one within it; and whether it is impossible.
+    """Both interpretations of an angle beyond the circle, or ""; and True if it is impossible.
 
     value   rad
-    unit    "deg" or "gon", in which it was written; "rad" for others
+    unit    "deg" or "gon" in the file; "rad" for others
 
     >>> beyond_circle(453015 * DEGREE, "deg")
     ('453015 deg is 1258 turns and 135 deg; read as packed 45-30-15 it is 45.5042 deg', True)
@@ -38,8 +38,8 @@ def beyond_circle(value: float, unit: str) -> tuple[str, bool]:
     if turns == 0 or abs(value) < TWO_PI * (1.0 + 1e-12):
         return "", False
     size = {"deg": DEGREE, "gon": GON}.get(unit, 1.0)
-    number, left = value / size, (abs(value) - turns * TWO_PI) / size
-    text = f"{number:.10g} {unit} is {turns} turn{'s' * (turns > 1)} and {left:.6g} {unit}"
+    number, remainder = value / size, (abs(value) - turns * TWO_PI) / size
+    text = f"{number:.10g} {unit} is {turns} turn{'s' * (turns > 1)} and {remainder:.6g} {unit}"
     packed = PACKED.fullmatch(f"{abs(number):.10g}") if unit == "deg" else None
     if packed is not None and int(packed[1]) <= 360:
         degrees = int(packed[1]) + int(packed[2]) / 60.0 + float(packed[3]) / 3600.0
@@ -50,24 +50,24 @@ def beyond_circle(value: float, unit: str) -> tuple[str, bool]:
 
 
 def with_lengths_checked(network: ObservationNetwork) -> ObservationNetwork:
-    """The network, with a doubt where its lengths and given coordinates differ by a thousand; InputError if they must.
+    """Network with a doubt for lengths a thousand times off its coordinates; InputError if certain.
 
-    Impossible: most lengths that known points allow to check are a hundred times too long or too short for them (a
-    triangle that does not close), and a thousand times less or more they fit. Known is what is held or in the datum.
+    Certain: most lengths that can be checked by reference points are a hundred times too long or too short for them (a
+    triangle does not close), and fit after a factor of a thousand. Reference points are held or in the datum.
     """
     rows = _lengths(network)
     if not len(rows[0]):
         return network
     group, row, ends, length, level = rows
     points = network.points
-    for known, must in ((points.fixed, True), (np.isfinite(points.xyz), False)):
-        sure = known & np.isfinite(points.xyz)
+    for reference, must in ((points.fixed, True), (np.isfinite(points.xyz), False)):
+        sure = reference & np.isfinite(points.xyz)
         places = np.where(level[:, None], sure[ends][:, :, :2].all(axis=2), sure[ends].all(axis=2))
-        checked, wrong = _triangles(points.xyz, ends, length, level=level, known=places)
+        checked, wrong = _triangles(points.xyz, ends, length, level=level, reference=places)
         if checked < 1 or 2 * len(wrong) < checked:
             continue
         for factor in THOUSAND:
-            _, still = _triangles(points.xyz, ends, length * factor, level=level, known=places, far=1.0 + CLOSED)
+            _, still = _triangles(points.xyz, ends, length * factor, level=level, reference=places, far=1.0 + CLOSED)
             if 2 * len(still) >= max(len(wrong), 1):
                 continue
             k = wrong[0]
@@ -82,7 +82,7 @@ def with_lengths_checked(network: ObservationNetwork) -> ObservationNetwork:
 
 
 def _lengths(network: ObservationNetwork) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Group, row, both points (m, 2), length (m,) and whether it is horizontal (m,), of every measured length."""
+    """Group, row, points (m, 2), length (m,) and horizontal mask (m,) of every measured length."""
     tables = []
     for g, group in enumerate(network.groups):
         if isinstance(group, LENGTHS):
@@ -98,22 +98,22 @@ def _lengths(network: ObservationNetwork) -> tuple[np.ndarray, np.ndarray, np.nd
 
 
 def _triangles(
-    xyz: np.ndarray, ends: np.ndarray, length: np.ndarray, *, level: np.ndarray, known: np.ndarray, far: float = FAR
+    xyz: np.ndarray, ends: np.ndarray, length: np.ndarray, *, level: np.ndarray, reference: np.ndarray, far: float = FAR
 ) -> tuple[int, list[int]]:
-    """How many lengths known points check, and the rows that are `far` times too long or short for them.
+    """Number of lengths checked by reference points, and rows `far` times too long or short.
 
-    known   (m, 2) bool: the coordinates of that end are known
+    reference   (m, 2) bool: that end is a reference point
     """
     flat = np.where(np.isfinite(xyz), xyz, 0.0)
-    both = np.flatnonzero(known.all(axis=1))
-    along = flat[ends[both, 1]] - flat[ends[both, 0]]
-    along[level[both], 2] = 0.0
+    complete = np.flatnonzero(reference.all(axis=1))
+    along = flat[ends[complete, 1]] - flat[ends[complete, 0]]
+    along[level[complete], 2] = 0.0
     apart = np.linalg.norm(along, axis=1)
-    off = (length[both] > far * apart) | (apart > far * length[both])
-    wrong, checked = both[off & (apart > 0.0)].tolist(), int(np.sum(apart > 0.0))
-    one = np.flatnonzero(known[:, 0] != known[:, 1])
-    free = np.where(known[one, 0], ends[one, 1], ends[one, 0])
-    anchor = np.where(known[one, 0], ends[one, 0], ends[one, 1])
+    off = (length[complete] > far * apart) | (apart > far * length[complete])
+    wrong, checked = complete[off & (apart > 0.0)].tolist(), int(np.sum(apart > 0.0))
+    one = np.flatnonzero(reference[:, 0] != reference[:, 1])
+    free = np.where(reference[one, 0], ends[one, 1], ends[one, 0])
+    anchor = np.where(reference[one, 0], ends[one, 0], ends[one, 1])
     order = np.argsort(free, kind="stable")
     points, first = np.unique(free[order], return_index=True)
     for part in np.split(order, first[1:]) if len(points) else []:

@@ -1,4 +1,4 @@
-"""Points as a reduction left them: coordinates.json with its full covariance, and the posture beside it."""
+"""Points of a reduction: coordinates.json with its full covariance, and the posture."""
 
 import json
 import math
@@ -18,22 +18,22 @@ from catseye.records.files.verdicts import stored_verdict
 from catseye.verdict import Verdict
 
 FORMAT = "catseye-reduction-1"  # of coordinates.json and pose.json
-FILE, BESIDE = "coordinates.json", "pose.json"
-DRAWN = 1e-6  # of two standard uncertainties' product: how unsymmetric a covariance in print may be
+FILE, POSE_FILE = "coordinates.json", "pose.json"
+DRAWN = 1e-6  # of two standard uncertainties' product: largest asymmetry of a printed covariance
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SolvedPoints:
-    """The points of one epoch in the ground frame.
+    """Points of one epoch in the ground frame.
 
     file         as named by the user, for messages
     campaign     name
     names        n
     x            (n, 3) m
-    covariance   (3n, 3n) m^2; of many points mapped from a file, or what gives its parts
-    posture      azimuth and elevation, rad, if pose.json beside it says
-    hashes       SHA-256 of the files read, by their names
-    verdict      of the reduction; None where the file has none
+    covariance   (3n, 3n) m^2; for many points mapped from a file, or an object that gives its parts
+    posture      azimuth and elevation, rad, from pose.json, if there
+    hashes       SHA-256 of the files read, by name
+    verdict      of the reduction; None if the file has none
     """
 
     file: str
@@ -50,33 +50,33 @@ class SolvedPoints:
         return f"<Solved points of {self.campaign}: {len(self.names)} with their full covariance; from {where}>"
 
     def block(self, names: Sequence[str]) -> np.ndarray:
-        """(3k, 3k) m^2, of some points in this order."""
+        """Covariance (3k, 3k) m^2 of some points in this order."""
         return self.between(names, names)
 
-    def between(self, names: Sequence[str], others: Sequence[str]) -> np.ndarray:
-        """(3k, 3m) m^2, covariance of some points with others."""
-        rows, columns = self.rows(names), self.rows(others)
+    def between(self, names: Sequence[str], columns_of: Sequence[str]) -> np.ndarray:
+        """Covariance (3k, 3m) m^2 of some points with others."""
+        rows, columns = self.rows(names), self.rows(columns_of)
         if isinstance(self.covariance, JointPoints):
             return self.covariance.between(rows, columns)
-        rows, columns = ((3 * each[:, None] + np.arange(3)).ravel() for each in (rows, columns))
+        rows, columns = ((3 * points[:, None] + np.arange(3)).ravel() for points in (rows, columns))
         return part_of(self.covariance, rows, columns)
 
     def places(self, names: Sequence[str]) -> np.ndarray:
-        """(k, 3) m, of some points in this order."""
+        """Coordinates (k, 3) m of some points in this order."""
         return np.asarray(self.x[self.rows(names)])
 
     def rows(self, names: Sequence[str]) -> np.ndarray:
-        """(k,) where some points stand."""
+        """Row indices (k,) of some points."""
         at = {name: k for k, name in enumerate(self.names)}
         return np.array([at[n] for n in names], dtype=int)
 
 
 def read_solved_points(path: Path | str) -> SolvedPoints:
-    """Points from a coordinates.json, or from a directory that `catseye reduce --out` wrote.
+    """Points of a coordinates.json, or of a directory from `catseye reduce --out`.
 
     path   the file, or the directory
 
-    Raises InputError with the file, the place in it, the value and what was expected.
+    Raises InputError with file, place, value and expectation.
     """
     path = Path(path)
     folder, name = (Folder(path), FILE) if path.is_dir() else (Folder(path.parent), path.name)
@@ -91,8 +91,8 @@ def read_solved_points(path: Path | str) -> SolvedPoints:
         raise refusal(name, f"frame = {shown(document.get('frame'))} (expected 'ground')")
     x = np.array([[_number(name, n, points[n], axis) for axis in "xyz"] for n in names])
     covariance = _covariance(name, stored_covariance(document, folder.directory, len(order)), len(order))
-    beside = folder.directory / BESIDE
-    posture = _posture(_object(folder, BESIDE)) if beside.is_file() else None
+    pose_file = folder.directory / POSE_FILE
+    posture = _posture(_object(folder, POSE_FILE)) if pose_file.is_file() else None
     hashes = {f"{path.name}/{f}" if path.is_dir() else f: digest for f, digest in folder.hashes.items()}
     judged = stored_verdict(name, document)
     return SolvedPoints(str(path), str(document.get("campaign", "")), names, x, covariance, posture, hashes, judged)
@@ -118,14 +118,14 @@ def _number(file: str, point: str, row: Any, axis: str) -> float:
 
 
 def _covariance(file: str, rows: Any, size: int) -> np.ndarray:
-    if isinstance(rows, np.ndarray):  # mapped: looked at where it is used
+    if isinstance(rows, np.ndarray):  # mapped: checked when used
         if not np.all(np.diag(rows) >= 0.0):
             raise refusal(file, "its covariance file has a negative variance (expected a covariance, m^2)")
         return rows
     try:
         q = np.array(rows, dtype=float)
     except (TypeError, ValueError) as problem:
-        raise refusal(file, "covariance is no table of numbers (expected one row a coordinate)") from problem
+        raise refusal(file, "covariance is not a table of numbers (expected one row per coordinate)") from problem
     if q.shape != (size, size) or not np.isfinite(q).all():
         raise refusal(file, f"covariance has shape {q.shape} (expected ({size}, {size}), all finite)")
     scale = np.sqrt(np.abs(np.outer(np.diag(q), np.diag(q))))
@@ -140,5 +140,5 @@ def _posture(document: dict[str, Any]) -> tuple[float, float] | None:
         return None
     angles: list[Any] = [posture.get(key) for key in ("azimuth_deg", "elevation_deg")]
     if any(isinstance(v, bool) or not isinstance(v, int | float) or not math.isfinite(v) for v in angles):
-        raise refusal(BESIDE, f"nominal_posture = {shown(posture)} (expected azimuth_deg and elevation_deg)")
+        raise refusal(POSE_FILE, f"nominal_posture = {shown(posture)} (expected azimuth_deg and elevation_deg)")
     return float(angles[0]) * DEGREE, float(angles[1]) * DEGREE

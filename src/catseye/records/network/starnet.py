@@ -1,23 +1,23 @@
-"""STAR*NET's lines of a three-dimensional survey (.dat), as its reference manual defines them.
+"""STAR*NET data of a three-dimensional survey (.dat), by its manual.
 
-Read are the codes C and E (coordinates), A, D, V, DV, B, M, BM (observations), DB DN DM DE (direction sets), L
+Supported are the codes C and E (coordinates), A, D, V, DV, B, M, BM (observations), DB DN DM DE (direction sets), L
 (levelling), and the options .UNITS .ORDER .DELTA .SEPARATOR .2D .3D .DATA .MULTIPLIER .REFRACTION .INSTRUMENT
-(a name only: its library is not in the file); the rest is refused by name, but for options that only shape the listing.
+(name only: its library is not in the file); others are refused by name, except options for the listing only.
 Text after # is a comment, after ' a description.
 
-What a project file would say and a .dat cannot is taken as: metres, degrees-minutes-seconds, north before east,
+Settings of a project file, absent in a .dat, are taken as: metres, degrees-minutes-seconds, north before east,
 At-From-To, slope distance and zenith angle, three-dimensional. Standard errors are in the lines, in seconds (with GONS
-in milligons) and the line's unit of length. Where they are missing or `&`, a comment must say what they are:
+in milligons) and the line's unit of length. Where they are missing or `&`, a comment must give them:
 
     # catseye: angle_arcsec = 2, zenith_arcsec = 3, distance_mm = 1, distance_ppm = 1.5
 
-with direction_, azimuth_, zenith_, angle_arcsec, distance_mm + distance_ppm D, elevation_mm, from there on. Nothing is
-assumed without it. `!` holds a coordinate; on an observation it stands for 1e-7 m or 1e-9 rad. `*` frees a coordinate
-and leaves an observation out; the network's description says so. A coordinate of C without standard errors is free.
+with direction_, azimuth_, zenith_, angle_arcsec, distance_mm + distance_ppm D, elevation_mm, from there on. There
+are no other defaults. `!` holds a coordinate; on an observation it means 1e-7 m or 1e-9 rad. `*` frees a coordinate
+and excludes an observation, which the network's description lists. A coordinate of C without standard errors is free.
 
 The network is plane: no curvature, no refraction. `.REFRACTION k` turns both on, with the coefficient k, for the zenith
 angles of the whole file; horizontal angles are at the mark, distances chords between the ends of the heights. A zenith
-angle beyond half a turn is of the second face.
+angle beyond half a turn is from the second face.
 """
 
 from collections.abc import Callable, Sequence
@@ -44,7 +44,7 @@ from catseye.records.network.starnet_lines import (
     set_option,
 )
 
-FIXED_LENGTH = 1e-7  # m, standard uncertainty of a `!` observation: small against any survey, kind to the arithmetic
+FIXED_LENGTH = 1e-7  # m, standard uncertainty of a `!` observation: negligible in a survey, numerically safe
 FIXED_ANGLE = 1e-9  # rad
 DEFAULTS = {  # observation -> the comment's key
     "angle": "angle_arcsec",
@@ -53,7 +53,7 @@ DEFAULTS = {  # observation -> the comment's key
     "zenith_angle": "zenith_arcsec",
     "height_difference": "elevation_mm",
 }
-PROJECT_OPTIONS = {  # what STAR*NET calls these among its project options, Instrument
+PROJECT_OPTIONS = {  # names in STAR*NET's project options, Instrument
     "angle_arcsec": "Angle",
     "direction_arcsec": "Direction",
     "azimuth_arcsec": "Azimuth / Bearing",
@@ -65,10 +65,10 @@ DISTANCES = ("slope_distance", "horizontal_distance")
 
 
 def read_starnet(path: Path, claim: RangeClaim = NO_CLAIM) -> ObservationNetwork:
-    """The network of a STAR*NET .dat file; InputError, with its line, for what cannot be used or is not known.
+    """Network of a STAR*NET .dat file; InputError with the line for invalid or unknown input.
 
     path    the file
-    claim   standard error of distances without one, until a comment of the file says otherwise
+    claim   standard error of distances without one, until a comment in the file changes it
 
     Source: [STARNET04] chapter 5.
     """
@@ -76,10 +76,10 @@ def read_starnet(path: Path, claim: RangeClaim = NO_CLAIM) -> ObservationNetwork
 
 
 def starnet_network(text: str, file: str, claim: RangeClaim = NO_CLAIM) -> ObservationNetwork:
-    """The same of the file's text.
+    """Network of the file's text.
 
     text    lines
-    file    its name, for refusals
+    file    file name, for messages
     claim   as for `read_starnet`
     """
     reader = _Reader(file)
@@ -96,7 +96,7 @@ class _Reader:
         self.draft = NetworkDraft(file, implied=True)
         self.settings = StarnetSettings()
         self.coordinates: dict[str, dict[str, tuple[float, str, str]]] = {}
-        self.written: dict[str, str] = {}  # key of a name -> as it stands first
+        self.written: dict[str, str] = {}  # key of a name -> first spelling
         self.sets: dict[str, int] = {}
         self.station, self.orientation = "", -1
         self.left_out: list[str] = []
@@ -107,7 +107,7 @@ class _Reader:
         return self.draft.refuse(line.place, problem)
 
     def read(self, line: StarnetLine) -> None:
-        """Take in one line, by its code."""
+        """Process one line, by its code."""
         if not self.settings.data and not line.code.startswith(".DAT"):
             return
         if line.code.startswith("."):
@@ -119,17 +119,17 @@ class _Reader:
             raise self.refuse(line, f"{shown(line.text)} is not known here (expected one of the codes {known})")
 
     def network(self) -> ObservationNetwork:
-        """The network of all lines together."""
+        """Network of all lines of the file."""
         if self.orientation >= 0:
             raise refusal(self.draft.file, f"ends within the direction set at {shown(self.station)} (expected DE)")
         if self.without:
             raise self._refuse_without()
-        for key, known in self.coordinates.items():
+        for key, values in self.coordinates.items():
             name = self.written[key]
-            place = next(iter(known.values()))[2]
-            xyz = [known[axis][0] if axis in known else np.nan for axis in "xyz"]
-            self.draft.point(name, xyz, fixed=[known.get(a, (0, "", ""))[1] == "!" for a in "xyz"], place=place)
-            for axis, (value, error, where) in known.items():
+            place = next(iter(values.values()))[2]
+            xyz = [values[axis][0] if axis in values else np.nan for axis in "xyz"]
+            self.draft.point(name, xyz, fixed=[values.get(a, (0, "", ""))[1] == "!" for a in "xyz"], place=place)
+            for axis, (value, error, where) in values.items():
                 if error not in ("!", "*"):
                     self.draft.observe(Row("coordinates", (name,), value, float(error), where, component=axis))
         notes = [(self.left_out, "take no part (*)"), (self.held, "are held to 1e-7 m or 1e-9 rad (!)")]
@@ -137,11 +137,11 @@ class _Reader:
         if self.settings.refraction is not None:
             bent = {"refraction": self.settings.refraction, "curved": 1.0}
             rows = self.draft.rows
-            self.draft.rows = [replace(row, known=bent) if row.kind == "zenith_angle" else row for row in rows]
+            self.draft.rows = [replace(row, constants=bent) if row.kind == "zenith_angle" else row for row in rows]
         return self.draft.network()
 
     def _refuse_without(self) -> InputError:
-        """All standard errors that are missing, in the words of STAR*NET's project options."""
+        """Error listing all missing standard errors, in the terms of STAR*NET's project options."""
         missing = [
             f"{PROJECT_OPTIONS[key]} ({len(places)} observation{'s' if len(places) > 1 else ''}, first {places[0]})"
             for key, places in self.without.items()
@@ -150,12 +150,12 @@ class _Reader:
         keys = ", ".join(f"{key} = ..." for key in self.without)
         return refusal(
             self.draft.file,
-            f"leaves to the project options{named}, which are not in it: {', '.join(missing)} (expected standard "
+            f"has no values for the project options{named}: {', '.join(missing)} (expected standard "
             f"errors in the lines, or above them the comment '# catseye: {keys}')",
         )
 
     def stations(self, line: StarnetLine, count: int) -> list[str]:
-        """Names joined by the separator, At-From-To in that order whatever the file's."""
+        """Names joined by the separator, in the order At-From-To whatever the file's."""
         words = line.words
         joined = words[1] if len(words) > 1 else ""
         names = joined.split(self.settings.separator)
@@ -167,7 +167,7 @@ class _Reader:
         return names
 
     def place_coordinates(self, line: StarnetLine) -> None:
-        """C: north, east, elevation; E: elevation."""
+        """Process C: north, east, elevation; or E: elevation."""
         settings, words = self.settings, line.words
         axes = "z" if line.code == "E" else ("yx" if settings.north_first else "xy") + ("z" if settings.three_d else "")
         numbers = words[2:]
@@ -189,24 +189,24 @@ class _Reader:
     def measure(
         self, line: StarnetLine, ends: Sequence[str], kinds: Sequence[tuple[str, tuple[str, ...]]], first: int
     ) -> None:
-        """Observations from word `first` on, then none or all of their standard errors, then perhaps HI/HT."""
+        """Add observations from word `first` on, then all or no standard errors, then optionally HI/HT."""
         words = line.words[first:]
         if len(words) < len(kinds):
             form = " ".join(kind.replace("_", " ") for kind, _ in kinds)
             raise self.refuse(line, f"{line.code}: {len(words)} values (expected {form})")
-        values, rest = words[: len(kinds)], words[len(kinds) :]
+        values, remainder = words[: len(kinds)], words[len(kinds) :]
         heights = (0.0, 0.0)
-        if rest and "/" in rest[-1]:
-            parts = rest.pop().split("/")
+        if remainder and "/" in remainder[-1]:
+            parts = remainder.pop().split("/")
             if len(parts) != 2:
                 raise self.refuse(line, f"{line.code}: heights {shown('/'.join(parts))} (expected HI/HT)")
             heights = tuple(number_of(line, part, self.refuse) * self.settings.length for part in parts)  # type: ignore[assignment]
-        if rest and len(rest) != len(kinds):
+        if remainder and len(remainder) != len(kinds):
             form = f"none or {len(kinds)}, then perhaps HI/HT"
             raise self.refuse(
-                line, f"{line.code}: {len(rest)} standard errors {shown(' '.join(rest))} (expected {form})"
+                line, f"{line.code}: {len(remainder)} standard errors {shown(' '.join(remainder))} (expected {form})"
             )
-        errors = rest or ["&"] * len(kinds)
+        errors = remainder or ["&"] * len(kinds)
         for (kind, points), word, error in zip(kinds, values, errors, strict=True):
             if word != "?":
                 self._observe(line, kind, points or tuple(ends), word=word, error=error, heights=heights)
@@ -235,8 +235,8 @@ class _Reader:
         u = self._standard_error(line, kind, error=error, value=value)
         claim = (0.0, 0.0, 1.0)
         if error == "&" and kind in DISTANCES:
-            given = self.settings.defaults
-            claim = (given.get("distance_mm", 0.0) * MILLIMETRE, given.get("distance_ppm", 0.0) * PPM, 1.0)
+            defaults = self.settings.defaults
+            claim = (defaults.get("distance_mm", 0.0) * MILLIMETRE, defaults.get("distance_ppm", 0.0) * PPM, 1.0)
         heights = heights if kind in ("slope_distance", "zenith_angle", "height_difference") else (0.0, 0.0)
         parameters = {"orientation": self.orientation} if kind == "direction" else {}
         shifted = heights if any(heights) else ()
@@ -261,7 +261,7 @@ class _Reader:
         return defaults[key] * (MILLIMETRE if length else np.pi / 648_000.0)
 
     def _distance_and_height(self, ends: tuple[str, ...]) -> list[tuple[str, tuple[str, ...]]]:
-        """What a line gives of the way from one point to another, by the mode."""
+        """Kinds of observation between two points in a line, by the mode."""
         settings = self.settings
         if not settings.three_d:
             return [("horizontal_distance", ends)]
@@ -320,7 +320,10 @@ class _Reader:
         self.station, self.orientation = "", -1
 
     def level(self, line: StarnetLine) -> None:
-        """L: height difference, length of the section, standard error; the length only serves project defaults."""
+        """L: height difference, length of the section, standard error.
+
+        The length only matters for project defaults.
+        """
         ends = tuple(self.stations(line, 2))
         words = line.words[2:]
         if len(words) == 3 and NUMBER.fullmatch(words[1]):

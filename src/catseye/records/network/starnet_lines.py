@@ -34,12 +34,12 @@ OPTIONS = (
     "INSTRUMENT",
     "CATSEYE",
 )
-SHORTEST = 3  # letters by which an option may be called
+SHORTEST = 3  # shortest abbreviation of an option
 
 
 @dataclass(frozen=True)
 class StarnetLine:
-    """A line of data: its words without comment and description."""
+    """Line of data: its words without comment and description."""
 
     place: str
     text: str
@@ -52,9 +52,9 @@ class StarnetLine:
 
 @dataclass
 class StarnetSettings:
-    """What options have set so far.
+    """Current settings by options.
 
-    unit, multiplier    m of a unit of length, and what `.MULTIPLIER` makes of it
+    unit, multiplier    m per unit of length, and the factor of `.MULTIPLIER`
     gons                angles are in gon
     decimal             angles are in decimal degrees
     north_first         coordinates are north, east
@@ -64,7 +64,7 @@ class StarnetSettings:
     separator           of stations
     data                lines are read
     refraction          coefficient, or None for a plane network
-    instrument          name that `.INSTRUMENT` gave last
+    instrument          last name given by `.INSTRUMENT`
     defaults            standard errors by the comment's key
     """
 
@@ -84,20 +84,20 @@ class StarnetSettings:
 
     @property
     def length(self) -> float:
-        """Metres of a number in the file."""
+        """Metres per unit of a number in the file."""
         return self.unit * self.multiplier
 
     @property
     def angle_error(self) -> float:
-        """Radians of an angular standard error in the file: seconds, or milligons."""
+        """Radians per unit of an angular standard error in the file: seconds, or milligons."""
         return 1e-3 * GON if self.gons else ARCSECOND
 
 
 def lines_of(text: str) -> list[StarnetLine]:
-    """Lines with words in them; our own comment comes as the option .CATSEYE.
+    """Lines with words; catseye's comment becomes the option .CATSEYE.
 
-    A last word `&` continues a line where the next one begins with no letter or option, so has no code; else it stands
-    for a default standard error.
+    A last word `&` continues a line if the next one has no code, that is begins with no letter or option; else it
+    means a default standard error.
 
     >>> [line.words for line in lines_of("M 2-1-3 45-00-00 10.0 90-00-00 & &\\n  & 1.5/1.6  # heights\\n")]
     [['M', '2-1-3', '45-00-00', '10.0', '90-00-00', '&', '&', '1.5/1.6']]
@@ -121,7 +121,7 @@ def lines_of(text: str) -> list[StarnetLine]:
 
 
 def number_of(line: StarnetLine, word: str, refuse: Refuse) -> float:
-    """The number that a word is."""
+    """Number written as a word of a line."""
     if not NUMBER.fullmatch(word):
         raise refuse(line, f"{line.code}: {shown(word)} (expected a number)")
     return float(word)
@@ -130,13 +130,13 @@ def number_of(line: StarnetLine, word: str, refuse: Refuse) -> float:
 def angle_of(
     line: StarnetLine, word: str, settings: StarnetSettings, *, refuse: Refuse, bearing: bool = False
 ) -> float:
-    """A word as an angle in rad: gon, decimal degrees, or ddd-mm-ss.s; bearings also N34-23-45.7E.
+    """Word as an angle in rad: gon, decimal degrees, or ddd-mm-ss.s; bearings also N34-23-45.7E.
 
-    line       where it stands
+    line       line of the word
     word       the angle
-    settings   their units
-    refuse     makes the error
-    bearing    whether a quadrant may be given
+    settings   units
+    refuse     function that makes the error
+    bearing    True if a quadrant is allowed
     """
     if bearing and (parts := QUADRANT.fullmatch(word)):
         acute = angle_of(line, parts[2], settings, refuse=refuse)
@@ -160,15 +160,15 @@ def angle_of(
 
 
 def set_option(settings: StarnetSettings, line: StarnetLine, refuse: Refuse) -> None:
-    """What a line that begins with a point says, from there on; an unknown one is refused by name."""
+    """Apply an option line, which begins with a point; an unknown one is refused by name."""
     word, values = line.code[1:], [value.upper() for value in line.words[1:]]
     if word == "CATSEYE":
         _set_defaults(settings, line, refuse)
         return
     matching = [o for o in (*OPTIONS, *SHAPING) if o == word or (len(word) >= SHORTEST and o.startswith(word))]
     if len(matching) != 1:
-        known = " ".join(f".{o}" for o in OPTIONS[:-1])
-        raise refuse(line, f"{shown(line.text)} is not known here (expected one of {known})")
+        names = " ".join(f".{o}" for o in OPTIONS[:-1])
+        raise refuse(line, f"{shown(line.text)} is not known here (expected one of {names})")
     name = matching[0]
     if name == "UNITS":
         _set_units(settings, line, values, refuse)
@@ -198,7 +198,7 @@ def set_option(settings: StarnetSettings, line: StarnetLine, refuse: Refuse) -> 
 
 
 def _set_units(settings: StarnetSettings, line: StarnetLine, values: list[str], refuse: Refuse) -> None:
-    if not values:  # back to what the file starts with
+    if not values:  # back to the defaults
         settings.unit, settings.gons, settings.decimal = 1.0, False, False
     for value in values:
         if value in UNITS:

@@ -1,9 +1,9 @@
-"""Our own file of a network: TOML with `format = "catseye-network-1"`, every number's unit in its key.
+"""Network file of catseye: TOML with `format = "catseye-network-1"`, units in the keys.
 
     description        free text
-    [[point]]          name; xyz_m, or x_m, y_m, z_m or some of them: what is measured and not given is found, what is
-                       neither does not exist (x and y of a levelled point); fixed and datum = "xyz" or some of it;
-                       u_mm, one or three, or covariance_mm2: a prior about xyz, zero holds the coordinate
+    [[point]]          name; xyz_m, or x_m, y_m, z_m or some of them: coordinates measured but not given are computed,
+                       others are absent (x and y of a levelled point); fixed and datum = "xyz" or some of it;
+                       u_mm, one or three, or covariance_mm2: a prior of xyz, zero holds the coordinate
     [[points]]         many: columns and rows, or file; keys of [[point]], x_m y_m z_m, and role = free, fixed or datum
     [[ranger]]         name of a point; its zero and scale: zero_mm, scale_ppm known, with u_zero_mm, u_scale_ppm priors
                        about them, or zero = "free", scale = "free"
@@ -11,15 +11,15 @@
                        observations name it as refractivity, scale, zero, orientation, refraction or level
     [[observation]]    kind, its points, value_m (or _mm, _deg, _gon, _dms ...), u_mm (or _arcsec ...), or for lengths
                        u_mm + u_ppm of the length
-    [[observations]]   many: columns and rows, or file; keys that stand beside them hold for all rows
+    [[observations]]   many: columns and rows, or file; keys beside them apply to all rows
     [[correlated]]     observation = [tables], correlation = matrix of all their values
     [[body]] [[shape]] [[frame]] [[tilt]] [[plane]] [[line]] [[sphere]]     see `toml_bodies`
 
 Kinds: slope_distance horizontal_distance fixed_distance distance_difference (from, to, from_2, to_2) direction (with
-set, "1" if not said) angle (at, backsight, foresight) azimuth zenith_angle height_difference inclination level_plane
-(point, level, height_m) coordinates (point, xyz_m) vector (xyz_m). instrument_height_m and target_height_m stand on
-slope_distance, zenith_angle, height_difference and inclination; index (what a metre reads) and offset_mm on lengths;
-refraction_coefficient and curved on zenith_angle. Azimuths run clockwise from y to x, z is up.
+set, "1" by default) angle (at, backsight, foresight) azimuth zenith_angle height_difference inclination level_plane
+(point, level, height_m) coordinates (point, xyz_m) vector (xyz_m). instrument_height_m and target_height_m apply to
+slope_distance, zenith_angle, height_difference and inclination; index (reading of a metre) and offset_mm to lengths;
+refraction_coefficient and curved to zenith_angle. Azimuths run clockwise from y to x, z is up.
 """
 
 from collections.abc import Callable
@@ -42,7 +42,7 @@ FORMAT = "catseye-network-1"
 U_FIXED_DISTANCE = 1e-7  # m, as `FixedDistances`
 ROLES = ("orientation", "zero", "scale", "refractivity", "refraction", "level")
 ROLE_UNIT = {"orientation": "rad", "zero": "m", "scale": "1", "refractivity": "1", "refraction": "1", "level": "m"}
-ALLOWED = {  # roles that a kind can use
+ALLOWED = {  # roles allowed for a kind
     "slope_distance": ("zero", "scale", "refractivity"),
     "horizontal_distance": ("zero", "scale", "refractivity"),
     "distance_difference": ("zero", "scale", "refractivity"),
@@ -52,7 +52,7 @@ ALLOWED = {  # roles that a kind can use
     "level_plane": ("level",),
 }
 HEIGHTS = ("slope_distance", "zenith_angle", "height_difference", "inclination")
-RANGED = ("slope_distance", "horizontal_distance")  # of which a ranger's zero and scale are
+RANGED = ("slope_distance", "horizontal_distance")  # kinds affected by a ranger's zero and scale
 TOP = (
     *("format", "description", "point", "points", "ranger", "parameter", "observation", "observations", "correlated"),
     *SECTIONS,
@@ -60,10 +60,10 @@ TOP = (
 
 
 def read_network_toml(path: Path, *, planned: bool = False) -> ObservationNetwork:
-    """The network of a file of ours; InputError, with the table's number, where it cannot be used.
+    """Network of a catseye TOML file; InputError, with the table's number, if invalid.
 
-    path      the file; tables that it names stand beside it
-    planned   observed values may be missing, for a plan
+    path      the file; tables that it names are in the same directory
+    planned   True if observed values may be missing, for a plan
     """
     folder = Folder(path.parent)
     document = toml_of(folder.text(path.name), path.name)
@@ -84,32 +84,32 @@ class _Reader:
         for key in TOP:
             self.document.has(key)
         self.draft.description = self.document.text("description", "")
-        self.document.taken.update(TOP)
-        self.document.done()
-        for fields in self.each("point", "points"):
+        self.document.used.update(TOP)
+        self.document.refuse_unused()
+        for fields in self.sections("point", "points"):
             self.point(fields)
-        for fields in self.each("parameter"):
+        for fields in self.sections("parameter"):
             self.parameter(fields)
-        for fields in self.each("ranger"):
+        for fields in self.sections("ranger"):
             self.ranger(fields)
-        for fields in self.each("observation", "observations"):
+        for fields in self.sections("observation", "observations"):
             self.observation(fields)
-        for fields in self.each("correlated"):
+        for fields in self.sections("correlated"):
             start = len(self.draft.rows)
             for inner in fields.tables("observation"):
                 self.observation(inner)
             u = np.array([row.u for row in self.draft.rows[start:]])
             self.draft.correlate(start, fields.array("correlation", (len(u), len(u))) * np.outer(u, u), fields.place)
-            fields.done()
+            fields.refuse_unused()
         bodies = Bodies(self.draft, self.named)
         for section, read in SECTIONS.items():
-            for fields in self.each(section):
+            for fields in self.sections(section):
                 read(bodies, fields)
-                fields.done()
+                fields.refuse_unused()
         return self.draft.network()
 
-    def each(self, single: str, many: str = "") -> list[Fields]:
-        """All tables of a section, those of compact ones too."""
+    def sections(self, single: str, many: str = "") -> list[Fields]:
+        """All tables of a section, including compact ones."""
         tables = self.document.tables(single)
         for table in tables:
             table.place = table.place.removeprefix("top, ")
@@ -119,7 +119,7 @@ class _Reader:
         return tables
 
     def _expanded(self, compact: Fields) -> list[Fields]:
-        """The rows of a compact table, each with the keys that stand beside them."""
+        """Rows of a compact table, each with the common keys."""
         common = {key: value for key, value in compact.values.items() if key not in ("columns", "rows", "file")}
         if "file" in compact.values:
             file = compact.text("file")
@@ -133,7 +133,7 @@ class _Reader:
                 raise refusal(self.draft.file, f"{place}, {shown(row)} (expected {len(columns)} values)")
             double = [key for key in columns if key in common or columns.count(key) > 1]
             if double:
-                raise compact.refuse(f"{shown(double[0])} is there twice (expected each key once)")
+                raise compact.refuse(f"{shown(double[0])} occurs twice (expected unique keys)")
             fields.append(Fields(self.draft.file, place, {**common, **dict(zip(columns, row, strict=True))}))
         return fields
 
@@ -146,28 +146,30 @@ class _Reader:
         role = fields.text("role", "free")
         if role not in ("free", "fixed", "datum"):
             raise fields.refuse(f"role = {shown(role)} (expected free, fixed or datum)")
-        held, in_datum = (self._axes(fields, key) for key in ("fixed", "datum"))
-        given = np.isfinite(xyz)
-        some = given if given.any() else np.ones(3, dtype=bool)  # a levelled point has a height alone
-        held |= (role == "fixed") & some
+        fixed_axes, in_datum = (self._axes(fields, key) for key in ("fixed", "datum"))
+        present = np.isfinite(xyz)
+        some = present if present.any() else np.ones(3, dtype=bool)  # a levelled point has only a height
+        fixed_axes |= (role == "fixed") & some
         in_datum |= (role == "datum") & some
         covariance = fields.uncertainties(3, or_zero=True)
         if covariance is not None:
-            each = fields.has("covariance_mm2") or any(isinstance(fields.values.get(f"u_{k}"), list) for k in LENGTH)
-            if not (given.all() or (given.any() and not each)):
+            per_axis = fields.has("covariance_mm2") or any(
+                isinstance(fields.values.get(f"u_{k}"), list) for k in LENGTH
+            )
+            if not (present.all() or (present.any() and not per_axis)):
                 raise fields.refuse(f"point {shown(name)} has a prior and no xyz (expected both)")
-            exact = (np.diag(covariance) == 0.0) & given
+            exact = (np.diag(covariance) == 0.0) & present
             if np.any(covariance[exact]):
                 raise fields.refuse("covariance_mm2 has a zero variance with covariances (expected them zero too)")
-            held |= exact  # a prior without error holds the coordinate
-        self.draft.point(name, xyz, fixed=held, datum=in_datum, place=fields.place)
-        if covariance is not None and not held[given].all():
-            at = np.flatnonzero(~held & given)
+            fixed_axes |= exact  # a prior without error holds the coordinate
+        self.draft.point(name, xyz, fixed=fixed_axes, datum=in_datum, place=fields.place)
+        if covariance is not None and not fixed_axes[present].all():
+            at = np.flatnonzero(~fixed_axes & present)
             start = len(self.draft.rows)
             for axis in at:
                 self.draft.observe(Row("coordinates", (name,), xyz[axis], 1.0, fields.place, component="xyz"[axis]))
             self.draft.correlate(start, covariance[np.ix_(at, at)], fields.place)
-        fields.done()
+        fields.refuse_unused()
 
     def _axes(self, fields: Fields, key: str) -> np.ndarray:
         text = fields.text(key, "")
@@ -178,7 +180,7 @@ class _Reader:
     def parameter(self, fields: Fields) -> None:
         name = fields.text("name")
         if name in self.named:
-            raise fields.refuse(f"parameter {shown(name)} is there twice (expected each name once)")
+            raise fields.refuse(f"parameter {shown(name)} occurs twice (expected unique names)")
         for unit, units in DIMENSIONS.items():
             if fields.keyed("value", units):
                 value = fields.quantity("value", units)
@@ -186,9 +188,9 @@ class _Reader:
                 free = fields.take("free", bool, "true or false", False)
                 self._refuse_prior(fields, "u", sigma, free=free)
                 self.named[name] = self.draft.parameter(name, value, np.inf if free else sigma, unit)
-                fields.done()
+                fields.refuse_unused()
                 return
-        raise fields.refuse("value is missing (expected value_mm, value_ppm, value_arcsec or its like)")
+        raise fields.refuse("value is missing (expected value_mm, value_ppm, value_arcsec etc.)")
 
     def _refuse_prior(self, fields: Fields, key: str, sigma: float, *, free: bool) -> None:
         if sigma < 0.0:
@@ -199,10 +201,10 @@ class _Reader:
     def ranger(self, fields: Fields) -> None:
         name = name_key(fields.text("name"))
         if name in self.rangers:
-            raise fields.refuse(f"ranger {shown(name)} is there twice (expected each once)")
+            raise fields.refuse(f"ranger {shown(name)} occurs twice (expected unique names)")
         if name not in self.draft.names:
-            raise fields.refuse(f"ranger {shown(name)} is no point (expected the name of one)")
-        own = self.rangers[name] = {}
+            raise fields.refuse(f"ranger {shown(name)} is not a point (expected the name of one)")
+        columns = self.rangers[name] = {}
         for role, unit, units in (("zero", "m", LENGTH), ("scale", "1", RATIO)):
             free = fields.text(role, "") == "free"
             if fields.has(role) and not free:
@@ -213,8 +215,8 @@ class _Reader:
             sigma = fields.quantity(f"u_{role}", units, 0.0)
             self._refuse_prior(fields, f"u_{role}", sigma, free=free)
             if free or sigma or value:
-                own[role] = self.draft.parameter(f"{role} {name}", value, np.inf if free else sigma, unit)
-        fields.done()
+                columns[role] = self.draft.parameter(f"{role} {name}", value, np.inf if free else sigma, unit)
+        fields.refuse_unused()
 
     def observation(self, fields: Fields) -> None:
         kind = fields.text("kind")
@@ -225,7 +227,7 @@ class _Reader:
             self._components(fields, kind, ends)
         else:
             self._single(fields, kind, ends)
-        fields.done()
+        fields.refuse_unused()
 
     def _components(self, fields: Fields, kind: str, ends: tuple[str, ...]) -> None:
         unknown = (np.nan,) * 3 if self.draft.planned else None
@@ -245,40 +247,40 @@ class _Reader:
         default = U_FIXED_DISTANCE if kind == "fixed_distance" else None
         if units is LENGTH and fields.has("u_ppm"):
             claim = (fields.quantity("u", units, 0.0), fields.quantity("u", {"ppm": RATIO["ppm"]}), 1.0)
-            u = claim[0] + claim[1] * (1.0 if np.isnan(value) else abs(value))  # of a plan: computed there
+            u = claim[0] + claim[1] * (1.0 if np.isnan(value) else abs(value))  # in a plan computed later
         else:
             u = fields.quantity("u", units, default)
         heights: tuple[float, ...] = ()
         if kind in HEIGHTS:
             heights = tuple(fields.quantity(key, LENGTH, 0.0) for key in ("instrument_height", "target_height"))
-        known: dict[str, float] = {}
+        constants: dict[str, float] = {}
         if "scale" in ALLOWED.get(kind, ()):
-            known |= {"index": fields.number("index", 1.0)} if fields.has("index") else {}
-            known |= {"offset": fields.quantity("offset", LENGTH)} if fields.keyed("offset", LENGTH) else {}
+            constants |= {"index": fields.number("index", 1.0)} if fields.has("index") else {}
+            constants |= {"offset": fields.quantity("offset", LENGTH)} if fields.keyed("offset", LENGTH) else {}
         if kind == "zenith_angle":
-            known["refraction"] = fields.number("refraction_coefficient", 0.0)
-            known["curved"] = float(fields.take("curved", bool, "true or false", False))
+            constants["refraction"] = fields.number("refraction_coefficient", 0.0)
+            constants["curved"] = float(fields.take("curved", bool, "true or false", False))
         if kind == "level_plane":
-            known["height"] = fields.quantity("height", LENGTH, 0.0)
+            constants["height"] = fields.quantity("height", LENGTH, 0.0)
         parameters = self._parameters(fields, kind, ends)
         shifted = heights if any(heights) else ()
         key = fields.keyed("value", units)
         unit = "gon" if key is not None and key[0].endswith("gon") else "deg" if units is ANGLE else ""
-        row = Row(kind, ends, value, u, fields.place, shifted, parameters, known=known, claim=claim, unit=unit)
+        row = Row(kind, ends, value, u, fields.place, shifted, parameters, constants=constants, claim=claim, unit=unit)
         self.draft.observe(row)
 
     def _parameters(self, fields: Fields, kind: str, ends: tuple[str, ...]) -> dict[str, int]:
-        """Role -> parameter: those that the observation names, its ranger's, its set's orientation."""
+        """Parameters by role: those of the observation, its ranger, and its set's orientation."""
         parameters = dict(self.rangers.get(name_key(ends[0]), {})) if kind in RANGED else {}
         for role in ALLOWED.get(kind, ()):
             if not fields.has(role):
                 continue
             name = fields.text(role)
             if name not in self.named:
-                raise fields.refuse(f"{role} = {shown(name)} is no parameter (expected the name of a [[parameter]])")
-            wanted, unit = ROLE_UNIT[role], self.draft.parameters[self.named[name]].unit
-            if (wanted if kind != "inclination" else "rad") != unit:
-                raise fields.refuse(f"{role} = {shown(name)} has the unit {unit} (expected one in {wanted})")
+                raise fields.refuse(f"{role} = {shown(name)} is not a parameter (expected the name of a [[parameter]])")
+            expected_unit, unit = ROLE_UNIT[role], self.draft.parameters[self.named[name]].unit
+            if (expected_unit if kind != "inclination" else "rad") != unit:
+                raise fields.refuse(f"{role} = {shown(name)} has the unit {unit} (expected one in {expected_unit})")
             if role in parameters:
                 raise fields.refuse(f"{role} = {shown(name)}, but ranger {shown(ends[0])} has its own (expected one)")
             parameters[role] = self.named[name]
@@ -291,22 +293,22 @@ class _Reader:
 
 
 class _AnyColumn(tuple[str, ...]):
-    """Columns of a table beside a file of ours: its keys are checked row by row."""
+    """Columns of a table named in a TOML file: its keys are checked row by row."""
 
     def __contains__(self, name: object) -> bool:
         return name != ""
 
 
 def _rows_of(table: TextColumns, common: dict[str, Any]) -> list[Fields]:
-    """Rows of a CSV as tables: cells that are numbers are, names and texts stay text; blank cells are not there."""
+    """Rows of a CSV as tables: numeric cells become numbers; blank cells are absent."""
     columns: list[list[Any]] = []
     for name, cells in table.cells.items():
         if name in common:
-            raise refusal(table.file, f"line 1, column {shown(name)} is there twice (expected each key once)")
+            raise refusal(table.file, f"line 1, column {shown(name)} occurs twice (expected unique keys)")
         is_text: Callable[[str], bool] = TEXT_KEYS.__contains__
         numbers = [pointed(c) for c in cells] if table.comma else cells
-        known = [float(n) if NUMBER.fullmatch(n) else c for n, c in zip(numbers, cells, strict=True)]
-        columns.append(cells if is_text(name) else known)
+        typed = [float(n) if NUMBER.fullmatch(n) else c for n, c in zip(numbers, cells, strict=True)]
+        columns.append(cells if is_text(name) else typed)
     rows = []
     for line, row in zip(table.lines, zip(*columns, strict=True), strict=True):
         values = {key: value for key, value in zip(table.cells, row, strict=True) if value != ""}

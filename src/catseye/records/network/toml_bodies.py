@@ -1,17 +1,17 @@
-"""Bodies, frames and surfaces in our file of a network: what ties several points to each other.
+"""Bodies, frames and surfaces in a network file: ties between several points.
 
-    [[body]]     name, point = [{name, xyz_mm, u_mm or covariance_mm2}]: they move as one; a pose
+    [[body]]     name, point = [{name, xyz_mm, u_mm or covariance_mm2}]: they move as one body; a pose
     [[shape]]    name, point = [{name, xyz_mm, and u_mm: a prior, or free = true, or nothing: known}] in its own axes
-    [[frame]]    name, shape, point = [{name, at: the shape's point, u_mm}]: where a shape is in one posture; a pose
+    [[frame]]    name, shape, point = [{name, at: the shape's point, u_mm}]: a shape in one posture; a pose
     [[tilt]]     frame, axis = [x, y, z] in it, value_arcsec, u_arcsec, zero: a parameter's name
     [[plane]]    name, points, u_mm, value_mm (else 0); normal, centre_m
     [[line]]     name, points, u_mm; along, centre_m
     [[sphere]]   name, centre: a point's name, points, u_mm, value_mm, radius_mm, u_radius_mm or radius = "free"
 
-A pose is origin_m and rotation_deg (a rotation vector in ground axes, or its like in rad or gon), ground from body;
-both or none: then it is found from the coordinates of the file. It is free, or has priors u_origin_mm and
-u_rotation_arcsec, or is held where pose = "fixed". Surfaces are free, or held where surface = "fixed"; a normal, along
-or centre that is not there is found from the points' coordinates.
+A pose is origin_m and rotation_deg (a rotation vector in ground axes, or in rad or gon), ground from body;
+both or none: then it is computed from the coordinates of the file. It is free, or has priors u_origin_mm and
+u_rotation_arcsec, or is held with pose = "fixed". Surfaces are free, or held with surface = "fixed"; a missing normal,
+along or centre is computed from the points' coordinates.
 """
 
 from collections.abc import Callable, Mapping
@@ -32,14 +32,14 @@ from catseye.records.files.toml_fields import ANGLE, LENGTH, Fields
 from catseye.records.network.draft import NetworkDraft
 
 U_FRAME_POINT = 1e-7  # m, as a fixed distance's
-FLAT = 1e-6  # of the largest extent: points that span less show no rotation
+FLAT = 1e-6  # of the largest extent: smaller point sets determine no rotation
 
 
 class Bodies:
     """Sections of one file, read into its draft.
 
     draft   the network so far
-    named   its parameters by name
+    named   parameters by name
     """
 
     def __init__(self, draft: NetworkDraft, named: Mapping[str, int]) -> None:
@@ -52,7 +52,7 @@ class Bodies:
         parts = fields.tables("point")
         if not parts:
             raise fields.refuse("point is missing (expected tables of points)")
-        own, blocks = [part.vector("xyz", LENGTH) for part in parts], []
+        local, blocks = [part.vector("xyz", LENGTH) for part in parts], []
         for part in parts:
             covariance = part.uncertainties(3)
             if covariance is None:
@@ -60,9 +60,9 @@ class Bodies:
             blocks.append(covariance)
         names = [part.text("name") for part in parts]
         for part in parts:
-            part.done()
-        pose, start = self._pose(fields, name, np.array(own), names)
-        observed, covariances = np.concatenate(own), np.array(blocks)
+            part.refuse_unused()
+        pose, start = self._pose(fields, name, np.array(local), names)
+        observed, covariances = np.concatenate(local), np.array(blocks)
         self.draft.also(
             names,
             fields.place,
@@ -72,43 +72,43 @@ class Bodies:
     def shape(self, fields: Fields) -> None:
         name = fields.text("name")
         if name in self.shapes:
-            raise fields.refuse(f"shape {shown(name)} is there twice (expected each name once)")
+            raise fields.refuse(f"shape {shown(name)} occurs twice (expected unique names)")
         points = self.shapes[name] = {}
         for part in fields.tables("point"):
             label, xyz = part.text("name"), part.vector("xyz", LENGTH)
             free = part.take("free", bool, "true or false", False)
             u = part.quantity("u", LENGTH, 0.0)
             if label in points or u < 0.0 or (free and u > 0.0):
-                raise part.refuse(f"{shown(label)} (expected each point once, free or with u_mm above 0)")
+                raise part.refuse(f"{shown(label)} (expected unique points, free or with u_mm above 0)")
             sigma = np.inf if free else u
             indices = [
                 self.draft.parameter(f"{axis} of {label} in {name}", value, sigma, "m")
                 for axis, value in zip("xyz", xyz, strict=True)
             ]
             points[label] = (indices[0], xyz)
-            part.done()
+            part.refuse_unused()
 
     def frame(self, fields: Fields) -> None:
         name, shape = fields.text("name"), fields.text("shape")
         if shape not in self.shapes:
-            raise fields.refuse(f"shape = {shown(shape)} is not there (expected the name of a [[shape]])")
+            raise fields.refuse(f"shape = {shown(shape)} is missing (expected the name of a [[shape]])")
         if name in self.frames:
-            raise fields.refuse(f"frame {shown(name)} is there twice (expected each name once)")
-        names, indices, own, variances = [], [], [], []
+            raise fields.refuse(f"frame {shown(name)} occurs twice (expected unique names)")
+        names, indices, local, variances = [], [], [], []
         for part in fields.tables("point"):
             names.append(part.text("name"))
             label = part.text("at", names[-1])
             if label not in self.shapes[shape]:
-                raise part.refuse(f"at = {shown(label)} is no point of the shape {shown(shape)} (expected one)")
+                raise part.refuse(f"at = {shown(label)} is not a point of the shape {shown(shape)} (expected one)")
             index, xyz = self.shapes[shape][label]
             u = part.quantity("u", LENGTH, U_FRAME_POINT)
             if u <= 0.0:
-                raise part.refuse("u = 0 (expected above 0: 1e-7 m if it is not there)")
+                raise part.refuse("u = 0 (expected above 0: 1e-7 m by default)")
             indices.append(index)
-            own.append(xyz)
+            local.append(xyz)
             variances += [u**2] * 3
-            part.done()
-        pose, start = self._pose(fields, name, np.array(own).reshape(-1, 3), names)
+            part.refuse_unused()
+        pose, start = self._pose(fields, name, np.array(local).reshape(-1, 3), names)
         self.frames[name] = (pose, start)
         if names:
             self.draft.also(
@@ -128,14 +128,14 @@ class Bodies:
     def tilt(self, fields: Fields) -> None:
         frame = fields.text("frame")
         if frame not in self.frames:
-            raise fields.refuse(f"frame = {shown(frame)} is not there (expected the name of a [[frame]])")
+            raise fields.refuse(f"frame = {shown(frame)} is missing (expected the name of a [[frame]])")
         axis = fields.array("axis", (3,))
         value, u = fields.quantity("value", ANGLE), fields.quantity("u", ANGLE)
         zero = fields.text("zero", "")
         if not np.any(axis) or u <= 0.0:
             raise fields.refuse("axis is zero or u is (expected a direction, and u above 0)")
         if zero and zero not in self.named:
-            raise fields.refuse(f"zero = {shown(zero)} is no parameter (expected the name of a [[parameter]])")
+            raise fields.refuse(f"zero = {shown(zero)} is not a parameter (expected the name of a [[parameter]])")
         pose, start = self.frames[frame]
         self.draft.also(
             [],
@@ -217,7 +217,7 @@ class Bodies:
             raise fields.refuse(f"points = {shown(names)} (expected names of points)")
         u, value = fields.quantity("u", LENGTH), fields.quantity("value", LENGTH, 0.0)
         if u <= 0.0:
-            raise fields.refuse("u = 0 (expected above 0: nothing is measured without error)")
+            raise fields.refuse("u = 0 (expected above 0: no measurement is exact)")
         return names, u, value
 
     def _unknowns(self, fields: Fields, kind: str, unknowns: tuple[tuple[str, str], ...]) -> np.ndarray:
@@ -231,27 +231,27 @@ class Bodies:
     def _direction(
         self, fields: Fields, key: str, names: list[str], *, smallest: bool
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Direction and centre as the file gives them, else as the coordinates of the points do."""
+        """Direction and centre from the file, or else from the coordinates of the points."""
         has_centre = fields.keyed("centre", LENGTH) is not None
         if fields.has(key) and has_centre:
             direction, centre = fields.array(key, (3,)), fields.vector("centre", LENGTH)
             if not np.any(direction):
                 raise fields.refuse(f"{key} is zero (expected a direction)")
             return direction, centre
-        xyz = self._known(names)
+        xyz = self._coordinates_of(names)
         if len(xyz) < (3 if smallest else 2):
             raise fields.refuse(f"{key} or centre is missing, and too few points have coordinates (expected both)")
         centre = fields.vector("centre", LENGTH) if has_centre else xyz.mean(axis=0)
         axes = np.linalg.svd(xyz - xyz.mean(axis=0))[2]
         return fields.array(key, (3,)) if fields.has(key) else axes[2 if smallest else 0], centre
 
-    def _known(self, names: list[str]) -> np.ndarray:
-        """(k, 3) coordinates of those points that the file has with coordinates."""
+    def _coordinates_of(self, names: list[str]) -> np.ndarray:
+        """Coordinates (k, 3) of those points that have them in the file."""
         xyz = np.array([self.draft.xyz[self.draft.names[name]] for name in names if name in self.draft.names])
         xyz = xyz.reshape(-1, 3)
         return xyz[np.isfinite(xyz).all(axis=1)]
 
-    def _pose(self, fields: Fields, name: str, own: np.ndarray, names: list[str]) -> tuple[list[int], np.ndarray]:
+    def _pose(self, fields: Fields, name: str, local: np.ndarray, names: list[str]) -> tuple[list[int], np.ndarray]:
         """Indices of the six parameters of a pose, and its start R0."""
         has_origin, has_rotation = (
             fields.keyed(stem, units) is not None for stem, units in (("origin", LENGTH), ("rotation", ANGLE))
@@ -263,7 +263,7 @@ class Bodies:
         else:
             if fields.keyed("u_origin", LENGTH) or fields.keyed("u_rotation", ANGLE):
                 raise fields.refuse("has a prior of its pose and no pose (expected origin and rotation)")
-            origin, start = self._found_pose(fields, own, names)
+            origin, start = self._found_pose(fields, local, names)
         state = fields.text("pose", "free")
         if state not in ("free", "fixed"):
             raise fields.refuse(f"pose = {shown(state)} (expected free or fixed)")
@@ -282,11 +282,11 @@ class Bodies:
         pose += [self.draft.parameter(f"turn about {axis} of {name}", 0.0, sigmas[1], "rad") for axis in "xyz"]
         return pose, start
 
-    def _found_pose(self, fields: Fields, own: np.ndarray, names: list[str]) -> tuple[np.ndarray, np.ndarray]:
-        """Origin and rotation that lay a body's points best on their coordinates, by singular values."""
-        known = [i for i, n in enumerate(names) if n in self.draft.names and len(self._known([n]))]
-        ground, local = self._known(names), own[known]
-        if len(known) >= 3:
+    def _found_pose(self, fields: Fields, body_frame: np.ndarray, names: list[str]) -> tuple[np.ndarray, np.ndarray]:
+        """Origin and rotation that fit a body's points to their coordinates, by singular values."""
+        rows = [i for i, n in enumerate(names) if n in self.draft.names and len(self._coordinates_of([n]))]
+        ground, local = self._coordinates_of(names), body_frame[rows]
+        if len(rows) >= 3:
             a, b = ground - ground.mean(axis=0), local - local.mean(axis=0)
             u, s, vt = np.linalg.svd(a.T @ b)
             if s[1] > FLAT * s[0]:

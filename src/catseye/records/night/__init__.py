@@ -1,1 +1,1 @@
-"""A campaign, its shots, its weather; and a living night's records."""
+"""Campaigns with shots and weather; records of a live night."""

@@ -1,4 +1,4 @@
-"""A campaign: a directory of records, weather, shots and samples, read whole or refused in one line."""
+"""Campaign: a directory of records, weather, shots and samples; invalid ones give one-line errors."""
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -23,25 +23,24 @@ from catseye.records.site.folder import (
     SiteFolder,
     read_records,
     refuse_directory,
-    refuse_stranger,
     refuse_unjoined,
+    refuse_unknown_ends,
 )
 from catseye.verdict import Verdict
 
 LONGEST_CAMPAIGN = 1.0  # days from its start to any shot
-WEATHER_MARGIN = 3600.0 / SECONDS_PER_DAY  # days that a shot may lie outside the weather
-SOUND_MARGIN = 3600.0 / SECONDS_PER_DAY  # days that a path temperature may lie outside the shots
+WEATHER_MARGIN = 3600.0 / SECONDS_PER_DAY  # days, largest time of a shot outside the weather
+SOUND_MARGIN = 3600.0 / SECONDS_PER_DAY  # days, largest time of a path temperature outside the shots
 PATH_TEMPERATURES = "path_temperatures.csv"  # optional
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ObservedSite(SiteFolder):
-    """A site with its shots and its weather, all that ranges and coordinates need once phases are known.
+    """Site with its shots and weather: all inputs for coordinates once phases are measured.
 
-    `path_temperatures` is None where no line's temperature was measured by sound, `jitter` where nothing is known to
-    shake; `postures` where the telescope moved. `weather` and the site's stations are
-    what was believed, `doubted` the shots that were not, by their ids, with why; `doubt_notes` tell of the weather.
-    `verdict` is that of the export that wrote the campaign; None of others.
+    `path_temperatures` is None without acoustic temperatures, `jitter` without known jitter; `postures` is set if the
+    telescope moved. `weather` and the site's stations are those trusted; `doubted` are the rejected shots by id, with
+    reasons; `doubt_notes` describe rejected weather. `verdict` is that of the export that wrote the campaign, or None.
     """
 
     weather: Weather
@@ -56,7 +55,7 @@ class ObservedSite(SiteFolder):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Campaign(ObservedSite):
-    """Everything that a campaign's directory holds: its site and its night, with the samples of each shot."""
+    """Content of a campaign's directory: its site and its night, with the samples of each shot."""
 
     frames: np.ndarray = field(kw_only=True)
 
@@ -70,7 +69,7 @@ class Campaign(ObservedSite):
 
 
 def read_campaign(directory: Path | str) -> Campaign:
-    """The campaign in the directory (layout: examples/night-01/README.md); a bad one raises InputError."""
+    """Campaign in the directory (layout: examples/night-01/README.md); InputError if invalid."""
     folder = Folder(Path(directory))
     refuse_directory(folder.directory, "campaign")
     records = read_records(folder)
@@ -97,39 +96,39 @@ def read_campaign(directory: Path | str) -> Campaign:
     refuse_unjoined(campaign, records)
     refuse_weather(samples, [station.name for station in campaign.site.weather_station])
     refuse_shots("shots.csv", shots, buffers)
-    refuse_strangers(campaign, shots)
+    refuse_unknown_names(campaign, shots)
     refuse_times(campaign, shots)
     refuse_path_temperatures(campaign, lines)
     refuse_doubts(doubts, shots, samples)
-    return _as_believed(campaign, doubts, samples, shots) if doubts else campaign
+    return _without_doubts(campaign, doubts, samples, shots) if doubts else campaign
 
 
-def _as_believed(
+def _without_doubts(
     campaign: Campaign, doubts: Sequence[DoubtRow], samples: Sequence[WeatherSample], shots: Sequence[ShotRow]
 ) -> Campaign:
-    """Without the weather that was not believed, and with the shots that were not named."""
-    kept, notes = believed_samples(samples, doubts, campaign.shots.mjd_utc)
-    spoke = {sample.station for sample in kept}
+    """Campaign without rejected weather, with rejected shots in `doubted`."""
+    trusted, notes = believed_samples(samples, doubts, campaign.shots.mjd_utc)
+    spoke = {sample.station for sample in trusted}
     stations = tuple(station for station in campaign.site.weather_station if station.name in spoke)
-    believed = replace(
+    reduced = replace(
         campaign,
         site=campaign.site.model_copy(update={"weather_station": stations}),
-        weather=weather_columns(kept),
-        doubted={int(each.name): each.why for each in doubts if each.what == "shot"},
+        weather=weather_columns(trusted),
+        doubted={int(doubt.name): doubt.why for doubt in doubts if doubt.what == "shot"},
         doubt_notes=tuple(notes),
     )
-    refuse_times(believed, shots)
-    return believed
+    refuse_times(reduced, shots)
+    return reduced
 
 
-def refuse_strangers(campaign: Campaign, shots: Iterable[ShotRow]) -> None:
-    known, rangers = set(campaign.target_names), set(campaign.rangers)
+def refuse_unknown_names(campaign: Campaign, shots: Iterable[ShotRow]) -> None:
+    targets, rangers = set(campaign.target_names), set(campaign.rangers)
     for row, shot in enumerate(shots, start=1):
-        refuse_stranger("shots.csv", row, shot, known=known, rangers=rangers)
+        refuse_unknown_ends("shots.csv", row, shot, targets=targets, rangers=rangers)
 
 
 def refuse_weather(samples: Iterable[WeatherSample], stations: list[str]) -> None:
-    """Each station's samples come in order of time, and each station has some."""
+    """Raise InputError unless each station has samples, in time order."""
     latest: dict[str, float] = {}
     for row, sample in enumerate(samples, start=1):
         if sample.station not in stations:
@@ -145,7 +144,7 @@ def refuse_weather(samples: Iterable[WeatherSample], stations: list[str]) -> Non
 
 
 def refuse_times(campaign: Campaign, shots: Iterable[ShotRow]) -> None:
-    """Every shot was fired during the campaign, and the weather was known."""
+    """Raise InputError for shots outside the campaign or without weather."""
     start = campaign.site.campaign.start_mjd_utc
     first, last = float(campaign.weather.mjd_utc.min()), float(campaign.weather.mjd_utc.max())
     for row, shot in enumerate(shots, start=1):
@@ -158,19 +157,19 @@ def refuse_times(campaign: Campaign, shots: Iterable[ShotRow]) -> None:
 
 
 def refuse_path_temperatures(campaign: Campaign, lines: Sequence[PathTemperature]) -> None:
-    """Every line has two known ends, was sounded during the shots, and once at a time."""
+    """Raise InputError for lines with unknown ends, outside the shots, or repeated at one time."""
     if not lines:
         return
-    known, rangers = set(campaign.target_names) - {REFERENCE}, set(campaign.rangers)
+    targets, rangers = set(campaign.target_names) - {REFERENCE}, set(campaign.rangers)
     first, last = float(campaign.shots.mjd_utc.min()), float(campaign.shots.mjd_utc.max())
-    seen: dict[tuple[frozenset[str], float], int] = {}
+    first_rows: dict[tuple[frozenset[str], float], int] = {}
     for row, line in enumerate(lines, start=1):
-        refuse_stranger(PATH_TEMPERATURES, row, line, known=known, rangers=rangers)
+        refuse_unknown_ends(PATH_TEMPERATURES, row, line, targets=targets, rangers=rangers)
         if not first - SOUND_MARGIN <= line.mjd_utc <= last + SOUND_MARGIN:
             span = f"the shots cover {first!r} to {last!r}; expected within 1 h"
             raise in_row(PATH_TEMPERATURES, row, f"mjd_utc = {line.mjd_utc!r} is outside the campaign ({span})")
         key = (frozenset((line.ranger, line.target)), line.mjd_utc)
-        if key in seen:
-            same = f"{line.ranger} - {line.target} has a temperature at that time in row {seen[key]}"
-            raise in_row(PATH_TEMPERATURES, row, f"mjd_utc = {line.mjd_utc!r}: {same} (expected one)")
-        seen[key] = row
+        if key in first_rows:
+            duplicate = f"{line.ranger} - {line.target} has a temperature at that time in row {first_rows[key]}"
+            raise in_row(PATH_TEMPERATURES, row, f"mjd_utc = {line.mjd_utc!r}: {duplicate} (expected one)")
+        first_rows[key] = row

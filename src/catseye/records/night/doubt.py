@@ -1,4 +1,4 @@
-"""doubts.csv: what was not believed while a night was measured, and why; a night is reduced without it."""
+"""doubts.csv: readings and shots rejected during a night, with reasons; excluded from its reduction."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal
@@ -12,16 +12,16 @@ from catseye.records.night.shot import ShotRow
 from catseye.records.night.weather import WeatherSample
 
 DOUBTS = "doubts.csv"  # optional
-LONGEST_GAP = 1800.0 / 86_400.0  # days that a station may be without a believed reading before it counts for nothing
+LONGEST_GAP = 1800.0 / 86_400.0  # days, largest gap between trusted readings of a usable station
 
 
 class DoubtRow(Record):
-    """A row of doubts.csv.
+    """Row of doubts.csv.
 
-    what      a shot, or a reading of the weather
-    name      the shot's number, the station
-    mjd_utc   as in its own file
-    why       in words, as it was told then
+    what      shot, or weather reading
+    name      number of the shot, or station
+    mjd_utc   as in the other file
+    why       reason given at the time
     """
 
     what: Literal["shot", "weather"]
@@ -31,48 +31,48 @@ class DoubtRow(Record):
 
 
 def refuse_doubts(doubts: Sequence[DoubtRow], shots: Sequence[ShotRow], samples: Sequence[WeatherSample]) -> None:
-    """Every doubt is of a shot or a reading that is there, and there is one of each."""
-    known = {("shot", str(shot.shot), shot.mjd_utc) for shot in shots}
-    known |= {("weather", sample.station, sample.mjd_utc) for sample in samples}
-    seen: dict[tuple[str, str, float], int] = {}
+    """Raise InputError for doubts on missing shots or readings, or repeated ones."""
+    existing = {("shot", str(shot.shot), shot.mjd_utc) for shot in shots}
+    existing |= {("weather", sample.station, sample.mjd_utc) for sample in samples}
+    first_rows: dict[tuple[str, str, float], int] = {}
     for row, doubt in enumerate(doubts, start=1):
         which = (doubt.what, doubt.name, doubt.mjd_utc)
-        if which not in known:
+        if which not in existing:
             file = "shots.csv" if doubt.what == "shot" else "weather.csv"
             text = f"{doubt.what} {shown(doubt.name)} at {doubt.mjd_utc!r} is not in {file} (expected name and time)"
             raise in_row(DOUBTS, row, text)
-        if (first := seen.setdefault(which, row)) != row:
+        if (first := first_rows.setdefault(which, row)) != row:
             raise in_row(DOUBTS, row, f"{doubt.what} {doubt.name} has a doubt in row {first} (expected one)")
 
 
 def believed_samples(
     samples: Sequence[WeatherSample], doubts: Sequence[DoubtRow], times: np.ndarray
 ) -> tuple[list[WeatherSample], list[str]]:
-    """The readings that count, and notes about those that do not.
+    """Trusted readings, and notes on the others.
 
     times   MJD of the shots
 
-    A station that for half an hour of shots and more has no believed reading counts for nothing: what it reads
-    before and after does not say what the air was meanwhile.
+    A station without a trusted reading for half an hour of shots is excluded: its readings before and after do not
+    describe the air in between.
 
-    Raises InputError where nothing is left.
+    Raises InputError if no reading remains.
     """
-    doubted = {(each.name, each.mjd_utc): each.why for each in doubts if each.what == "weather"}
-    if not doubted:
+    reasons = {(doubt.name, doubt.mjd_utc): doubt.why for doubt in doubts if doubt.what == "weather"}
+    if not reasons:
         return list(samples), []
-    kept = [sample for sample in samples if (sample.station, sample.mjd_utc) not in doubted]
+    trusted = [sample for sample in samples if (sample.station, sample.mjd_utc) not in reasons]
     notes = []
-    for name in sorted({name for name, _ in doubted}):
-        own = np.array([sample.mjd_utc for sample in kept if sample.station == name])
-        count = sum(station == name for station, _ in doubted)
-        why = next(text for (station, _), text in doubted.items() if station == name)
-        gap = np.abs(times[:, None] - own).min(axis=1).max() if len(own) else np.inf
+    for name in sorted({name for name, _ in reasons}):
+        station_times = np.array([sample.mjd_utc for sample in trusted if sample.station == name])
+        count = sum(station == name for station, _ in reasons)
+        why = next(text for (station, _), text in reasons.items() if station == name)
+        gap = np.abs(times[:, None] - station_times).min(axis=1).max() if len(station_times) else np.inf
         if gap > LONGEST_GAP:
-            kept = [sample for sample in kept if sample.station != name]
-            what = "the whole station is left out"
+            trusted = [sample for sample in trusted if sample.station != name]
+            what = "the station is left out"
         else:
             what = f"{count} of its readings {'is' if count == 1 else 'are'} left out"
-        notes.append(f"{name} was not believed while it was measured ({why}): {what}, by {DOUBTS}")
-    if not kept:
-        raise refusal(DOUBTS, "leaves no weather reading (expected some that are believed; take rows out)")
-    return kept, notes
+        notes.append(f"{name} was rejected during the measurement ({why}): {what}, by {DOUBTS}")
+    if not trusted:
+        raise refusal(DOUBTS, "leaves no weather reading (expected some trusted ones; remove rows)")
+    return trusted, notes

@@ -1,6 +1,6 @@
-"""What a living site hands from hand to hand: shots, weather, posture, and what happened. Journal, reduction, replay.
+"""Records exchanged by a live site, its journal and replay: shots, weather, posture, events.
 
-Times are `ticks`, whole steps of 1e-8 day = 864 000 ns since MJD 0, as a ZY's stamps are: they travel without loss.
+Times are `ticks`, integer steps of 1e-8 day = 864 000 ns since MJD 0, as in a ZY's stamps: they transfer exactly.
 """
 
 from dataclasses import dataclass, field
@@ -15,16 +15,16 @@ TICK_SECONDS = 864e-6
 
 @dataclass(frozen=True, eq=False)
 class LiveShot:
-    """One buffer of a ranger, or what the ranger itself made of it where the buffer did not travel.
+    """Buffer of a ranger, or the ranger's own result if the buffer was not transferred.
 
     ranger, target   names; a shot on the internal cube has the target ZRG
-    ticks            when the first sample was taken
-    cycles, samples_per_cycle, if_hz   how the buffer was taken
+    ticks            time of the first sample
+    cycles, samples_per_cycle, if_hz   settings of the buffer
     volts_per_code   V
-    samples          (cycles samples_per_cycle,) int16, or None: then `amplitude` and `phase` count
-    amplitude        V, as the ranger reports it (MAG); NaN where it said nothing
-    phase            rad, the same (RAD); NaN
-    number           in its run, counted from 1 by who receives it; 0 before that
+    samples          (cycles samples_per_cycle,) int16, or None: then `amplitude` and `phase` are used
+    amplitude        V, as reported by the ranger (MAG); NaN if not reported
+    phase            rad, likewise (RAD)
+    number           in its run, counted from 1 by the receiver; 0 before that
     """
 
     ranger: str
@@ -41,18 +41,18 @@ class LiveShot:
 
     @property
     def duration(self) -> float:
-        """How long the buffer took, s."""
+        """Duration of the buffer, s."""
         return self.cycles / self.if_hz
 
     @property
     def middle_mjd(self) -> float:
-        """The middle of the buffer, where its mean phase belongs, MJD."""
+        """Middle of the buffer, time of its mean phase, MJD."""
         return self.ticks / TICKS_PER_DAY + 0.5 * self.duration / 86_400.0
 
 
 @dataclass(frozen=True, slots=True)
 class LiveWeather:
-    """One reading of a weather station; a sensor that said nothing is NaN."""
+    """Reading of a weather station; NaN for a sensor without a value."""
 
     station: str
     ticks: int
@@ -63,7 +63,7 @@ class LiveWeather:
 
 @dataclass(frozen=True, slots=True)
 class LivePosture:
-    """Where the telescope says it is: azimuth clockwise from north and elevation, rad, and their rates, rad/s."""
+    """Reported telescope position: azimuth from north clockwise and elevation, rad, and rates, rad/s."""
 
     ticks: int
     azimuth: float
@@ -77,12 +77,12 @@ Severity = Literal["debug", "note", "warning", "alarm"]
 
 @dataclass(frozen=True, slots=True)
 class Happening:
-    """Something that a person or an analyst should know.
+    """Event for operators and analysts.
 
-    ticks      when
+    ticks      time
     who        a ranger, a station, "telescope", "coordinator", "journal"
-    kind       one word with hyphens that programs compare: "connected", "lost", "blocked", "sun-refused" ...
-    text       one line for people: what, the value, the limit, what to do
+    kind       hyphenated word for programs: "connected", "lost", "blocked", "sun-refused" ...
+    text       one line for people: event, value, limit, remedy
     severity   debug (routine: a single shot, a single line), note, warning, alarm
     details    values for programs
     """

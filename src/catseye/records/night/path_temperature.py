@@ -1,4 +1,4 @@
-"""path_temperatures.csv: air temperature along lines of a campaign, as sound measured it, and the same as columns."""
+"""path_temperatures.csv: acoustic air temperatures along lines of a campaign."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ from catseye.records.files.record import Mjd, Name, Record, Within
 
 
 class PathTemperature(Record):
-    """A row of path_temperatures.csv.
+    """Row of path_temperatures.csv.
 
     mjd_utc           middle of the measurement
     ranger, target    ends of the line, as in shots.csv
     temperature_c     mean along the straight line between them
-    u_temperature_c   of one row, what all rows of the line share (its acoustic length, the delay) included
+    u_temperature_c   of one row, including what all rows of the line share (acoustic length, delay)
     """
 
     mjd_utc: Mjd
@@ -28,7 +28,7 @@ class PathTemperature(Record):
 
 @dataclass(frozen=True, eq=False)
 class PathTemperatureTable:
-    """All rows in the order of the file, as read-only columns."""
+    """All rows in file order, as read-only columns."""
 
     mjd_utc: np.ndarray
     ranger: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""postures.csv: where the telescope was while a night was measured in which it moved."""
+"""postures.csv: positions of a telescope that moved during a night."""
 
 from collections.abc import Sequence
 from typing import Annotated
@@ -12,16 +12,16 @@ from catseye.records.night.live import TICKS_PER_DAY, LivePosture
 from catseye.records.night.shot import ShotRow
 
 POSTURES = "postures.csv"  # optional
-NEAREST = 2.0 / 86_400.0  # days from a shot to a posture: rates are trusted no longer
+NEAREST = 2.0 / 86_400.0  # days, longest extrapolation of rates from a posture to a shot
 
 
 class PostureRow(Record):
-    """A row of postures.csv.
+    """Row of postures.csv.
 
-    mjd_utc           when
-    azimuth_deg       clockwise from north, of the encoder
-    elevation_deg     of the encoder
-    azimuth_rate_deg_s, elevation_rate_deg_s   then
+    mjd_utc           time
+    azimuth_deg       encoder, clockwise from north
+    elevation_deg     encoder
+    azimuth_rate_deg_s, elevation_rate_deg_s   rates at that time
     """
 
     mjd_utc: Mjd
@@ -32,9 +32,9 @@ class PostureRow(Record):
 
 
 def postures_of(rows: Sequence[PostureRow], shots: Sequence[ShotRow]) -> tuple[LivePosture, ...]:
-    """The postures in order of time.
+    """Postures in time order.
 
-    Raises InputError: a row that is not after the last, a shot without a posture within 2 s.
+    Raises InputError for a row not after the last, or a shot without a posture within 2 s.
     """
     for number, (row, last) in enumerate(zip(rows[1:], rows, strict=False), start=2):
         if row.mjd_utc <= last.mjd_utc:

@@ -1,6 +1,6 @@
-"""Recordings of sound: .wav and .csv files, tables of travel times, and the sheet that says what they are.
+"""Sound recordings: .wav and .csv files, tables of travel times, and their sheet.
 
-A WAVE file is read whole: PCM of 16, 24 and 32 bits, floats of 32 and 64, any number of channels. Rows of a table are
+WAVE files may be PCM of 16, 24 and 32 bits or floats of 32 and 64, with any number of channels. Rows of a table are
 counted as in `columns`.
 """
 
@@ -52,7 +52,7 @@ UMicroseconds = Annotated[float, Within(0, 1e5)]
 
 
 class Signal(Record):
-    """The known signal, as `signal.delay.waveform` makes it.
+    """Reference signal, for `signal.delay.waveform`.
 
     kind                                      "chirp", "pulse" or "mls"
     start_hz, stop_hz, duration_s, taper      of a chirp
@@ -86,13 +86,13 @@ class Signal(Record):
 
     @property
     def values(self) -> dict[str, float]:
-        """What `signal.delay.waveform.sampled` takes beside the kind."""
-        given = {"duration" if name == "duration_s" else name: value for name, value in self if name != "kind"}
-        return {name: value for name, value in given.items() if value is not None}
+        """Arguments of `signal.delay.waveform.sampled` other than the kind."""
+        parameters = {"duration" if name == "duration_s" else name: value for name, value in self if name != "kind"}
+        return {name: value for name, value in parameters.items() if value is not None}
 
 
 class AcousticWeather(Record):
-    """One reading of the weather by the path: the temperature only predicts the arrival."""
+    """Weather reading near the path; temperature only predicts the arrival."""
 
     mjd_utc: Mjd
     temperature_c: Annotated[float, Within(-60, 60)]
@@ -101,28 +101,28 @@ class AcousticWeather(Record):
 
 
 class RecordingStart(Record):
-    """When the first sample of one file was taken."""
+    """Time of the first sample of a file."""
 
     file: Annotated[str, Field(min_length=1)]
     start_mjd_utc: Mjd
 
 
 class AcousticSheet(Certificate):
-    """What a recording is: the path, the signal, the electronics, the weather. Defaults are zero effects, not unknown.
+    """Sheet of a recording: path, signal, electronics, weather. Defaults are zero effects.
 
     ranger, target         ends A and B: "ab" is the channel of the microphone at the target
-    length_m, u_length_mm  from loudspeaker to microphone, both ways alike
+    length_m, u_length_mm  from loudspeaker to microphone, equal in both directions
     channels               of a WAVE file in order; a .csv names its own
     sampling_hz            of the files
-    recordings             when each file began
+    recordings             start time of each file
     emission_s             from a file's first sample to the first signal; shots follow each other by interval_s
-    window_ms              half width about the predicted arrival; by default for 15 °C and 15 m/s of wind
-    delay_us, u_delay_us   of loudspeaker, microphone and what the loop-back does not see: alike both ways
-    clock_offset_us, u_clock_offset_us   what the clock of channel "ab" is ahead of that of the emission, and channel
-                           "ba" behind: two recorders; a common clock has 0
+    window_ms              half width around the predicted arrival; by default for 15 °C and 15 m/s of wind
+    delay_us, u_delay_us   of loudspeaker, microphone and parts outside the loop-back: equal in both directions
+    clock_offset_us, u_clock_offset_us   lead of the clock of channel "ab" over that of the emission, and lag of
+                           channel "ba", with two recorders; 0 with a common clock
     u_time_us              least standard uncertainty of a travel time: turbulence, converter
     u_pressure_hpa, u_humidity_percent   of the weather, common to all
-    crosswind_m_per_s, u_crosswind_m_per_s   expected across the path; with no anemometer 0 and the site's rms wind
+    crosswind_m_per_s, u_crosswind_m_per_s   expected across the path; without an anemometer 0 and the site's rms wind
     wind_m_per_s, u_wind_m_per_s   along a path measured one way only, positive from ranger to target
     speed_gradient_per_s, u_speed_gradient_per_s   change of the speed of sound across the path: rays bend
     frequency_hz           of the sound, for the air's dispersion; by default the signal's
@@ -165,7 +165,7 @@ class AcousticSheet(Certificate):
     @model_validator(mode="after")
     def _belongs_together(self) -> "AcousticSheet":
         if self.ranger == self.target:
-            raise broken_rule(f"target = {self.target!r} is the ranger, too (expected the path's other end)")
+            raise broken_rule(f"target = {self.target!r} is also the ranger (expected the path's other end)")
         if (self.wind_m_per_s is None) != (self.u_wind_m_per_s is None):
             raise broken_rule("wind_m_per_s and u_wind_m_per_s belong together (expected both or none)")
         if self.shots > 1 and self.interval_s is None:
@@ -179,11 +179,11 @@ class AcousticSheet(Certificate):
         return self
 
     def start_of(self, file: str) -> float | None:
-        """When a file began, MJD; None where the sheet does not say."""
+        """Start time of a file, MJD; None if not in the sheet."""
         return next((item.start_mjd_utc for item in self.recordings if item.file == file), None)
 
     def weather_at(self, mjd: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Temperature °C, pressure hPa, humidity %, each (k,): linear in time, the nearest reading beyond the ends."""
+        """Temperature °C, pressure hPa, humidity %, each (k,): linear in time, constant beyond the ends."""
         times = [reading.mjd_utc for reading in self.weather]
         columns = ("temperature_c", "pressure_hpa", "humidity_percent")
         first, second, third = (
@@ -194,12 +194,12 @@ class AcousticSheet(Certificate):
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """One file of samples.
+    """File of samples.
 
-    file          its name
+    file          file name
     samples       channel -> (n,) codes or volts
-    sampling_hz   as the file says, None for a .csv
-    full_scale    magnitude at the converter's ends, None where the samples do not tell
+    sampling_hz   in the file, None for a .csv
+    full_scale    magnitude at the converter's ends, None if unknown
     digest        SHA-256 of the file
     """
 
@@ -212,13 +212,13 @@ class Recording:
 
 @dataclass(frozen=True, eq=False)
 class TravelTimes:
-    """A table of travel times, each column (k,).
+    """Table of travel times, each column (k,).
 
     mjd            UTC
-    time_ab        s, NaN where the cell is blank
-    time_ba        s, the same; None without the column
+    time_ab        s, NaN for blank cells
+    time_ba        s, likewise; None without the column
     u_time         s, of each; None without the column
-    weather        column -> values, of those that are there
+    weather        column -> values, of the columns present
     """
 
     file: str
@@ -231,7 +231,7 @@ class TravelTimes:
 
 
 def read_sheet(path: Path | str) -> tuple[AcousticSheet, str]:
-    """A sheet and its SHA-256. Raises InputError, one line with file, place, value and what was expected."""
+    """Sheet and its SHA-256; InputError with file, place, value."""
     path = Path(path)
     folder = Folder(path.parent)
     sheet = folder.record(path.name, AcousticSheet)
@@ -239,12 +239,12 @@ def read_sheet(path: Path | str) -> tuple[AcousticSheet, str]:
 
 
 def read_recording(path: Path | str, sheet: AcousticSheet) -> Recording | TravelTimes:
-    """A .wav or .csv file, or a table of travel times.
+    """Samples of a .wav or .csv file, or travel times of a table.
 
-    path    a .csv with the column mjd_utc holds travel times, another one samples
+    path    a .csv with the column mjd_utc holds travel times, others samples
     sheet   names the channels of a .wav
 
-    Raises InputError for a file that is neither, or whose channels or sampling are not the sheet's.
+    Raises InputError for other files, or if channels or sampling differ from the sheet.
     """
     path = Path(path)
     raw = _bytes(path)
@@ -271,7 +271,7 @@ def read_recording(path: Path | str, sheet: AcousticSheet) -> Recording | Travel
 
 
 def wav_bytes(samples: np.ndarray, sampling_hz: int) -> bytes:
-    """A WAVE file of 16-bit samples (channels, n)."""
+    """WAVE file of 16-bit samples (channels, n)."""
     codes = np.asarray(samples)
     if codes.ndim != 2 or codes.dtype != np.int16:
         raise InputError(f"samples {codes.dtype} of {codes.ndim} axes are no WAVE file (expected int16, channels by n)")
@@ -293,7 +293,7 @@ def _bytes(path: Path) -> bytes:
 def _of_wav(raw: bytes, file: str, sheet: AcousticSheet, digest: str) -> Recording:
     samples, sampling_hz, full_scale = wav_samples(raw, file)
     if not sheet.channels:
-        raise refusal(file, "the sheet does not say what its channels are (expected channels = ['ab', 'ba'] or so)")
+        raise refusal(file, "the sheet has no channels (expected e.g. channels = ['ab', 'ba'])")
     if len(samples) != len(sheet.channels):
         raise refusal(
             file, f"has {len(samples)} channels (expected {len(sheet.channels)}: {', '.join(sheet.channels)})"
@@ -305,12 +305,12 @@ def _of_wav(raw: bytes, file: str, sheet: AcousticSheet, digest: str) -> Recordi
 
 
 def wav_samples(raw: bytes, file: str) -> tuple[np.ndarray, float, float | None]:
-    """Samples (channels, n) of a WAVE file, its sampling in Hz, and the magnitude at the converter's ends.
+    """Samples (channels, n) of a WAVE file, sampling in Hz, and full-scale magnitude.
 
-    raw    the whole file
-    file   its name, for refusals
+    raw    content of the file
+    file   file name, for messages
 
-    Raises InputError for other kinds of WAVE file and for one that is cut off.
+    Raises InputError for other kinds of WAVE file and truncated ones.
     """
     if raw[:4] != b"RIFF" or raw[8:12] != b"WAVE":
         raise refusal(file, f"starts with {shown(raw[:12])} (expected a RIFF WAVE file)")
@@ -319,7 +319,7 @@ def wav_samples(raw: bytes, file: str) -> tuple[np.ndarray, float, float | None]
         name, size = raw[at : at + 4], struct.unpack("<I", raw[at + 4 : at + 8])[0]
         content = raw[at + 8 : at + 8 + size]
         if name in (b"fmt ", b"data") and len(content) < size:
-            raise refusal(file, f"is cut off: {len(content)} of {size} bytes of {shown(name)} are there")
+            raise refusal(file, f"is truncated: {len(content)} of {size} bytes of {shown(name)} are present")
         form = content if name == b"fmt " else form
         body = content if name == b"data" else body
         at += 8 + size + size % 2
@@ -336,18 +336,18 @@ def wav_samples(raw: bytes, file: str) -> tuple[np.ndarray, float, float | None]
 
 
 def _codes(body: bytes, kind: int, bits: int, file: str) -> tuple[np.ndarray, float | None]:
-    whole = len(body) - len(body) % max(1, bits // 8)
+    complete = len(body) - len(body) % max(1, bits // 8)
     if (kind, bits) == (PCM, 16):
-        return np.frombuffer(body[:whole], "<i2"), 2.0**15 - 1.0
+        return np.frombuffer(body[:complete], "<i2"), 2.0**15 - 1.0
     if (kind, bits) == (PCM, 32):
-        return np.frombuffer(body[:whole], "<i4"), 2.0**31 - 1.0
+        return np.frombuffer(body[:complete], "<i4"), 2.0**31 - 1.0
     if (kind, bits) == (PCM, 24):
-        three = np.frombuffer(body[:whole], np.uint8).reshape(-1, 3)
+        three = np.frombuffer(body[:complete], np.uint8).reshape(-1, 3)
         wide = np.zeros((len(three), 4), np.uint8)
         wide[:, 1:] = three
         return wide.view("<i4").ravel() >> 8, 2.0**23 - 1.0
     if kind == FLOAT and bits in (32, 64):
-        return np.frombuffer(body[:whole], f"<f{bits // 8}"), 1.0
+        return np.frombuffer(body[:complete], f"<f{bits // 8}"), 1.0
     raise refusal(file, f"holds samples of kind {kind}, {bits} bits (expected PCM of 16, 24, 32 bits or floats)")
 
 

@@ -1,4 +1,4 @@
-"""shots.csv and frames.npy: which ranger shot at which target and when, and the buffers of samples."""
+"""shots.csv and frames.npy: ranger, target and time of each shot, and its samples."""
 
 import hashlib
 import math
@@ -22,7 +22,7 @@ SAMPLE_BYTES = 2
 
 
 class ShotRow(Record):
-    """A row of shots.csv: one measured range; `frame` is its buffer's row in frames.npy, counted from 0."""
+    """Row of shots.csv: one range; `frame` is its buffer's row in frames.npy, counted from 0."""
 
     shot: Annotated[int, Within(0, 2**53)]
     mjd_utc: Mjd
@@ -41,7 +41,7 @@ class ShotRow(Record):
 
 @dataclass(frozen=True, eq=False)
 class ShotColumns:
-    """All shots in the order of the file, as read-only columns."""
+    """All shots in file order, as read-only columns."""
 
     shot: np.ndarray
     mjd_utc: np.ndarray
@@ -68,7 +68,7 @@ def shot_columns(shots: Sequence[ShotRow]) -> ShotColumns:
 
 
 def read_buffers(folder: Folder, file: str = "frames.npy") -> np.memmap:
-    """The buffers (rows, samples) of int16, mapped read-only; nothing in the file is ever run."""
+    """Buffers (rows, samples) of int16, mapped read-only; no code in the file is executed."""
     path = folder.path(file)
     try:
         with path.open("rb") as stream:
@@ -78,8 +78,8 @@ def read_buffers(folder: Folder, file: str = "frames.npy") -> np.memmap:
             promised = math.prod(shape) * SAMPLE_BYTES
             if size - start != promised:
                 fault = "truncated" if size - start < promised else "too long"
-                held = f"holds {size - start} bytes of data, its header promises {promised}"
-                raise refusal(file, f"{held}: {fault}")
+                sizes = f"holds {size - start} bytes of data, its header promises {promised}"
+                raise refusal(file, f"{sizes}: {fault}")
             stream.seek(0)
             folder.hashes[file] = hashlib.file_digest(stream, "sha256").hexdigest()
         return np.memmap(path, dtype="<i2", mode="r", offset=start, shape=shape, order="F" if fortran else "C")
@@ -88,14 +88,14 @@ def read_buffers(folder: Folder, file: str = "frames.npy") -> np.memmap:
 
 
 def let_go(buffers: np.ndarray) -> None:
-    """Give the memory of mapped buffers back to the system; who reads them again reads the file."""
+    """Release the memory of mapped buffers; later access reads the file again."""
     mapped = getattr(buffers, "_mmap", None)
     if mapped is not None and hasattr(mmap, "MADV_DONTNEED"):
         mapped.madvise(mmap.MADV_DONTNEED)
 
 
 def header_of(stream: BinaryIO, file: str) -> str:
-    """The header's text, which describes the array; the stream stands at the data afterwards."""
+    """Text of the header that describes the array; the stream is then at the data."""
     opening = stream.read(8)
     if not opening:
         raise refusal(file, "holds 0 bytes: empty")
@@ -110,7 +110,7 @@ def header_of(stream: BinaryIO, file: str) -> str:
 
 
 def checked_header(header: str, file: str) -> tuple[tuple[int, int], bool]:
-    """The shape, and whether columns come first, of an array that can be buffers."""
+    """Shape of an array that can be buffers, and True if columns come first."""
     kind = re.search(r"['\"]descr['\"]: *['\"]([^'\"]*)['\"]", header)
     order = re.search(r"['\"]fortran_order['\"]: *(True|False)", header)
     shape = re.search(r"['\"]shape['\"]: *\(([0-9, ]{0,60})\)", header)
@@ -127,7 +127,7 @@ def checked_header(header: str, file: str) -> tuple[tuple[int, int], bool]:
 
 
 def refuse_shots(file: str, shots: Sequence[ShotRow], buffers: np.memmap) -> None:
-    """Shots come in order of time, each once, each with a buffer of its own that holds its samples."""
+    """Raise InputError unless shots are unique, in time order, each with its own buffer."""
     if not shots:
         raise refusal(file, "row 1 is missing, 0 shots (expected at least one)")
     rows, width = buffers.shape
@@ -143,10 +143,10 @@ def refuse_shots(file: str, shots: Sequence[ShotRow], buffers: np.memmap) -> Non
         if (first := rows_of_ids.setdefault(shot.shot, row)) != row:
             raise in_row(file, row, f"shot = {shot.shot} is in row {first} already (expected each shot once)")
         if (first := rows_of_frames.setdefault(shot.frame, row)) != row:
-            raise in_row(file, row, f"frame = {shot.frame} is in row {first} already (expected a buffer a shot)")
+            raise in_row(file, row, f"frame = {shot.frame} is in row {first} already (expected one buffer per shot)")
         if shot.mjd_utc < previous:
             raise in_row(file, row, f"mjd_utc = {shot.mjd_utc!r} is before {previous!r} (expected in order of time)")
         if shot.mjd_utc <= latest.get(shot.ranger, -math.inf):
-            again = f"mjd_utc = {shot.mjd_utc!r} is the time of {shot.ranger}'s last shot too"
-            raise in_row(file, row, f"{again} (expected a later time)")
+            simultaneous = f"mjd_utc = {shot.mjd_utc!r} is also the time of {shot.ranger}'s last shot"
+            raise in_row(file, row, f"{simultaneous} (expected a later time)")
         latest[shot.ranger] = previous = shot.mjd_utc

@@ -1,4 +1,4 @@
-"""weather.csv: samples of the weather stations, and the same as columns."""
+"""weather.csv: samples of the weather stations, and as columns."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from catseye.records.files.record import Mjd, Name, Record, Within
 
 
 class WeatherSample(Record):
-    """A row of weather.csv; a millibar is a hectopascal."""
+    """Row of weather.csv; a millibar is a hectopascal."""
 
     mjd_utc: Mjd
     station: Name
@@ -22,7 +22,7 @@ class WeatherSample(Record):
 
 @dataclass(frozen=True, eq=False)
 class Weather:
-    """All samples in the order of the file, as read-only columns."""
+    """All samples in file order, as read-only columns."""
 
     mjd_utc: np.ndarray
     station: tuple[str, ...]

@@ -1,1 +1,1 @@
-"""The panel setting instrument: its sheet, readings, the dish's panels and actuators."""
+"""Panel setting instrument: sheet, readings, panels and actuators."""

@@ -1,6 +1,6 @@
-"""actuators.csv: what each actuator of a dish has to do; positions.csv: where each stands now.
+"""actuators.csv: required motions of a dish's actuators; positions.csv: current positions.
 
-Both are tables, a row an actuator; docs/formats/surface.md says each column.
+Both are tables with one row per actuator; columns in docs/formats/surface.md.
 """
 
 from pathlib import Path
@@ -12,7 +12,7 @@ from catseye.records.files.reading import Folder
 from catseye.records.files.record import Name, Record, Within
 from catseye.records.files.refusal import refusal, shown
 
-LIMIT_MM = 25.4  # of an actuator's travel, both ways from its middle
+LIMIT_MM = 25.4  # of an actuator's travel, in both directions from its middle
 STEP_MM = 0.025  # of its encoder
 
 Travel = Annotated[float, Within(-1000, 1000)]
@@ -21,23 +21,23 @@ Place = Annotated[float, Within(-1e4, 1e4)]
 
 
 class ActuatorPosition(Record):
-    """One row of positions.csv: the actuator's travel from its middle, above zero towards the focus."""
+    """Row of positions.csv: an actuator's travel from its middle, positive towards the focus."""
 
     actuator: Name
     position_mm: Travel
 
 
 class ActuatorCorrection(Record):
-    """One row of actuators.csv.
+    """Row of actuators.csv.
 
-    x_m, y_m, z_m              where it holds the panels, reflector frame, as designed
-    deviation_mm               of the surface there, along the normal, above zero towards the focus
+    x_m, y_m, z_m              design position of its support of the panels, reflector frame
+    deviation_mm               of the surface there, along the normal, positive towards the focus
     correction_mm              of its travel: the deviation's opposite
-    steps, left_mm             whole steps of its encoder, and what they leave of the correction
-    position_mm, target_mm     before and after; 0 where no position is known
-    within_limits              whether the target is
-    prisms, weight             the three prisms that support it most, joined by spaces, and their part of the weights
-    how                        "measured": it has a prism of its own; "foretold": it has none that was seen
+    steps, left_mm             whole steps of its encoder, and the remaining correction
+    position_mm, target_mm     before and after; 0 without a known position
+    within_limits              True if the target is
+    prisms, weight             the three prisms with the largest weights, joined by spaces, and their sum of weights
+    how                        "measured": it has its own prism; "foretold": predicted without one
     """
 
     actuator: Name
@@ -59,7 +59,7 @@ class ActuatorCorrection(Record):
 
 
 def read_positions(path: Path | str) -> dict[str, float]:
-    """Each actuator's travel, mm, by its name; InputError for a file that cannot be used or a name given twice.
+    """Travel of each actuator, mm, by name; InputError for an invalid file or a repeated name.
 
     path   CSV with the header actuator,position_mm
     """
@@ -73,6 +73,6 @@ def read_positions(path: Path | str) -> dict[str, float]:
 
 
 def read_corrections(path: Path | str) -> list[ActuatorCorrection]:
-    """The rows of a table of corrections, as `catseye surface --actuators` writes it; InputError for another file."""
+    """Corrections of a table from `catseye surface --actuators`; InputError for other files."""
     path = Path(path)
     return Folder(path.parent).table(path.name, ActuatorCorrection)

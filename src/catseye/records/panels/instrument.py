@@ -1,4 +1,4 @@
-"""The data sheet of a panel setting instrument, and what is known beforehand of panels and screws: SHEET.toml."""
+"""Data sheet of a panel setting instrument, with priors of panels and screws: SHEET.toml."""
 
 from itertools import pairwise
 from typing import Annotated, Literal
@@ -13,13 +13,13 @@ Slope = Annotated[float, Within(0, 1e5, above=True)]  # µrad
 
 
 class PanelGauge(Record):
-    """One displacement gauge.
+    """Displacement gauge.
 
-    x_mm, y_mm      its tip in the tool's axes, from the shaft's axis
-    scale_ppm       reads so much too long
-    zero_um_per_c   reads so much too high for each °C above the flat's temperature
-    sag_um          its tip hangs so much lower when the tool stands upright than weightless
-    linearity       pairs of a reading in mm and its correction in µm, to be added; straight between, sorted
+    x_mm, y_mm      tip in the tool's axes, from the shaft's axis
+    scale_ppm       scale error, positive if it reads too long
+    zero_um_per_c   increase of the reading per °C above the flat's temperature
+    sag_um          sag of the tip with the tool upright, compared with weightless
+    linearity       pairs of a reading in mm and its correction in µm, to be added; sorted, linear between
     """
 
     name: Literal["a", "b", "c", "d"]
@@ -34,16 +34,16 @@ class PanelGauge(Record):
     def _has_a_sorted_linearity(self) -> "PanelGauge":
         at = [reading for reading, _ in self.linearity]
         if any(b <= a for a, b in pairwise(at)):
-            raise broken_rule(f"linearity of gauge {self.name!r} is not sorted by reading (expected rising readings)")
+            raise broken_rule(f"linearity of gauge {self.name!r} is not sorted by reading (expected sorted readings)")
         return self
 
 
 class PanelPrior(Record):
-    """[panel]: what is known of panels before the tool reads them.
+    """[panel]: prior knowledge of panels before the tool reads them.
 
-    u_set_um               of a corner's height before it was ever set
+    u_set_um               of a corner's height before its first setting
     u_shape_um             of the surface at a corner from the panel's best fit, without a map
-    u_slope_urad           of the surface's slope near a corner from that of the whole panel, without a map
+    u_slope_urad           of the surface's slope near a corner from that of the complete panel, without a map
     u_map_um, u_map_slope_urad   the same with a map
     u_twist_um             of the warp that four screws force on the panel, at its corners
     """
@@ -57,7 +57,7 @@ class PanelPrior(Record):
 
 
 class PanelScrew(Record):
-    """[screw]: what a turn does; `u_turn` is how well a turn is made, in turns."""
+    """[screw]: effect of a turn; `u_turn` is the uncertainty of a turn, in turns."""
 
     pitch_mm: Annotated[float, Within(0.05, 20)]
     clockwise: Literal["raises", "lowers"]
@@ -65,19 +65,19 @@ class PanelScrew(Record):
 
 
 class PanelInstrument(Certificate):
-    """The whole of SHEET.toml.
+    """Complete SHEET.toml.
 
-    u_gauge_um         repeatability of one reading, put on anew
+    u_gauge_um         repeatability of one reading, with repositioning
     resolution_um      last digit of a reading
     travel_mm          of a gauge; readings beyond are refused
     u_zero_um          of a gauge's zero within a session
     u_flat_um          of the flat under one gauge
     u_lean_arcsec      of one reading of an inclinometer
-    u_level_arcsec     of an inclinometer's zero in a session, the telescope's own tilt with it
-    lean_limit_arcmin  the shaft leans less; what counts (over root three) where no lean was read
+    u_level_arcsec     of an inclinometer's zero in a session, including the telescope's tilt
+    lean_limit_arcmin  largest lean of the shaft; over root three, u of an unread lean
     flat_temperature_c at which the gauges were zeroed
-    u_stand_um         of the shaft's shoulder below its prism: surveyed heights of prisms carry it
-    goal_um            a corner shall lie within, of its neighbours' mean
+    u_stand_um         of the shaft's shoulder below its prism, contained in surveyed heights of prisms
+    goal_um            tolerance of a corner from its neighbours' mean
     """
 
     format: Annotated[str, Version("panel-instrument")]

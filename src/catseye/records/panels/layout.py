@@ -1,4 +1,4 @@
-"""Which panel has which corners: a table of the layout, or the same made from the prisms of a site."""
+"""Corners of each panel: a table of the layout, or derived from the prisms of a site."""
 
 import math
 import re
@@ -21,9 +21,9 @@ COLUMNS = ("panel", "place", "corner", "x_mm", "y_mm", "design_offset_um")
 
 
 class PanelCorner(Record):
-    """A row of the layout: one corner of one panel.
+    """Row of the layout: one corner of one panel.
 
-    place              1 to 4, in order round the panel, from x to y
+    place              1 to 4, in order around the panel, from x to y
     x_mm, y_mm         of the corner, reflector frame; the same in every row of a corner
     design_offset_um   of this panel's surface at the corner from the paraboloid, by design
     """
@@ -42,10 +42,10 @@ class PanelLayout:
 
     panels, corners   names
     xy                (c, 2) m, reflector frame
-    quad              (p, 4) numbers of each panel's corners, in order round it
+    quad              (p, 4) indices of each panel's corners, in order around it
     offset            (p, 4) m, design offset
     focal_length      m
-    hashes            SHA-256 of the files that it came from
+    hashes            SHA-256 of the input files
     """
 
     panels: tuple[str, ...]
@@ -57,12 +57,12 @@ class PanelLayout:
     hashes: dict[str, str] = field(default_factory=dict)
 
     def only(self, panels: np.ndarray) -> "PanelLayout":
-        """The layout of some panels (numbers, sorted); corners that none of them has are gone."""
-        kept, quad = np.unique(self.quad[panels], return_inverse=True)
+        """Layout of some panels (indices, sorted), without corners that none of them has."""
+        corners, quad = np.unique(self.quad[panels], return_inverse=True)
         return PanelLayout(
             tuple(self.panels[p] for p in panels),
-            tuple(self.corners[c] for c in kept),
-            self.xy[kept],
+            tuple(self.corners[c] for c in corners),
+            self.xy[corners],
             quad.reshape(-1, 4),
             self.offset[panels],
             self.focal_length,
@@ -70,7 +70,7 @@ class PanelLayout:
         )
 
     def rows(self) -> Iterable[tuple[str, int, str, float, float, float]]:
-        """The rows of the table of corners."""
+        """Rows of the table of corners."""
         for p, name in enumerate(self.panels):
             for place in range(4):
                 c = self.quad[p, place]
@@ -78,12 +78,12 @@ class PanelLayout:
                 yield name, place + 1, self.corners[c], round(x, 3), round(y, 3), round(self.offset[p, place] * 1e6, 2)
 
     def csv(self) -> str:
-        """The table of corners as CSV text."""
+        """Table of corners as CSV text."""
         return "\n".join([",".join(COLUMNS), *(",".join(map(str, row)) for row in self.rows())]) + "\n"
 
 
 def read_layout(path: Path, focal_length: float) -> PanelLayout:
-    """The layout in a table, or InputError: four corners a panel, in order round it, a place for each corner.
+    """Layout of a table; InputError unless panels have four corners in order, with places.
 
     path           of the table
     focal_length   m, of the design paraboloid
@@ -91,7 +91,7 @@ def read_layout(path: Path, focal_length: float) -> PanelLayout:
     folder = Folder(path.parent)
     rows = folder.table(path.name, PanelCorner)
     if not rows:
-        raise refusal(path.name, "holds a header and no rows (expected four a panel)")
+        raise refusal(path.name, "holds a header and no rows (expected four per panel)")
     places: dict[str, tuple[float, float]] = {}
     panels: dict[str, dict[int, PanelCorner]] = {}
     for number, row in enumerate(rows, start=1):
@@ -99,7 +99,7 @@ def read_layout(path: Path, focal_length: float) -> PanelLayout:
         if places.setdefault(row.corner, at) != at:
             raise refusal(path.name, f"row {number}, corner {row.corner!r} is at {at} (expected {places[row.corner]})")
         if panels.setdefault(row.panel, {}).setdefault(row.place, row) is not row:
-            raise refusal(path.name, f"row {number}, place = {row.place} of panel {row.panel!r} is there already")
+            raise refusal(path.name, f"row {number}, place = {row.place} of panel {row.panel!r} is a duplicate")
     number_of = {name: k for k, name in enumerate(places)}
     for name, four in panels.items():
         if sorted(four) != [1, 2, 3, 4]:
@@ -113,25 +113,25 @@ def read_layout(path: Path, focal_length: float) -> PanelLayout:
 
 
 def _refuse_flat(layout: PanelLayout, file: str) -> None:
-    """Every panel is convex and its corners run from x to y; no corner is the vertex."""
+    """Raise InputError unless panels are convex with corners from x to y, none at the vertex."""
     if np.any(np.sum(layout.xy**2, axis=1) == 0.0):
-        raise refusal(file, "a corner is the vertex, where outwards is nowhere (expected another place)")
+        raise refusal(file, "a corner is the vertex, where no direction is outwards (expected another place)")
     four = layout.xy[layout.quad]
     side = np.roll(four, -1, axis=1) - four
     after = np.roll(side, -1, axis=1)
     bad = np.flatnonzero(np.any(side[..., 0] * after[..., 1] - side[..., 1] * after[..., 0] <= 0.0, axis=1))
     if len(bad):
         raise refusal(
-            file, f"panel {layout.panels[bad[0]]!r} has no four corners in order round it (expected from x to y)"
+            file, f"panel {layout.panels[bad[0]]!r} lacks four corners in order around it (expected from x to y)"
         )
 
 
 def layout_of_site(site: SiteFolder) -> PanelLayout:
-    """The panels between the prisms DPhhC, DPhhNnn, DPhhPnn of a site's dish, or InputError.
+    """Panels between the prisms DPhhC, DPhhNnn, DPhhPnn of a site's dish; or InputError.
 
     Between two hoops a panel lies between neighbouring ribs, angles that both hoops have; where the ribs change, a hoop
     has corners of both sides, and a corner of one side is on the edge of a panel of the other. Named Ttt by tier and
-    Nnn, Pnn from the plane of symmetry, x below and above zero. Design offsets are zero: no public table has them.
+    Nnn, Pnn from the plane of symmetry, x below and above zero. Design offsets are zero: they are not published.
     """
     prisms = [(CORNER.fullmatch(name), t) for name, t in site.targets.items() if t.frame == "reflector"]
     corners = [(match, t) for match, t in prisms if match]
@@ -148,13 +148,13 @@ def layout_of_site(site: SiteFolder) -> PanelLayout:
         if not len(inner) or not len(outer):
             raise refusal("targets.toml", f"hoop {tier if not len(inner) else tier + 1} has no prisms")
         at = np.clip(np.searchsorted(angle[outer], angle[inner] - SAME_ANGLE), 0, len(outer) - 1)
-        both = np.abs(angle[outer[at]] - angle[inner]) < SAME_ANGLE
-        a, b = inner[both], outer[at[both]]
-        for k in range(len(a) - 1):  # the angle runs from +y to +x, so that x to y is the other way
-            left = float(angle[a[k]] + angle[a[k + 1]]) < 0.0
+        common = np.abs(angle[outer[at]] - angle[inner]) < SAME_ANGLE
+        a, b = inner[common], outer[at[common]]
+        for k in range(len(a) - 1):  # angles increase from +y to +x, opposite to x to y
+            negative_x = float(angle[a[k]] + angle[a[k + 1]]) < 0.0
             on_side = angle[a] + np.roll(angle[a], -1)
-            count = int(np.sum(on_side[k:-1] < 0.0)) if left else int(np.sum(on_side[: k + 1] > 0.0))
-            panels.append(f"T{tier:02d}{'N' if left else 'P'}{count:02d}")
+            count = int(np.sum(on_side[k:-1] < 0.0)) if negative_x else int(np.sum(on_side[: k + 1] > 0.0))
+            panels.append(f"T{tier:02d}{'N' if negative_x else 'P'}{count:02d}")
             quads.append([a[k + 1], b[k + 1], b[k], a[k]])
     layout = PanelLayout(
         tuple(panels),
@@ -167,7 +167,7 @@ def layout_of_site(site: SiteFolder) -> PanelLayout:
     )
     unused = sorted(set(range(len(names))) - set(layout.quad.ravel().tolist()))
     if unused:
-        raise refusal("targets.toml", f"prism {shown(names[unused[0]])} is no panel's corner ({len(unused)} such)")
+        raise refusal("targets.toml", f"prism {shown(names[unused[0]])} is not a panel's corner ({len(unused)} such)")
     _refuse_flat(layout, "targets.toml")
     return layout
 

@@ -1,4 +1,4 @@
-"""What a crew brings home: READINGS.csv of the tool, SURVEY.csv of the actuators, MAPS/ of the panels."""
+"""Crew's results: READINGS.csv of the tool, SURVEY.csv of the actuators, MAPS/ of the panels."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from catseye.records.files.refusal import refusal, shown
 from catseye.records.panels.instrument import GAUGES, PanelInstrument
 from catseye.records.panels.layout import PanelLayout
 
-FLAT = "FLAT"  # as a corner: the tool stood on the flat
+FLAT = "FLAT"  # name of the flat in the column of corners
 REQUIRED = ("corner", "turn", "session", "a_mm", "b_mm", "c_mm", "d_mm")
 OPTIONAL = ("member", "lean_x_arcsec", "lean_y_arcsec", "temperature_c", "elevation_deg")
 LARGEST_LEAN = 3600.0  # arcsec
@@ -23,16 +23,16 @@ LARGEST_LEAN = 3600.0  # arcsec
 
 @dataclass(frozen=True, eq=False)
 class PanelReadings:
-    """Placements of the tool, in the order of the file.
+    """Placements of the tool, in file order.
 
-    file          its name
-    corner        (m,) number of the corner, -1 on the flat
+    file          file name
+    corner        (m,) index of the corner, -1 on the flat
     turn          (m,) quarter turns
-    session       (m,) number; sessions are their names
-    member        (m,) who
-    reading       (m, 4) m, nan where the gauge read nothing
-    lean          (m, 2) rad, of the tool's axis from the design normal towards the tool's x and y; nan where not read
-    temperature_c (m,); nan where not read
+    session       (m,) index; sessions are their names
+    member        (m,) crew member
+    reading       (m, 4) m, nan without a reading
+    lean          (m, 2) rad, of the tool's axis from the design normal towards the tool's x and y; nan if not read
+    temperature_c (m,); nan if not read
     elevation     (m,) rad, of the telescope
     where         (m,) "line 2"
     digest        SHA-256
@@ -56,11 +56,11 @@ class PanelReadings:
 
 
 def read_panel_readings(path: Path, layout: PanelLayout, sheet: PanelInstrument) -> PanelReadings:
-    """The table of readings, or InputError that names line, column and value.
+    """Table of readings; InputError names line, column and value.
 
     path     READINGS.csv
-    layout   whose corners it may name
-    sheet    whose travel and lean limits hold
+    layout   panel layout with the allowed corners
+    sheet    sheet with the limits of travel and lean
     """
     folder = Folder(path.parent)
     table = columns_of(folder.text(path.name), path.name, REQUIRED, optional=OPTIONAL)
@@ -109,7 +109,7 @@ def read_panel_readings(path: Path, layout: PanelLayout, sheet: PanelInstrument)
 
 @dataclass(frozen=True, eq=False)
 class PanelSurvey:
-    """Heights of actuators over the design as the lasers found their prisms: corner numbers (k,), height and u, m."""
+    """Actuator heights over the design from laser ranging: corner indices (k,), height and u, m."""
 
     corner: np.ndarray
     height: np.ndarray
@@ -118,7 +118,7 @@ class PanelSurvey:
 
 
 def read_survey(path: Path, layout: PanelLayout) -> PanelSurvey:
-    """SURVEY.csv: corner, height_um, u_um; each corner once, or InputError."""
+    """SURVEY.csv: corner, height_um, u_um; InputError for repeated corners."""
     folder = Folder(path.parent)
     table = columns_of(folder.text(path.name), path.name, ("corner", "height_um", "u_um"))
     number = {name: k for k, name in enumerate(layout.corners)}
@@ -135,7 +135,7 @@ def read_survey(path: Path, layout: PanelLayout) -> PanelSurvey:
 
 @dataclass(frozen=True, eq=False)
 class PanelMap:
-    """What a coordinate measuring machine found of one panel: (k, 2) m in the panel's axes, (k,) m off its design."""
+    """Map of one panel by a coordinate measuring machine: (k, 2) m in panel axes, (k,) m off its design."""
 
     panel: str
     xy: np.ndarray
@@ -144,21 +144,21 @@ class PanelMap:
 
 
 def read_maps(directory: Path, layout: PanelLayout) -> dict[str, PanelMap]:
-    """The maps PANEL.csv of a directory by panel, or InputError; panels without a map have none.
+    """Maps PANEL.csv of a directory by panel, or InputError; panels may lack one.
 
-    directory   its other files are refused, so that no map is lost by a wrong name
+    directory   other files in it are refused, so that no map is lost by a wrong name
     """
     if not directory.is_dir():
-        raise InputError(f"{directory}: is no directory (expected one of maps PANEL.csv)")
-    maps, known = {}, set(layout.panels)
+        raise InputError(f"{directory}: is not a directory (expected one with maps PANEL.csv)")
+    maps, names = {}, set(layout.panels)
     for path in sorted(directory.iterdir()):
         if path.name.startswith(".") or path.suffix in (".md", ".txt"):
             continue
-        if path.suffix != ".csv" or path.stem not in known:
-            raise refusal(path.name, f"is no map of a panel (expected a name such as {layout.panels[0]}.csv)")
+        if path.suffix != ".csv" or path.stem not in names:
+            raise refusal(path.name, f"is not a map of a panel (expected a name such as {layout.panels[0]}.csv)")
         maps[path.stem] = _map(path)
     if not maps:
-        raise InputError(f"{directory}: holds no map (expected files such as {layout.panels[0]}.csv)")
+        raise InputError(f"{directory}: has no map (expected files such as {layout.panels[0]}.csv)")
     return maps
 
 
@@ -171,10 +171,10 @@ def _map(path: Path) -> PanelMap:
     if len(table) < 6:
         raise refusal(path.name, f"holds {len(table)} points (expected 6 or more)")
     if np.linalg.matrix_rank(xy - xy.mean(axis=0), tol=1.0) < 2:
-        raise refusal(path.name, f"{shown(len(table))} points lie on one line (expected them over the panel)")
+        raise refusal(path.name, f"{shown(len(table))} points lie on one line (expected points over the panel)")
     return PanelMap(path.stem, xy * MILLIMETRE, deviation * 1e-6, folder.hashes[path.name])
 
 
 def digest_of_maps(maps: Sequence[PanelMap]) -> str:
-    """One SHA-256 for all maps, over their names and their own."""
+    """SHA-256 of all maps, over their names and hashes."""
     return sha256("".join(f"{m.panel} {m.digest}\n" for m in maps).encode()).hexdigest()

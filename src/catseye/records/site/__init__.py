@@ -1,1 +1,1 @@
-"""A site: monuments, mirrors, targets, triplets, what is in the way."""
+"""Site records: monuments, mirrors, targets, triplets, obstacles, interlocks."""

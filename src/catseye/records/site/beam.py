@@ -1,4 +1,4 @@
-"""A beam from laser to reflector to detector, element by element; the layout is docs/formats/beam.md."""
+"""Beam from laser to reflector to detector, by elements; layout in docs/formats/beam.md."""
 
 from typing import Annotated, Literal
 
@@ -7,8 +7,8 @@ from pydantic import Field, model_validator
 from catseye.records.files.record import Certificate, Record, Version, Within, broken_rule
 
 Millimetres = Annotated[float, Within(0, 1e6)]
-Size = Annotated[float, Within(1e-4, 1e6)]  # mm, of what has one
-Curved = Annotated[float, Within(-1e7, 1e7)]  # mm; above zero where the centre lies behind the surface
+Size = Annotated[float, Within(1e-4, 1e6)]  # mm
+Curved = Annotated[float, Within(-1e7, 1e7)]  # mm; positive if the centre is behind the surface
 Share = Annotated[float, Within(0, 1, above=True)]
 Leak = Annotated[float, Within(0, 1)]
 Quality = Annotated[float, Within(1, 100)]
@@ -16,7 +16,7 @@ Incidence = Annotated[float, Within(0, 89)]  # degrees
 Axis = Literal["x", "y"]
 Kind = Literal["space", "lens", "thick_lens", "mirror", "plate", "aperture", "splitter", "isolator"]
 
-# keys of each kind: needed, and welcome besides
+# keys of each kind: required and optional
 KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "space": (("length_mm",), ()),
     "lens": (("focal_length_mm",), ("acts",)),
@@ -31,16 +31,16 @@ COMMON = {"kind", "name", "aperture_radius_mm", "transmission"}
 
 
 class Laser(Record):
-    """[laser]: two planes, x and y; the waist of each as a radius at 1/e^2, or from the full angle at half maximum.
+    """[laser]: x and y planes; waist as radius at 1/e^2, or from the full angle at half maximum.
 
     power_mw                 mean
     waist_*_um               radius at 1/e^2
-    divergence_*_deg         full angle at half maximum, as data sheets of diodes have it; instead of the waist
-    astigmatism_um           by how much the waist of x lies deeper in the laser than that of y, which stands at 0
+    divergence_*_deg         full angle at half maximum, as in data sheets of diodes; instead of the waist
+    astigmatism_um           depth of the waist of x in the laser beyond that of y, which is at 0
     quality_*                M^2
-    polarization             along which axis the field lies; behind an isolator it is turned by 45 degrees
-    back_reflection          share of the emitted power that comes back to the isolator, from all there is
-    regulation_rad           phase for each unit of relative change of the power; see `signal.systematics.feedback`
+    polarization             axis of the field; after an isolator it is rotated by 45 degrees
+    back_reflection          share of the emitted power that returns to the isolator, from all sources
+    regulation_rad           phase per relative change of the power; see `signal.systematics.feedback`
     """
 
     power_mw: Annotated[float, Within(1e-6, 1e5)]
@@ -58,29 +58,29 @@ class Laser(Record):
     @model_validator(mode="after")
     def _has_one_size_in_each_plane(self) -> "Laser":
         for axis in ("x", "y"):
-            given = [key for key in (f"waist_{axis}_um", f"divergence_{axis}_deg") if getattr(self, key) is not None]
-            if len(given) != 1:
+            present = [key for key in (f"waist_{axis}_um", f"divergence_{axis}_deg") if getattr(self, key) is not None]
+            if len(present) != 1:
                 raise broken_rule(
-                    f"laser has {' and '.join(given) or 'neither'} (expected waist_{axis}_um or "
+                    f"laser has {' and '.join(present) or 'neither'} (expected waist_{axis}_um or "
                     f"divergence_{axis}_deg, one of them)"
                 )
         return self
 
 
 class BeamElement(Record):
-    """[[outward]], [[inward]]: one thing that the light meets, in order.
+    """[[outward]], [[inward]]: optical element, in the order of the light.
 
     kind                 space, lens, thick_lens, mirror, plate, aperture, splitter, isolator
-    aperture_radius_mm   of any element: what passes beside it is lost
-    transmission         of any element, coating of a mirror not counted
+    aperture_radius_mm   of any element: light outside is lost
+    transmission         of any element, without a mirror's coating
     length_mm            of a space, in air
     focal_length_mm      of a thin lens; acts = "x" or "y" for a cylindrical one
-    r1_mm, r2_mm         of a thick lens, above zero where the centre lies behind; missing means flat
+    r1_mm, r2_mm         of a thick lens, positive if the centre is behind; flat by default
     thickness_mm, glass  of a thick lens or a plate
-    radius_mm            of a mirror, above zero for a hollow one; missing means flat
+    radius_mm            of a mirror, positive if concave; flat by default
     incidence_deg        on a mirror or a plate; `plane` is the axis that lies in the plane of incidence
     coating              of a mirror, by its name in `optics.coating`
-    turn_deg, leak       of an isolator: what its rotator turns, what each polarizer leaks
+    turn_deg, leak       of an isolator: rotation by its rotator, leakage of each polarizer
     """
 
     kind: Kind
@@ -104,11 +104,11 @@ class BeamElement(Record):
     @model_validator(mode="after")
     def _has_the_keys_of_its_kind(self) -> "BeamElement":
         needed, welcome = KEYS[self.kind]
-        given = {key for key in self.model_fields_set if getattr(self, key) is not None}
+        present = {key for key in self.model_fields_set if getattr(self, key) is not None}
         for key in needed:
-            if key not in given:
+            if key not in present:
                 raise broken_rule(f"{key} is missing (expected for kind = '{self.kind}')")
-        for key in sorted(given - COMMON - set(needed) - set(welcome)):
+        for key in sorted(present - COMMON - set(needed) - set(welcome)):
             raise broken_rule(f"{key} = {getattr(self, key)!r} does not belong to kind = '{self.kind}'")
         for key in ("focal_length_mm", "r1_mm", "r2_mm", "radius_mm"):
             if getattr(self, key) == 0.0:
@@ -129,11 +129,11 @@ class ReflectorRecord(Record):
 
 
 class Detector(Record):
-    """[detector]: a round photodiode behind the last inward element.
+    """[detector]: a round photodiode after the last inward element.
 
     radius_mm                     of the active disc
     offset_um, u_offset_um        of the image from its centre, and the standard uncertainty of each coordinate
-    spot_um                       radius of the image at 1/e^2; from the beam if missing
+    spot_um                       radius of the image at 1/e^2; by default from the beam
     sheet_resistance_ohm          per square; with capacitance_pf the delay across the disc: `optics.detector`
     """
 
@@ -154,19 +154,19 @@ class Detector(Record):
     def _has_its_image_on_it(self) -> "Detector":
         if self.offset_um > self.radius_mm * 1e3:
             raise broken_rule(
-                f"offset_um = {self.offset_um:g} is beside the disc (expected up to {self.radius_mm * 1e3:g}, as its "
-                "radius_mm says)"
+                f"offset_um = {self.offset_um:g} is outside the disc (expected up to {self.radius_mm * 1e3:g}, by its "
+                "radius_mm)"
             )
         return self
 
 
 class BeamTrain(Certificate):
-    """The whole file.
+    """Complete file.
 
     wavelength_um    of the light in air
     modulation_hz    of its amplitude
     distance_m       from the last outward element to the reflector and from it to the first inward one
-    distances_m      for the table of returned power; a doubling row about distance_m if missing
+    distances_m      for the table of returned power; by default a doubling series around distance_m
     """
 
     format: Annotated[int | str, Version("beam")]

@@ -1,6 +1,6 @@
-"""A site: a directory of what stands there, the layout of a campaign without shots, samples and weather.
+"""Site: a directory with the layout of a campaign without shots, samples and weather.
 
-A campaign's directory is a site's too; what belongs to its night alone is then not read.
+A campaign's directory is also a site's; files of its night only are then not read.
 """
 
 import csv
@@ -23,12 +23,12 @@ from catseye.records.site.triplet import TripletRecord
 
 T = TypeVar("T")
 
-REFERENCE = "ZRG"  # as a target: the ranger's internal cube
+REFERENCE = "ZRG"  # target name of the ranger's internal cube
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SiteFolder:
-    """Everything that a site's directory holds; `hashes` are the SHA-256 of its files by relative path."""
+    """Content of a site's directory; `hashes` are the SHA-256 of its files by relative path."""
 
     directory: Path
     site: SiteRecord
@@ -49,12 +49,12 @@ class SiteFolder:
 
     @property
     def rangers(self) -> tuple[str, ...]:
-        """The names of all rangers, on the ground and on the feed arm, sorted."""
+        """Names of all rangers, on the ground and on the feed arm, sorted."""
         return tuple(sorted(mounts(self.monuments, self.feedarm)))
 
     @property
     def target_names(self) -> tuple[str, ...]:
-        """Every name that a shot's target may have, sorted."""
+        """Names that a shot's target may have, sorted."""
         prisms_and_balls = (name for triplet in self.triplets.values() for name in triplet.targets)
         return tuple(sorted([*self.targets, *prisms_and_balls, *self.rangers, REFERENCE]))
 
@@ -67,7 +67,7 @@ class SiteFolder:
 
 @dataclass(frozen=True)
 class SiteRecords:
-    """What a site's files hold, file by file, not yet held against each other."""
+    """Content of a site's files, file by file, before cross-checks."""
 
     site: SiteRecord
     monuments: dict[str, MonumentRecord]
@@ -78,7 +78,7 @@ class SiteRecords:
     benchmarks: list[BenchmarkRow]
 
     def named(self, folder: Folder) -> dict[str, Any]:
-        """The fields of a `SiteFolder`, records by name; `hashes` are those of the files read by now."""
+        """Fields of a `SiteFolder`, records by name; `hashes` are those of the files read so far."""
         return {
             "directory": folder.directory,
             "site": self.site,
@@ -95,9 +95,9 @@ class SiteRecords:
 
 
 def read_site(directory: Path | str) -> SiteFolder:
-    """The site in the directory (layout: docs/formats/site.md); a bad one raises InputError.
+    """Site in the directory (layout: docs/formats/site.md); InputError if invalid.
 
-    directory   a site's or a campaign's
+    directory   of a site or a campaign
     """
     folder = Folder(Path(directory))
     refuse_directory(folder.directory, "site")
@@ -108,7 +108,7 @@ def read_site(directory: Path | str) -> SiteFolder:
 
 
 def read_records(folder: Folder) -> SiteRecords:
-    """A site's files, each read and each good by itself."""
+    """Records of a site's files, each valid on its own."""
     return SiteRecords(
         site=folder.record("site.toml", SiteRecord),
         monuments={file: folder.record(file, MonumentRecord) for file in folder.records_in("monuments")},
@@ -121,7 +121,7 @@ def read_records(folder: Folder) -> SiteRecords:
 
 
 def refuse_unjoined(site: SiteFolder, records: SiteRecords) -> None:
-    """The files agree: each name stands for one thing, each ranger has its mirror, each benchmark its two ends."""
+    """Raise InputError for double names, rangers without mirror, or benchmarks without ends."""
     refuse_double_names(site, [target.name for target in records.targets])
     refuse_mirrors(site)
     refuse_benchmarks(site)
@@ -138,7 +138,7 @@ def refuse_directory(directory: Path, kind: str) -> None:
 
 
 def by_stem(key: str, records: dict[str, tuple[str, T]]) -> dict[str, T]:
-    """The records by name, which must be the name of the file too."""
+    """Records by name, which must also be the file's name."""
     for file, (name, _) in records.items():
         if name != Path(file).stem:
             raise refusal(file, f"{key} = {shown(name)} (expected {shown(Path(file).stem)}, as the file's name)")
@@ -146,15 +146,15 @@ def by_stem(key: str, records: dict[str, tuple[str, T]]) -> dict[str, T]:
 
 
 def mounts(monuments: dict[str, MonumentRecord], feedarm: FeedArm) -> dict[str, tuple[str, str]]:
-    """By ranger: its mirror's name, and the file and place that say so."""
+    """Name of each ranger's mirror, and the file and place that define it."""
     ground = {name: (monument.zp, f"monuments/{name}.toml: ") for name, monument in monuments.items()}
     arm = {ranger.name: (ranger.zp, f"feedarm.toml: ranger[{ranger.name!r}].") for ranger in feedarm.ranger}
     return ground | arm
 
 
 def refuse_double_names(site: SiteFolder, targets: Iterable[str]) -> None:
-    """A name stands for one thing; a monument's name with -F stands for its fixed point."""
-    taken = {REFERENCE: "the internal reference cube"}
+    """Raise InputError for names used twice; a monument's name with -F is its fixed point."""
+    files_by_name = {REFERENCE: "the internal reference cube"}
     named = [(name, f"monuments/{name}.toml", "monument") for name in site.monuments]
     named += [(f"{name}-F", f"monuments/{name}.toml", "fixed point") for name in site.monuments]
     named += [(ranger.name, "feedarm.toml", "ranger") for ranger in site.feedarm.ranger]
@@ -162,31 +162,31 @@ def refuse_double_names(site: SiteFolder, targets: Iterable[str]) -> None:
     for triplet in site.triplets.values():
         named += [(name, f"triplets/{triplet.triplet}.toml", "target") for name in triplet.targets]
     for name, file, key in named:
-        if name in taken:
-            raise refusal(file, f"{key} = {name!r} is a name taken by {taken[name]} (expected each name once)")
-        taken[name] = file
+        if name in files_by_name:
+            raise refusal(file, f"{key} = {name!r} is a name taken by {files_by_name[name]} (expected unique names)")
+        files_by_name[name] = file
 
 
 def refuse_mirrors(site: SiteFolder) -> None:
-    """Every ranger has a mirror, and a mirror of its own."""
+    """Raise InputError unless every ranger has its own mirror."""
     users: dict[str, str] = {}
     for ranger, (zp, place) in mounts(site.monuments, site.feedarm).items():
         file, _, key = place.partition(": ")
         if zp not in site.mirrors:
             raise refusal(file, f"{key}zp = {zp!r} has no calibration (expected a file mirrors/{zp}.toml)")
         if zp in users:
-            raise refusal(file, f"{key}zp = {zp!r} is on {users[zp]} already (expected a mirror a ranger)")
+            raise refusal(file, f"{key}zp = {zp!r} is on {users[zp]} already (expected one mirror per ranger)")
         users[zp] = ranger
 
 
 def refuse_benchmarks(site: SiteFolder) -> None:
-    known, rangers = set(site.target_names) - {REFERENCE}, set(site.rangers)
+    targets, rangers = set(site.target_names) - {REFERENCE}, set(site.rangers)
     for row, benchmark in enumerate(site.benchmarks, start=1):
-        refuse_stranger("benchmarks.csv", row, benchmark, known=known, rangers=rangers)
+        refuse_unknown_ends("benchmarks.csv", row, benchmark, targets=targets, rangers=rangers)
 
 
 class SiteLine(Protocol):
-    """A row that joins a ranger to a target."""
+    """Row that joins a ranger to a target."""
 
     @property
     def ranger(self) -> str: ...
@@ -194,11 +194,11 @@ class SiteLine(Protocol):
     def target(self) -> str: ...
 
 
-def refuse_stranger(file: str, row: int, line: SiteLine, *, known: set[str], rangers: set[str]) -> None:
-    """A row's ranger and target are known, and two."""
+def refuse_unknown_ends(file: str, row: int, line: SiteLine, *, targets: set[str], rangers: set[str]) -> None:
+    """Raise InputError unless a row's ranger and target are known and different."""
     if line.ranger not in rangers:
         raise in_row(file, row, f"ranger = {shown(line.ranger)} is not in monuments/ or feedarm.toml")
-    if line.target not in known:
+    if line.target not in targets:
         places = "targets.toml, triplets/, monuments/ or feedarm.toml"
         raise in_row(file, row, f"target = {shown(line.target)} is not in {places}")
     if line.target == line.ranger:
@@ -206,9 +206,9 @@ def refuse_stranger(file: str, row: int, line: SiteLine, *, known: set[str], ran
 
 
 def site_files(site: SiteFolder) -> dict[str, str]:
-    """A site as its files, text by relative path, which `read_site` reads back without the loss of a bit.
+    """Files of a site, text by relative path, exact when read back by `read_site`.
 
-    site   of a campaign too, whose night is left out
+    site   or a campaign, without its night
     """
     return {
         "site.toml": record_toml(site.site),

@@ -1,4 +1,4 @@
-"""interlocks.toml: when a ranger, or all, may not shine or not move: spans of time, hours of each day, switches."""
+"""interlocks.toml: periods, daily hours and switches that forbid rangers to shine or move."""
 
 from datetime import UTC, datetime, time
 from typing import Annotated, Literal
@@ -9,19 +9,19 @@ from catseye.constants import SECONDS_PER_DAY
 from catseye.records.files.record import Certificate, Name, Record, Version, broken_rule
 
 MJD_ZERO = datetime(1858, 11, 17, tzinfo=UTC)
-FARTHEST = 400  # days that `spans` looks at once
+FARTHEST = 400  # days, longest period of `spans`
 Act = Literal["shine", "move"]
 
 
 class Interlock(Record):
-    """[[interlock]]: what is forbidden, to whom, when and why.
+    """[[interlock]]: forbidden action, rangers, times and reason.
 
     rangers                  names; none means all
-    forbids                  "shine": the laser on, and shots; "move": the mirror; both unless said
-    begin, end               date-times with their offset from UTC (2003-09-07T16:00:00Z); one alone has no other end
-    daily_from, daily_until  UTC, times of day, over midnight where until is earlier; within begin and end if given
-    switch                   instead of times: a contact, open until somebody says that it is closed
-    why                      a refusal says it
+    forbids                  "shine": the laser on, and shots; "move": the mirror; by default both
+    begin, end               date-times with their offset from UTC (2003-09-07T16:00:00Z); a missing one is open
+    daily_from, daily_until  UTC, times of day, over midnight if until is earlier; within begin and end if given
+    switch                   instead of times: a contact, open until reported closed
+    why                      reason, repeated in refusals
     """
 
     name: Name
@@ -43,7 +43,7 @@ class Interlock(Record):
             )
         if not self.switch and not times:
             raise broken_rule(
-                f"{self.name} says no time (expected begin, end, daily_from with daily_until, or switch = true)"
+                f"{self.name} has no times (expected begin, end, daily_from with daily_until, or switch = true)"
             )
         if (self.daily_from is None) != (self.daily_until is None):
             raise broken_rule(f"{self.name}: daily_from and daily_until belong together (expected both or none)")
@@ -59,13 +59,13 @@ class Interlock(Record):
         return self
 
     def concerns(self, ranger: str) -> bool:
-        """Whether a ranger is meant."""
+        """True if it applies to a ranger."""
         return not self.rangers or ranger in self.rangers
 
     def spans(self, since_mjd: float, until_mjd: float) -> list[tuple[float, float]]:
-        """Its times (begin, end), MJD, that overlap a time, in order, cut to it; a switch has none.
+        """Periods (begin, end), MJD, overlapping an interval, in order, cut to it; none for a switch.
 
-        until_mjd    at most 400 days later: what is beyond is not looked at
+        until_mjd    at most 400 days later are used
 
         >>> from datetime import UTC, datetime, time
         >>> night = Interlock(name="n", why="tests", daily_from=time(23), daily_until=time(1))
@@ -87,7 +87,7 @@ class Interlock(Record):
 
 
 class Interlocks(Certificate):
-    """The whole of a file.
+    """Complete file.
 
     >>> Interlocks(format="catseye-interlocks-1").interlock
     ()
@@ -97,11 +97,11 @@ class Interlocks(Certificate):
     interlock: Annotated[tuple[Interlock, ...], Field(strict=False)] = ()
 
     @model_validator(mode="after")
-    def _names_each_once(self) -> "Interlocks":
-        names = [each.name for each in self.interlock]
+    def _has_unique_names(self) -> "Interlocks":
+        names = [interlock.name for interlock in self.interlock]
         for name in names:
             if names.count(name) > 1:
-                raise broken_rule(f"interlock {name!r} is given twice (expected each name once)")
+                raise broken_rule(f"interlock {name!r} is given twice (expected unique names)")
         return self
 
 
@@ -110,5 +110,5 @@ def _mjd(at: datetime) -> float:
 
 
 def _share(at: time) -> float:
-    """Of the day that is over."""
+    """Elapsed share of the day."""
     return (at.hour * 3600 + at.minute * 60 + at.second + at.microsecond * 1e-6) / SECONDS_PER_DAY

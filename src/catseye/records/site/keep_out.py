@@ -1,4 +1,4 @@
-"""keep-out.toml: boxes that no beam may enter, and the Sun's cone."""
+"""keep-out.toml: boxes closed to beams, and the Sun's cone."""
 
 from typing import Annotated
 
@@ -9,18 +9,18 @@ from catseye.constants import DEGREE, MILLIMETRE
 from catseye.geometry.clearance.keep_out import BoxZone
 from catseye.records.files.record import Certificate, Name, Record, Vector, Version, Within, broken_rule
 
-SMALLEST_MM, LARGEST_MM = 50.0, 1e6  # of a box: a sandwich in mm, a mountain in mm; neither can be metres
+SMALLEST_MM, LARGEST_MM = 50.0, 1e6  # of a box in mm; excludes values in metres
 FARTHEST_MM = 1e7
 Margin = Annotated[float, Within(0, 2000)]  # counts
 
 
 class KeepOutBox(Record):
-    """[[box]]: an upright solid in the ground frame, by its two corners or by its centre and size.
+    """[[box]]: an upright solid in the ground frame, by two corners or by centre and size.
 
-    low_mm, high_mm      corners with the least and the greatest x, y, z, before the turn
-    centre_mm, size_mm   instead
-    turn_deg             about its vertical middle axis, from x towards y
-    why                  what it keeps the beam off; a refusal says it
+    low_mm, high_mm      corners with the least and the greatest x, y, z, before the rotation
+    centre_mm, size_mm   alternative to the corners
+    turn_deg             rotation about its vertical middle axis, from x towards y
+    why                  protected object, repeated in refusals
     """
 
     name: Name
@@ -32,13 +32,13 @@ class KeepOutBox(Record):
     turn_deg: Annotated[float, Within(-360, 360)] = 0.0
 
     @model_validator(mode="after")
-    def _is_given_one_way(self) -> "KeepOutBox":
+    def _has_one_definition(self) -> "KeepOutBox":
         corners = (self.low_mm is not None) + (self.high_mm is not None)
         middle = (self.centre_mm is not None) + (self.size_mm is not None)
         if (corners, middle) not in ((2, 0), (0, 2)):
-            given = [k for k in ("low_mm", "high_mm", "centre_mm", "size_mm") if getattr(self, k) is not None]
+            present = [k for k in ("low_mm", "high_mm", "centre_mm", "size_mm") if getattr(self, k) is not None]
             raise broken_rule(
-                f"{self.name} is given by {', '.join(given) or 'nothing'} "
+                f"{self.name} is defined by {', '.join(present) or 'nothing'} "
                 "(expected low_mm and high_mm, or centre_mm and size_mm)"
             )
         return self
@@ -61,7 +61,7 @@ class KeepOutBox(Record):
         return self
 
     def box(self, length: float = np.inf) -> BoxZone:
-        """In metres and radians, for a beam of a length, m."""
+        """Box in metres and radians, for a beam of a length, m."""
         centre, size = (np.array(v) * MILLIMETRE for v in self._centre_and_size_mm())
         return BoxZone(centre, size, self.turn_deg * DEGREE, length, self.name, " ".join(self.why.split()))
 
@@ -73,17 +73,17 @@ class KeepOutBox(Record):
 
 
 class SunCone(Record):
-    """[sun]: the cone about its middle, and the altitude below which it is set."""
+    """[sun]: the half angle of its cone, and the altitude below which it is set."""
 
     half_angle_deg: Annotated[float, Within(0.5, 60)] = 5.0
     horizon_deg: Annotated[float, Within(-90, 0)] = -2.0
 
 
 class KeepOut(Certificate):
-    """The whole of a file.
+    """Complete file.
 
-    beam_length_m   what lies further from a scan point does not count; without it the beam has no end
-    margin_counts   how far azimuth and elevation axis may be off their profile, a later start of one axis included
+    beam_length_m   boxes further from a scan point are ignored; by default the beam is infinite
+    margin_counts   deviation of azimuth and elevation axis from their profile, including a later start of one
     """
 
     format: Annotated[int | str, Version("keep-out")] = 1
@@ -93,13 +93,13 @@ class KeepOut(Certificate):
     box: Annotated[tuple[KeepOutBox, ...], Field(strict=False)] = ()
 
     @model_validator(mode="after")
-    def _names_each_box_once(self) -> "KeepOut":
+    def _has_unique_names(self) -> "KeepOut":
         names = [box.name for box in self.box]
         for name in names:
             if names.count(name) > 1:
-                raise broken_rule(f"box {name!r} is given twice (expected each name once)")
+                raise broken_rule(f"box {name!r} is given twice (expected unique names)")
         return self
 
     def boxes(self) -> tuple[BoxZone, ...]:
-        """All boxes, for beams of this length."""
+        """Boxes for beams of this length."""
         return tuple(box.box(np.inf if self.beam_length_m is None else self.beam_length_m) for box in self.box)

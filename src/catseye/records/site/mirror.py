@@ -1,4 +1,4 @@
-"""mirrors/ZPnnn.toml: what the laboratory knows of a ranger's head and mirror."""
+"""mirrors/ZPnnn.toml: laboratory calibration of a ranger's head and mirror."""
 
 from typing import Annotated, Self
 
@@ -7,9 +7,9 @@ from pydantic import Field, model_validator
 from catseye.constants import TWO_PI
 from catseye.records.files.record import Certificate, Name, Uncertainty, Version, Within, broken_rule
 
-Counts = Annotated[int, Within(-1_000_000, 1_000_000)]  # 100 000 a turn
-Zero = Annotated[int | float, Within(-1_000_000, 1_000_000)]  # counts; a calibration finds parts of one
-FewCounts = Annotated[float, Within(-1000, 1000)]  # what an encoder may be wrong: 1000 are 3.6 degrees
+Counts = Annotated[int, Within(-1_000_000, 1_000_000)]  # 100 000 per turn
+Zero = Annotated[int | float, Within(-1_000_000, 1_000_000)]  # counts; a calibration gives fractions
+FewCounts = Annotated[float, Within(-1000, 1000)]  # largest encoder error: 1000 are 3.6 degrees
 Offset = Annotated[float, Within(-100, 100)]
 Tilt = Annotated[float, Within(-0.1, 0.1)]
 PositiveVolts = Annotated[float, Within(0, 10, above=True)]
@@ -41,28 +41,29 @@ PAIRED = (
 
 
 class MirrorGeometry(Certificate):
-    """A mirror as far as its pointing needs: what it ranges with may be missing.
+    """Mirror data required for pointing; ranging data may be missing.
 
     dx_mm, dy_mm, dz_mm scan point from the Kelvin fixed point, mount's axes, with u_offset_mm each
-    beta1_rad, beta2_rad  small turns about x and y, with u_beta_rad each
+    beta1_rad, beta2_rad  small rotations about x and y, with u_beta_rad each
     na0, ne0            encoder counts at zero, with u_zero_counts each
     az_low_limit, az_high_limit  counts, both allowed
-    axis_offset_mm      elevation axis from the azimuth axis, above zero along the azimuth of the beam
-    mirror_offset_mm    reflecting face from the elevation axis, above zero along its outward normal
+    axis_offset_mm      elevation axis from the azimuth axis, positive along the azimuth of the beam
+    mirror_offset_mm    reflecting face from the elevation axis, positive along its outward normal
     beam_x_mm, beam_y_mm  laser beam from the azimuth axis where it meets the mirror, mirror's axes at Theta = 0
     u_axis_mm           of each of these four
     face_tilt_rad       of the face's outward normal from the plane across the elevation axis, towards the axis's y end
                         (y of the mirror's axes at Theta = 0)
-    beam_tilt_x_rad, beam_tilt_y_rad  x and y of the direction against which the laser beam comes in; z is nearly 1
+    beam_tilt_x_rad, beam_tilt_y_rad  x and y of the direction opposite to the incoming laser beam; z is nearly 1
     u_tilt_rad          of each of these three
-    azimuth_encoder_cosine_counts, ..._sine_counts, elevation_encoder_...  orders 1, 2, ... of what the encoder reads
-                        too high, waves of the axis's turn from its zero; with u_encoder_counts of each
+    azimuth_encoder_cosine_counts, ..._sine_counts, elevation_encoder_...  orders 1, 2, ... of the encoder's
+                        error, positive if it reads too high: waves of the axis's angle from its zero; with
+                        u_encoder_counts of each
     laser_number, detector_number, head_number, oscillator_number  parts of the head
     abv_0, aba_0        velocity and acceleration of axis 0 (azimuth), integers of the motion chip: counts a sample
                         (a sample) times 65 536; fkp_0, fki_0, fkd_0, fil_0, fsi_0 its filter; erl_0 in counts; _1 is
                         elevation
     detector_defocus_mm, beam_divergence_rad  with u_ of each: of the optics, for the record
-    notes               what the report's NOTES say
+    notes               NOTES of the report
     """
 
     format: Annotated[int | str, Version("mirror")] = 1
@@ -145,8 +146,8 @@ class MirrorGeometry(Certificate):
                 value = getattr(self, key)
                 terms = value if isinstance(value, tuple) else (value,)
                 if any(terms) and getattr(self, u) is None:
-                    shown = list(value) if isinstance(value, tuple) else value
-                    raise broken_rule(f"{key} = {shown} has no {u} (expected its standard uncertainty)")
+                    text = list(value) if isinstance(value, tuple) else value
+                    raise broken_rule(f"{key} = {text} has no {u} (expected its standard uncertainty)")
         return self
 
     @model_validator(mode="after")
@@ -170,18 +171,18 @@ class MirrorGeometry(Certificate):
 
 
 class Mirror(MirrorGeometry):
-    """A laser head with its mirror, all that ranging needs; what is not said here is in `MirrorGeometry`.
+    """Laser head with its mirror, complete for ranging; other keys are in `MirrorGeometry`.
 
     leakage_amplitude_volt, leakage_phase_rad, u_leakage_volt   the phasor that leaks into every shot
     d0_mm               straight from the scan point to the internal reference cube, with u_d0_mm
-    amplitude_to_phase_rad  growth of the measured phase for each factor e of amplitude above that of the reference
+    amplitude_to_phase_rad  increase of the measured phase per factor e of amplitude above that of the reference
                         shots, with u_amplitude_to_phase_rad
-    cyclic_cosine_mm, cyclic_sine_mm  of the range read too long, orders 1, 2, ... of the phase after the electronics',
-                        with u_cyclic_mm of each; u_cyclic_mm alone means orders 1 and 2, expected zero
-    azm_zrg, elv_zrg    counts that look at the cube
+    cyclic_cosine_mm, cyclic_sine_mm  of the range error (too long), orders 1, 2, ... of the phase after the
+                        electronics', with u_cyclic_mm of each; u_cyclic_mm alone means orders 1 and 2, expected zero
+    azm_zrg, elv_zrg    counts that point at the cube
 
     The scan point is where the axes should meet: on the azimuth axis, nearest to the elevation axis. D0 is a distance
-    between two points; what offsets add to the way to the cube, at the angles of azm_zrg and elv_zrg, is not in it.
+    between two points; the effect of offsets on the path to the cube, at azm_zrg and elv_zrg, is not included.
     """
 
     leakage_amplitude_volt: Annotated[float, Within(0, 10)]

@@ -1,4 +1,4 @@
-"""monuments/ZYnnn.toml: where a ground ranger stands, a Kelvin mount's surveyed fixed point and its turn."""
+"""monuments/ZYnnn.toml: surveyed fixed point and orientation of a ground ranger's Kelvin mount."""
 
 import math
 from typing import Annotated, Self
@@ -18,7 +18,7 @@ from catseye.records.files.record import (
 )
 
 LEAST_RADIUS_MM, MOST_RADIUS_MM = 1e3, 1e7  # of a monument about the pintle
-AZIMUTH_TOLERANCE = 1e-4  # rad: coarser than either value is printed, finer than any slip of sign or digit
+AZIMUTH_TOLERANCE = 1e-4  # rad: above the rounding of both values, below any error of sign or digit
 HeldOrUncertain = Annotated[float, Within(0, 100)]  # mm; zero means held fixed
 Turn = Annotated[float, Within(-TWO_PI, TWO_PI)]
 Tilt = Annotated[float, Within(-0.1, 0.1)]
@@ -28,7 +28,7 @@ Text = Annotated[str, Field(min_length=1)]
 
 
 class MonumentGeometry(Certificate):
-    """A monument as far as pointing needs: the survey's uncertainties and the place on Earth may be missing.
+    """Monument data required for pointing; the survey's u and the geographic place may be missing.
 
     monument            the ranger's name, zp its mirror
     x_mm, y_mm, z_mm    Kelvin fixed point, ground frame, with u_x_mm, u_y_mm, u_z_mm (0: held fixed)
@@ -37,7 +37,7 @@ class MonumentGeometry(Certificate):
     latitude_deg, longitude_deg (east positive, NAD83), elevation_m (above sea level)
     wv_x_m, wv_y_m, wv_z_m  West Virginia South state plane (NAD83): easting, northing, and elevation
     control_panel, ethernet_address, ip_address  of the ranger's cabinet
-    notes               what the report's NOTES say
+    notes               NOTES of the report
     """
 
     format: Annotated[int | str, Version("monument")] = 1
@@ -91,7 +91,7 @@ class MonumentGeometry(Certificate):
 
 
 class MonumentRecord(MonumentGeometry):
-    """A ground monument, all that ranging needs; its keys are explained in `MonumentGeometry`."""
+    """Ground monument, complete for ranging; its keys are in `MonumentGeometry`."""
 
     zp: Name
     u_x_mm: HeldOrUncertain

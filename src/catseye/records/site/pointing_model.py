@@ -1,4 +1,4 @@
-"""A pointing series with its covariance as a TOML file: catseye-pointing-series-1."""
+"""Pointing series with covariance as a TOML file: catseye-pointing-series-1."""
 
 from typing import Annotated, Literal
 
@@ -18,13 +18,13 @@ Coefficient = Annotated[float, Within(-36_000, 36_000)]  # arcsec: ten degrees
 
 
 class PointingModel(Certificate):
-    """The whole of a pointing series' file.
+    """Complete file of a pointing series.
 
-    terms               names of the coefficients, each once
-    values_arcsec       as many
-    covariance_arcsec2  of these, rows in the same order; none where nothing is known of it
-    sky_rms_arcsec      of the fit, if it was one
-    verdict, why        of the fit where it was not good: a prediction is no better
+    terms               unique names of the coefficients
+    values_arcsec       in the same order
+    covariance_arcsec2  rows in the same order; none if unknown
+    sky_rms_arcsec      of the fit, if any
+    verdict, why        of the fit if not good, and then of predictions
     """
 
     format: Literal["catseye-pointing-series-1"]
@@ -49,15 +49,15 @@ class PointingModel(Certificate):
 
     @property
     def judged(self) -> Verdict | None:
-        """The fit's verdict; None where the file has none."""
+        """Verdict of the fit; None if the file has none."""
         return None if self.verdict is None else Verdict(self.verdict, self.why)
 
     @property
     def series(self) -> PointingSeries:
-        """In radians; a covariance that is not given is zero."""
+        """Series in radians; a missing covariance is zero."""
         k, values = len(self.terms), np.array(self.values_arcsec) * ARCSECOND
-        given = self.covariance_arcsec2
-        q = np.zeros((k, k)) if given is None else np.array(given) * ARCSECOND**2
+        stored = self.covariance_arcsec2
+        q = np.zeros((k, k)) if stored is None else np.array(stored) * ARCSECOND**2
         return PointingSeries(tuple(self.terms), values, q)
 
 
@@ -70,4 +70,4 @@ def _refuse_covariance(rows: tuple[tuple[float, ...], ...], k: int) -> None:
         raise broken_rule(f"covariance_arcsec2 has the variance {variance.min()} (expected 0 or more)")
     scale = np.sqrt(np.maximum(np.outer(variance, variance), 1e-300))
     if np.any(np.abs(q - q.T) > SYMMETRY * scale) or np.linalg.eigvalsh(q / scale)[0] < -SYMMETRY * k:
-        raise broken_rule("covariance_arcsec2 is no covariance (expected it symmetric, with no negative eigenvalue)")
+        raise broken_rule("covariance_arcsec2 is not a covariance (expected symmetric, without negative eigenvalues)")

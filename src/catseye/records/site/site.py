@@ -26,7 +26,7 @@ PositiveMillimetres = Annotated[float, Within(500, 1e6)]
 
 
 class PostureRecord(Record):
-    """[campaign]: when, and how the telescope stood."""
+    """[campaign]: time and position of the telescope."""
 
     name: str = Field(min_length=1)
     start_mjd_utc: Mjd
@@ -35,7 +35,7 @@ class PostureRecord(Record):
 
 
 class Location(Record):
-    """[site]: longitude east positive; elevation of the ground frame's z = 0 above the sea."""
+    """[site]: longitude east positive; elevation of the ground frame's z = 0 above sea level."""
 
     latitude_deg: Latitude
     longitude_deg: Annotated[float, Within(-180, 360)]
@@ -57,7 +57,7 @@ class ReflectorFrame(Record):
 
 
 class Frames(Record):
-    """[frames]: the two frames in which positions are given."""
+    """[frames]: the two frames of all positions."""
 
     ground: GroundFrame
     reflector: ReflectorFrame
@@ -72,10 +72,10 @@ class ParaboloidRecord(Record):
 
 
 class Ranging(Record):
-    """[ranging]: the modulation, and how quiet electronics and air usually are.
+    """[ranging]: the modulation, and typical noise of electronics and air.
 
-    bk7_to_air_phase_index_ratio   where given, oblique light is bent by it, as it is; without, by the group index as
-                                   appendix B of the triplet memo has it (0.4 um at 30 degrees)
+    bk7_to_air_phase_index_ratio   refracts oblique light, if given; else the group index, as in
+                                   appendix B of the triplet memo (0.4 um at 30 degrees)
     """
 
     modulation_hz: Annotated[float, Within(1e6, 1e11)]
@@ -88,7 +88,7 @@ class Ranging(Record):
 
 
 class Adc(Record):
-    """[adc]: the converter; a code of 32768 stands for full_scale_volt."""
+    """[adc]: the converter; code 32768 corresponds to full_scale_volt."""
 
     bits: Annotated[int, Within(8, 16)]
     full_scale_volt: Annotated[float, Within(0.01, 1000)]
@@ -103,9 +103,9 @@ class Adc(Record):
 
 
 class WeatherStation(Record):
-    """[[weather_station]]: its elevation is above sea level, its place in the ground frame.
+    """[[weather_station]]: elevation above sea level, place in ground frame.
 
-    x_m, y_m   east and north of the pintle bearing; not said: it may stand anywhere on the site
+    x_m, y_m   east and north of the pintle bearing; unknown if missing
     """
 
     name: Name
@@ -115,13 +115,13 @@ class WeatherStation(Record):
 
 
 class InCommon(Record):
-    """[in_common]: standard uncertainties of what records of one kind share; considered, as no range tells them.
+    """[in_common]: uncertainties common to records of one kind, as consider parameters.
 
-    certificate_scale_ppm   of the benchmarks' certificates, by one laboratory; 0: each errs by itself, as its u says
+    certificate_scale_ppm   of the benchmarks' certificates, by one laboratory; 0: independent errors, by each one's u
     survey_scale_ppm        of the monuments, by one survey; likewise
     glass_index_ratio       of bk7_to_air_group_index_ratio
-    sheets_at_c             where given, heads and prisms were calibrated at that temperature, and what steel and glass
-                            do from there to the campaign's is uncertain as a whole; else their own u cover it
+    sheets_at_c             calibration temperature of heads and prisms; if given, the expansion of steel and glass to
+                            the campaign's is uncertain in common; else it is covered by their own u
     """
 
     certificate_scale_ppm: Annotated[float, Within(0, 1000)] = 0.0
@@ -131,7 +131,7 @@ class InCommon(Record):
 
 
 class SiteRecord(Certificate):
-    """Everything that site.toml holds."""
+    """Complete content of site.toml."""
 
     format: Annotated[int | str, Version("site")] = 1
     campaign: PostureRecord
@@ -144,11 +144,11 @@ class SiteRecord(Certificate):
     weather_station: Annotated[tuple[WeatherStation, ...], Field(strict=False, min_length=1)]
 
     @model_validator(mode="after")
-    def _names_each_station_once(self) -> "SiteRecord":
+    def _has_unique_stations(self) -> "SiteRecord":
         names = [station.name for station in self.weather_station]
         for name in names:
             if names.count(name) > 1:
-                raise broken_rule(f"weather_station {name!r} is given twice (expected each station once)")
+                raise broken_rule(f"weather_station {name!r} is given twice (expected unique stations)")
         return self
 
 

@@ -1,4 +1,4 @@
-"""solids.toml: simple solids that stand between rangers and retroreflectors."""
+"""solids.toml: simple solids that obstruct paths between rangers and retroreflectors."""
 
 import re
 from abc import abstractmethod
@@ -17,7 +17,7 @@ WORDS = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _.-]{0,59}")
 
 
 def _plain_words(value: str) -> str:
-    """A name as reasons print it: letters, digits, spaces and _ . - only."""
+    """Name as printed in reasons: only letters, digits, spaces and _ . -"""
     if WORDS.fullmatch(value):
         return value
     raise PydanticCustomError("name", "expected up to 60 letters, digits, spaces, _ . -")
@@ -26,21 +26,21 @@ def _plain_words(value: str) -> str:
 Words = Annotated[str, AfterValidator(_plain_words)]
 SolidFrame = Literal["ground", "alidade", "elevation", "reflector"]
 FARTHEST_MM = 1e7
-Size = Annotated[float, Within(20, 1e6)]  # mm: thinner than a rod of a lattice, larger than any telescope
+Size = Annotated[float, Within(20, 1e6)]  # mm: from a lattice rod to larger than any telescope
 Radius = Annotated[float, Within(10, 5e5)]  # mm
 RadiusOrPoint = Annotated[float, Within(0, 5e5)]  # mm
 Thickness = Annotated[float, Within(0, 1e4)]  # mm
 
 
 class SolidRecord(Record):
-    """What all kinds share: a name, and the frame that carries it."""
+    """Keys of all kinds: a name and a frame."""
 
     name: Words
     frame: SolidFrame
 
     @abstractmethod
     def solid(self) -> solids.Solid:
-        """In metres, in its frame."""
+        """Solid in metres, in its frame."""
 
 
 class BoxRecord(SolidRecord):
@@ -103,7 +103,7 @@ class ConeRecord(SolidRecord):
 
 
 class DishRecord(SolidRecord):
-    """[[dish]]: a piece of the paraboloid z = (x^2 + y^2)/4f about the frame's z axis, vertex in its origin.
+    """[[dish]]: piece of the paraboloid z = (x^2 + y^2)/4f about the frame's z axis, vertex at its origin.
 
     focal_length_mm; aperture_centre_mm (x, y) and aperture_radius_mm; below_mm and above_mm the thickness along z
     """
@@ -125,7 +125,7 @@ class DishRecord(SolidRecord):
 
 
 class Solids(Certificate):
-    """The whole of solids.toml: any number of each kind, names different.
+    """Complete solids.toml: any number of each kind, with unique names.
 
     >>> Solids(format="catseye-solids-1").all
     ()
@@ -140,15 +140,15 @@ class Solids(Certificate):
 
     @property
     def all(self) -> tuple[SolidRecord, ...]:
-        """Every solid, kind by kind."""
+        """All solids, kind by kind."""
         return (*self.box, *self.sphere, *self.cylinder, *self.cone, *self.dish)
 
     @model_validator(mode="after")
-    def _names_each_solid_once(self) -> "Solids":
+    def _has_unique_names(self) -> "Solids":
         names = [solid.name for solid in self.all]
         for name in names:
             if names.count(name) > 1:
-                raise broken_rule(f"solid {name!r} is given twice (expected each name once)")
+                raise broken_rule(f"solid {name!r} is given twice (expected unique names)")
         return self
 
     @model_validator(mode="after")
@@ -162,7 +162,7 @@ class Solids(Certificate):
 
 
 def read_solids(path: Path | str) -> Solids:
-    """The solids of a file; InputError in one line for a bad one."""
+    """Solids of a file; InputError in one line if invalid."""
     return read_record(path, Solids)
 
 

@@ -1,9 +1,9 @@
-"""structural-model.toml: how gravity, temperature and track move the telescope's frames and groups of points.
+"""structural-model.toml: motion of frames and groups of points with gravity, temperature and track.
 
-    StructuralModel (a certificate: who made it, when, from what)
-    ├── frame[]      name, parent, where it stands nominally, its motion
-    ├── group[]      points of a frame: with a motion of their own, or a table for each
-    └── vibration[]  how one mode of a frame moves it for a metre seen by the quadrant detector
+    StructuralModel (a certificate: author, date, source)
+    ├── frame[]      name, parent, nominal place, motion
+    ├── group[]      points of a frame: with their own motion, or a table each
+    └── vibration[]  motion of a frame by one mode per metre on the quadrant detector
 
 A motion is given by terms, or by a table over elevation and temperature; see docs/formats/structural-model.md.
 """
@@ -22,16 +22,16 @@ from catseye.records.files.record import Certificate, Length, Name, Record, Vect
 from catseye.records.files.toml_text import toml_value
 
 FORMAT = "catseye-structural-model-1"
-MARK = f'format = "{FORMAT}"'  # by which a file is known as ours
+MARK = f'format = "{FORMAT}"'  # identifies a file of catseye
 ROOT = "ground"
-REQUIRED = ("alidade", "elevation", "reflector")  # each is the next one's parent
+REQUIRED = ("alidade", "elevation", "reflector")  # each is the parent of the next
 PARENTS = {"alidade": ROOT, "elevation": "alidade", "reflector": "elevation", "subreflector": "prime_focus"}
 KEYS = ("shift_x_mm", "shift_y_mm", "shift_z_mm", "turn_x_arcsec", "turn_y_arcsec", "turn_z_arcsec")
-NARROW_DEG = 5.0  # a range of elevations narrower than this is in radians
-LEAST_AXIS_MM = 500.0  # of the elevation axis above the ground: below it is in metres
+NARROW_DEG = 5.0  # a narrower range of elevations indicates radians
+LEAST_AXIS_MM = 500.0  # of the elevation axis above the ground; a smaller value indicates metres
 SYMMETRY = 1e-9  # of the largest product of two standard uncertainties
 
-MOST_SHIFT_MM, MOST_TURN_ARCSEC = 3000.0, 20_000.0  # of a coefficient: beyond it nothing stands any more
+MOST_SHIFT_MM, MOST_TURN_ARCSEC = 3000.0, 20_000.0  # largest plausible coefficients
 Place = Annotated[Vector, Length(0, 1e6)]  # mm
 Row = Annotated[tuple[float, ...], Field(strict=False)]
 Values = Row | Annotated[tuple[Row, ...], Field(strict=False)]
@@ -43,14 +43,14 @@ RangeC = Annotated[tuple[Celsius, Celsius], Field(strict=False)]
 
 
 class Basis(Record):
-    """Functions of posture: `terms`, or knots `elevation_deg` and perhaps `temperature_c` of a table."""
+    """Functions of posture: `terms`, or knots `elevation_deg` and optionally `temperature_c` of a table."""
 
     terms: Annotated[tuple[str, ...], Field(strict=False, min_length=1)] | None = None
     elevation_deg: Annotated[tuple[Degrees, ...], Field(strict=False, min_length=1)] | None = None
     temperature_c: Annotated[tuple[Celsius, ...], Field(strict=False, min_length=1)] | None = None
 
     @model_validator(mode="after")
-    def _is_one_of_both(self) -> Self:
+    def _has_terms_or_table(self) -> Self:
         if (self.terms is None) == (self.elevation_deg is None):
             raise broken_rule("expected terms, or a table's elevation_deg, and not both")
         if self.terms is not None and self.temperature_c is not None:
@@ -65,39 +65,39 @@ class Basis(Record):
             if key == "terms" and values is not None:
                 values = tuple("*".join(sorted(term.replace(" ", "").split("*"))) for term in values)
             if values is not None and len(set(values)) != len(values):
-                raise broken_rule(f"{key} = {list(values)} says one twice")
+                raise broken_rule(f"{key} = {list(values)} has a repeated value")
             if key != "terms" and values is not None and list(values) != sorted(values):
-                raise broken_rule(f"{key} = {list(values)} does not rise")
+                raise broken_rule(f"{key} = {list(values)} is not increasing")
         if self.elevation_deg is not None and len(self.elevation_deg) > 1:
             refuse_narrow(self.elevation_deg[0], self.elevation_deg[-1])
         return self
 
     @property
     def size(self) -> int:
-        """How many functions of posture there are."""
+        """Number of functions of posture."""
         return len(self.terms or self.elevation_deg or ()) * len(self.temperature_c or (0,))
 
     def refuse_shape(self, key: str, values: Any, limit: float) -> None:
-        """A list with one value a term, or a row of values an elevation, each as long as there are temperatures."""
+        """Raise InputError unless values match: one per term, or one row per elevation, by temperature."""
         flat, rows = flattened(values), len(self.terms or self.elevation_deg or ())
         width = len(self.temperature_c) if self.temperature_c is not None else None
         fits = len(values) == rows and all(
             isinstance(v, float | int) if width is None else isinstance(v, tuple) and len(v) == width for v in values
         )
         if not fits:
-            wanted = f"{rows} values" if width is None else f"{rows} rows of {width} values"
-            raise broken_rule(f"{key} has another shape than its terms or knots (expected {wanted})")
+            expected = f"{rows} values" if width is None else f"{rows} rows of {width} values"
+            raise broken_rule(f"{key} does not have the shape of its terms or knots (expected {expected})")
         for value in flat:
             if not -limit <= value <= limit:
                 raise broken_rule(f"{key} holds {value:.6g} (expected {-limit:.6g} to {limit:.6g})")
 
 
 class MotionRecord(Basis):
-    """Shift and turn of a frame or group in its own nominal axes; a component without values is zero.
+    """Shift and rotation of a frame or group in its nominal axes; missing components are zero.
 
     pivot_mm        in these axes
-    u_shift_mm      standard uncertainty of each shift in any one posture, each time anew: what the model leaves
-    u_turn_arcsec   of each turn
+    u_shift_mm      standard uncertainty of each shift in any one posture, independent each time: the model's residual
+    u_turn_arcsec   of each rotation
     covariance      of all coefficients, mm and arc seconds, component by component in the order of the keys; 6 k rows
     """
 
@@ -127,10 +127,10 @@ class MotionRecord(Basis):
 
 
 class FrameRecord(Record):
-    """A frame: its axes are its parent's at rest, but for alidade and elevation, which azimuth and elevation turn.
+    """Frame with its parent's axes at rest, except alidade and elevation, which azimuth and elevation turn.
 
-    parent      the frame it stands on
-    origin_mm   its origin in the parent's axes
+    parent      frame that carries it
+    origin_mm   origin in the parent's axes
     """
 
     name: Name
@@ -140,7 +140,7 @@ class FrameRecord(Record):
 
 
 class PointRecord(Record):
-    """A point of a group, in the frame of the group; shifts by the group's own basis."""
+    """Point of a group, in the frame of the group; shifts by the group's basis."""
 
     name: Name
     position_mm: Place
@@ -151,12 +151,12 @@ class PointRecord(Record):
 
 
 class GroupRecord(Record):
-    """Points that move together, or each by a table of its own.
+    """Points that move together, or each by its own table.
 
-    frame        in whose axes they are given
-    motion       of all of them, beyond the frame's
-    shifts       functions of posture whose values each point gives
-    u_shift_mm   what these leave of each coordinate in any one posture; with `shifts` only
+    frame        frame of their coordinates
+    motion       of all of them, in addition to the frame's
+    shifts       functions of posture with values in each point
+    u_shift_mm   residual u of each coordinate in any one posture; with `shifts` only
     """
 
     name: Name
@@ -178,18 +178,18 @@ class GroupRecord(Record):
                 if values is None:
                     continue
                 if self.shifts is None:
-                    raise broken_rule(f"point {point.name!r} gives {key} and the group no shifts to say of what")
+                    raise broken_rule(f"point {point.name!r} gives {key} but the group has no shifts")
                 self.shifts.refuse_shape(f"point {point.name!r}, {key}", values, MOST_SHIFT_MM)
         return self
 
 
 class VibrationRecord(Record):
-    """One mode of vibration of a frame, and what the quadrant detector sees of it.
+    """Vibration mode of a frame, and its effect on the quadrant detector.
 
-    frame                whose shift and turn it is, about the pivot of the frame's motion
+    frame                moved frame; rotations are about the pivot of its motion
     frequency_hz, u_frequency_hz, damping_ratio   of the mode
-    shift_per_x, shift_per_y                      m of shift for each metre the detector shows in x, in y
-    turn_arcsec_per_mm_x, turn_arcsec_per_mm_y    likewise of the turn
+    shift_per_x, shift_per_y                      m of shift per metre on the detector in x, in y
+    turn_arcsec_per_mm_x, turn_arcsec_per_mm_y    rotation likewise
     """
 
     name: Name
@@ -204,7 +204,7 @@ class VibrationRecord(Record):
 
 
 class StructuralModel(Certificate):
-    """The whole of a structural model's file; outside its ranges it is refused, not extrapolated."""
+    """Complete structural model; outside its ranges refused, not extrapolated."""
 
     format: Annotated[int | str, Version("structural-model")] = 1
     title: str = Field(min_length=1)
@@ -217,14 +217,14 @@ class StructuralModel(Certificate):
 
     @property
     def moving(self) -> list[FrameRecord | GroupRecord]:
-        """Frames and groups: whatever may have a motion."""
+        """Frames and groups, which may have a motion."""
         return [*self.frame, *self.group]
 
     @model_validator(mode="after")
     def _ranges_rise(self) -> Self:
         refuse_narrow(*self.elevation_deg)
         if not self.temperature_c[0] < self.temperature_c[1]:
-            raise broken_rule(f"temperature_c = {list(self.temperature_c)} does not rise")
+            raise broken_rule(f"temperature_c = {list(self.temperature_c)} is not increasing")
         for owner, basis in _bases(self):
             for key, (low, high) in (("elevation_deg", self.elevation_deg), ("temperature_c", self.temperature_c)):
                 knots = getattr(basis, key)
@@ -243,33 +243,33 @@ class StructuralModel(Certificate):
         _refuse_twice("frame", [frame.name for frame in self.frame])
         for name in REQUIRED:
             if name not in parents:
-                raise broken_rule(f"frame {name!r} is missing (expected {', '.join(REQUIRED)} at least)")
+                raise broken_rule(f"frame {name!r} is missing (expected at least {', '.join(REQUIRED)})")
         below = [np.array(frame.origin_mm) for frame in self.frame if frame.name in ("alidade", "elevation")]
         height = float(np.linalg.norm(np.sum(below, axis=0)))
         if height < LEAST_AXIS_MM:
             raise broken_rule(
                 f"frame 'elevation': origin_mm lies {height:g} mm from the ground's, which looks like metres "
-                f"(expected {LEAST_AXIS_MM:g} at least, the elevation axis's height in mm)"
+                f"(expected at least {LEAST_AXIS_MM:g}, the elevation axis's height in mm)"
             )
         for name, parent in parents.items():
-            wanted = PARENTS.get(name, parent)
-            if parent != wanted:
-                raise broken_rule(f"frame {name!r}: parent = {parent!r} (expected {wanted!r})")
+            expected = PARENTS.get(name, parent)
+            if parent != expected:
+                raise broken_rule(f"frame {name!r}: parent = {parent!r} (expected {expected!r})")
             if name == ROOT or (parent == ROOT and name != "alidade"):
                 raise broken_rule(f"frame {name!r} on {parent!r}: only the alidade stands on the ground")
         for start in parents:
-            seen, name = [start], start
+            chain, name = [start], start
             while name != ROOT:
                 name = parents.get(name, "")
-                if name in seen or not name:
-                    what = "comes back to itself" if name else f"ends at {seen[-1]!r}, which is no frame here"
+                if name in chain or not name:
+                    what = "is circular" if name else f"ends at {chain[-1]!r}, which is not a frame here"
                     raise broken_rule(f"frame {start!r}: its line of parents {what} (expected it to end at 'ground')")
-                seen.append(name)
+                chain.append(name)
         for kind, entries in (("group", self.group), ("vibration", self.vibration)):
             _refuse_twice(kind, [entry.name for entry in entries])
             for entry in entries:
                 if entry.frame not in parents:
-                    raise broken_rule(f"{kind} {entry.name!r}: frame = {entry.frame!r} is no frame of this file")
+                    raise broken_rule(f"{kind} {entry.name!r}: frame = {entry.frame!r} is not a frame of this file")
         _refuse_twice("point", [point.name for group in self.group for point in group.point])
         _refuse_twice("frame or group", [*parents, *(group.name for group in self.group)])
         motions = {frame.name: frame.motion for frame in self.frame}
@@ -280,7 +280,7 @@ class StructuralModel(Certificate):
 
 
 def read_structural_model(path: Path | str) -> StructuralModel:
-    """The structural model of a file; InputError with file, key and value where it cannot be used.
+    """Structural model of a file; InputError with file, key and value if invalid.
 
     path    TOML file of docs/formats/structural-model.md
     """
@@ -288,7 +288,7 @@ def read_structural_model(path: Path | str) -> StructuralModel:
 
 
 def structural_model_toml(model: StructuralModel) -> str:
-    """A structural model as its file, which `read_structural_model` reads back without the loss of a bit."""
+    """Structural model as TOML text, exact when read back."""
     values = model.model_dump(exclude_none=True) | {"format": FORMAT}
     head = [_pair(key, value) for key, value in values.items() if key not in ("frame", "group", "vibration", "format")]
     lines = [MARK, *head]
@@ -305,7 +305,7 @@ def structural_model_toml(model: StructuralModel) -> str:
 
 
 def _table(values: dict[str, Any], *inner: str) -> list[str]:
-    """Lines of a table and of the tables in it."""
+    """Lines of a table and its subtables."""
     places = {name.rpartition(".")[2]: name for name in inner}
     lines = [_pair(key, value) for key, value in values.items() if key not in places]
     for key, name in places.items():
@@ -321,16 +321,16 @@ def _pair(key: str, value: Any) -> str:
 
 
 def flattened(values: Any) -> list[float]:
-    """Coefficients in the order of the basis: as they stand, or row by row."""
+    """Coefficients in the order of the basis: unchanged, or row by row."""
     return [float(v) for row in values for v in (row if isinstance(row, tuple) else (row,))]
 
 
 def refuse_narrow(low_deg: float, high_deg: float) -> None:
-    """A range of elevations that rises and is in degrees."""
+    """Raise InputError unless a range of elevations increases and is in degrees."""
     if not high_deg - low_deg >= NARROW_DEG:
-        hint = " looks like radians" if 0.0 < high_deg - low_deg <= 100.0 * DEGREE else " does not rise"
+        hint = " looks like radians" if 0.0 < high_deg - low_deg <= 100.0 * DEGREE else " is not increasing"
         raise broken_rule(
-            f"elevation_deg = {low_deg:g} to {high_deg:g}{hint} (expected a rise of {NARROW_DEG:g} at least)"
+            f"elevation_deg = {low_deg:g} to {high_deg:g}{hint} (expected a range of at least {NARROW_DEG:g})"
         )
 
 
@@ -345,11 +345,11 @@ def _bases(model: StructuralModel) -> list[tuple[str, Basis]]:
 def _refuse_twice(kind: str, names: list[str]) -> None:
     for name in names:
         if names.count(name) > 1:
-            raise broken_rule(f"{kind} {name!r} is there {names.count(name)} times (expected once)")
+            raise broken_rule(f"{kind} {name!r} occurs {names.count(name)} times (expected once)")
 
 
 def _refuse_asymmetry(rows: tuple[tuple[float, ...], ...]) -> None:
-    """A covariance is symmetric and has no negative variance, of any combination."""
+    """Raise InputError unless a covariance is symmetric without negative eigenvalues."""
     q = np.array(rows)
     sigma = np.sqrt(np.maximum(np.diag(q), 0.0))
     scaled = q / np.where(sigma > 0.0, sigma, 1.0)[:, None] / np.where(sigma > 0.0, sigma, 1.0)

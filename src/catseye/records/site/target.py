@@ -1,4 +1,4 @@
-"""What single retroreflectors and feed-arm rangers are: targets.toml, feedarm.toml, benchmarks.csv."""
+"""Single retroreflectors and feed-arm rangers: targets.toml, feedarm.toml, benchmarks.csv."""
 
 import math
 from typing import Annotated, Literal
@@ -10,16 +10,16 @@ from catseye.records.files.record import Name, Position, Record, Uncertainty, Un
 FrameName = Literal["ground", "alidade", "reflector"]
 PrismHeight = Annotated[float, Within(5, 500)]  # mm
 PrismReference = Annotated[float, Within(2, 500)]  # mm
-GlassConstant = Annotated[float, Within(-2000, -1)]  # mm; glass is slow, so the range must shrink
+GlassConstant = Annotated[float, Within(-2000, -1)]  # mm; negative, since light is slower in glass
 SQUARE = 2e-3  # cosine: directions are written with three digits or more
-PositionUncertainty = Annotated[float, Within(0, 1000, above=True)]  # mm, each coordinate; farther off is lost
+PositionUncertainty = Annotated[float, Within(0, 1000, above=True)]  # mm, each coordinate
 
 
 class TargetRow(Record):
-    """One retroreflector; the keys from normal on belong to a prism, and only to a prism.
+    """Retroreflector; the keys from normal on are for prisms only.
 
     position_mm     approximate, in the named frame
-    u_position_mm   of each of its coordinates; without it the reduction's setting, 10 mm, counts
+    u_position_mm   of each coordinate; by default the reduction's setting, 10 mm
     normal          outward normal of the entry face, same frame
     height_mm, u_height_mm   of the prism; hrp_mm from the entry face down to the reference point
     pc_mm           prism constant, negative
@@ -51,16 +51,16 @@ class TargetRow(Record):
 
 
 class Targets(Record):
-    """The whole of targets.toml."""
+    """Complete content of targets.toml."""
 
     format: Annotated[int | str, Version("targets")] = 1
     target: Annotated[tuple[TargetRow, ...], Field(strict=False)]
 
 
 class FeedArmRanger(Record):
-    """A ranger on the feed arm: its scan point is known nominally, in the reflector frame.
+    """Ranger on the feed arm; its scan point is nominal, in the reflector frame.
 
-    u_position_mm   of each coordinate of the scan point; without it the reduction's setting, 10 mm, counts
+    u_position_mm   of each coordinate of the scan point; by default the reduction's setting, 10 mm
     mount_z, mount_y  directions of the mount's z^ (fixed point to v-block) and y^ (up), reflector frame; both or none
     """
 
@@ -72,10 +72,10 @@ class FeedArmRanger(Record):
     mount_y: UnitVector | None = None
 
     @model_validator(mode="after")
-    def _knows_two_axes_across_each_other(self) -> "FeedArmRanger":
-        for key, other in (("mount_z", "mount_y"), ("mount_y", "mount_z")):
-            if getattr(self, key) is None and getattr(self, other) is not None:
-                raise broken_rule(f"{other} = {list(getattr(self, other))} has no {key} (expected both or none)")
+    def _has_perpendicular_axes(self) -> "FeedArmRanger":
+        for key, partner in (("mount_z", "mount_y"), ("mount_y", "mount_z")):
+            if getattr(self, key) is None and getattr(self, partner) is not None:
+                raise broken_rule(f"{partner} = {list(getattr(self, partner))} has no {key} (expected both or none)")
         if self.mount_z is not None and self.mount_y is not None:
             along = sum(z * y for z, y in zip(self.mount_z, self.mount_y, strict=True))
             if abs(along) > SQUARE:
@@ -93,7 +93,7 @@ class AimPoint(Record):
 
 
 class FeedArm(Record):
-    """The whole of feedarm.toml."""
+    """Complete content of feedarm.toml."""
 
     format: Annotated[int | str, Version("feedarm")] = 1
     ranger: Annotated[tuple[FeedArmRanger, ...], Field(strict=False)]
@@ -101,7 +101,7 @@ class FeedArm(Record):
 
 
 class BenchmarkRow(Record):
-    """A row of benchmarks.csv: a certified distance from a ranger's scan point to a target."""
+    """Row of benchmarks.csv: certified distance from a ranger's scan point to a target."""
 
     target: Name
     ranger: Name
@@ -110,6 +110,6 @@ class BenchmarkRow(Record):
 
 
 def refuse_deep_reference(hrp_mm: float, height_mm: float) -> None:
-    """The reference point of a prism lies in the glass."""
+    """Raise InputError for a reference point outside the glass."""
     if hrp_mm >= height_mm:
         raise broken_rule(f"hrp_mm = {hrp_mm} reaches past height_mm = {height_mm} (expected less)")

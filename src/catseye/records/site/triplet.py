@@ -1,4 +1,4 @@
-"""triplets/TRnn.toml: the data sheet of a triplet, two prisms on one side of a plate and a ball on the other."""
+"""triplets/TRnn.toml: data sheet of a triplet, two prisms and a ball on opposite sides of a plate."""
 
 from typing import Annotated
 
@@ -24,7 +24,7 @@ from catseye.records.site.target import (
     refuse_deep_reference,
 )
 
-MOST_COSINE = 0.1  # between normal and axis, which is in the plate: 6 degrees is more than any data sheet's tenths
+MOST_COSINE = 0.1  # between normal and axis, which is in the plate: 6 degrees exceeds data sheet rounding
 Small = Annotated[float, Within(-20, 20)]  # mm
 
 
@@ -61,16 +61,16 @@ class TripletBall(Record):
 
 
 class TripletRecord(Certificate):
-    """A triplet unit.
+    """Triplet unit.
 
     nominal_position_mm     approximate centre of the ball, in the named frame
-    u_position_mm           of each of its coordinates; without it the reduction's setting, 10 mm, counts
+    u_position_mm           of each coordinate; by default the reduction's setting, 10 mm
     normal                  of the top plate, towards the prism side
     axis                    unit vector from the left to the right prism
     d12_mm                  between the prisms, with u_d12_mm
-    h_corr_mm               ball centre above the prisms' mid-point along normal, with u_h_corr_mm
+    h_corr_mm               ball centre above the prisms' midpoint along normal, with u_h_corr_mm
     l_mpbc_mm               the same from the surface plate, with u_l_mpbc_mm
-    u_lateral_mm            ball centre against the mid-point, each direction in the plate
+    u_lateral_mm            ball centre against the midpoint, each direction in the plate
     """
 
     format: Annotated[int | str, Version("triplet")] = 1
@@ -93,7 +93,7 @@ class TripletRecord(Certificate):
 
     @property
     def targets(self) -> tuple[str, str, str]:
-        """The names of the left prism, the right prism and the ball."""
+        """Names of left prism, right prism and ball."""
         return self.left_prism.target, self.right_prism.target, self.ball.target
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""Certificates of a site against the date of what was measured with them."""
+"""Check of a site's certificates against the date of measurements."""
 
 import math
 from collections.abc import Mapping
@@ -11,16 +11,18 @@ MJD_ZERO = date(1858, 11, 17)  # day 0 of the Modified Julian Day, UTC
 
 
 def expired(certificates: Mapping[str, Certificate], mjd: float) -> tuple[str, ...]:
-    """Certificates that ended before the day of the data, one line each; the last day itself is valid.
+    """Certificates that expired before the day of the data, one line each.
 
-    certificates   by the name of the thing
+    The last day itself is valid.
+
+    certificates   by name of the item
     mjd            UTC of the data
     """
     day = MJD_ZERO + timedelta(days=math.floor(mjd))
     return tuple(
-        f"the certificate of {name} ended on {each.valid_until}, the data are of {day}"
-        for name, each in certificates.items()
-        if each.valid_until is not None and each.valid_until < day
+        f"the certificate of {name} ended on {certificate.valid_until}, the data are of {day}"
+        for name, certificate in certificates.items()
+        if certificate.valid_until is not None and certificate.valid_until < day
     )
 
 
@@ -29,5 +31,5 @@ def expired_of_site(site: SiteFolder, mjd: float | None = None) -> tuple[str, ..
 
     mjd   UTC of the data; None: its campaign's start
     """
-    held: dict[str, Certificate] = {"site.toml": site.site, **site.monuments, **site.mirrors, **site.triplets}
-    return expired(held, site.site.campaign.start_mjd_utc if mjd is None else mjd)
+    certificates: dict[str, Certificate] = {"site.toml": site.site, **site.monuments, **site.mirrors, **site.triplets}
+    return expired(certificates, site.site.campaign.start_mjd_utc if mjd is None else mjd)
