@@ -282,9 +282,9 @@ def test_a_group_that_is_left_out_whole_is_still_predicted():
 def test_a_parameter_that_nothing_sees_is_named():
     x0, groups = linear_problem(1)
     solution = adjust(np.append(x0, 0.0), groups, names=["a", "b", "c", "d", "zero ZY101"])
-    assert solution.status == ("rank deficient: zero ZY101 not held by any observation; add one, or give a prior")
+    assert solution.status == ("rank deficient: zero ZY101 not determined by any observation; add one, or give a prior")
     assert np.isnan(solution.covariance).all()  # not zero, which would claim certainty
-    with pytest.raises(EstimationError, match="zero ZY101 not held"):
+    with pytest.raises(EstimationError, match="zero ZY101 not determined"):
         solution.require_converged()
 
 
@@ -318,7 +318,7 @@ def test_one_floating_direction_is_named_in_any_unit(unit):
     held = Linear("survey", survey.observed[keep], survey.covariance[keep], keep, np.eye(len(keep)))
     status = adjust(x0, [*groups[:-1], held], names=names).status
     assert status.startswith("rank deficient")
-    named = status.removeprefix("rank deficient: ").partition(" not held")[0].removesuffix(" ...")
+    named = status.removeprefix("rank deficient: ").partition(" not determined")[0].removesuffix(" ...")
     assert {name[-1] for name in named.split(", ")} == {"x"}
 
 
@@ -361,7 +361,7 @@ def test_a_covariance_that_is_none_is_refused_by_name(covariance):
 def test_points_that_coincide_have_a_status_that_says_so():
     held = Linear("datum", np.zeros(3), np.ones(3), np.arange(3), np.eye(3))
     solution = adjust(np.zeros(6), [distances("rod", np.ones(1), np.ones(1), np.zeros(1, int), np.full(1, 3)), held])
-    assert solution.status.startswith("undefined at the present values: rod has no finite value or derivative")
+    assert solution.status.startswith("undefined at the current values: rod has no finite value or derivative")
     assert np.isnan(solution.covariance).all()
 
 

@@ -269,9 +269,9 @@ def test_a_start_that_is_no_rotation_or_no_direction_is_refused():
         kinds.RigidBodies("b", *nine, point, pose, 1.001 * np.eye(3))
     with pytest.raises(EstimationError, match="b: the start R0 has determinant -1"):
         kinds.FramePoints("b", *nine, point, pose, np.diag([1.0, 1.0, -1.0]), np.array([9]))
-    with pytest.raises(EstimationError, match="p: the normal has no length"):
+    with pytest.raises(EstimationError, match="p: the normal has zero length"):
         kinds.PointsOnPlane("p", np.zeros(1), np.ones(1), point, np.zeros(3), np.zeros(3), np.array([3, 4, 5]))
-    with pytest.raises(EstimationError, match="p: the line has no length"):
+    with pytest.raises(EstimationError, match="p: the line has zero length"):
         kinds.PointsOnLine("p", np.zeros(2), np.ones(2), point, np.zeros(3), np.zeros(3), np.array([3, 4, 5, 6]))
 
 
