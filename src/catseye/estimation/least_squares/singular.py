@@ -127,7 +127,7 @@ class FactoredModel:
 
     @cached_property
     def weight(self) -> np.ndarray:
-        """Weight matrix P (m, m)."""
+        """Weight matrix P, (m, m)."""
         if self.factor is None:
             return np.zeros((len(self.sigma),) * 2)
         inverse = np.tril(lapack.dpotri(self.factor, lower=1)[0])
@@ -181,7 +181,7 @@ class LinearEstimate:
 
     @property
     def weight_diagonal(self) -> np.ndarray:
-        """Diagonal (m,) of P."""
+        """Diagonal (m,) of the weight matrix P."""
         return self.model.weight_diagonal
 
 
