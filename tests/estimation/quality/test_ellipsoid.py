@@ -72,7 +72,7 @@ def test_a_held_coordinate_makes_a_flat_ellipsoid_and_no_answer_makes_nan():
 
 
 def test_a_matrix_with_a_negative_eigenvalue_is_refused():
-    with pytest.raises(EstimationError, match="covariance 1 is none: its smallest eigenvalue is -1"):
+    with pytest.raises(EstimationError, match="covariance 1 is invalid: its smallest eigenvalue is -1"):
         ellipsoid(np.array([np.eye(3), np.diag([1.0, -1.0, 2.0])]))
     with pytest.raises(EstimationError, match="must not be negative"):
         ellipse(np.diag([1.0, -0.1]))

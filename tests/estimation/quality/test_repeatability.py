@@ -43,5 +43,5 @@ def test_the_alarm_rate_is_the_level():
 def test_readings_that_cannot_separate_the_two_are_refused():
     with pytest.raises(ValidityError, match="2 readings in 2 sets"):
         repeatability([1.0, 2.0], ["a", "b"])
-    with pytest.raises(ValidityError, match="3 places"):
+    with pytest.raises(ValidityError, match="3 set labels"):
         repeatability([1.0, 2.0], ["a", "b", "b"])

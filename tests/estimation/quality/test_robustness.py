@@ -372,7 +372,9 @@ def test_what_is_not_removable_keeps_its_weight():
 
 def test_unknown_names_are_refused_in_one_line():
     line = Line(np.ones((3, 1)))
-    with pytest.raises(EstimationError, match="'welsch' from 'annealed' with 'known' scale is unknown; known: huber"):
+    with pytest.raises(
+        EstimationError, match="method 'welsch', start 'annealed', scale 'known'; expected one of huber"
+    ):
         estimate_robustly(line.solver(np.zeros(3)), [3], options=RobustOptions(method="welsch"))
 
 

@@ -220,7 +220,7 @@ def test_a_group_without_redundancy_is_named():
     rng = np.random.default_rng(0)
     a = [np.hstack([rng.normal(size=(10, 2)), np.zeros((10, 2))]), np.hstack([np.zeros((2, 2)), np.eye(2)])]
     dense = Dense(a, [np.eye(10), np.eye(2)])
-    with pytest.raises(EstimationError, match="variance factor of alone shows in no residual"):
+    with pytest.raises(EstimationError, match="variance factor of alone affects no residual"):
         variance_components(dense.solver(rng.normal(size=12)), GroupFactors(("many", "alone"), (10, 2)))
 
 
