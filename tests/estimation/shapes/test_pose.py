@@ -139,7 +139,7 @@ def test_a_pose_in_other_axes_moves_the_same_points():
     )
     np.testing.assert_allclose(told.covariance, direct.covariance, rtol=0, atol=1e-9 * np.abs(direct.covariance).max())
     np.testing.assert_allclose(told.gain, direct.gain, rtol=0, atol=1e-7)
-    with pytest.raises(FrameError, match="'reflector' cannot be told"):
+    with pytest.raises(FrameError, match="'reflector' cannot be transformed"):
         told.in_frame(to)
 
 
@@ -181,7 +181,7 @@ def test_points_that_share_every_error_tell_the_relative_motion_better():
     ("change", "said"),
     [
         ({"covariance": PlaceCovariances()}, "both are missing"),
-        ({"robust": "median"}, "none of l1"),
+        ({"robust": "median"}, "unknown robust method"),
         ({"covariance": PlaceCovariances(second=np.eye(5))}, "expected"),
     ],
 )

@@ -228,4 +228,4 @@ def test_a_mirror_image_and_a_weak_turn_are_said():
         mirrored.require_converged()
     thin = points * [1, 1e-4, 1e-4]
     weak = fit_transformation(thin, thin, covariance_second=np.eye(18) * 1e-6)
-    assert weak.status.replace("-", "").startswith("weak: the turn about (1.000")
+    assert weak.status.replace("-", "").startswith("weak: the rotation about (1.000")

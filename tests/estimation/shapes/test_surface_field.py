@@ -75,10 +75,10 @@ def test_a_measured_point_without_noise_is_foretold_as_measured():
 
 def test_what_cannot_be_is_refused():
     _, places, field, trend = scene(3, 8, 0)
-    with pytest.raises(EstimationError, match="8 points beside 3 coefficients"):
+    with pytest.raises(EstimationError, match="8 points for 3 coefficients"):
         find_roughness(places, field, np.zeros((8, 8)), trend=trend)
     same = np.column_stack([np.ones(8), np.ones(8)])
-    with pytest.raises(EstimationError, match="do not hold the 2 coefficients"):
+    with pytest.raises(EstimationError, match="do not determine the 2 coefficients"):
         foretell(
             MeasuredField(places, field, np.zeros((8, 8)), same),
             places[:1],
