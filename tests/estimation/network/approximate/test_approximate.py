@@ -347,7 +347,7 @@ class TestWhatCannotBeFound:
         assert why == {"P": "seen by 3 ranges only and two positions fit"}
 
     def test_nothing(self):
-        assert Survey(POINT).ranges("A", "B").missing("P") == {"P": "no observation holds it"}
+        assert Survey(POINT).ranges("A", "B").missing("P") == {"P": "no observation of it"}
 
     def test_sights_from_points_that_are_lost_too(self):
         places = POINT | {"Q": (10, 20, 30)}
@@ -364,7 +364,7 @@ class TestWhatCannotBeFound:
         survey.groups.append(
             DistanceDifferences("d", np.ones(1), np.ones(1), *(survey.at(n) for n in ("A", "P", "B", "P")))
         )
-        assert survey.missing("P") == {"P": "no observation holds it"}
+        assert survey.missing("P") == {"P": "no observation of it"}
 
     def test_resection_on_the_circle_through_its_three_points(self):
         circle = {n: (50 * np.cos(a), 50 * np.sin(a), 0) for n, a in zip("ABCP", (0.3, 1.2, 2.5, 4.0), strict=True)}
