@@ -336,7 +336,10 @@ class _Problem:
         return afloat
 
     def _motions(self, rows: list[ActiveRows], x: np.ndarray) -> Floating:
-        """Floating motions at x; none if the start is too poor to determine them."""
+        """Floating motions at x.
+
+        None if the start is too poor to determine them.
+        """
         try:
             return self._floating(rows, x)
         except np.linalg.LinAlgError:
@@ -345,7 +348,10 @@ class _Problem:
     def _inflated(
         self, inflation: Sequence[np.ndarray] | None, alone: bool
     ) -> tuple[list[np.ndarray] | None, list[np.ndarray] | None]:
-        """Factors on standard uncertainties per group; or, with `alone`, variances to add."""
+        """Factors on standard uncertainties per group.
+
+        With `alone`, variances to add instead.
+        """
         factors = _padded(inflation, self.groups, 1.0)
         if factors is None or not alone:
             return factors, None

@@ -49,7 +49,10 @@ class Cure:
 
 @dataclass(frozen=True)
 class NetworkReason:
-    """End of a status, "" for none; `named` is True for a cause, False for a place."""
+    """End of a status, "" for none.
+
+    `named` is True for a cause, False for a place.
+    """
 
     text: str
     named: bool

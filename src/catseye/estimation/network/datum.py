@@ -142,7 +142,10 @@ def floating_motions(
 
 
 def _row_form(rows: ActiveRows, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Columns (m, w) of each row and its whitened Jacobian; zero for absent columns."""
+    """Columns (m, w) of each row and its whitened Jacobian.
+
+    Zero for absent columns.
+    """
     _, j = rows.linear(x)
     at = rows.row_columns()
     return np.maximum(at, 0), np.where(at < 0, 0.0, j)

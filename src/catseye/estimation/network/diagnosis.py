@@ -46,7 +46,9 @@ def pieces_of(network: ObservationNetwork) -> np.ndarray:
 
 
 def unconnected(network: ObservationNetwork, afloat: Callable[[np.ndarray], bool]) -> str | None:
-    """Status of a disconnected network; None if connected, or if each piece is held by itself.
+    """Status of a disconnected network.
+
+    None if connected, or if each piece is held by itself.
 
     afloat   True if a piece of the network, (n,) bool of its points, can move as a whole
     """

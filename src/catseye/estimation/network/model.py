@@ -201,7 +201,10 @@ class NetworkSolution:
 
 
 def points_of(group: ObservationGroup) -> tuple[np.ndarray, ...]:
-    """Point rows (m,) of the observations by role (from, to, ...); -1 for none."""
+    """Point rows (m,) of the observations by role (from, to, ...).
+
+    -1 for none.
+    """
     return tuple(np.where(end < 0, -1, end // 3) for end in getattr(group, "ends", ()))
 
 

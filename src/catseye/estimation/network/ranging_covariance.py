@@ -28,7 +28,10 @@ class RangingCovariance:
 
     @cached_property
     def _station_columns(self) -> np.ndarray:
-        """Index (N,) of each parameter among the stations' parameters; -1 for targets."""
+        """Index (N,) of each parameter among the stations' parameters.
+
+        -1 for targets.
+        """
         count, width = len(self.station), self.solution.width
         used = sum(int(np.sum(c >= 0)) for c in (self.zero, self.scale))
         place = np.full(3 * count + used, -1)

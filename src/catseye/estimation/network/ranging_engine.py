@@ -29,7 +29,9 @@ def adjusted_as_ranges(
     tests: bool,
     forced: bool,
 ) -> NetworkSolution | None:
-    """Solution of a ranging network; None if unsuitable, small, or without a solution.
+    """Solution of a ranging network.
+
+    None if unsuitable, small, or without a solution.
 
     network      every group of ranges or of whole coordinates, each parameter one station's zero or scale
     active       as for `adjust_network`
@@ -231,7 +233,10 @@ def _inflation(
     inflation: Sequence[np.ndarray] | None,
     split: _Split,
 ) -> np.ndarray | None:
-    """Factor on each range's sigma, infinite if left out; None if other observations are changed."""
+    """Factor on each range's sigma, infinite if left out.
+
+    None if other observations are changed.
+    """
     factor = [np.ones(len(g.observed)) for g in network.groups]
     if inflation is not None:
         factor = [f * i for f, i in zip(factor, inflation, strict=True)]

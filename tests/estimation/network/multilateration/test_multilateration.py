@@ -710,7 +710,7 @@ def test_a_range_between_coinciding_points_is_named():
     targets = network.targets.copy()
     targets[2] = network.stations[4]
     assert status(replace(network, targets=targets)).startswith(
-        "undefined at the present values: the range S05 to T03 "
+        "undefined at the current values: the range S05 to T03 "
     )
 
 
@@ -750,8 +750,8 @@ def test_an_error_of_a_millimetre_shows_in_its_test_alone():
         ({"sigma": (3, 0.0)}, "range 3, S01 to T04: distance .* sigma 0.0 m; both must be finite and sigma positive"),
         ({"sigma": (3, np.inf)}, "range 3, S01 to T04"),
         ({"distance": (5, np.nan)}, "range 5, S01 to T06: distance nan m"),
-        ({"station": (2, 7)}, "range 2 names station 7, there are 7"),
-        ({"target": (2, -1)}, "range 2 names target -1, there are 14"),
+        ({"station": (2, 7)}, "range 2 names station 7, but there are 7"),
+        ({"target": (2, -1)}, "range 2 names target -1, but there are 14"),
         ({"stations": ((1, 2), np.nan)}, "S02 starts at .*nan.*; every point needs approximate coordinates"),
     ],
 )
@@ -770,7 +770,7 @@ def test_bad_extras_are_refused():
         adjust_ranges(
             replace(network, station_priors=PointPriors(np.array([0]), np.zeros((1, 3)), np.zeros((1, 3, 3))))
         )
-    with pytest.raises(InputError, match="priors name point 2, there are 7"):
+    with pytest.raises(InputError, match=r"priors name point 2 \(expected below 7"):
         adjust_ranges(replace(network, station_priors=prior(network.stations, [2, 2])))
     with pytest.raises(InputError, match="zero of S03: start"):
         adjust_ranges(replace(network, zero_sigma=np.where(np.arange(7) == 2, -1.0, 0.0)))

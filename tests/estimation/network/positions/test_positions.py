@@ -351,7 +351,7 @@ def test_a_damped_descent_that_settles_has_ended_however_it_came_there():
     got = descend(r, start)
     there = apart(got.x, targets) < 1e-6
     assert there.mean() > 0.8
-    assert got.ended[there].all()
+    assert got.settled[there].all()
     assert (got.iterations[there] > 10).any()  # some were damped on the way
 
 
