@@ -81,7 +81,10 @@ def _checked(model: EpochModel, inside: np.ndarray, datum: str) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Movements:
-    """Movements of k single points; covariances with variance factor 1, nan where not compared."""
+    """Movements of k single points.
+
+    Covariances with variance factor 1, nan where not compared.
+    """
 
     displacement: np.ndarray
     covariance: np.ndarray

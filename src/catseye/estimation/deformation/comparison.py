@@ -26,7 +26,9 @@ LARGEST = 700  # common points of one joint test, whose work grows with their nu
 
 @dataclass(frozen=True, eq=False)
 class PointMovements:
-    """Movements between two epochs; arrays over the n points of `deformation`, x east, y north, z up.
+    """Movements between two epochs.
+
+    Arrays over the n points of `deformation`, x east, y north, z up.
 
     first, second           as adjusted
     deformation             displacements relative to the stable points, each the best estimate if these did not move,
@@ -61,7 +63,10 @@ class PointMovements:
 
     @property
     def doubts(self) -> list[str]:
-        """Reasons to doubt the comparison, one line each; without the epochs' own verdicts."""
+        """Reasons to doubt the comparison, one line each.
+
+        The epochs' own verdicts are not included.
+        """
         doubts = [] if self.deformation.conclusive else [self.deformation.status]
         if self.apart:
             text = ", ".join(f"{name} ({by:.3g} m)" for name, by in self.apart.items())

@@ -188,7 +188,10 @@ class Differences:
 
     @property
     def _visible(self) -> np.ndarray:
-        """Motions (3n, r) observable in the compared coordinates; a rotation about a line of points is not."""
+        """Motions (3n, r) observable in the compared coordinates.
+
+        A rotation about a line of points is not.
+        """
         return self.motions @ observable_motions(self.motions[self.used])[0]
 
     def holds(self, stable: np.ndarray) -> bool:
@@ -322,7 +325,9 @@ def _check_fixed(names: Sequence[str], apart: np.ndarray) -> None:
 def _aligned(
     x: np.ndarray, y: np.ndarray, on: np.ndarray, pivot: np.ndarray, *, combination: np.ndarray, limit: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """y moved exactly onto x by datum motions, and the matrix used; coordinates `on` are fitted.
+    """y moved exactly onto x by datum motions, and the matrix used.
+
+    Coordinates `on` are fitted.
 
     With a finite `limit`, m, the smallest sigma, y is returned unchanged if the second-order effect of the rotation is
     negligible against it.
@@ -369,7 +374,10 @@ def congruence_test(epochs: Epochs, *, datum: str = "rigid", variance_factor: Va
 
 
 def global_test(pvv: float, degrees: int, variance_factor: VarianceFactor) -> CongruenceTest:
-    """Test of a sum of squares with its degrees of freedom; EstimationError if there are none."""
+    """Test of a sum of squares with its degrees of freedom.
+
+    EstimationError if there are none.
+    """
     if degrees <= 0:
         raise EstimationError(
             "nothing to test: the compared coordinates have no redundancy beyond the datum; compare more points"

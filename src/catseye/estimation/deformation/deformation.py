@@ -164,7 +164,10 @@ def moved_points(
 
 
 def _after(state: DeletionState, variance_factor: VarianceFactor) -> CongruenceTest:
-    """Test of the stable points; zero degrees of freedom if all compared points moved."""
+    """Test of the stable points.
+
+    Zero degrees of freedom if all compared points moved.
+    """
     if state.degrees == 0:
         return CongruenceTest(0.0, 0, np.nan)
     return global_test(state.pvv, state.degrees, variance_factor)

@@ -93,7 +93,10 @@ class DeletionSearch:
         return enough and self._holds(self.precision[np.ix_(rows, rows)], rows)
 
     def without(self, out: Sequence[int]) -> DeletionState:
-        """State with points `out` left out; each of them is tested against the remainder."""
+        """State with points `out` left out.
+
+        Each of them is tested against the remainder.
+        """
         rows = np.concatenate([np.zeros(0, dtype=int), *(self.rows[i] for i in out)])
         covariance = np.linalg.inv(self.precision[np.ix_(rows, rows)])
         displacement = covariance @ self.weighted[rows]

@@ -1,4 +1,6 @@
-"""Point movements from range changes, with approximate stations and points; optionally constrained.
+"""Point movements from range changes, with approximate stations and points.
+
+Optionally constrained.
 
 A change of range is the exact difference of two distances, without linearisation: with P the point's and S the
 station's approximate position, change = |P + dx - S| - |P - S|. An error e of a position changes the predicted change
@@ -271,7 +273,10 @@ def constraint_test(restricted: GroupMovements, free: GroupMovements) -> tuple[n
 def _checked(
     stations: np.ndarray, points: np.ndarray, changes: np.ndarray, sigma: np.ndarray | float, basis: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Validated float arrays, broadcast; weights are zero where a change or its sigma is missing."""
+    """Validated float arrays, broadcast.
+
+    Weights are zero where a change or its sigma is missing.
+    """
     stations, points, changes, basis = (np.asarray(a, dtype=float) for a in (stations, points, changes, basis))
     s, n = len(stations), points.shape[-2] if points.ndim > 1 else 0
     if stations.shape != (s, 3) or points.shape[-1:] != (3,) or changes.shape[-2:] != (n, s):

@@ -147,7 +147,10 @@ def _refuse_foreign(
     *,
     names: Sequence[Sequence[str]],
 ) -> None:
-    """Refuse coordinates fixed in one epoch only; names are the point names of both epochs."""
+    """Refuse coordinates fixed in one epoch only.
+
+    `names` are the point names of both epochs.
+    """
     if foreign[0] and max(foreign[0].values()) <= tolerance:
         raise EstimationError(EXCHANGED.format(names=listed([name for name, _ in foreign[0]])))
     for which, unmatched in zip(("first", "second"), foreign, strict=True):
@@ -173,7 +176,9 @@ def _least_datum(kinds: np.ndarray) -> str:
 
 @dataclass(frozen=True, eq=False)
 class EpochModel:
-    """Joint stochastic model of n common points in both epochs; coordinates are numbered 0 to 3n - 1.
+    """Joint stochastic model of n common points in both epochs.
+
+    Coordinates are numbered 0 to 3n - 1.
 
     x, y             (n, 3) m, first and second; carried coordinates of the second are the first's
     q                covariances of the epochs, and

@@ -198,7 +198,10 @@ def adjust(
 
 
 def _lower(rows: Sequence[ActiveRows], x: np.ndarray, step: np.ndarray, cost: float) -> tuple[np.ndarray, bool]:
-    """First of x + step, x + step/2, ... that does not raise the cost; x itself if none does."""
+    """First of x + step, x + step/2, ... that does not raise the cost.
+
+    Returns x itself if none does.
+    """
     for halving in range(11):
         trial = x + step * 0.5**halving
         if sum(r.cost(trial) for r in rows) <= cost * ROUNDING:

@@ -228,7 +228,10 @@ def _by_column(
 
 
 def _part(group: ObservationGroup, rows: np.ndarray) -> ObservationGroup:
-    """Selected rows of a group of independent lengths; any other group unchanged."""
+    """Selected rows of a group of independent lengths.
+
+    Returns any other group unchanged.
+    """
     if group.covariance.ndim != 1 or not isinstance(group, Distances | MovingDistances):
         return group
     m = len(group.observed)

@@ -17,7 +17,10 @@ SOLVED = 100  # points per batch, of blocks outside the factor's pattern or of p
 
 
 class Covariance(Protocol):
-    """Covariance of n parameters; rows and columns of fixed ones are zero."""
+    """Covariance of n parameters.
+
+    Rows and columns of fixed ones are zero.
+    """
 
     def matrix(self) -> np.ndarray:
         """Full matrix (n, n); EstimationError if it is too large."""
@@ -296,13 +299,19 @@ class JointPoints:
 
     @staticmethod
     def of(q: Covariance, columns: np.ndarray) -> "JointPoints":
-        """Joint covariance of selected parameters; a dense one is cut to them."""
+        """Joint covariance of selected parameters.
+
+        A dense one is cut to them.
+        """
         if not _is_dense(q):
             return JointPoints(q, columns)
         return JointPoints(Dense(q.within(columns.ravel())), np.arange(columns.size).reshape(columns.shape))
 
     def matrix(self) -> np.ndarray:
-        """Full matrix (3p, 3p), x y z point by point; EstimationError if it is too large."""
+        """Full matrix (3p, 3p), x y z point by point.
+
+        EstimationError if it is too large.
+        """
         self.check_size()
         return self.block(np.arange(len(self.columns)))
 
@@ -319,7 +328,10 @@ class JointPoints:
         return self.q.within(self.columns[rows].ravel())
 
     def held(self) -> "JointPoints":
-        """Dense copy, for many requests; itself if a dense one would be too large."""
+        """Dense copy, for many requests.
+
+        Returns itself if a dense one would be too large.
+        """
         if isinstance(self.q, Dense) or self.columns.size > LARGEST_MATRIX:
             return self
         return JointPoints(Dense(self.matrix()), np.arange(self.columns.size).reshape(-1, 3))

@@ -49,7 +49,9 @@ class Reaching:
         return np.asarray(answer)
 
     def carried(self, z: np.ndarray, other_rows: "Reaching | None" = None) -> np.ndarray:
-        """Rows times z (g, g) times the rows' transpose, (k, k); z is symmetric.
+        """Rows times z (g, g) times the rows' transpose, (k, k).
+
+        z is symmetric.
 
         other_rows   given these m rows, their transpose instead: (k, m)
         """

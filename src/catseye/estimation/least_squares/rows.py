@@ -20,7 +20,10 @@ def shared(columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def dense_jacobian(jacobian: np.ndarray, position: np.ndarray, width: int) -> np.ndarray:
-    """Jacobian (m, w) over each row's own columns as (m, width) over shared ones; repeats add up."""
+    """Jacobian (m, w) over each row's own columns as (m, width) over shared ones.
+
+    Repeats add up.
+    """
     m = len(jacobian)
     flat = (np.arange(m)[:, None] * (width + 1) + position).ravel()
     return np.bincount(flat, jacobian.ravel(), m * (width + 1)).reshape(m, width + 1)[:, :width]
@@ -66,7 +69,9 @@ class ActiveRows:
         extra: np.ndarray | None = None,
         inflation: np.ndarray | None = None,
     ) -> "ActiveRows":
-        """Rows of a group; EstimationError if the active ones' covariance is not positive definite.
+        """Rows of a group.
+
+        EstimationError if the active ones' covariance is not positive definite.
 
         active      (m,) bool, all if None
         extra       (m,) added to the variances
@@ -162,7 +167,10 @@ class ActiveRows:
         return np.linalg.solve(self.factor.transpose(0, 2, 1), inside).reshape(a.shape)
 
     def own_weight(self) -> np.ndarray:
-        """Diagonal (m,) of C^-1 over the active rows; 1 for inactive ones."""
+        """Diagonal (m,) of C^-1 over the active rows.
+
+        1 for inactive ones.
+        """
         if self.factor.ndim == 1:
             return 1.0 / self.factor**2
         if self.factor.ndim == 2:

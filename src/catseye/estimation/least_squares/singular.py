@@ -26,7 +26,9 @@ PANEL = 512  # columns of an inverse solved for together: some MB, at full speed
 
 @dataclass(frozen=True, eq=False)
 class FactoredModel:
-    """Values = design @ parameters + errors of covariance Q, factorised once; Q may be singular.
+    """Values = design @ parameters + errors of covariance Q, factorised once.
+
+    Q may be singular.
 
     With U an orthonormal base of the design and N one of its complement: P = N (N'QN)^-1 N', computed without N from
     the projected covariance, and gain U'(1 - QP). All is scaled to unit variances.

@@ -134,7 +134,10 @@ def entry(lp, li, z, diagonal, i, j):
 
 @njit(cache=True, error_model="numpy")
 def products(lp, li, z, diagonal, columns, a):
-    """Sum over j of Q_ij a_j for each row of columns, a (m, w); -1 in columns is skipped."""
+    """Sum over j of Q_ij a_j for each row of columns, a (m, w).
+
+    -1 in columns is skipped.
+    """
     m, w = columns.shape
     result = np.zeros((m, w))
     for row in range(m):

@@ -12,7 +12,10 @@ from catseye.estimation.observations.sight import triples
 
 
 class ReadPair(Scaled, Protocol):
-    """Protocol of two points and a reading of the length between them; see `BetweenPoints`."""
+    """Protocol of two points and a reading of the length between them.
+
+    See `BetweenPoints`.
+    """
 
     @property
     def name(self) -> str: ...

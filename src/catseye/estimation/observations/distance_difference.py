@@ -54,7 +54,9 @@ class DistanceDifferences(ObservationKind):
         return self.origin, self.target, self.origin_2, self.target_2
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values (m,) and Jacobian (m, 12 + q + s); nan where the ends of a distance coincide.
+        """Values (m,) and Jacobian (m, 12 + q + s).
+
+        Values are nan where the ends of a distance coincide.
 
         >>> at = np.array([0]), np.array([3]), np.array([0]), np.array([6])
         >>> d = DistanceDifferences("d", np.ones(1), np.ones(1), *at)

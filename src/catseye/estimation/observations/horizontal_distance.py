@@ -22,7 +22,9 @@ class HorizontalDistances(LengthsBetweenPoints):
     unit: ClassVar[str] = "m"
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values (m,) and Jacobian (m, 6 + q + s); nan where one point is above the other.
+        """Values (m,) and Jacobian (m, 6 + q + s).
+
+        Values are nan where one point is above the other.
 
         >>> d = HorizontalDistances("d", np.ones(1), np.ones(1), np.array([0]), np.array([3]))
         >>> d.predict(np.array([0.0, 0.0, 0.0, 3.0, 4.0, 12.0]))[0]

@@ -11,7 +11,9 @@ from catseye.estimation.observations.kind import ObservationKind, Reported
 
 @dataclass(frozen=True, eq=False)
 class Joint(ObservationKind):
-    """Rows of all parts in order; the parts' own covariances are ignored.
+    """Rows of all parts in order.
+
+    The parts' own covariances are ignored.
 
     name         of the group, for reports
     observed     (m,) of all parts in order

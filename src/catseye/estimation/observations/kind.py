@@ -88,12 +88,17 @@ class ObservationKind:
 
     @property
     def ends(self) -> tuple[np.ndarray, ...]:
-        """Columns (m,) of the points by role: from, to, third; -1 for none."""
+        """Columns (m,) of the points by role: from, to, third.
+
+        -1 for none.
+        """
         return ()
 
 
 def joined_columns(name: str, m: int, *parts: np.ndarray) -> np.ndarray:
-    """Columns (m, w) joined from parts (m, w_i) or (1, w_i); else EstimationError.
+    """Columns (m, w) joined from parts (m, w_i) or (1, w_i).
+
+    Raises EstimationError for other shapes.
 
     >>> joined_columns("a", 2, np.array([[0, 1]]), np.array([[5], [6]])).tolist()
     [[0, 1, 5], [0, 1, 6]]
@@ -115,5 +120,8 @@ def optional(columns: np.ndarray | None, m: int, width: int = 1) -> np.ndarray:
 
 
 def value(x: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Parameters at columns of any shape; 0 where a column is -1."""
+    """Parameters at columns of any shape.
+
+    0 where a column is -1.
+    """
     return np.where(columns < 0, 0.0, x[columns])

@@ -43,7 +43,9 @@ class MovingDistances(BetweenPoints, ObservationKind):
         return a, b
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values (m,) and Jacobian (m, 6 + q + s); nan where two points coincide.
+        """Values (m,) and Jacobian (m, 6 + q + s).
+
+        Values are nan where two points coincide.
 
         >>> turn = np.array([[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]])
         >>> still = np.eye(3)[None], np.zeros((1, 3))

@@ -14,7 +14,10 @@ XYZ = np.arange(3)
 
 
 def triples(first: np.ndarray) -> np.ndarray:
-    """Columns (m, 3) of points whose x is at `first` (m,); EstimationError if negative."""
+    """Columns (m, 3) of points whose x is at `first` (m,).
+
+    EstimationError if negative.
+    """
     if first.size and first.min() < 0:
         raise EstimationError(f"row {int(np.argmin(first))} names no point (column {int(first.min())}); give its own")
     return first[:, None] + XYZ

@@ -51,7 +51,9 @@ class ObservedTilts(ObservationKind):
         return joined_columns(self.name, m, np.atleast_2d(self.turn), optional(self.zero, m))
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values (m,) and Jacobian (m, 4); nan where an axis is vertical.
+        """Values (m,) and Jacobian (m, 4).
+
+        Values are nan where an axis is vertical.
 
         >>> t = ObservedTilts("t", np.zeros(1), np.ones(1), np.array([0.0, 1.0, 0.0]), np.arange(3), np.eye(3))
         >>> t.predict(np.array([0.25, 0.0, 0.0]))[0]

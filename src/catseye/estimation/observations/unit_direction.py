@@ -9,7 +9,9 @@ from catseye.errors import EstimationError
 
 @dataclass(frozen=True, eq=False)
 class Direction:
-    """u = (u0 + a_1 e_1 + a_2 e_2) / |...|, with e_1, e_2 across u0; small a are angles, a right angle is infinite.
+    """u = (u0 + a_1 e_1 + a_2 e_2) / |...|, with e_1, e_2 across u0.
+
+    Small a are angles, a right angle is infinite.
 
     u     (m, 3)
     f     (m, 2, 3) e_1, e_2 turned with u by the shortest rotation

@@ -56,7 +56,10 @@ def _square_roots(values: np.ndarray) -> np.ndarray:
 
 
 def _eigen(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Ascending eigenvalues and eigenvectors; nan for matrices that are not finite, nan rows first."""
+    """Ascending eigenvalues and eigenvectors.
+
+    Values are nan for matrices that are not finite, nan rows first.
+    """
     size = covariance.shape[-1]
     missing = np.isnan(np.diagonal(covariance, axis1=-2, axis2=-1))
     pairs = ~(missing[..., :, None] | missing[..., None, :])

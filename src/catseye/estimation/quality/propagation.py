@@ -307,7 +307,9 @@ def agrees(budget: Budget, scattered: Scattered, digits: int = 2) -> bool:
 
 
 def agreement(budget: Budget, scattered: Scattered, digits: int = 2) -> bool | None:
-    """Result of `agrees`; None if there are too few draws to decide.
+    """Result of `agrees`.
+
+    None if there are too few draws to decide.
 
     Source: [JCGM101] clauses 7.9.4 and 8.2: twice an end's standard deviation must be below the tolerance, here with
     that deviation from the binomial scatter of its rank.

@@ -75,7 +75,9 @@ def w_critical(level: float) -> float:
 
 
 def tau_critical(level: float, degrees_of_freedom: float) -> float:
-    """Critical |tau| of the two-sided test at `level`; EstimationError for f <= 1.
+    """Critical |tau| of the two-sided test at `level`.
+
+    EstimationError for f <= 1.
 
     Source: [POPE76] (tau and its relation to Student's t).
 
@@ -344,7 +346,10 @@ class SuspectObservation:
 
 
 def checked(fit: GroupFit) -> np.ndarray:
-    """Mask (m,) of observations checked by the others; valid with correlations too."""
+    """Mask (m,) of observations checked by the others.
+
+    Valid with correlations too.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         return fit.sigma**2 > UNCHECKED * (fit.detectable_error / NONCENTRALITY) ** 2
 

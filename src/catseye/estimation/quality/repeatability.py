@@ -11,7 +11,9 @@ from catseye.errors import ValidityError
 
 @dataclass(frozen=True)
 class Repeatability:
-    """One-way analysis of variance of readings in sets; in the unit of the readings.
+    """One-way analysis of variance of readings in sets.
+
+    In the unit of the readings.
 
     mean, u_mean       weighted mean of the sets' means, and its standard uncertainty
     within             standard deviation of a reading within its set, `degrees_within` degrees of freedom

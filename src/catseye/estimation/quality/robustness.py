@@ -35,7 +35,10 @@ MOST_RETURNS = 2  # readmissions of one observation, so that the rounds end
 
 
 def huber(t: np.ndarray, k: float = 1.345) -> np.ndarray:
-    """Huber's weights min(1, k / |t|); k = 1.345 gives 95 % efficiency. Source: [HUBER09]."""
+    """Huber's weights min(1, k / |t|).
+
+    k = 1.345 gives 95 % efficiency. Source: [HUBER09].
+    """
     return np.minimum(1.0, k / np.maximum(np.abs(t), k))
 
 
@@ -82,7 +85,9 @@ STARTS = ("annealed", "l1", "none")
 
 @dataclass(frozen=True, eq=False)
 class RobustEstimate:
-    """Result of a robust estimation; tuples hold one (m,) array per group.
+    """Result of a robust estimation.
+
+    Tuples hold one (m,) array per group.
 
     weights      1e-6 (for zero) to 1
     rejected     |statistic| beyond the limit
@@ -258,7 +263,9 @@ def _scale(rows: _Rows, rescale: bool) -> float:
 def _reweight(
     rows: _Rows, weight: Callable[[np.ndarray], np.ndarray], scale: float, rescale: bool, iterations: int
 ) -> float:
-    """Reweight until the roots of the weights settle; returns the last change.
+    """Reweight until the roots of the weights settle.
+
+    Returns the last change.
 
     With `rescale`, `scale` is multiplied by that of the residuals at each iteration.
     """
@@ -443,7 +450,10 @@ def snoop(
 
 
 def _tests(rows: _Rows, out: np.ndarray) -> np.ndarray:
-    """|w| of each row with some left out; 0 for fixed or unchecked rows."""
+    """|w| of each row with some left out.
+
+    0 for fixed or unchecked rows.
+    """
     rows.solve(np.where(out, np.inf, np.where(rows.doubtful, MOST_INFLATION, 1.0)))
     u = rows.of("detectable_error") / NONCENTRALITY
     with np.errstate(invalid="ignore"):
@@ -487,7 +497,10 @@ def _rejections(rows: _Rows, out: np.ndarray, critical: float, weigh: bool) -> t
 
 
 def _loosen(rows: _Rows, out: np.ndarray, undecided: np.ndarray, status: str) -> str:
-    """Last solution: rejected rows out, undecided rows with large sigmas; returns the status."""
+    """Last solution: rejected rows out, undecided rows with large sigmas.
+
+    Returns the status.
+    """
     _tests(rows, out)
     error = np.abs(rows.of("estimated_error") / rows.sigma)
     size = float(error[(undecided & out) | rows.doubtful].max(initial=MOST_INFLATION))

@@ -285,7 +285,9 @@ def _least_squares_not_negative(normal: np.ndarray, right: np.ndarray) -> np.nda
 def _inverse_information(
     solve: Scaled, model: VarianceModel, theta: np.ndarray, size: np.ndarray
 ) -> tuple[np.ndarray, list[int]]:
-    """Covariance of the components, and indices of inseparable ones; `size` (K,) is the step of each.
+    """Covariance of the components, and indices of inseparable ones.
+
+    `size` (K,) is the step of each.
 
     d tr(P_v Q_k) / d theta_l = -tr(P_v Q_k P_v Q_l), twice the information with the sign turned.
     """

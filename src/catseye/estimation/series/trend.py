@@ -52,11 +52,17 @@ class Trend:
     last: float
 
     def at(self, seconds: np.ndarray) -> np.ndarray:
-        """Level at times (...); constant before the first and after the last reading."""
+        """Level at times (...).
+
+        Constant before the first and after the last reading.
+        """
         return np.interp(np.clip(seconds, self.first, self.last), self.seconds, self.level)
 
     def rate_at(self, seconds: np.ndarray) -> np.ndarray:
-        """Rate at times (...), unit/s, from adjacent grid steps; zero outside the readings."""
+        """Rate at times (...), unit/s, from adjacent grid steps.
+
+        Zero outside the readings.
+        """
         if len(self.seconds) < 2:
             return np.zeros(np.shape(seconds))
         inside = (seconds >= self.first) & (seconds <= self.last)

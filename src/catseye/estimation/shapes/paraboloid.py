@@ -162,7 +162,10 @@ def _parts(step: np.ndarray, free: tuple[str, ...]) -> dict[str, np.ndarray]:
 
 
 def ordered(free: Sequence[str]) -> tuple[str, ...]:
-    """Free parts in the order of the parameters; EstimationError for an unknown name."""
+    """Free parts in the order of the parameters.
+
+    EstimationError for an unknown name.
+    """
     for name in free:
         if name not in PARAMETERS:
             raise EstimationError(f"{name!r} is not a part of a paraboloid (expected {', '.join(PARAMETERS)})")

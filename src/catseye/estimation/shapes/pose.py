@@ -182,12 +182,18 @@ class _Problem:
         return replace(self, names=names, x=self.x[mask], y=self.y[mask], covariances=self.covariances.of(mask))
 
     def fit(self, extra: np.ndarray | None = None) -> tuple[Transformation, LinearEstimate]:
-        """Motion and its linear estimate; `extra` (3n,) m^2 is added to the second epoch's variances."""
+        """Motion and its linear estimate.
+
+        `extra` (3n,) m^2 is added to the second epoch's variances.
+        """
         return adjusted_motion(self.x, self.y, self.covariances, pivot=self.pivot, names=self.names, extra=extra)
 
 
 def _retained(problem: _Problem, method: str) -> tuple[np.ndarray, np.ndarray]:
-    """Mask (n,) of retained points, and largest |w| (n,) of each point; unchecked points stay."""
+    """Mask (n,) of retained points, and largest |w| (n,) of each point.
+
+    Unchecked points stay.
+    """
     sigma = np.sqrt(np.diag(problem.covariances.difference(len(problem.names), np.eye(3))))
 
     def solve(inflation: Sequence[np.ndarray]) -> list[GroupFit]:
@@ -213,7 +219,9 @@ def _retained(problem: _Problem, method: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _one_left_out(problem: _Problem, why: str) -> tuple[np.ndarray, np.ndarray]:
-    """Mask without the one point that prevents a rigid fit, as `_retained`; used if the weights fail.
+    """Mask without the one point that prevents a rigid fit, as `_retained`.
+
+    Used if the weights fail.
 
     Each point is left out in turn. Raises EstimationError if none or several qualify, with their p-values.
     """

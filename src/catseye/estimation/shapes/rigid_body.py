@@ -89,7 +89,10 @@ class Transformation:
 
     @property
     def variance_factor(self) -> float:
-        """Variance factor [pvv] / degrees of freedom, expectation 1; nan without redundancy."""
+        """Variance factor [pvv] / degrees of freedom, expectation 1.
+
+        It is nan without redundancy.
+        """
         return self.pvv / self.degrees_of_freedom if self.degrees_of_freedom else float("nan")
 
     def require_converged(self) -> "Transformation":
@@ -103,7 +106,9 @@ class Transformation:
         return self.pivot + self.translation + (np.asarray(points, dtype=float) - self.pivot) @ self.matrix.T
 
     def about(self, pivot: np.ndarray) -> "Transformation":
-        """The same transformation with another pivot (3,) m; translation and covariance follow.
+        """The same transformation with another pivot (3,) m.
+
+        Translation and covariance follow.
 
         translation' = translation + (matrix - 1) (pivot' - pivot). Exact.
         """

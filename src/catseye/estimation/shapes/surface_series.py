@@ -21,7 +21,9 @@ LARGE = 20_000  # points times epochs from which the compiled form is faster, im
 
 @dataclass(frozen=True, eq=False)
 class SurfaceSeries:
-    """Fits of T epochs of k points; a failed epoch has nan and a status with the reason.
+    """Fits of T epochs of k points.
+
+    A failed epoch has nan and a status with the reason.
 
     free         fitted parts
     parameters   (T, p) m and rad: vertex in the nominal paraboloid's axes, tilts about its x and y, focal length

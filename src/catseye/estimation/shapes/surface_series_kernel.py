@@ -30,7 +30,10 @@ def _turned(a, b):
 
 @njit(cache=True, error_model="numpy")
 def _factor(matrix, p):
-    """Cholesky factor in place of the matrix; False if a pivot is too small."""
+    """Cholesky factor in place of the matrix.
+
+    False if a pivot is too small.
+    """
     for i in range(p):
         for j in range(i + 1):
             total = matrix[i, j]
@@ -60,7 +63,9 @@ def _solve(factor, right, p):
 
 @njit(cache=True, error_model="numpy")
 def _pass(local, weights, variance, six, settings, what, deviation, sums):
-    """Deviations and right-hand side of a step; `what` 1: and the normal matrix, 2: and the noise's.
+    """Deviations and right-hand side of a step.
+
+    `what` 1: and the normal matrix, 2: and the noise's.
 
     `settings` are columns, focal and squared of `series`; `sums` the normal matrix, that of the noise and the right
     side. Returns the number of points used.
@@ -175,7 +180,10 @@ def series(local, variance, weights, columns, focal, squared):
 
 @njit(cache=True, error_model="numpy")
 def _scaled(normal, size, p):
-    """Scale the normal matrix to unit diagonal and factor it in place; diagonal roots in `size`."""
+    """Scale the normal matrix to unit diagonal and factor it in place.
+
+    Diagonal roots in `size`.
+    """
     for a in range(p):
         size[a] = np.sqrt(normal[a, a])
     for a in range(p):

@@ -12,7 +12,9 @@ from catseye.estimation.observations.sight import triples
 
 @dataclass(frozen=True, eq=False)
 class LevelPlanes(ObservationKind):
-    """observed = z of point + height - x[level] + error; usually 0.
+    """observed = z of point + height - x[level] + error.
+
+    The observed value is usually 0.
 
     For a levelling instrument that reads a staff on every point, the reading is the `height` and its line of sight the
     unknown `level`.

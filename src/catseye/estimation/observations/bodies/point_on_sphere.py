@@ -46,7 +46,9 @@ class PointsOnSphere(ObservationKind):
         return self.point, self.centre
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values (m,) and Jacobian (m, 7); nan for a point at the centre.
+        """Values (m,) and Jacobian (m, 7).
+
+        Values are nan for a point at the centre.
 
         >>> p = PointsOnSphere("p", np.zeros(1), np.ones(1), np.array([0]), np.array([3]), 4.5)
         >>> p.predict(np.array([3.0, 4.0, 0.0, 0.0, 0.0, 0.0]))[0]

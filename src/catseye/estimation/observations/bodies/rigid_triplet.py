@@ -78,7 +78,10 @@ class RigidTriplets(ObservationKind):
 
     @property
     def component(self) -> np.ndarray:
-        """Components (5n,): x along, y across, z height of the unit; else ""."""
+        """Components (5n,): x along, y across, z height of the unit.
+
+        It is "" for other rows.
+        """
         return np.tile(["x", "y", "z", "", ""], len(self.left))
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
