@@ -57,7 +57,7 @@ def vector(solution):
     return np.concatenate([solution.x.ravel(), solution.parameters])
 
 
-def test_the_metro_points_move_as_two_other_programs_say(metro):
+def test_metro_displacements_match_two_other_programs(metro):
     """Differences of the published answers of GNU Gama and another; axes are the file's south and west."""
     found = compare(*metro)
     assert set(found.deformation.names) == {*MONITORED, *CARRIED, "4901", "4902"}
@@ -283,7 +283,7 @@ def test_holding_the_fewest_coordinates_anywhere_changes_no_decision(ranging_net
         )
 
 
-def test_points_held_in_both_epochs_are_common_knowledge(ranging_network):
+def test_points_fixed_in_both_epochs_define_the_datum(ranging_network):
     held = {0: [0, 1, 2], 1: [0, 1, 2], 2: [0, 1, 2]}
     found = compare(*twins(ranging_network, np.random.default_rng(45), moved=["T005"], datums=(held, held)))
     d = found.deformation
@@ -391,7 +391,7 @@ def test_a_point_that_kept_its_name_only_is_compared_and_doubted_unless_asked_fo
     assert set(narrow.apart) == {"T004"}
 
 
-def test_what_does_not_fit_together_is_refused_in_one_line(metro, ranging_network):
+def test_incompatible_epochs_are_refused_in_one_line(metro, ranging_network):
     first, second = metro
     with pytest.raises(EstimationError, match=r"the first epoch fixes 201, .* at the second's result; give the epochs"):
         compare(second, first)

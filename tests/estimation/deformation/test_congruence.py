@@ -86,7 +86,7 @@ def test_epochs_of_wrong_shape_or_name_are_refused():
         congruence_test(Epochs(("A",), np.eye(3)[:1], np.eye(3)[:1], np.eye(3), np.eye(3)))
 
 
-def test_a_covariance_seen_from_stable_points_is_that_of_their_inner_constraints():
+def test_covariance_in_the_datum_of_stable_points_is_that_of_inner_constraints():
     """Against the bordered normal equations with the conditions of the chosen points; plain numpy."""
     chosen = np.arange(9) < 5
     e = np.repeat(chosen, 3)[:, None] * FIELD.g

@@ -69,7 +69,7 @@ def test_no_decision_depends_on_how_either_epoch_was_held(seed, turned):
 
 @draws(400)
 @pytest.mark.parametrize("rule", ["global", "local"])
-def test_where_nothing_moved_the_search_rarely_says_so(rule, runs):
+def test_search_rarely_alarms_without_movement(rule, runs):
     rng = np.random.default_rng(5)
     alarms = sum(moved_points(FIELD.epochs(FIELD.ranges(rng)), rule=rule).moved.any() for _ in range(runs))
     assert alarms / runs < 0.05 + 3.5 * np.sqrt(0.05 * 0.95 / runs)
@@ -128,7 +128,7 @@ def test_the_claimed_covariance_of_a_movement_holds_in_scatter(runs):
 
 @pytest.mark.parametrize("rule", ["global", "local"])
 @pytest.mark.parametrize(("seed", "innocent"), [(63, "P3"), (398, "P4")])
-def test_a_point_left_out_in_the_shadow_of_others_comes_back(seed, innocent, rule):
+def test_point_removed_because_of_others_is_readmitted(seed, innocent, rule):
     """Seeds where three movements make a fourth point look worst at first."""
     rng = np.random.default_rng([seed, 1])
     which, vectors = rng.choice(9, 3, replace=False), rng.normal(size=(3, 3))
@@ -188,7 +188,7 @@ def test_a_coordinate_that_is_not_common_takes_no_part():
         moved_points(Epochs(tuple("ABCDEFG"), first, spoiled, q, q, compared=compared), datum="rigid")
 
 
-def test_what_cannot_be_decided_is_said():
+def test_undecidable_cases_are_reported():
     q = np.eye(15) * 1e-10
     heights = np.zeros((5, 3), dtype=bool)
     heights[:, 2] = True

@@ -55,7 +55,7 @@ def test_it_is_the_weighted_least_squares_that_scipy_finds():
     np.testing.assert_allclose(found.residual[0] / sigma, residuals(theirs.x), atol=1e-4)
 
 
-def test_missing_channels_are_left_out_and_too_few_are_said():
+def test_missing_channels_are_ignored_and_too_few_are_reported():
     changes = change_of_range(STATIONS, GROUP, np.full((4, 3), 1e-3))
     changes[0, :2] = np.nan
     changes[1, 2:] = np.nan
@@ -149,7 +149,7 @@ def test_approximate_places_err_alike_in_all_epochs():
 FLAT = allowed_directions(4, forbidden=np.array([[0, 0, 1.0]]))
 
 
-def test_a_constraint_that_holds_wins_and_its_covariance_is_true():
+def test_valid_constraint_improves_and_its_covariance_is_right():
     rng = np.random.default_rng(6)
     true = np.concatenate([rng.normal(size=(4, 2)) * 1e-3, np.zeros((4, 1))], axis=1)
     changes = change_of_range(STATIONS, GROUP, true) + rng.normal(size=(500, 4, 6)) * SIGMA
@@ -173,7 +173,7 @@ def test_a_constraint_that_holds_wins_and_its_covariance_is_true():
     np.testing.assert_allclose(p[0], stats.chi2.sf(statistic[0], 4))
 
 
-def test_a_constraint_that_does_not_hold_costs_the_bias_foretold_and_is_found_out():
+def test_violated_constraint_causes_the_predicted_bias_and_is_detected():
     true = np.array([[1e-3, 0, 3e-4], [0, 1e-3, 0], [0, 0, -2e-4], [0, 0, 0]])
     changes = change_of_range(STATIONS, GROUP, true)
     found = constrained(STATIONS, GROUP, changes, sigma=SIGMA, basis=FLAT, u_violation=3e-4)
@@ -189,7 +189,7 @@ def test_a_constraint_that_does_not_hold_costs_the_bias_foretold_and_is_found_ou
     assert p < 1e-6
 
 
-def test_a_body_is_determined_where_no_single_point_is():
+def test_body_is_determined_although_no_single_point_is():
     """Six channels over four points: none has three, together they hold six motions."""
     motion = np.array([1e-3, -5e-4, 2e-4, 1e-5, 2e-5, -1e-5])
     basis = rigid_group(GROUP)

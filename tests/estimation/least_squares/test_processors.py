@@ -85,7 +85,7 @@ def test_the_system_s_own_count_is_read():
         ({}, None),
     ],
 )
-def test_a_user_s_word_is_obeyed(monkeypatch, environment, count):
+def test_user_setting_is_obeyed(monkeypatch, environment, count):
     assert said(environment) == count
     monkeypatch.setattr(processors, "LOAD", Busy(1, 0.0, 10.0))
     monkeypatch.setattr(processors, "allowed", lambda: ({0}, 1.0))

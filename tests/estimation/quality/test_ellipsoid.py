@@ -192,7 +192,7 @@ def test_the_weakest_direction_of_a_chain_is_its_free_end():
 
 
 @pytest.mark.parametrize("gone", [(2,), (0, 1), (1,), (0, 2)])
-def test_coordinates_that_do_not_exist_leave_the_ellipsoid_of_the_others(gone):
+def test_missing_coordinates_leave_the_ellipsoid_of_the_others(gone):
     rng = np.random.default_rng(4)
     root = rng.normal(size=(5, 3, 3))
     covariance = root @ np.swapaxes(root, 1, 2)

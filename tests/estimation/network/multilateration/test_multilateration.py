@@ -453,7 +453,7 @@ def test_units_and_sigmas_do_not_change_what_is_decided(unit, claim, few):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_another_range_never_grows_a_covariance(seed):
+def test_further_range_never_increases_a_covariance(seed):
     network = room(seed, seen=0.5, noise=0.0)
     left_out = np.ones(len(network.distance))
     left_out[7 * seed] = np.inf
@@ -660,7 +660,7 @@ def test_a_network_without_datum_floats_by_six_motions_or_seven():
     assert adjust_ranges(replace(self_scaled, datum_stations=np.ones((7, 3), dtype=bool))).status == CONVERGED
 
 
-def test_a_datum_that_leaves_a_turn_free_is_told_which():
+def test_datum_with_a_free_rotation_names_it():
     base = room(offset=0.0, noise=0.0)
     stations = base.stations.copy()
     stations[0], stations[3] = (-25, 0, 2), (25, 0, 2)
@@ -690,7 +690,7 @@ def test_a_station_without_ranges_is_named():
     assert "[S03]" in status(without(network, network.station == 2))
 
 
-def test_a_zero_and_scale_that_no_range_tells_apart_are_named():
+def test_inseparable_zero_and_scale_are_named():
     """All targets of one station lie at one distance: its zero and scale do the same."""
     network = room(5, t=25, noise=0.0, offset=0.0, station_names=NAMES["station_names"])
     targets = network.targets.copy()
