@@ -180,10 +180,10 @@ class EpochModel:
 
     Coordinates are numbered 0 to 3n - 1.
 
-    x, y             (n, 3) m, first and second; carried coordinates of the second are the first's
-    q                covariances of the epochs, and
-    columns          (3n,) indices of the coordinates in them
-    compared         (3n,) bool: in both epochs; elsewhere x or y is 0
+    x, y                 (n, 3) m, first and second; carried coordinates of the second are the first's
+    q                    covariances of the epochs, and
+    columns              (3n,) indices of the coordinates in them
+    compared             (3n,) bool: in both epochs; elsewhere x or y is 0
     follow               (3n, k) derivatives of the second epoch's coordinates by the k carried ones; unit rows for
                          these
     carried_indices      (k,) of the carried coordinates

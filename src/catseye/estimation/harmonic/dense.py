@@ -33,11 +33,11 @@ class Solved:
 def solved_together(y: Array, visible: Array, r: Array, *, body: Array, local: Array, full: Array) -> Solved:
     """Joint solution: the body's unknowns function by function, then the points'.
 
-    y      (T, n, 3) m, 0 if not seen
-    visible   (T, n) bool, measured points
-    r      (n, 3, 6) rigid design
+    y             (T, n, 3) m, 0 if not seen
+    visible       (T, n) bool, measured points
+    r             (n, 3, 6) rigid design
     body, local   (T, K), (T, m)
-    full   (T or 1, 3n, 3n) m^2
+    full          (T or 1, 3n, 3n) m^2
 
     Raises ValidityError for an invalid covariance, EstimationError for undetermined unknowns.
     """

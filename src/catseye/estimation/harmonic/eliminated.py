@@ -41,12 +41,12 @@ def solved_by_elimination(
 ) -> Solved:
     """Solution of body, points and shared unknowns, by elimination of the points.
 
-    y      (T, n, 3) m, 0 if not seen
-    visible   (T, n) bool, measured points
-    r      (n, 3, 6) rigid design
+    y             (T, n, 3) m, 0 if not seen
+    visible       (T, n) bool, measured points
+    r             (n, 3, 6) rigid design
     body, local   (T, K), (T, m)
-    points      (T or 1, n or 1, 3, 3) m^2
-    shared      (T or 1, n, 3, q) m, or None
+    points        (T or 1, n or 1, 3, 3) m^2
+    shared        (T or 1, n, 3, q) m, or None
 
     Raises ValidityError for an invalid covariance and for too many remaining unknowns, EstimationError for undetermined
     ones.
@@ -95,8 +95,8 @@ def weights_of(points: Array, measured: Array) -> Array:
 
     0 if not seen.
 
-    points   (T or 1, n or 1, 3, 3) m^2
-    measured     (T, n)
+    points     (T or 1, n or 1, 3, 3) m^2
+    measured   (T, n)
     """
     q = np.asarray(points, dtype=float)
     if (

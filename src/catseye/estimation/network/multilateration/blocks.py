@@ -69,15 +69,15 @@ class IterationState:
 class Reduced:
     """Normal equations of the stations' parameters after the targets' elimination.
 
-    normal      (n, n), n = S width, held parameters included
-    before      (n,) its diagonal before the elimination
-    right       (n,)
-    inverse     (T, 3, 3) V^-1 over free coordinates, zero elsewhere
-    target_step         (T, 3) V^-1 b, the targets' step with fixed stations
-    condition   (T,) 1 / (trace V trace V^-1), nearly the ratio of V's smallest eigenvalue to their sum; nan without V
-    cost        sum of squares of the whitened misclosures of the ranges; nan if the ends of a range coincide
-    gain        sum of b' V^-1 b
-    moment      sum of (root D)^2: amplification of roundoff in the cost
+    normal        (n, n), n = S width, held parameters included
+    before        (n,) its diagonal before the elimination
+    right         (n,)
+    inverse       (T, 3, 3) V^-1 over free coordinates, zero elsewhere
+    target_step   (T, 3) V^-1 b, the targets' step with fixed stations
+    condition     (T,) 1 / (trace V trace V^-1), nearly the ratio of V's smallest eigenvalue to their sum; nan without V
+    cost          sum of squares of the whitened misclosures of the ranges; nan if the ends of a range coincide
+    gain          sum of b' V^-1 b
+    moment        sum of (root D)^2: amplification of roundoff in the cost
     """
 
     normal: np.ndarray
