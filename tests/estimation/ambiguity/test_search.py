@@ -121,7 +121,7 @@ def test_the_stations_covariance_acts_along_the_rays():
 
 
 def test_further_range_is_predicted_with_its_joint_covariance():
-    """By conditioning a normal law (mean and covariance of one value given others), to which the search is blind."""
+    """Conditions a normal distribution (one value given others), independently of the search."""
     rng = np.random.default_rng(22)
     stations = stations_about(rng, 4)
     root = rng.normal(size=(4, 4)) * 3e-4

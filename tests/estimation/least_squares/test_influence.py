@@ -1,4 +1,4 @@
-"""What leaving out does to all other tests, against an adjustment without."""
+"""Influence of left-out observations on all other tests, against a new adjustment."""
 
 import numpy as np
 import pytest

@@ -253,7 +253,7 @@ def test_advice_decides_between_four_ranges_and_takes_no_part_in_the_answer():
 
 @pytest.mark.parametrize("error", [0.003, -0.02])
 def test_small_error_beside_a_gross_one_leaves_good_shots_decided(error):
-    """Of six ranges one is foreign and one is off by chance; which other might be the second does not matter."""
+    """One of six ranges is foreign and one is off by chance; the choice of the second does not matter."""
     field = Field(17)
     field.observed[0][3] += error
     field.observed[4][3] += 7 * SIGMA

@@ -65,7 +65,7 @@ def test_floating_or_exactly_known_combinations_are_named():
 @pytest.mark.parametrize("rows", [4, 11, 40])
 @pytest.mark.parametrize("null", [0, 2])
 def test_diagonal_of_weights_by_panels_is_that_of_the_dense_matrix(rows, null, monkeypatch):
-    """Of a full covariance, and of one that does not know two of the design's combinations."""
+    """Full covariance, and one singular in two of the design's combinations."""
     monkeypatch.setattr(module, "PANEL", 7)
     rng = np.random.default_rng(rows)
     design = rng.normal(size=(rows, 3))

@@ -1,4 +1,4 @@
-"""What holds for every kind: derivatives are those of the values, -1 is no parameter, nonsense is refused."""
+"""Laws of all observation kinds: derivatives match values, -1 is no parameter, invalid input is refused."""
 
 import warnings
 from dataclasses import replace

@@ -150,7 +150,7 @@ class Surveyed(Ranging):
 
 
 def efficiency(weight):
-    """Of the location estimate with normal errors: (E psi')^2 / E psi^2, psi = t w(t), E psi' = E t psi."""
+    """Efficiency of the location estimate with normal errors: (E psi')^2 / E psi^2, psi = t w(t), E psi' = E t psi."""
     slope = (
         2
         * quad(
@@ -396,7 +396,7 @@ def thirty_percent(seed):
 
 
 def survives(seed):
-    """Of a self-calibrating network with 30 % wrong ranges: targets misjudged in silence, undecided, and the misfit."""
+    """Self-calibrating network with 30 % wrong ranges: silently misjudged and undecided targets, and misfit."""
     network, wrong = Ranging(seed), thirty_percent(seed)
     observed = network.contaminated(seed, wrong)
     solve = network.solver(observed)

@@ -135,7 +135,7 @@ def test_many_points_are_the_same_by_the_short_product():
 
 
 def test_rows_at_other_places_are_the_change_there():
-    """By moving the paraboloid and looking at the surface's height, not by the same formula."""
+    """Moves the paraboloid and compares the surface's height, without the same formula."""
     rng = np.random.default_rng(4)
     fit = fit_paraboloid(OUTER.points(section(rng, 30)), np.zeros((30, 3, 3)), OUTER, focal_length=F, free=ALL)
     places = section(rng, 9)

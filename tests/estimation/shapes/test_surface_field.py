@@ -39,7 +39,7 @@ def test_it_is_the_solution_of_the_textbooks_saddle_system():
 
 @draws(24)
 def test_prediction_error_scatters_as_claimed(runs):
-    """With the roughness found from the same few points: seeds apart, points that nothing was told of."""
+    """Roughness is estimated from the same few points; predictions are at other points."""
     ratios = []
     for seed in range(runs):
         rng, places, field, trend = scene(seed, 80, 60)

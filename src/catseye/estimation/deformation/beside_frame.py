@@ -66,7 +66,7 @@ def frame_points(
 
 
 def _evenly(rows: np.ndarray, most: int) -> np.ndarray:
-    """At most so many of the rows, evenly chosen."""
+    """Evenly chosen rows, at most so many."""
     return rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int))]
 
 

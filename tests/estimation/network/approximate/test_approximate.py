@@ -110,7 +110,7 @@ class Survey:
         return self
 
     def station(self, origin, *targets):
-        """What a total station measures."""
+        """Add the observations of a total station."""
         return self.directions(origin, *targets).ranges(origin, *targets).zeniths(origin, *targets)
 
     def network(self, *unknown, given=None):

@@ -341,7 +341,7 @@ def nearest_covariance(name):
 @named
 @pytest.mark.parametrize("engine", ENGINES)
 def test_covariances_are_those_of_the_nearest_network_derived_by_a_bordered_inverse(name, engine):
-    """Where plain numpy's answer is, which is the compiled form's to a picometre (below)."""
+    """Tested on plain numpy, which agrees with the compiled form to a picometre (below)."""
     network, expected = VARIANTS[name], nearest_covariance(name)
     solution = adjust_ranges(network, engine=engine).require_converged()
     stations, targets, _ = columns_of(network)
@@ -436,7 +436,7 @@ def test_moving_and_turning_everything_moves_and_turns_the_answer(seed, far):
 @settings(max_examples=15)
 @given(unit=st.sampled_from([1e-3, 1.0, 1e3, 1e6]), claim=st.sampled_from([1e-3, 1.0, 1e3]), few=st.booleans())
 def test_units_and_sigmas_do_not_change_what_is_decided(unit, claim, few):
-    """From nanometres to kilometres, from 20 nm to 20 mm at 40 m: the same status, iterations apart."""
+    """Nanometres to kilometres, 20 nm to 20 mm at 40 m: same status, except for iterations."""
     network = room(5, seen=0.8, offset=1e-7 if claim < 1 else 1e-4, noise=claim)
     if few:
         kept = (network.target != 3) | (network.station < 2)

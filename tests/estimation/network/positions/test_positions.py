@@ -70,7 +70,7 @@ def test_weighted_positions_with_missing_ranges_are_scipys(compiled):
 
 @pytest.mark.parametrize("compiled", [False, True])
 def test_targets_of_an_adjusted_network_are_found_again_from_its_stations(compiled):
-    """At the optimum of the whole network the targets are optimal for its stations: an independent solver's answer."""
+    """Targets of an optimal network are optimal for its stations (independent solver)."""
 
     def table(name):
         with open(NETWORK / name, encoding="utf-8") as file:
@@ -191,7 +191,7 @@ def test_nearly_coplanar_stations_tell_the_side_when_they_can_and_say_so_when_th
 
 @pytest.mark.parametrize("compiled", [False, True])
 def test_the_closed_form_starts_at_the_answer(compiled):
-    """Without noise one step sees that nothing is left to do: flat, tilted and deep figures of stations."""
+    """Noise-free ranges need one step only: flat, tilted and deep figures of stations."""
     for flat in (0.05, 0.3, 1.0):
         stations, targets, d = hall(17, 64, flat=flat, sigma=0.0)
         turn = rotation(np.random.default_rng(17))
@@ -236,7 +236,7 @@ def test_compiled_and_plain_forms_give_the_same():
 
 
 def counted(monkeypatch):
-    """How many targets the compiled form has left to the plain one, as a list that grows."""
+    """Number of targets that the compiled form left to the plain one, as a growing list."""
     left, plain = [], module._plain
     monkeypatch.setattr(module, "_plain", lambda s, chunk, **kept: (left.append(len(chunk.d)), plain(s, chunk, **kept)))
     return left
