@@ -311,9 +311,8 @@ class _Problem:
         if len(solution.floating):
             status = unconnected(self.network, self._afloat(rows, x)) or floating_text(self.network, solution)
             return self.unanswered(status, solution.x)
-        degrees = sum(int(r.active.sum()) for r in rows) - int(
-            free_columns.sum()
-        )  # sum of redundancy numbers, without rounding
+        # sum of redundancy numbers, without rounding
+        degrees = sum(int(r.active.sum()) for r in rows) - int(free_columns.sum())
         factor = sum(f.pvv for f in solution.fits) / degrees if degrees else float("nan")
         answer = self.answer(solution, solution.q, self._datum_words(floating, datum))
         return replace(answer, degrees_of_freedom=float(degrees), variance_factor=factor)

@@ -37,7 +37,7 @@ MOST_RETURNS = 2  # readmissions of one observation, so that the rounds end
 def huber(t: np.ndarray, k: float = 1.345) -> np.ndarray:
     """Huber's weights min(1, k / |t|).
 
-    k = 1.345 gives 95 % efficiency. Source: [HUBER09].
+    k = 1.345 gives 95 % efficiency for normal errors. Source: [HUBER09].
     """
     return np.minimum(1.0, k / np.maximum(np.abs(t), k))
 
