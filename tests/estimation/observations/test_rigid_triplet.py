@@ -82,9 +82,9 @@ def test_a_normal_along_the_prisms_is_not_defined():
 
 
 def test_what_does_not_fit_is_refused():
-    with pytest.raises(EstimationError, match="t: 5 observed values for 2 triplets; give 5 a unit"):
+    with pytest.raises(EstimationError, match="t: 5 observed values for 2 triplets; give 5 per unit"):
         RigidTriplets("t", np.zeros(5), np.ones(5), *(np.array([0, 3]),) * 3, np.zeros((2, 2), int), np.ones(3))
-    with pytest.raises(EstimationError, match="t: the plate's normal has no length"):
+    with pytest.raises(EstimationError, match="t: the plate's normal has zero length"):
         body(np.zeros(3))
 
 
