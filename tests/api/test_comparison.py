@@ -32,7 +32,7 @@ def test_points_that_went_far_are_named_and_doubted(later, moved):
         assert found.u[i, 1] == pytest.approx(3.8e-4, abs=1e-5)
         assert found.p[i] < 1e-300
     assert found.verdict.word == "doubtful"
-    assert "another point under the same name: P (0.1" in found.verdict.why
+    assert "another point of the same name: P (0.1" in found.verdict.why
     assert all(name in found.verdict.why for name in moved)
     told = found.to_object()
     assert told["moved"] == list(moved)
@@ -99,7 +99,7 @@ def test_a_point_of_a_plane_network_moved_twelve_millimetres(datum):
     assert ("held" in found.words) == (datum == "held")
     assert {"plan"} == set(found.figures())
     said = " ".join(p.text for p in found.passages())
-    assert ("are held in both epochs" in said) == (datum == "held")
+    assert ("are fixed in both epochs" in said) == (datum == "held")
     assert "nan" not in said
 
 
@@ -124,14 +124,14 @@ def test_names_that_differ_by_case_are_said(tmp_path):
         catseye.compare(EPOCHS / "stations-1.gkf", strange)
     part = catseye.compare(EPOCHS / "stations-1.gkf", renamed(tmp_path, {"P": "p", "Q": "Q2"}))
     assert part.verdict.word == "doubtful"
-    assert "not compared, since the names differ by upper and lower case: P and p" in part.verdict.why
+    assert "not compared, as the names differ by upper and lower case: P and p" in part.verdict.why
     words = part.compared.moved.words
     assert "in the first epoch only: P, Q" in words
     assert "in the second epoch only: p, Q2" in words
     gone = renamed(tmp_path, {"D": "d"})  # a held point that the other epoch does not have
     with pytest.raises(
         EstimationError,
-        match=r"the first epoch holds D, which the other epoch does not have \(by another case: D and d\)",
+        match=r"the first epoch fixes D, missing in the other epoch \(differing only in case: D and d\)",
     ):
         catseye.compare(EPOCHS / "stations-1.gkf", gone)
 
@@ -144,9 +144,9 @@ def test_no_answer_says_nan(tmp_path):
     bare.write_text(text.replace("<dh" + rows[1], "").replace("<dh" + rows[3], ""))
     whole = EPOCHS / "levels-2.gkf"
     for pair, said in (
-        ((bare, whole), "variance factor 0.2 of the second epoch, nothing is redundant in the first"),
-        ((whole, bare), "variance factor 0.2 of the first epoch, nothing is redundant in the second"),
-        ((bare, bare), "nothing is redundant in either epoch"),
+        ((bare, whole), "variance factor 0.2 of the second epoch, no redundancy in the first"),
+        ((whole, bare), "variance factor 0.2 of the first epoch, no redundancy in the second"),
+        ((bare, bare), "neither epoch has redundancy"),
     ):
         found = catseye.compare(*pair)
         assert any(said in word for word in found.compared.moved.words)

@@ -119,7 +119,7 @@ def test_any_number_of_free_points_may_have_moved_among_held_ones(kind, moved):
     assert list(np.flatnonzero(d.moved)) == list(which)
     assert d.conclusive
     assert (d.p[which] < 1e-90).all()
-    assert d.status.startswith(f"moved: {', '.join(scene.names[i] for i in which)}, all that are compared")
+    assert d.status.startswith(f"moved: {', '.join(scene.names[i] for i in which)}, all points compared")
 
 
 @pytest.mark.parametrize("kind", KINDS)

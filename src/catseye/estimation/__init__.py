@@ -1,1 +1,1 @@
-"""From observations to parameters and their covariance."""
+"""Estimation of parameters and their covariance from observations."""

@@ -49,7 +49,7 @@ def by_grid(u, stations, lengths, sigma, reach=4.5, step=0.006):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_the_search_finds_what_looking_everywhere_finds(seed):
+def test_search_matches_exhaustive_enumeration(seed):
     rng = np.random.default_rng(seed)
     u, sigma, ranges = 0.06, 0.004, 4 + seed % 2  # so noisy that the grid sees every basin, and the second is near
     stations = stations_about(rng, ranges)
@@ -120,8 +120,8 @@ def test_the_stations_covariance_acts_along_the_rays():
         np.testing.assert_allclose(other.x, results[0].x, rtol=0, atol=1e-12)
 
 
-def test_a_further_range_is_predicted_as_well_as_the_joint_covariance_says():
-    """By conditioning a normal law (mean and covariance of one value given others), to which the search is blind."""
+def test_further_range_is_predicted_with_its_joint_covariance():
+    """Conditions a normal distribution (one value given others), independently of the search."""
     rng = np.random.default_rng(22)
     stations = stations_about(rng, 4)
     root = rng.normal(size=(4, 4)) * 3e-4
@@ -144,7 +144,7 @@ def test_a_further_range_is_predicted_as_well_as_the_joint_covariance_says():
     assert floor == pytest.approx(square[0] + ((HALF - abs(surprise)) / u) ** 2, rel=1e-6)
 
 
-def test_an_error_that_all_ranges_share_does_not_make_a_misfit_when_it_is_said():
+def test_declared_common_error_causes_no_misfit():
     rng = np.random.default_rng(14)
     stations = stations_about(rng, 7)
     lengths = ranged(stations, np.array([0.1, 0.0, -0.1]), 2e-3)  # a zero 2 mm wrong
@@ -173,7 +173,7 @@ def test_one_wrong_range_of_seven_is_named_and_left_out_only_when_asked_for():
     np.testing.assert_array_equal(found.cycles, right)
 
 
-def test_a_wrong_range_can_make_wrong_cycles_fit_and_who_says_so_is_not_deceived():
+def test_wrong_range_can_fit_wrong_cycles_unless_declared_possible():
     rng = np.random.default_rng(16)
     stations = stations_about(rng, 5)
     point = np.array([0.2, -0.1, 0.15])
@@ -264,7 +264,7 @@ def test_a_station_known_to_decimetres_is_the_same_problem():
     np.testing.assert_allclose(found.x, station, rtol=0, atol=3e-4)
 
 
-def test_what_cannot_be_searched_is_a_status():
+def test_impossible_searches_have_a_status():
     rng = np.random.default_rng(19)
     stations = stations_about(rng, 6)
     lengths = ranged(stations, np.zeros(3))
@@ -296,7 +296,7 @@ def test_what_cannot_be_searched_is_a_status():
         )
 
 
-def test_many_points_at_once_are_each_point_alone():
+def test_many_points_give_the_single_point_results():
     rng = np.random.default_rng(20)
     stations = stations_about(rng, 8)
     start = rng.uniform(-5.0, 5.0, (9, 3))

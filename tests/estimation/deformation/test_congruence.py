@@ -86,7 +86,7 @@ def test_epochs_of_wrong_shape_or_name_are_refused():
         congruence_test(Epochs(("A",), np.eye(3)[:1], np.eye(3)[:1], np.eye(3), np.eye(3)))
 
 
-def test_a_covariance_seen_from_stable_points_is_that_of_their_inner_constraints():
+def test_covariance_in_the_datum_of_stable_points_is_that_of_inner_constraints():
     """Against the bordered normal equations with the conditions of the chosen points; plain numpy."""
     chosen = np.arange(9) < 5
     e = np.repeat(chosen, 3)[:, None] * FIELD.g
@@ -95,7 +95,7 @@ def test_a_covariance_seen_from_stable_points_is_that_of_their_inner_constraints
     bordered = np.linalg.inv(np.block([[normal, scale * e], [scale * e.T, np.zeros((6, 6))]]))[:27, :27]
     still = (np.zeros(len(FIELD.design)),) * 2
     for start in ((FIELD.solve, FIELD.q), FIELD.held([0, 1, 2, 4, 5, 8])):
-        found = differences(FIELD.epochs(still, first=start), "rigid", chosen).seen_from(chosen)[1]
+        found = differences(FIELD.epochs(still, first=start), "rigid", chosen).in_datum(chosen)[1]
         np.testing.assert_allclose(found, 2 * bordered, rtol=0, atol=1e-8 * np.abs(bordered).max())
 
 
@@ -131,7 +131,7 @@ def test_plain_differences_in_the_datum_of_stable_points_scatter_as_claimed(turn
         q2 = block @ plain.covariance_second @ block.T
         epochs = Epochs(plain.names, plain.first, plain.second @ turn.T + turned, plain.covariance_first, q2)
         found = differences(epochs, "rigid", stable)
-        d, q = found.seen_from(stable)
+        d, q = found.in_datum(stable)
         np.testing.assert_allclose(d, onto @ (plain.second - plain.first).ravel(), rtol=0, atol=2e-9)
         np.testing.assert_allclose(epochs.second @ found.turned.T + found.shifted - epochs.first, found.d.reshape(9, 3),
                                    rtol=0, atol=1e-12)  # fmt: skip
@@ -140,7 +140,7 @@ def test_plain_differences_in_the_datum_of_stable_points_scatter_as_claimed(turn
     white = np.linalg.solve(np.linalg.cholesky(q[15:, 15:]), np.array(errors).T[15:])
     np.testing.assert_allclose(white @ white.T / runs, np.eye(12), atol=5.0 * np.sqrt(2.0 / runs))
     other = differences(epochs, "rigid", np.ones(9, dtype=bool))  # aligned on all, seen from five
-    np.testing.assert_allclose(other.seen_from(stable)[0], d, rtol=0, atol=2e-9)
+    np.testing.assert_allclose(other.in_datum(stable)[0], d, rtol=0, atol=2e-9)
     assert np.abs(other.d - d).max() > 1e-6
-    with pytest.raises(EstimationError, match="2 stable points do not hold a rigid datum"):
-        found.seen_from(np.arange(9) < 2)
+    with pytest.raises(EstimationError, match="2 stable points do not determine a rigid datum"):
+        found.in_datum(np.arange(9) < 2)

@@ -94,7 +94,7 @@ def test_strain_within_a_plane_needs_no_thickness():
     np.testing.assert_allclose(found.strain[:2, :2], [[2e-5, 1e-5], [1e-5, 0.0]], rtol=0, atol=1e-12)
     assert found.rigid.degrees_of_freedom == 3
     assert found.rigid.p < 1e-12
-    with pytest.raises(EstimationError, match=r"not held by these points: .*strain zz"):
+    with pytest.raises(EstimationError, match=r"not determined by these points: .*strain zz"):
         group_motion(epochs, "ABCDEF", stable="GHIJ", strain_axes=np.eye(3))
     with pytest.raises(EstimationError, match="turn about x of the group"):
         group_motion(epochs, "AB", stable="GHIJ")

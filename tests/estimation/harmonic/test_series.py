@@ -76,7 +76,7 @@ def written_out(y, seen, arms, body, own, full):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_both_ways_are_the_least_squares_written_out(seed):
+def test_both_methods_match_explicit_least_squares(seed):
     rng, arms, body, own, points, u, seen, truth = scene(seed)
     y = observed(rng, arms, body, own, points, u, seen, truth)
     full = full_of(points, u)
@@ -110,7 +110,7 @@ def test_both_ways_are_the_least_squares_written_out(seed):
         np.testing.assert_allclose(together.covariance(body[:2], own[:2], arms)[:, p], whole[:, at, at], atol=1e-20)
 
 
-def test_points_with_all_functions_of_their_own_are_as_many_small_fits():
+def test_points_with_separate_functions_equal_separate_fits():
     rng, arms, body, own, points, u, seen, truth = scene(7, epochs=30, shared=0, lost=0.0)
     y = observed(rng, arms, body, own, points, u, seen, truth)
     both = np.concatenate([own, body], axis=1)
@@ -168,7 +168,7 @@ def test_claimed_covariance_is_the_scatter(way, runs):
         assert np.mean(np.array(values) > chi2.ppf(0.95, freedom)) < 0.05 + same_sigmas(0.05, 400, runs)
 
 
-def test_what_floats_or_is_no_covariance_is_refused():
+def test_floating_unknowns_and_invalid_covariances_are_refused():
     rng, arms, body, own, points, u, seen, truth = scene(2, shared=0, lost=0.0)
     y = observed(rng, arms, body, own, points, u, seen, truth)
     spread = Spread(points=points)

@@ -143,7 +143,7 @@ def test_left_out_or_not_an_observation_has_the_same_test(seed):
             assert not without.fits[i].active[k]
 
 
-def test_in_a_network_the_same_holds_to_its_curvature():
+def test_network_tests_agree_within_curvature():
     x0, groups, _ = network(3)
     whole = adjust(x0, groups)
     active = [np.ones(len(g.observed), dtype=bool) for g in groups]
@@ -279,12 +279,12 @@ def test_a_group_that_is_left_out_whole_is_still_predicted():
 # what cannot be solved says so
 
 
-def test_a_parameter_that_nothing_sees_is_named():
+def test_unobserved_parameter_is_named():
     x0, groups = linear_problem(1)
     solution = adjust(np.append(x0, 0.0), groups, names=["a", "b", "c", "d", "zero ZY101"])
-    assert solution.status == ("rank deficient: zero ZY101 not held by any observation; add one, or give a prior")
+    assert solution.status == ("rank deficient: zero ZY101 not determined by any observation; add one, or give a prior")
     assert np.isnan(solution.covariance).all()  # not zero, which would claim certainty
-    with pytest.raises(EstimationError, match="zero ZY101 not held"):
+    with pytest.raises(EstimationError, match="zero ZY101 not determined"):
         solution.require_converged()
 
 
@@ -318,7 +318,7 @@ def test_one_floating_direction_is_named_in_any_unit(unit):
     held = Linear("survey", survey.observed[keep], survey.covariance[keep], keep, np.eye(len(keep)))
     status = adjust(x0, [*groups[:-1], held], names=names).status
     assert status.startswith("rank deficient")
-    named = status.removeprefix("rank deficient: ").partition(" not held")[0].removesuffix(" ...")
+    named = status.removeprefix("rank deficient: ").partition(" not determined")[0].removesuffix(" ...")
     assert {name[-1] for name in named.split(", ")} == {"x"}
 
 
@@ -352,20 +352,20 @@ def test_parameters_of_very_different_size_do_not_look_deficient():
     [np.array([1.0, 0.0]), np.array([1.0, -1.0]), np.ones((2, 2)), np.array([[1.0, 2.0], [2.0, 1.0]])],
     ids=["zero", "negative", "repeated", "indefinite"],
 )
-def test_a_covariance_that_is_none_is_refused_by_name(covariance):
+def test_invalid_covariance_is_refused_by_name(covariance):
     group = Linear("ZY101", np.zeros(2), covariance, np.arange(2), np.eye(2))
     with pytest.raises(EstimationError, match=r"ZY101: the covariance of its 2 observations is not positive definite"):
         adjust(np.zeros(2), [group])
 
 
-def test_points_that_coincide_have_a_status_that_says_so():
+def test_coinciding_points_are_reported_in_the_status():
     held = Linear("datum", np.zeros(3), np.ones(3), np.arange(3), np.eye(3))
     solution = adjust(np.zeros(6), [distances("rod", np.ones(1), np.ones(1), np.zeros(1, int), np.full(1, 3)), held])
-    assert solution.status.startswith("undefined at the present values: rod has no finite value or derivative")
+    assert solution.status.startswith("undefined at the current values: rod has no finite value or derivative")
     assert np.isnan(solution.covariance).all()
 
 
-def test_an_observation_that_is_no_number_has_a_status_that_names_its_group():
+def test_nan_observation_is_reported_with_its_group():
     x0, groups = linear_problem(1)
     bad = Linear("thermometers", np.array([np.nan]), np.ones(1), np.arange(1), np.eye(1))
     assert "thermometers" in adjust(x0, [*groups, bad]).status

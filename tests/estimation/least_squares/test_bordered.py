@@ -135,7 +135,7 @@ def test_a_parameter_of_a_block_and_one_it_never_meets_are_as_correlated_as_dens
     np.testing.assert_allclose(q.within(pair), whole[np.ix_(pair, pair)], rtol=1e-4, atol=1e-13)
 
 
-def test_an_answer_found_from_afar_is_the_dense_one():
+def test_solution_from_a_distant_start_is_the_dense_one():
     """On the way slopes change: by the limit that an earlier elimination serves up to, a row is another."""
     problem = Problem()
     dense, bordered = problem.solve(), problem.solve(border=problem.bordered())
@@ -163,7 +163,7 @@ def test_rows_that_go_and_come_back_update_an_elimination(problem):
             np.testing.assert_allclose(b.redundancy, a.redundancy, atol=1e-8)
 
 
-def test_a_step_is_refined_from_an_elimination_that_is_only_nearly_its_own(problem):
+def test_step_is_refined_from_a_nearby_elimination(problem):
     """A third of a millimetre beside where it was eliminated: the same step as from nothing, and nothing eliminated."""
     border = problem.bordered()
     problem.solve(border=border, iterations=1)
@@ -209,7 +209,7 @@ def test_wrong_ranges_are_the_same_as_densely(problem):
     assert np.abs((bordered.x - dense.x) / u).max() < 1e-4
 
 
-def test_what_nothing_holds_is_named_as_densely():
+def test_undetermined_parameters_are_named_as_in_the_dense_form():
     """A target out of the typed positions and seen twice, and one in no row at all."""
     for lost in (7, 12):
         problem = Problem()
@@ -224,7 +224,10 @@ def test_what_nothing_holds_is_named_as_densely():
                 a[seen] = False
         dense, bordered = problem.solve(active=active), problem.solve(active=active, border=problem.bordered())
         assert bordered.status.startswith("rank deficient")
-        assert bordered.status.split(" not held")[0].split()[2] == dense.status.split(" not held")[0].split()[2]
+        assert (
+            bordered.status.split(" not determined")[0].split()[2]
+            == dense.status.split(" not determined")[0].split()[2]
+        )
         assert not bordered.solved
         assert np.isnan(bordered.covariance[0, 0])
 

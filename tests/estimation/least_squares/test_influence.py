@@ -1,4 +1,4 @@
-"""What leaving out does to all other tests, against an adjustment without."""
+"""Influence of left-out observations on all other tests, against a new adjustment."""
 
 import numpy as np
 import pytest
@@ -49,7 +49,7 @@ def test_tests_without_some_are_those_of_an_adjustment_without_them(seed):
     )
 
 
-def test_what_hangs_on_the_one_that_left_is_no_longer_checked():
+def test_observations_checked_only_by_the_removed_one_become_unchecked():
     """Two observations of one parameter: without the one nothing says that the other is wrong."""
     pair = [Linear("pair", np.array([0.0, 1.0]), np.ones(2), np.array([0]), np.ones((2, 1)))]
     tests = Influence(pair, adjust(np.zeros(1), pair))
@@ -79,7 +79,7 @@ def with_parameter(every, pattern):
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("out", [0, 5])
-def test_an_error_of_a_pattern_is_what_a_parameter_more_is_found_to_be(seed, out):
+def test_error_of_a_pattern_is_the_estimate_of_an_added_parameter(seed, out):
     every = groups(seed)
     rng = np.random.default_rng(seed + 100)
     total = sum(len(g.observed) for g in every)
@@ -97,7 +97,7 @@ def test_an_error_of_a_pattern_is_what_a_parameter_more_is_found_to_be(seed, out
         assert u[k] == pytest.approx(np.sqrt(plain.covariance[3, 3]), rel=1e-6)
 
 
-def test_a_pattern_that_the_parameters_take_up_wholly_has_an_infinite_u_and_says_nothing():
+def test_pattern_absorbed_by_the_parameters_has_infinite_u():
     every = groups(0)[:1]
     patterns = np.stack([every[0].matrix @ [1.0, -2.0, 0.5], np.arange(8.0)], axis=1)
     estimate, u = Influence(every, adjust(np.zeros(3), every)).errors_of(patterns)

@@ -55,7 +55,7 @@ def test_the_pool_follows_what_others_leave(monkeypatch, cores, idle, own, share
 
 
 def test_before_anything_is_measured_the_load_of_the_last_minute_counts(monkeypatch):
-    """Of 16 cores with load 12 a process that may use 4 has one; nothing is divided by no time."""
+    """A process that may use 4 of 16 cores gets one at load 12; zero elapsed time is handled."""
     load = Busy(4, 0.0, 0.0)
     load.passed = 0.0
     monkeypatch.setattr(processors, "allowed", lambda: (load.cores, load.share))
@@ -85,7 +85,7 @@ def test_the_system_s_own_count_is_read():
         ({}, None),
     ],
 )
-def test_a_user_s_word_is_obeyed(monkeypatch, environment, count):
+def test_user_setting_is_obeyed(monkeypatch, environment, count):
     assert said(environment) == count
     monkeypatch.setattr(processors, "LOAD", Busy(1, 0.0, 10.0))
     monkeypatch.setattr(processors, "allowed", lambda: ({0}, 1.0))

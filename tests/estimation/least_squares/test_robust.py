@@ -133,7 +133,7 @@ def test_a_wrong_range_of_six_that_pulls_hard_is_found(error):
     assert alone >= 0.95 * cases  # else a second one might be the wrong one just as well, and both go
 
 
-def test_two_that_contradict_each_other_alone_are_both_left_out():
+def test_two_mutually_contradicting_observations_are_both_left_out():
     # three stations hold the point; the fourth shot repeats the first's line and disagrees: which of the two?
     stations = STATIONS[[0, 2, 4, 0]]
     field = Field(9, targets=3, stations=stations)
@@ -231,7 +231,7 @@ def typed_on_a_body(seed=5, shift=(30.0, -20.0, 10.0)):
     return field, body.tolist()
 
 
-def test_a_typed_place_on_a_body_that_many_know_is_known_of_the_point():
+def test_typed_place_on_a_well_determined_body_is_prior_of_the_point():
     field, body = typed_on_a_body()
     field.observed[1][7] += 0.6
     assert field.left_out(from_agreement(field, settled=body)) == {(1, 7)}
@@ -252,8 +252,8 @@ def test_advice_decides_between_four_ranges_and_takes_no_part_in_the_answer():
 
 
 @pytest.mark.parametrize("error", [0.003, -0.02])
-def test_a_slight_error_beside_a_grave_one_makes_no_innocent_shot_undecided(error):
-    """Of six ranges one is foreign and one is off by chance; which other might be the second does not matter."""
+def test_small_error_beside_a_gross_one_leaves_good_shots_decided(error):
+    """One of six ranges is foreign and one is off by chance; the choice of the second does not matter."""
     field = Field(17)
     field.observed[0][3] += error
     field.observed[4][3] += 7 * SIGMA
@@ -262,7 +262,7 @@ def test_a_slight_error_beside_a_grave_one_makes_no_innocent_shot_undecided(erro
     assert len(field.left_out(solution)) <= 2
 
 
-def test_nothing_comes_back_that_was_rejected_at_another_point():
+def test_rejections_at_other_points_are_not_readmitted():
     field = Field(31, targets=8)
     field.observed[4][2] += 0.02
     field.observed[1][2] += 0.3
@@ -279,7 +279,7 @@ def test_a_selection_given_is_a_start_not_a_verdict():
     assert field.left_out(field.adjusted(active=active).require_converged()) == {(2, 4)}
 
 
-def test_what_must_stay_stays():
+def test_non_removable_observations_stay():
     field = Field(6, prior=1e-3)
     field.prior[0].observed[0] += 1.0  # a wrong prior that may not be removed
     solution = field.adjusted()
@@ -351,7 +351,7 @@ def test_a_conflict_of_two(pair):
     assert conflict(u, u @ [1.0, 2, 3] + wrong).smallest_conflict() == pair
 
 
-def test_three_wrong_of_eight_are_too_many_to_say():
+def test_three_wrong_of_eight_are_not_decided():
     u = towards(8)
     wrong = np.array([300.0, -500, 800, 0, 0, 0, 0, 0])
     assert conflict(u, wrong).smallest_conflict() is None
@@ -384,7 +384,7 @@ def test_the_cost_is_the_sum_of_squares_at_the_best_place():
     st.lists(st.tuples(st.integers(0, 5), st.integers(0, 3), st.floats(-100.0, 100.0)), max_size=14),
     st.booleans(),
 )
-def test_whatever_is_wrong_it_ends_with_a_status(seed, stations, wrong, typed):
+def test_any_input_ends_with_a_status(seed, stations, wrong, typed):
     field = Field(seed, targets=4, stations=STATIONS[:stations], prior=0.1 if typed else None)
     for s, k, error in wrong:
         field.observed[s % stations][k] += error
@@ -430,6 +430,6 @@ def one_left_out(w, others=4):
         (0.5, [], []),
     ],
 )
-def test_what_is_out_comes_back_a_tenth_below_the_limit_and_what_is_in_stays_up_to_it(share, once_out, once_in, sign):
+def test_readmission_and_rejection_limits_differ_by_a_tenth(share, once_out, once_in, sign):
     """Critical is 3.5: between 3.15 and 3.5 an observation stays where it is, so that no rounding turns it about."""
     assert one_left_out(sign * share * 3.5) == (once_out, once_in)

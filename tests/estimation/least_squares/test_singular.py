@@ -48,24 +48,24 @@ def test_estimates_with_exactly_known_rows_are_those_of_elimination():
     np.testing.assert_allclose(found.pvv, left @ w @ left, rtol=1e-9)
 
 
-def test_what_floats_or_is_known_too_well_is_named():
+def test_floating_or_exactly_known_combinations_are_named():
     names = {"rows": list("123")}
-    with pytest.raises(EstimationError, match="not held by these points: b"):
+    with pytest.raises(EstimationError, match="not determined by these points: b"):
         best_linear_estimate(np.eye(3)[:, :2] * [1, 0], np.zeros(3), np.eye(3), parameters=["a", "b"], **names)
-    with pytest.raises(EstimationError, match=r"not held by these points: a, b"):
+    with pytest.raises(EstimationError, match=r"not determined by these points: a, b"):
         best_linear_estimate(np.ones((3, 2)), np.zeros(3), np.eye(3), parameters=["a", "b"], **names)
     q = np.array([[1.0, 0, 0], [0, 1, 1], [0, 1, 1]])
-    with pytest.raises(EstimationError, match=r"combination of (2, 3|3, 2) exactly"):
+    with pytest.raises(EstimationError, match=r"combination of (2, 3|3, 2) has zero variance"):
         best_linear_estimate(np.zeros((3, 0)), np.zeros(3), q, parameters=[], **names)
     q = np.array([[1.0, 0, 0], [0, 1, 2], [0, 2, 1]])
-    with pytest.raises(EstimationError, match="the covariance is none"):
+    with pytest.raises(EstimationError, match="invalid covariance"):
         best_linear_estimate(np.zeros((3, 0)), np.zeros(3), q, parameters=[], **names)
 
 
 @pytest.mark.parametrize("rows", [4, 11, 40])
 @pytest.mark.parametrize("null", [0, 2])
-def test_the_weights_diagonal_is_the_dense_matrix_one_panel_after_the_other(rows, null, monkeypatch):
-    """Of a full covariance, and of one that does not know two of the design's combinations."""
+def test_diagonal_of_weights_by_panels_is_that_of_the_dense_matrix(rows, null, monkeypatch):
+    """Full covariance, and one singular in two of the design's combinations."""
     monkeypatch.setattr(module, "PANEL", 7)
     rng = np.random.default_rng(rows)
     design = rng.normal(size=(rows, 3))

@@ -105,7 +105,7 @@ def test_rank_does_not_depend_on_units_or_sigmas(ranging_network, engine, sigma,
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_point_seen_by_two_ranges_is_named_with_what_would_hold_it(ranging_network, engine):
+def test_point_with_two_ranges_is_named_with_a_remedy(ranging_network, engine):
     network, _ = ranging_network(7)
     keep = (network.groups[0].target != 3 * 10) | (network.groups[0].origin < 6)
     status = adjust_network(with_ranges(network, keep=keep), engine=engine).status
@@ -340,7 +340,7 @@ def test_given_coordinates_exchanged_in_the_datum_are_named_though_every_range_f
     solution = adjust_network(replace(network, points=replace(network.points, xyz=xyz)), start=good)
     assert good.status == "converged"
     assert solution.variance_factor == pytest.approx(good.variance_factor, rel=1e-6)
-    assert solution.status.startswith("converged, but S03 and S07 lie at each other's given places")
+    assert solution.status.startswith("converged, but S03 and S07 appear exchanged")
 
 
 def test_points_on_a_line_do_not_turn_about_it():
@@ -355,10 +355,10 @@ def test_points_on_a_line_do_not_turn_about_it():
     np.testing.assert_allclose(solution.covariance, np.tile(np.eye(3) * 1e-6 / 4, (2, 1, 1)), atol=1e-15)
 
 
-def test_a_network_that_does_not_come_to_rest_in_its_datum_says_so(ranging_network, monkeypatch):
+def test_unsettled_datum_is_reported(ranging_network, monkeypatch):
     network, _ = ranging_network(24, off=0.5)
     monkeypatch.setattr(
         network_adjustment, "PASSES", 1
     )  # the first pass holds the fewest coordinates, half a metre off
     solution = adjust_network(network, engine="dense")
-    assert solution.status.startswith("not converged: the network does not come to rest in its datum")
+    assert solution.status.startswith("not converged: the network did not settle in its datum")

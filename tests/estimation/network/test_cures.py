@@ -156,7 +156,7 @@ def test_a_reason_whose_cure_does_not_fit_is_not_named():
     assert "variance factor is" not in status
 
 
-def test_pieces_that_are_held_are_not_blamed_for_a_height_that_nothing_measures():
+def test_held_pieces_are_not_named_for_an_unmeasured_height():
     head = ".UNITS Meters GONS\n.ORDER EN\n"
     corners = "".join(f"C {n} {x} 0 0 ! ! !\n" for n, x in (("A1", 0), ("A2", 100), ("B1", 1000), ("B2", 1100)))
     free = "C P 50 50 5\nC Q 1050 50 5\n"
@@ -189,7 +189,7 @@ def flat_stations(*, sigma, targets, seed=0):
 
 @pytest.mark.parametrize("sigma", [1e-3, 1e-9])
 @pytest.mark.parametrize("targets", [1, 4, 8])
-def test_stations_in_one_plane_are_told_of_the_mirror_image_and_no_zero_is_blamed(sigma, targets):
+def test_coplanar_stations_are_diagnosed_as_mirror_image_not_zero(sigma, targets):
     status = adjust_network(flat_stations(sigma=sigma, targets=targets)).status
     assert "mirror image" in status or "two positions fit" in status
     assert "zero" not in status

@@ -10,7 +10,7 @@ from catseye.estimation.network.external import effects_at_ends
 
 
 @pytest.mark.parametrize("engine", ["dense", "sparse", "ranging"])
-def test_an_error_of_the_detectable_size_moves_its_points_as_far_as_said(ranging_network, engine):
+def test_detectable_error_moves_its_points_by_the_predicted_amount(ranging_network, engine):
     network, _ = ranging_network(31, stations=8, sigma=1e-6)
     ranges = network.groups[0]
     solution = adjust_network(network, engine=engine)

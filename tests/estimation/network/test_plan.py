@@ -34,7 +34,7 @@ def with_more(network, pairs, sigma):
     return predicted(replace(network, groups=(longer,)))
 
 
-def test_each_candidate_gains_what_adjusting_with_it_gains(ranging_network):
+def test_predicted_gain_of_a_candidate_equals_gain_of_adjusting_with_it(ranging_network):
     network, _ = ranging_network(1, stations=8, seen=0.8)
     worth = plan(network, most=200)
     assert len(worth.candidates) == 8 * 12
@@ -48,7 +48,7 @@ def test_each_candidate_gains_what_adjusting_with_it_gains(ranging_network):
     assert gains[-1] > 0.0
 
 
-def test_each_observation_is_worth_what_leaving_it_out_costs(ranging_network):
+def test_worth_of_an_observation_is_the_loss_without_it(ranging_network):
     network, _ = ranging_network(2, stations=7)
     network = predicted(network)
     worth = plan(network)
@@ -85,7 +85,7 @@ def test_a_range_without_which_a_point_floats_is_worth_everything(ranging_networ
     assert np.isfinite(worth.worth[0][~needed]).all()
 
 
-def test_a_schedule_keeps_every_ranger_within_its_time_and_reaches_what_it_says(ranging_network):
+def test_schedule_keeps_the_time_of_every_ranger_and_its_predicted_uncertainty(ranging_network):
     network, _ = ranging_network(5, stations=8, seen=0.8)
     worth = plan(network)
     picked = schedule(worth, budget_s=10.0, shot_s=3.0)
@@ -118,7 +118,7 @@ def test_the_points_of_interest_decide_what_is_best(ranging_network):
         plan(network, interest=["X"])
 
 
-def test_a_plan_that_floats_says_what(ranging_network):
+def test_floating_plan_names_the_floating_points(ranging_network):
     network, _ = ranging_network(8)
     keep = (network.groups[0].target != 3 * 10) | (network.groups[0].origin < 6)
     part = {k: getattr(network.groups[0], k)[keep] for k in ("observed", "covariance", "origin", "target")}
@@ -140,7 +140,7 @@ def test_measuring_on_paper_scatters_as_predicted(ranging_network):
     assert result.false == 0.0
 
 
-def test_air_that_is_wrong_shows_beside_the_claim(ranging_network):
+def test_wrong_air_increases_scatter_over_claim(ranging_network):
     network, _ = ranging_network(10)
     wrong = scatter(network, adjust_network, runs=30, seed=2, disturbance=Disturbance(common_ppm=3.0))
     assert wrong.ratio > 1.5

@@ -126,7 +126,7 @@ def test_other_networks_are_refused_by_name(ranging_network):
         )
 
 
-def test_a_large_network_takes_it_by_itself_and_falls_back_where_it_has_no_answer(ranging_network):
+def test_large_networks_use_the_ranging_engine_and_fall_back_on_failure(ranging_network):
     network, _ = ranging_network(6, stations=10, targets=220)
     assert type(adjust_network(network).q).__name__ == "RangingCovariance"
     ranges = network.groups[0]

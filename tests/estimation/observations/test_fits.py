@@ -182,7 +182,7 @@ def test_a_two_axis_inclinometer_levels_a_frame_but_does_not_turn_it():
 def test_a_fixed_distance_holds_and_shows_a_contradiction():
     """Two bars of 2 m and 2.000002 m between the same points: neither is hidden, each misses by 1 um = 10 sigma."""
     ends = np.array([0, 0]), np.array([3, 3])
-    bars = kinds.FixedDistances.held("bars", np.array([2.0, 2.000002]), *ends)
+    bars = kinds.FixedDistances.constrained("bars", np.array([2.0, 2.000002]), *ends)
     x, _, pvv, _ = fit([bars], [0, 0, 0, 1.9, 0, 0], np.array([3]))
     assert x[3] == pytest.approx(2.000001, abs=1e-10)
     assert pvv == pytest.approx(200.0, rel=1e-3)

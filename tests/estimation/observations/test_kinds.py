@@ -1,4 +1,4 @@
-"""What holds for every kind: derivatives are those of the values, -1 is no parameter, nonsense is refused."""
+"""Laws of all observation kinds: derivatives match values, -1 is no parameter, invalid input is refused."""
 
 import warnings
 from dataclasses import replace
@@ -140,7 +140,7 @@ def test_kinds_have_names_of_their_own():
 
 
 @pytest.mark.parametrize("which", range(len(NAMES)), ids=NAMES)
-def test_rows_do_not_know_of_each_other(which):
+def test_rows_are_independent_of_each_other(which):
     """Values follow from the parameters of a row alone: changing others leaves them, so columns are complete."""
     made, x = groups(5)
     group = made[which]
@@ -160,7 +160,7 @@ DIRECTED = (
 
 
 @pytest.mark.parametrize("which", range(len(NAMES) - 1), ids=NAMES[:-1])
-def test_points_that_coincide_have_no_derivative_in_their_own_row_and_harm_no_other(which):
+def test_coinciding_points_give_nan_only_in_their_row(which):
     made, x = groups(4)
     shifts = {name: None for name in vars(made[which]) if "shift" in name}
     group = replace(made[which], **shifts)
@@ -221,7 +221,7 @@ def test_a_parameter_that_is_absent_counts_as_zero():
         np.testing.assert_array_equal(gone.predict(x)[1], expected)
 
 
-def test_a_joint_group_is_its_parts_one_below_the_other():
+def test_joint_group_stacks_its_parts():
     made, x = groups(9)
     parts = (made[0], made[4], made[-2])
     joint = kinds.Joint.of("j", parts, np.eye(12))
@@ -269,9 +269,9 @@ def test_a_start_that_is_no_rotation_or_no_direction_is_refused():
         kinds.RigidBodies("b", *nine, point, pose, 1.001 * np.eye(3))
     with pytest.raises(EstimationError, match="b: the start R0 has determinant -1"):
         kinds.FramePoints("b", *nine, point, pose, np.diag([1.0, 1.0, -1.0]), np.array([9]))
-    with pytest.raises(EstimationError, match="p: the normal has no length"):
+    with pytest.raises(EstimationError, match="p: the normal has zero length"):
         kinds.PointsOnPlane("p", np.zeros(1), np.ones(1), point, np.zeros(3), np.zeros(3), np.array([3, 4, 5]))
-    with pytest.raises(EstimationError, match="p: the line has no length"):
+    with pytest.raises(EstimationError, match="p: the line has zero length"):
         kinds.PointsOnLine("p", np.zeros(2), np.ones(2), point, np.zeros(3), np.zeros(3), np.array([3, 4, 5, 6]))
 
 

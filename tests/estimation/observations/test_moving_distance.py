@@ -92,7 +92,7 @@ def test_points_that_meet_have_no_derivative_and_no_warning():
     assert np.isnan(met.predict(np.zeros(6))[1]).all()
 
 
-def test_a_column_that_is_none_is_refused():
+def test_invalid_column_is_refused():
     group, _, more = scene(1)
     bad = {**more, "nuisance": np.zeros((M + 1, 1), dtype=int)}
     ends = group.origin_turn, group.origin_shift, group.target_turn, group.target_shift

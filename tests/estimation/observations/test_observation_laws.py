@@ -52,7 +52,7 @@ def clockwise(x, angle, shift):
 
 @quick
 @given(seeds, angles)
-def test_turning_everything_about_the_vertical_leaves_what_is_read(seed, angle):
+def test_rotation_about_the_vertical_leaves_readings_unchanged(seed, angle):
     x = scene(seed)
     moved = clockwise(x, angle, np.array([100.0, -50.0, 7.0]))
     level = (
@@ -92,7 +92,7 @@ def test_a_larger_scene_has_larger_lengths_and_the_same_angles(seed, factor):
 
 @quick
 @given(seeds)
-def test_exchanging_the_ends_turns_signs(seed):
+def test_exchanging_the_ends_changes_signs(seed):
     x = scene(seed)
 
     def there_and_back(make):
@@ -167,7 +167,7 @@ def test_a_sphere_gives_the_zenith_angle_that_the_curvature_term_claims(seed):
     np.testing.assert_allclose(value, exact, rtol=0, atol=1e-12)
 
 
-def test_a_ray_bent_as_much_as_the_earth_sees_equal_heights_on_its_horizon():
+def test_ray_with_earth_curvature_has_equal_heights_on_its_horizon():
     """k = 1: the ray follows the ground, so curvature and refraction cancel."""
     group = kinds.ZenithAngles(
         "law", np.zeros(1), np.ones(1), np.array([0]), np.array([3]), refraction=1.0, curved=True
@@ -225,7 +225,7 @@ def test_the_right_jacobian_is_the_mean_of_the_turn_back(seed, angle):
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-4, 0.299999999, 0.3, 0.300000001, 1.0])
-def test_the_right_jacobian_keeps_its_digits_where_series_and_formula_meet(angle):
+def test_right_jacobian_is_accurate_at_the_series_limit(angle):
     mpmath = pytest.importorskip("mpmath")
     w = mpmath.mpf(angle)
     with mpmath.workdps(50):

@@ -33,7 +33,7 @@ def placed(rng, own):
 
 
 @given(seeds)
-def test_a_unit_shows_its_own_shape_wherever_it_stands(seed):
+def test_unit_geometry_is_independent_of_its_pose(seed):
     rng = np.random.default_rng(seed)
     own = rng.normal(size=3) * 1e-3
     ground, normal = placed(rng, own)
@@ -61,7 +61,7 @@ def test_exchanged_prisms_turn_along_and_across_and_leave_the_height():
     np.testing.assert_allclose(values, [-1e-3, -2e-3, 3e-3, 0.635, -np.sin(2e-3)], rtol=0, atol=1e-13)
 
 
-def test_prisms_at_one_place_have_no_direction_and_harm_no_other_unit():
+def test_coinciding_prisms_give_nan_only_in_their_unit():
     ground, normal = placed(np.random.default_rng(5), np.zeros(3))
     x = np.concatenate([ground, [0.0, 0.0], ground])
     x[3:6] = x[:3]
@@ -82,13 +82,13 @@ def test_a_normal_along_the_prisms_is_not_defined():
 
 
 def test_what_does_not_fit_is_refused():
-    with pytest.raises(EstimationError, match="t: 5 observed values for 2 triplets; give 5 a unit"):
+    with pytest.raises(EstimationError, match="t: 5 observed values for 2 triplets; give 5 per unit"):
         RigidTriplets("t", np.zeros(5), np.ones(5), *(np.array([0, 3]),) * 3, np.zeros((2, 2), int), np.ones(3))
-    with pytest.raises(EstimationError, match="t: the plate's normal has no length"):
+    with pytest.raises(EstimationError, match="t: the plate's normal has zero length"):
         body(np.zeros(3))
 
 
-def test_the_squareness_tells_the_tilt_that_the_prisms_line_can_tell():
+def test_squareness_determines_the_tilt_about_the_prism_line():
     """Prisms known to 0.1 mm, u of the right angle 0.25 mrad: a prior of 5 mrad on the tilt along them becomes
     hypot(0.25, sqrt(2) 0.1/635 = 0.22) = 0.335 mrad; the tilt about their line stays where its prior is."""
     x = np.concatenate([[-0.3175, 0, 0, 0.3175, 0, 0, 0, 0, 0], [0.0, 0.0]])

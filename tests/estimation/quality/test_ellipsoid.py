@@ -72,7 +72,7 @@ def test_a_held_coordinate_makes_a_flat_ellipsoid_and_no_answer_makes_nan():
 
 
 def test_a_matrix_with_a_negative_eigenvalue_is_refused():
-    with pytest.raises(EstimationError, match="covariance 1 is none: its smallest eigenvalue is -1"):
+    with pytest.raises(EstimationError, match="covariance 1 is invalid: its smallest eigenvalue is -1"):
         ellipsoid(np.array([np.eye(3), np.diag([1.0, -1.0, 2.0])]))
     with pytest.raises(EstimationError, match="must not be negative"):
         ellipse(np.diag([1.0, -0.1]))
@@ -192,7 +192,7 @@ def test_the_weakest_direction_of_a_chain_is_its_free_end():
 
 
 @pytest.mark.parametrize("gone", [(2,), (0, 1), (1,), (0, 2)])
-def test_coordinates_that_do_not_exist_leave_the_ellipsoid_of_the_others(gone):
+def test_missing_coordinates_leave_the_ellipsoid_of_the_others(gone):
     rng = np.random.default_rng(4)
     root = rng.normal(size=(5, 3, 3))
     covariance = root @ np.swapaxes(root, 1, 2)

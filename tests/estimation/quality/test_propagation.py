@@ -33,7 +33,7 @@ def drawing(inputs, correlation=None):
     return lambda generator, n: draw_inputs(inputs, generator, n, correlation=correlation)
 
 
-def test_the_end_gauge_of_the_guide_comes_out_as_printed():
+def test_end_gauge_example_of_the_guide_is_reproduced():
     """JCGM 100 annex H.1, nanometres: u 32, 16.7 degrees of freedom, U99 93 (with t of 16, 2.92)."""
     inputs = [
         Input("standard", 50_000_623.0, 25.0, "t", 18.0),
@@ -72,7 +72,7 @@ def test_ten_resistors_calibrated_alike_add_their_uncertainties():
     ("widest", "u", "budgets", "draws", "same"),
     [(1.0, 2.00, 3.92, 3.88, True), (10.0, 10.1, 19.9, 17.0, False)],
 )
-def test_sums_of_rectangles_come_out_as_the_supplement_prints(widest, u, budgets, draws, same):
+def test_sums_of_rectangles_match_the_supplement(widest, u, budgets, draws, same):
     """JCGM 101 tables 3 and 4: half widths of both intervals; with one wide rectangle the budget's is too long."""
     inputs = [Input(f"x{k}", 0.0, s, "rectangular") for k, s in enumerate((1.0, 1.0, 1.0, widest))]
     budget = propagate(inputs, np.ones(4), value=0.0)
@@ -88,7 +88,7 @@ def test_sums_of_rectangles_come_out_as_the_supplement_prints(widest, u, budgets
     ("x1", "r", "mean", "u", "high"),
     [(0.000, 0.0, 50.0, 50.0, 150.0), (0.010, 0.0, 150.0, 112.0, 367.0), (0.010, 0.9, 150.0, 121.0, None)],
 )
-def test_the_mismatch_loss_of_the_supplement_comes_out_as_printed(x1, r, mean, u, high):
+def test_mismatch_loss_of_the_supplement_is_reproduced(x1, r, mean, u, high):
     """JCGM 101 clause 9.4, in 1e-6: a model so bent that the budget is useless; the shortest interval starts at 0."""
     inputs = [Input("x1", x1, 0.005), Input("x2", 0.0, 0.005)]
     joined = np.array([[1.0, r], [r, 1.0]])
@@ -181,7 +181,7 @@ def test_a_monte_carlo_repeats_itself_and_its_interval_is_the_quantiles():
     assert one.u == pytest.approx(1e-5, rel=0.013)  # small beside the value: nothing is lost to rounding
 
 
-def test_an_adaptive_run_stops_when_its_digits_stand_still():
+def test_adaptive_run_stops_when_its_digits_are_stable():
     inputs = [Input("a", 0.0, 3.0), Input("b", 0.0, 4.0)]
     coarse, fine = (
         adaptive_monte_carlo(lambda x: x.sum(axis=1), drawing(inputs), generator=rng(10), digits=d) for d in (1, 2)
@@ -193,7 +193,7 @@ def test_an_adaptive_run_stops_when_its_digits_stand_still():
     assert fine.high == pytest.approx(1.959964 * 5.0, abs=numerical_tolerance(5.0, 2))
 
 
-def test_an_adaptive_run_that_meets_its_cap_says_so():
+def test_adaptive_run_reports_its_limit():
     inputs = [Input("a", 0.0, 9.5)]  # its second digit is half a percent
     found = adaptive_monte_carlo(lambda x: x[:, 0], drawing(inputs), generator=rng(11), digits=2, most=30_000)
     assert not found.settled
@@ -239,7 +239,7 @@ def test_a_result_without_any_uncertainty_has_no_shares():
     assert numerical_tolerance(0.0) == 0.0
 
 
-def test_too_few_draws_decide_nothing():
+def test_too_few_draws_give_no_decision():
     """A linear normal model, whose budget is exact: a thousand draws would have said that it is wrong."""
     inputs = [Input("x", 0.0, 70.0)]
     budget = propagate(inputs, np.ones(1), value=0.0)

@@ -8,7 +8,7 @@ from catseye.estimation.quality.repeatability import repeatability
 from draws import draws, same_sigmas
 
 
-def test_the_ratio_is_that_of_another_librarys_analysis_of_variance():
+def test_f_ratio_matches_scipy_analysis_of_variance():
     from scipy.stats import f_oneway
 
     sets = [[6.0, 8.0, 4.0, 5.0, 3.0], [8.0, 12.0, 9.0, 11.0], [13.0, 9.0, 11.0, 8.0, 7.0, 12.0]]
@@ -17,7 +17,7 @@ def test_the_ratio_is_that_of_another_librarys_analysis_of_variance():
 
 
 @draws(2000)
-def test_both_components_and_the_mean_come_out_with_the_scatter_claimed(runs):
+def test_components_and_mean_scatter_as_claimed(runs):
     rng = np.random.default_rng(2)
     names = np.repeat(np.arange(12), [3, 4, 5, 3, 4, 5, 3, 4, 5, 3, 4, 5])
     within, between, off = [], [], []
@@ -43,5 +43,5 @@ def test_the_alarm_rate_is_the_level():
 def test_readings_that_cannot_separate_the_two_are_refused():
     with pytest.raises(ValidityError, match="2 readings in 2 sets"):
         repeatability([1.0, 2.0], ["a", "b"])
-    with pytest.raises(ValidityError, match="3 places"):
+    with pytest.raises(ValidityError, match="3 set labels"):
         repeatability([1.0, 2.0], ["a", "b", "b"])

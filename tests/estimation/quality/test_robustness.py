@@ -150,7 +150,7 @@ class Surveyed(Ranging):
 
 
 def efficiency(weight):
-    """Of the location estimate with normal errors: (E psi')^2 / E psi^2, psi = t w(t), E psi' = E t psi."""
+    """Efficiency of the location estimate with normal errors: (E psi')^2 / E psi^2, psi = t w(t), E psi' = E t psi."""
     slope = (
         2
         * quad(
@@ -182,13 +182,13 @@ def test_weights_are_even_between_zero_and_one_and_never_grow(name, t, factor):
     assert near == other
 
 
-def test_redescending_weights_vanish_where_they_say():
+def test_redescending_weights_vanish_at_their_constant():
     assert WEIGHTS["biweight"](np.array([4.684, 4.685]))[1] == 0.0 < WEIGHTS["biweight"](np.array([4.684]))[0]
     assert WEIGHTS["igg3"](np.array([2.0, 4.0, 6.0])).tolist() == [1.0, 0.125, 0.0]
     assert WEIGHTS["geman_mcclure"](np.array([3.0]))[0] == 0.25
 
 
-def test_l1_comes_to_the_least_sum_of_absolute_residuals_of_a_linear_programme():
+def test_l1_converges_to_the_linear_programming_solution():
     rng = np.random.default_rng(3)
     a = np.linalg.qr(rng.normal(size=(60, 3)))[0] * 8
     b = a @ [1.0, -2.0, 3.0] + rng.standard_t(1.5, size=60)
@@ -338,7 +338,7 @@ def test_a_place_where_hardly_more_agree_than_hold_it_is_undecided():
     assert answer.undecided[0].tolist() == [True] * 8 + [False] * 8
 
 
-def test_rows_given_as_doubtful_sway_no_other():
+def test_doubtful_rows_do_not_affect_the_others():
     line = Line(np.ones((20, 1)))
     b = np.random.default_rng(1).normal(size=20)
     b[:8] += 30.0
@@ -362,7 +362,7 @@ def test_a_large_but_unrelated_test_is_no_rival():
     assert found.rejections[0].statistic ** 2 - found.fits[0].standardised[40] ** 2 < 9.0
 
 
-def test_what_is_not_removable_keeps_its_weight():
+def test_non_removable_rows_keep_their_weight():
     line = Line(np.ones((6, 1)))
     b = np.array([0.0, 0.1, -0.1, 0.2, 0.0, 50.0])
     may = [np.array([True] * 5 + [False])]
@@ -372,11 +372,13 @@ def test_what_is_not_removable_keeps_its_weight():
 
 def test_unknown_names_are_refused_in_one_line():
     line = Line(np.ones((3, 1)))
-    with pytest.raises(EstimationError, match="'welsch' from 'annealed' with 'known' scale is unknown; known: huber"):
+    with pytest.raises(
+        EstimationError, match="method 'welsch', start 'annealed', scale 'known'; expected one of huber"
+    ):
         estimate_robustly(line.solver(np.zeros(3)), [3], options=RobustOptions(method="welsch"))
 
 
-def test_a_cap_on_iterations_is_told():
+def test_iteration_limit_is_reported():
     line = Line(np.random.default_rng(0).normal(size=(20, 2)))
     answer = estimate_robustly(
         line.solver(np.arange(20.0) ** 2), [20], options=RobustOptions(method="l1", iterations=2)
@@ -394,7 +396,7 @@ def thirty_percent(seed):
 
 
 def survives(seed):
-    """Of a self-calibrating network with 30 % wrong ranges: targets misjudged in silence, undecided, and the misfit."""
+    """Self-calibrating network with 30 % wrong ranges: silently misjudged and undecided targets, and misfit."""
     network, wrong = Ranging(seed), thirty_percent(seed)
     observed = network.contaminated(seed, wrong)
     solve = network.solver(observed)
@@ -463,7 +465,7 @@ def test_a_good_observation_left_out_at_the_start_comes_back():
     assert np.flatnonzero(found.rejected[0]).tolist() == [3]
 
 
-def test_two_that_contradict_each_other_alone_are_undecided_and_named():
+def test_two_mutually_contradicting_observations_are_undecided_and_named():
     a = np.zeros((8, 2))
     a[:6, 0], a[6:, 1] = 1.0, 1.0  # the second unknown is held by two rows only
     b = np.array([0.1, -0.2, 0.3, 0.0, 0.1, -0.1, 0.0, 90.0])
@@ -476,7 +478,7 @@ def test_two_that_contradict_each_other_alone_are_undecided_and_named():
     assert found.rejections[0].margin == pytest.approx(0.0, abs=1e-6)
 
 
-def test_undecided_rows_that_hold_nothing_have_no_say():
+def test_undecided_rows_without_own_parameters_have_no_effect():
     a = np.zeros((8, 2))
     a[:4, 0], a[4:, 1] = 1.0, 1.0
     sigma = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 20.0, 20.0])  # the last two hold the second unknown, loosely
@@ -507,7 +509,7 @@ def test_margins_are_differences_of_pvv_between_the_two_explanations():
 
 
 @draws(600)
-def test_snooping_good_observations_leaves_one_out_as_rarely_as_its_level_says(runs):
+def test_snooping_good_observations_rejects_at_its_level(runs):
     rng = np.random.default_rng(77)
     line = Line(np.kron(np.eye(4), rng.normal(size=(10, 2))))
     alarms = sum(

@@ -187,7 +187,7 @@ def test_observations_twice_as_wrong_give_components_four_times_as_large(seed, f
     assert (one.values >= 0.0).all()
 
 
-def test_a_component_that_would_be_negative_is_zero_and_says_so():
+def test_negative_component_is_set_to_zero_and_reported():
     dense, _, distances, _ = rangers(5)
     claimed = tuple(np.full(40, 1e-4) for _ in range(2))
     true = np.concatenate([1e-6 * d for d in distances])  # no constant part
@@ -220,7 +220,7 @@ def test_a_group_without_redundancy_is_named():
     rng = np.random.default_rng(0)
     a = [np.hstack([rng.normal(size=(10, 2)), np.zeros((10, 2))]), np.hstack([np.zeros((2, 2)), np.eye(2)])]
     dense = Dense(a, [np.eye(10), np.eye(2)])
-    with pytest.raises(EstimationError, match="variance factor of alone shows in no residual"):
+    with pytest.raises(EstimationError, match="variance factor of alone affects no residual"):
         variance_components(dense.solver(rng.normal(size=12)), GroupFactors(("many", "alone"), (10, 2)))
 
 
@@ -239,7 +239,7 @@ def test_a_variance_of_zero_is_refused_with_its_row():
         model.variances(model.start)
 
 
-def test_the_cap_is_told():
+def test_iteration_limit_is_reported():
     dense, model, _, true = rangers(1)
     answer = variance_components(dense.solver(true), model, iterations=1)
     assert answer.status.startswith("not converged: ")

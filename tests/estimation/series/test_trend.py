@@ -112,7 +112,7 @@ def test_readings_at_one_time_count_as_their_mean_with_less_noise():
         np.testing.assert_allclose(found.covariance(seconds), once.covariance(seconds), rtol=1e-8)
 
 
-def test_one_reading_says_itself_for_ever_and_less_and_less_well():
+def test_one_reading_gives_a_constant_level_with_growing_uncertainty():
     found = trend_of([100.0], [7.0], USUAL, grid=[0.0, 60.0, 120.0])
     times = np.array([-5000.0, 100.0, 100.0 + 3600.0, 100.0 + 7200.0])
     np.testing.assert_array_equal(found.at(times), 7.0)
@@ -132,7 +132,7 @@ def test_two_readings_are_joined_by_a_line_and_known_as_each_is():
     )
 
 
-def test_few_readings_show_no_strength_of_their_own():
+def test_few_readings_use_the_default_strength():
     seconds = np.arange(0.0, 300.0, 60.0)
     assert trend_strength(seconds, seconds**2, usual=USUAL, least_noise=0.003) is USUAL
     again = np.repeat(seconds, 4)  # twenty rows at five times
@@ -216,7 +216,7 @@ def test_of_a_smooth_wave_the_claim_is_not_too_small_and_at_most_twice_too_large
     assert np.sqrt(squares / 15) < 0.03
 
 
-def test_in_a_gap_the_claim_grows_to_what_the_record_can_have_done_there():
+def test_claim_grows_in_a_gap_with_possible_wander():
     rng = np.random.default_rng(11)
     seconds = np.concatenate([np.arange(0.0, 3001.0, 60.0), np.arange(9000.0, 12001.0, 60.0)])
     grid = np.arange(0.0, 12000.0, 60.0)
@@ -304,7 +304,7 @@ def test_strengths_scale_with_the_unit_of_the_values_and_of_time():
     assert slow.rate == pytest.approx(one.rate / 10.0**1.5)
 
 
-def test_readings_a_tenth_of_a_second_apart_are_told_apart_and_closer_ones_are_one():
+def test_readings_closer_than_a_tenth_of_a_second_are_merged():
     close = np.array([0.0, 0.02, 60.0, 60.1, 120.0])
     found = trend_of(close, np.array([1.0, 3.0, 2.0, 2.0, 2.0]), STRENGTH)
     assert len(found.seconds) == 4

@@ -47,7 +47,7 @@ def test_a_moved_paraboloid_is_found_and_its_points_lie_on_it(seed, size):
     assert (fit.frame.to, fit.frame.from_) == ("ground", "dish")
 
 
-def test_it_never_turns_about_its_own_axis():
+def test_no_rotation_about_the_paraboloid_axis():
     rng = np.random.default_rng(3)
     local = surface(rng)
     spun = local @ Rotation.from_rotvec([0, 0, 0.4]).as_matrix().T + rng.normal(size=(12, 3)) * 1e-3
@@ -176,7 +176,7 @@ def line():
 
 
 @pytest.mark.parametrize("points", [circle(30.0), line()], ids=["circle", "meridian"])
-def test_points_that_do_not_hold_it_are_refused(points):
+def test_points_that_do_not_determine_it_are_refused(points):
     with pytest.raises(EstimationError, match="9 points do not hold the paraboloid"):
         fit_paraboloid(OUTER.points(points), zero(9), OUTER, focal_length=F)
 

@@ -61,7 +61,7 @@ def test_all_parameters_are_those_of_scipy_on_true_distances(seed):
 
 
 @pytest.mark.parametrize("free", [ALL, ("vertex", "focal-length"), ("focal-length",), ("vertex",), ("axis",)])
-def test_what_was_moved_is_found_and_what_is_held_stays(free):
+def test_applied_motion_is_recovered_and_fixed_parts_stay(free):
     rng = np.random.default_rng(11)
     df, shift, tilt = 0.02, np.array([0.004, -0.003, 0.006]), np.array([1e-4, -2e-4])
     df, shift, tilt = df * ("focal-length" in free), shift * ("vertex" in free), tilt * ("axis" in free)
@@ -78,7 +78,7 @@ def test_what_was_moved_is_found_and_what_is_held_stays(free):
         np.testing.assert_allclose(fit.deviation, 0.0, atol=1e-11)
 
 
-def test_nothing_free_gives_plain_deviations_and_their_covariance():
+def test_no_free_part_gives_plain_deviations_with_covariance():
     rng = np.random.default_rng(5)
     local = section(rng, 7)
     local[2, 2] += 1e-3
@@ -135,7 +135,7 @@ def test_many_points_are_the_same_by_the_short_product():
 
 
 def test_rows_at_other_places_are_the_change_there():
-    """By moving the paraboloid and looking at the surface's height, not by the same formula."""
+    """Moves the paraboloid and compares the surface's height, without the same formula."""
     rng = np.random.default_rng(4)
     fit = fit_paraboloid(OUTER.points(section(rng, 30)), np.zeros((30, 3, 3)), OUTER, focal_length=F, free=ALL)
     places = section(rng, 9)

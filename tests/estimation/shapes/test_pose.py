@@ -31,7 +31,7 @@ def names(n):
     return [f"P{k:02d}" for k in range(n)]
 
 
-def test_what_was_done_is_found_about_any_pivot():
+def test_applied_motion_is_recovered_about_any_pivot():
     x, pivot = points(), np.array([3.0, -70.0, 20.0])
     found = fit_pose(
         names(12), x, moved(x, pivot=pivot), frame="ground", covariance=PlaceCovariances(second=spread(12)), pivot=pivot
@@ -139,7 +139,7 @@ def test_a_pose_in_other_axes_moves_the_same_points():
     )
     np.testing.assert_allclose(told.covariance, direct.covariance, rtol=0, atol=1e-9 * np.abs(direct.covariance).max())
     np.testing.assert_allclose(told.gain, direct.gain, rtol=0, atol=1e-7)
-    with pytest.raises(FrameError, match="'reflector' cannot be told"):
+    with pytest.raises(FrameError, match="'reflector' cannot be transformed"):
         told.in_frame(to)
 
 
@@ -181,7 +181,7 @@ def test_points_that_share_every_error_tell_the_relative_motion_better():
     ("change", "said"),
     [
         ({"covariance": PlaceCovariances()}, "both are missing"),
-        ({"robust": "median"}, "none of l1"),
+        ({"robust": "median"}, "unknown robust method"),
         ({"covariance": PlaceCovariances(second=np.eye(5))}, "expected"),
     ],
 )
@@ -197,7 +197,7 @@ def test_points_on_a_line_are_refused_by_name():
         fit_pose(names(5), line, line, frame="g", covariance=PlaceCovariances(second=spread(5)))
 
 
-def test_what_both_epochs_share_counts_once_in_every_row():
+def test_errors_common_to_both_epochs_cancel_in_every_row():
     """Largest normalised error by hand: all weights from the joint covariance of both epochs, (-R, 1) C (-R, 1)'."""
     n, rng = 8, np.random.default_rng(5)
     x, matrix = points(n), Rotation.from_rotvec([0.3, -0.2, 0.5]).as_matrix()
@@ -246,7 +246,7 @@ def test_of_four_points_the_one_that_moved_is_left_out_by_every_robust_method(me
     np.testing.assert_allclose(found.about(plain.pivot).translation, plain.translation, atol=1e-9)
 
 
-def test_four_points_of_which_two_moved_are_refused_with_what_was_tried():
+def test_two_moved_of_four_points_are_refused_with_the_attempts():
     called, x, y, covariance = four(2, [0, 3])
     with pytest.raises(
         EstimationError, match=r"without any of the 4 points \(best without P\d, p .*more than one moved"

@@ -38,8 +38,8 @@ def test_it_is_the_solution_of_the_textbooks_saddle_system():
 
 
 @draws(24)
-def test_foretold_less_true_scatters_as_claimed(runs):
-    """With the roughness found from the same few points: seeds apart, points that nothing was told of."""
+def test_prediction_error_scatters_as_claimed(runs):
+    """Roughness is estimated from the same few points; predictions are at other points."""
     ratios = []
     for seed in range(runs):
         rng, places, field, trend = scene(seed, 80, 60)
@@ -65,7 +65,7 @@ def test_the_roughness_that_was_planted_is_found(runs):
     assert np.median([f.smooth for f in found]) == pytest.approx(ROUGH.smooth, rel=same_sigmas(0.3, 8, runs))
 
 
-def test_a_measured_point_without_noise_is_foretold_as_measured():
+def test_noise_free_measured_point_is_predicted_exactly():
     _, places, field, trend = scene(3, 40, 0)
     found = foretell(MeasuredField(places, field, np.zeros((40, 40)), trend), places[:5], trend[:5],
                      roughness=ROUGH, same=np.arange(5))  # fmt: skip
@@ -75,10 +75,10 @@ def test_a_measured_point_without_noise_is_foretold_as_measured():
 
 def test_what_cannot_be_is_refused():
     _, places, field, trend = scene(3, 8, 0)
-    with pytest.raises(EstimationError, match="8 points beside 3 coefficients"):
+    with pytest.raises(EstimationError, match="8 points for 3 coefficients"):
         find_roughness(places, field, np.zeros((8, 8)), trend=trend)
     same = np.column_stack([np.ones(8), np.ones(8)])
-    with pytest.raises(EstimationError, match="do not hold the 2 coefficients"):
+    with pytest.raises(EstimationError, match="do not determine the 2 coefficients"):
         foretell(
             MeasuredField(places, field, np.zeros((8, 8)), same),
             places[:1],

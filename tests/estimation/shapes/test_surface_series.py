@@ -43,7 +43,7 @@ def test_the_compiled_form_is_the_plain_one(free, measure):
     assert np.isnan(one.deviation[3]).sum() == 30
 
 
-def test_an_epoch_without_an_answer_says_why_and_the_others_have_theirs():
+def test_failed_epoch_has_a_status_and_others_are_unaffected():
     rng = np.random.default_rng(2)
     points = scene(rng, 4, 40)
     points[1, 4:] = np.nan  # four points

@@ -120,7 +120,7 @@ def test_what_cannot_be_rejected_is_refused():
     y = 50.0 * rng.standard_normal(12)
     with pytest.raises(EstimationError, match="more than 33% of the readings would have to be rejected"):
         fit_readings(y, design, ObservedScatter(np.eye(12)), names=["p", "q"], options=FitOptions(reject=True))
-    with pytest.raises(EstimationError, match="rank deficient: p, twice p not held"):
+    with pytest.raises(EstimationError, match="rank deficient: p, twice p not determined"):
         fit_readings(y, design[:, [0, 0]], ObservedScatter(np.eye(12)), names=["p", "twice p"])
 
 

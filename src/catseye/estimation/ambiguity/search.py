@@ -1,7 +1,7 @@
-"""Where a point is that was ranged modulo a half wavelength, from a position known to decimetres only.
+"""Position of a point ranged modulo a half wavelength, from a prior known to decimetres.
 
 Every set of whole cycles that the prior allows is tried: three integers by enumeration inside the prior's ellipsoid,
-the others by prediction, with the geometry as it is, not linearised. That is integer least squares ([TEUNISSEN95])
+the others by prediction, with the exact geometry, not linearised. That is integer least squares ([TEUNISSEN95])
 without its decorrelation: in space three integers fix a point, so the search tree is bushy for three levels only.
 A station whose position is known to decimetres is the same problem with the targets in the stations' place.
 """
@@ -12,14 +12,14 @@ from enum import IntEnum
 import numpy as np
 
 from catseye.errors import InputError, ValidityError
-from catseye.estimation.ambiguity.tree import CycleCandidates, Ranged, grown, trunk
+from catseye.estimation.ambiguity.tree import CycleCandidates, Ranged, expanded, trunk
 
-SURE = 5.7e-7  # doubt that is accepted while all ranges are good: five standard deviations of a normal variable
-SURE_OF_ALL = 1e-3  # doubt that is accepted in all, one wrong range considered
+SURE = 5.7e-7  # accepted error probability if all ranges are good: five standard deviations of a normal variable
+SURE_OF_ALL = 1e-3  # accepted total error probability, one wrong range considered
 
 
 class AmbiguityStatus(IntEnum):
-    """What came of the search; only FOUND is an answer to go on with."""
+    """Status of the search; only FOUND is a usable result."""
 
     FOUND = 0
     AMBIGUOUS = 1
@@ -33,27 +33,27 @@ TEXTS = {
     AmbiguityStatus.FOUND: "found",
     AmbiguityStatus.AMBIGUOUS: "of {candidates} sets of whole cycles the second best, {apart:.3f} m away, is only "
     "{sigmas:.1f} sigma worse; range it from more stations, or survey it better",
-    AmbiguityStatus.TOO_FEW: "ranged from {ranges} stations only: four are needed where the position is known this "
-    "badly; range it from more, or survey it better",
+    AmbiguityStatus.TOO_FEW: "ranged from {ranges} stations only: four are needed for so uncertain a position; "
+    "range it from more, or survey it better",
     AmbiguityStatus.MISFIT: "no whole cycles fit its {ranges} ranges (chi-square {chi_square:.3g} at best); "
     "one of them or the position's uncertainty is wrong",
-    AmbiguityStatus.TOO_MANY: "its position is known too badly: more sets of whole cycles than can be tried; survey it",
+    AmbiguityStatus.TOO_MANY: "its position is too uncertain: more sets of whole cycles than can be tried; survey it",
     AmbiguityStatus.REFUSED: "a range, a station or an uncertainty of it is not a finite number, or not positive",
 }
 
 
 @dataclass(frozen=True, eq=False)
 class Located:
-    """The point and what speaks for it.
+    """Located point, with its cycles and their probability.
 
     x, covariance     (3,) m and (3, 3) m^2 of the best candidate; nan without one
     cycles            (r,) its whole half wavelengths
-    chi_square        of prior and ranges together; as many degrees of freedom as ranges took part
-    next_x            (3,) m, the second best candidate; nan where there is none
-    discrimination    by how much chi-square of the next candidate is larger, at least; infinite where there is none
-    probability       that the best one is right, all of the prior's region and one wrong range considered
-    candidates        sets of whole cycles that were tried
-    left_out          the range that did not take part, -1 if all did
+    chi_square        of prior and ranges together; degrees of freedom: the number of ranges used
+    next_x            (3,) m, the second best candidate; nan if there is none
+    discrimination    lower limit of the next candidate's excess in chi-square; infinite if there is none
+    probability       of the best one being right, the prior's region and one wrong range considered
+    candidates        number of sets of whole cycles tried
+    left_out          index of the range left out, -1 for none
     status            `AmbiguityStatus`
     """
 
@@ -70,7 +70,7 @@ class Located:
 
     @property
     def text(self) -> str:
-        """What happened and what to do, one line."""
+        """Status in one line, with the remedy."""
         apart = float(np.linalg.norm(self.next_x - self.x))
         return TEXTS[self.status].format(
             candidates=self.candidates,
@@ -83,11 +83,11 @@ class Located:
 
 @dataclass(frozen=True)
 class AmbiguityLimits:
-    """What `locate` allows for.
+    """Limits of `locate`.
 
-    wrong   probability that a range is wrong altogether, light from elsewhere: any length of a period is then as
-            likely. 0 trusts them all; else any one may be left out
-    most    candidates to try before giving up
+    wrong   probability that a range is a stray reflection: any length of a period is then equally likely. 0 trusts
+            all ranges; otherwise any one may be left out
+    most    limit of candidates
     """
 
     wrong: float = 0.0
@@ -108,23 +108,23 @@ def locate(
     station_covariance: np.ndarray | None = None,
     limits: AmbiguityLimits = ALL_TRUSTED,
 ) -> Located:
-    """The point and the whole cycles that fit a prior position and ranges modulo a half wavelength.
+    """Point and whole cycles that best fit a prior position and ranges modulo a half wavelength.
 
     start                (3,) m, approximate position
     prior_covariance     (3, 3) m^2 of it
-    stations             (r, 3) m, where the ranges were taken from; one station may stand there several times
-    lengths              (r,) m, a length of each range up to whole periods, all constants applied
+    stations             (r, 3) m, stations of the ranges; repetitions allowed
+    lengths              (r,) m, ranges modulo the period, all constants applied
     period               (r,) or one, m: the half wavelength in the air of each path
-    covariance           (r, r) m^2 of the lengths, or (r,) variances: noise, constants, what stations have in common
+    covariance           (r, r) m^2 of the lengths, or (r,) variances: noise, constants, errors common to stations
     station_covariance   (r, 3, 3) m^2 or (3r, 3r) jointly; None if known or already in `covariance`
-    limits               whether a range may be wrong, and when to give up
+    limits               probability of a wrong range, and limit of candidates
 
-    FOUND means: it fits (chi-square passes at 5.7e-7), and all the others together are less probable than 5.7e-7, every
-    set of whole cycles being as likely beforehand as its position in the prior. With `wrong` those count too that fit
-    once one range is left out, which costs chi-square 2 ln((1 - wrong)/wrong period/(sqrt(2 pi) u)); the doubt in all
-    may then be 1e-3. A wrong range can make a wrong set fit: where ranges may be wrong, say so. Two wrong ranges are
-    not considered. Values are never an exception, see the status; InputError for arrays whose shapes do not belong
-    together, ValidityError for a `wrong` outside 0 to 0.5.
+    FOUND means: it fits (chi-square passes at 5.7e-7), and all others together are less probable than 5.7e-7, every set
+    of whole cycles having the prior probability of its position. With `wrong`, candidates that fit with one range left
+    out count too, at an added chi-square of 2 ln((1 - wrong)/wrong period/(sqrt(2 pi) u)); the total error probability
+    may then be 1e-3. A wrong range can make a wrong set fit: if ranges may be wrong, set `wrong`. Two wrong ranges are
+    not considered. Values raise no exception, see the status; InputError for inconsistent shapes, ValidityError for a
+    `wrong` outside 0 to 0.5.
 
     Source: [TEUNISSEN95] section 2.2 for the principle; the nonlinear search and the probabilities are ours.
 
@@ -136,12 +136,12 @@ def locate(
     """
     ranged = _ranged(start, prior_covariance, stations, lengths, period, covariance, station_covariance)
     if ranged is None:
-        return _nothing(len(np.atleast_1d(lengths)), AmbiguityStatus.REFUSED)
+        return _unlocated(len(np.atleast_1d(lengths)), AmbiguityStatus.REFUSED)
     if not 0.0 <= limits.wrong < 0.5:
-        raise ValidityError(f"wrong = {limits.wrong}: a probability of 0 to 0.5 is expected")
+        raise ValidityError(f"wrong = {limits.wrong} (expected a probability of 0 to 0.5)")
     explanations = _explanations(ranged, limits.wrong, limits.most)
     if explanations is None:
-        return _nothing(len(ranged.lengths), AmbiguityStatus.TOO_MANY)
+        return _unlocated(len(ranged.lengths), AmbiguityStatus.TOO_MANY)
     return _judged(ranged, explanations)
 
 
@@ -156,7 +156,7 @@ def locate_all(
     seen: np.ndarray | None = None,
     limits: AmbiguityLimits = ALL_TRUSTED,
 ) -> list[Located]:
-    """`locate` for many points that were ranged from the same stations.
+    """Locate many points ranged from the same stations, as `locate`.
 
     start              (p, 3) m
     prior_covariance   (p, 3, 3) m^2, or one (3, 3) for all
@@ -164,7 +164,7 @@ def locate_all(
     lengths            (p, r) m
     period             (p, r), (r,) or one, m
     covariance         (p, r, r) or (r, r) m^2; or variances (p, r)
-    seen               (p, r) bool, which ranges there are; all if None
+    seen               (p, r) bool, existing ranges; all if None
     limits             as for `locate`
 
     A point's cycles are those of its own ranges, in the stations' order.
@@ -177,10 +177,10 @@ def locate_all(
     periods = np.broadcast_to(np.asarray(period, dtype=float), (points, r))
     c = np.asarray(covariance, dtype=float)
     variances = c.ndim == 2 and c.shape == (points, r) and not (points == r and np.allclose(c, c.T))
-    there = np.ones((points, r), dtype=bool) if seen is None else np.asarray(seen, dtype=bool)
+    existing = np.ones((points, r), dtype=bool) if seen is None else np.asarray(seen, dtype=bool)
     answers = []
-    for i, used in enumerate(there):
-        own = c[i][used] if variances else (c[i] if c.ndim == 3 else c)[np.ix_(used, used)]
+    for i, used in enumerate(existing):
+        point_covariance = c[i][used] if variances else (c[i] if c.ndim == 3 else c)[np.ix_(used, used)]
         answers.append(
             locate(
                 start[i],
@@ -188,7 +188,7 @@ def locate_all(
                 stations[used],
                 lengths=lengths[i, used],
                 period=periods[i, used],
-                covariance=own,
+                covariance=point_covariance,
                 limits=limits,
             )
         )
@@ -204,7 +204,7 @@ def _ranged(
     covariance: np.ndarray,
     station_covariance: np.ndarray | None,
 ) -> Ranged | None:
-    """The problem with one covariance of all ranges; None where a value makes no sense."""
+    """Problem with one covariance of all ranges; None for invalid values."""
     start, prior, stations, lengths, c = (
         np.asarray(v, dtype=float) for v in (start, prior_covariance, stations, lengths, covariance)
     )
@@ -227,7 +227,7 @@ def _ranged(
 
 
 def _of_stations(start: np.ndarray, stations: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """What the stations' covariance does to the ranges, (r, r); their directions hardly turn within the prior."""
+    """Covariance (r, r) of the ranges due to the stations, with directions constant within the prior."""
     r = len(stations)
     towards = stations - start
     e = towards / np.linalg.norm(towards, axis=1)[:, None]
@@ -238,16 +238,16 @@ def _of_stations(start: np.ndarray, stations: np.ndarray, covariance: np.ndarray
     raise InputError(f"station_covariance has shape {covariance.shape}: ({r}, 3, 3) or ({3 * r}, {3 * r}) is expected")
 
 
-def _nothing(ranges: int, status: AmbiguityStatus) -> Located:
+def _unlocated(ranges: int, status: AmbiguityStatus) -> Located:
     nan = np.full(3, np.nan)
     square = np.full((3, 3), np.nan)
-    none = np.zeros(ranges, dtype=np.int64)
-    return Located(nan, square, none, np.inf, nan, 0.0, 0.0, 0, -1, status)
+    no_cycles = np.zeros(ranges, dtype=np.int64)
+    return Located(nan, square, no_cycles, np.inf, nan, 0.0, 0.0, 0, -1, status)
 
 
 @dataclass(frozen=True, eq=False)
 class _Explanation:
-    """All candidates with one range left out, -1 for none, and what that costs in chi-square."""
+    """All candidates with one range left out (-1: none), and its chi-square penalty."""
 
     left_out: int
     penalty: float
@@ -255,18 +255,21 @@ class _Explanation:
 
 
 def _explanations(ranged: Ranged, wrong: float, most: int) -> list[_Explanation] | None:
-    """The searches with all ranges and, if they may be wrong, without each; None where one gave up."""
+    """Searches with all ranges and, if they may be wrong, without each.
+
+    None if a limit is reached.
+    """
     everything = np.arange(len(ranged.lengths))
     base = trunk(ranged, everything, most)
-    candidates = None if base is None else grown(ranged, everything, base, most=most)
+    candidates = None if base is None else expanded(ranged, everything, base, most=most)
     if base is None or candidates is None:
         return None
     explanations = [_Explanation(-1, 0.0, candidates)]
     u = np.linalg.norm(ranged.root, axis=1)
     for i in everything if wrong > 0.0 and len(everything) > 1 else ():
         rows = np.delete(everything, i)
-        own = trunk(ranged, rows, most) if i in base.rows else base
-        candidates = None if own is None else grown(ranged, rows, own, most=most)
+        branch_base = trunk(ranged, rows, most) if i in base.rows else base
+        candidates = None if branch_base is None else expanded(ranged, rows, branch_base, most=most)
         if candidates is None:
             return None
         odds = (1.0 - wrong) / wrong * ranged.periods[i] / (np.sqrt(2.0 * np.pi) * u[i])
@@ -275,26 +278,26 @@ def _explanations(ranged: Ranged, wrong: float, most: int) -> list[_Explanation]
 
 
 def _judged(ranged: Ranged, explanations: list[_Explanation]) -> Located:
-    """The best candidate of all explanations, and the doubt that the others leave.
+    """Best candidate of all explanations, and the probability of the others.
 
-    A candidate of two explanations whose cycles differ at most in what either leaves out is the same answer.
+    Candidates of two explanations whose cycles differ at most in the left-out ranges are the same solution.
     """
     from scipy.special import chdtri
 
     lowest = [float(np.min(e.candidates.chi_square, initial=np.inf)) + e.penalty for e in explanations]
     chosen = explanations[int(np.argmin(lowest))]
     if not np.isfinite(min(lowest)):
-        return _nothing(len(ranged.lengths), AmbiguityStatus.MISFIT)
+        return _unlocated(len(ranged.lengths), AmbiguityStatus.MISFIT)
     best = int(np.argmin(chosen.candidates.chi_square))
     cycles, square = chosen.candidates.cycles[best], float(chosen.candidates.chi_square[best])
     doubts, rivals, nowhere = [], [], np.full((1, 3), np.nan)
     for e in explanations:
         common = np.ones(len(cycles), dtype=bool)
         common[[i for i in (e.left_out, chosen.left_out) if i >= 0]] = False
-        other = np.any(e.candidates.cycles[:, common] != cycles[common], axis=1)
-        costs = np.append(e.candidates.chi_square[other], e.candidates.floor) + e.penalty - min(lowest)
+        different = np.any(e.candidates.cycles[:, common] != cycles[common], axis=1)
+        costs = np.append(e.candidates.chi_square[different], e.candidates.floor) + e.penalty - min(lowest)
         doubts.append(float(np.sum(np.exp(-0.5 * np.clip(costs, -1400.0, 1400.0)))))
-        rivals.append((costs, np.concatenate([e.candidates.x[other], nowhere])))
+        rivals.append((costs, np.concatenate([e.candidates.x[different], nowhere])))
     costs, places = (np.concatenate(part) for part in zip(*rivals, strict=True))
     nearest = int(np.argmin(costs))
     listed = np.where(np.isfinite(places[:, 0]), costs, np.inf)

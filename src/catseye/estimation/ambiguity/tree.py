@@ -1,20 +1,20 @@
-"""All sets of whole cycles that a prior position allows, one after the other, for `search`."""
+"""Search tree of all sets of whole cycles that a prior position allows, for `search`."""
 
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
-SIGMAS = 6.0  # of the prior and of each prediction: one true position in ten million lies beyond in space
-STEPS = 6  # of Gauss-Newton at the first point of each branch: from metres off to below a micrometre it takes four
-ROOM = 200_000  # branches that are followed at once
-MOST_COMPARED = 40  # ranges among whose triples the best figure is sought
-WORSE = 50.0**2  # chi-square from which a branch need not be followed
+SIGMAS = 6.0  # of the prior and of each prediction: exceeded by one position in ten million
+STEPS = 6  # of Gauss-Newton per branch: four suffice from metres to below a micrometre
+ROOM = 200_000  # branches per batch
+MOST_COMPARED = 40  # limit of ranges for the search of the best triple
+WORSE = 50.0**2  # chi-square above which a branch is dropped
 
 
 @dataclass(frozen=True, eq=False)
 class Ranged:
-    """A point with a prior and ranges modulo a period.
+    """Point with a prior and ranges modulo a period.
 
     start         (3,) m
     prior_root    (3, 3) m, Cholesky factor of the prior covariance
@@ -32,7 +32,7 @@ class Ranged:
     root: np.ndarray
 
     def ordered(self, rows: np.ndarray) -> "Ranged":
-        """Some of the ranges in another order."""
+        """Selected ranges in a given order."""
         covariance = self.root @ self.root.T
         root = np.linalg.cholesky(covariance[np.ix_(rows, rows)])
         return Ranged(self.start, self.prior_root, self.stations[rows], self.lengths[rows], self.periods[rows], root)
@@ -40,9 +40,11 @@ class Ranged:
 
 @dataclass(frozen=True, eq=False)
 class Trunk:
-    """The points that the prior allows by the first ranges alone; several searches may grow from it.
+    """Points allowed by the prior and the first ranges.
 
-    rows          (q,) the ranges it stands on, three where there are three
+    Base of several searches.
+
+    rows          (q,) ranges used, three if available
     cycles        (c, q)
     x             (c, 3) m
     information   (c, 3, 3) m^-2
@@ -58,14 +60,14 @@ class Trunk:
 
 @dataclass(frozen=True, eq=False)
 class CycleCandidates:
-    """What the search found.
+    """Candidates of the search.
 
-    x            (c, 3) m, one a set of whole cycles
-    cycles       (c, r); of a range that did not take part the nearest
-    chi_square   (c,) of the prior and the ranges that took part
+    x            (c, 3) m, one per set of whole cycles
+    cycles       (c, r); the nearest for a range not used
+    chi_square   (c,) of the prior and the ranges used
     covariance   (3, 3) m^2 of the best one
-    floor        no set that is not listed has a smaller chi-square, inside the region of SIGMAS of the prior
-    tried        sets looked at
+    floor        lower limit of the chi-square of all unlisted sets, within SIGMAS of the prior
+    tried        number of sets examined
     """
 
     x: np.ndarray
@@ -77,11 +79,13 @@ class CycleCandidates:
 
 
 def trunk(ranged: Ranged, rows: np.ndarray, most: int) -> Trunk | None:
-    """The first ranges' whole cycles wherever the prior allows; None where that would be more than `most`.
+    """First ranges' whole cycles allowed by the prior.
+
+    None if more than `most`.
 
     ranged   the problem
-    rows     the ranges that may take part
-    most     sets to look at before giving up
+    rows     usable ranges
+    most     limit of sets
 
     The three ranges of the best figure come first. Their integers are enumerated over the prior's ellipsoid, and each
     set's point follows by Gauss-Newton with the prior.
@@ -96,21 +100,23 @@ def trunk(ranged: Ranged, rows: np.ndarray, most: int) -> Trunk | None:
     return Trunk(first, cycles[inside], x[inside], information[inside], square[inside])
 
 
-def grown(ranged: Ranged, rows: np.ndarray, base: Trunk, *, most: int) -> CycleCandidates | None:
-    """Every set of whole cycles of some ranges that grows from a trunk; None where that would be more than `most`.
+def expanded(ranged: Ranged, rows: np.ndarray, base: Trunk, *, most: int) -> CycleCandidates | None:
+    """All sets of whole cycles of some ranges that extend a trunk.
+
+    None if more than `most`.
 
     ranged   the problem
-    rows     the ranges that take part, those of the trunk among them
+    rows     the ranges used, including those of the trunk
     base     from `trunk`
-    most     sets to look at before giving up
+    most     limit of sets
 
-    Each further range is predicted: its nearest integer goes on, and others where the prediction does not exclude them
-    by SIGMAS. The chi-square that those passed over would have had at least is kept, so that the second best is known
-    even where it was not followed.
+    Each further range is predicted: its nearest integer is followed, and others that the prediction does not exclude by
+    SIGMAS. The smallest possible chi-square of the dropped ones is recorded, so that the second best is known even if
+    it was not followed.
     """
-    rest = np.setdiff1d(rows, base.rows)
+    further = np.setdiff1d(rows, base.rows)
     noise = np.linalg.norm(ranged.root, axis=1)
-    order = np.concatenate([base.rows, rest[np.argsort(noise[rest], kind="stable")]])
+    order = np.concatenate([base.rows, further[np.argsort(noise[further], kind="stable")]])
     ordered = ranged.ordered(order)
     cycles, x, information, square = base.cycles, base.x, base.information, base.chi_square
     tried, floor = len(cycles), np.inf
@@ -122,14 +128,14 @@ def grown(ranged: Ranged, rows: np.ndarray, base: Trunk, *, most: int) -> CycleC
             return None
         x, information, square = _points(ordered, cycles, x)
     distance = np.linalg.norm(x[:, None] - ranged.stations, axis=2)
-    whole = np.rint((distance - ranged.lengths) / ranged.periods)
-    whole[:, order] = cycles
+    nearest_cycles = np.rint((distance - ranged.lengths) / ranged.periods)
+    nearest_cycles[:, order] = cycles
     covariance = np.linalg.inv(information[np.argmin(square)]) if len(square) else np.full((3, 3), np.nan)
-    return CycleCandidates(x, whole.astype(np.int64), square, covariance, floor, tried)
+    return CycleCandidates(x, nearest_cycles.astype(np.int64), square, covariance, floor, tried)
 
 
 def _best_figure(ranged: Ranged, rows: np.ndarray) -> np.ndarray:
-    """The three of some ranges that hold a point best, or all where there are fewer."""
+    """Three ranges that determine a point best, or all if fewer."""
     if len(rows) < 3:
         return rows
     noise = np.linalg.norm(ranged.root, axis=1)
@@ -142,7 +148,7 @@ def _best_figure(ranged: Ranged, rows: np.ndarray) -> np.ndarray:
 
 
 def _first_cycles(ranged: Ranged, first: int, most: int) -> np.ndarray | None:
-    """Whole cycles (c, first) of the first ranges wherever the prior allows; a few beyond do no harm.
+    """Whole cycles (c, first) of the first ranges allowed by the prior, with a small margin.
 
     With z = root^-1 (x - start) the prior is the unit ball times SIGMAS; a distance changes in it by |root' e| SIGMAS
     and, being curved, by t^2 / 2 D at most, t the prior's largest extent.
@@ -160,22 +166,24 @@ def _first_cycles(ranged: Ranged, first: int, most: int) -> np.ndarray | None:
     counts = high - low + 1
     if np.prod(counts) > 20.0 * most:
         return None
-    kept = np.zeros((1, 0))
+    grid_rows = np.zeros((1, 0))
     covariance = slope @ slope.T + (ranged.root @ ranged.root.T)[:first, :first]
-    for k in range(first):  # one range after the other, so that corners of the box are never made
-        now = np.arange(low[k], high[k] + 1)
-        grid = np.concatenate([np.repeat(kept, len(now), axis=0), np.tile(now, len(kept))[:, None]], axis=1)
+    for k in range(first):  # one range after the other, to avoid the corners of the box
+        integers = np.arange(low[k], high[k] + 1)
+        grid = np.concatenate(
+            [np.repeat(grid_rows, len(integers), axis=0), np.tile(integers, len(grid_rows))[:, None]], axis=1
+        )
         size = k + 1
         off = ranged.lengths[:size] + grid * ranged.periods[:size] - distance[:size]
-        # what is excluded is excluded however the curvature turns out: its largest effect is taken off first
+        # the largest effect of the curvature is subtracted first, so that exclusions are safe
         inverse = np.linalg.inv(np.linalg.cholesky(covariance[:size, :size]))
         far = np.linalg.norm(off @ inverse.T, axis=1) - np.linalg.norm(np.abs(inverse) @ bend[:size])
-        kept = grid[far <= SIGMAS]
-    return kept if len(kept) <= most else None
+        grid_rows = grid[far <= SIGMAS]
+    return grid_rows if len(grid_rows) <= most else None
 
 
 def _points(ranged: Ranged, cycles: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The points (c, 3) that fit the prior and the first ranges best, their information and chi-square."""
+    """Best-fit points (c, 3) of the prior and the first ranges, with information and chi-square."""
     parts = [_converged(ranged, cycles[i : i + ROOM], x[i : i + ROOM]) for i in range(0, max(len(cycles), 1), ROOM)]
     joined = [np.concatenate(column) for column in zip(*parts, strict=True)]
     return joined[0], joined[1], joined[2]
@@ -185,7 +193,7 @@ def _converged(ranged: Ranged, cycles: np.ndarray, x: np.ndarray) -> tuple[np.nd
     k = cycles.shape[1]
     whiten = np.linalg.inv(ranged.root[:k, :k])
     prior = np.linalg.inv(ranged.prior_root)
-    known = prior.T @ prior
+    prior_information = prior.T @ prior
     reached = ranged.lengths[:k] + cycles * ranged.periods[:k]
 
     def misses(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -196,14 +204,14 @@ def _converged(ranged: Ranged, cycles: np.ndarray, x: np.ndarray) -> tuple[np.nd
 
     for _ in range(STEPS):
         v, slope = misses(x)
-        information = known + np.einsum("cia,cib->cab", slope, slope)
-        gradient = np.einsum("cia,ci->ca", slope, v) + (ranged.start - x) @ known
+        information = prior_information + np.einsum("cia,cib->cab", slope, slope)
+        gradient = np.einsum("cia,ci->ca", slope, v) + (ranged.start - x) @ prior_information
         step = np.linalg.solve(information, gradient[..., None])[..., 0]
         x = x + step
         if not len(x) or np.max(np.abs(step)) < 1e-9:
             break
     v, slope = misses(x)
-    information = known + np.einsum("cia,cib->cab", slope, slope)
+    information = prior_information + np.einsum("cia,cib->cab", slope, slope)
     square = np.sum(v**2, axis=1) + np.sum(((x - ranged.start) @ prior.T) ** 2, axis=1)
     return x, information, square
 
@@ -211,20 +219,20 @@ def _converged(ranged: Ranged, cycles: np.ndarray, x: np.ndarray) -> tuple[np.nd
 def _next_cycles(
     ranged: Ranged, k: int, cycles: np.ndarray, x: np.ndarray, information: np.ndarray, square: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Each branch with the whole cycles of range k: the nearest, and others within SIGMAS of the prediction.
+    """Branches extended by range k: nearest integer, and others within SIGMAS of the prediction.
 
-    The third value is the least chi-square that any integer passed over would have had.
+    The third value is the smallest possible chi-square of the dropped integers.
     """
     if not len(cycles):
         return np.zeros((0, k + 1)), x, np.inf
-    row, own = ranged.root[k, :k], float(ranged.root[k, k])
+    row, noise_root = ranged.root[k, :k], float(ranged.root[k, k])
     whiten = np.linalg.inv(ranged.root[:k, :k])
     towards = x[:, None] - ranged.stations[: k + 1]
     distance = np.linalg.norm(towards, axis=2)
     e = towards / distance[..., None]
-    noise = (ranged.lengths[:k] + cycles * ranged.periods[:k] - distance[:, :k]) @ whiten.T  # of the ranges before
+    noise = (ranged.lengths[:k] + cycles * ranged.periods[:k] - distance[:, :k]) @ whiten.T  # of the previous ranges
     slope = e[:, k] - np.einsum("j,cja->ca", row @ whiten, e[:, :k])
-    variance = own**2 + np.sum(slope * np.linalg.solve(information, slope[..., None])[..., 0], axis=1)
+    variance = noise_root**2 + np.sum(slope * np.linalg.solve(information, slope[..., None])[..., 0], axis=1)
     u = np.sqrt(variance)
     period = float(ranged.periods[k])
     exact = (distance[:, k] + noise @ row - ranged.lengths[k]) / period
@@ -236,10 +244,10 @@ def _next_cycles(
     counts = (high - low + 1).astype(int)
     parent = np.repeat(np.arange(len(cycles)), counts)
     within = np.arange(len(parent)) - np.repeat(np.cumsum(counts) - counts, counts)
-    now = np.repeat(low, counts) + within
-    cost = square[parent] + ((now - exact[parent]) / u[parent] * period) ** 2
-    if len(cost) > 2:  # the second best stays, to say where it is
+    integers = np.repeat(low, counts) + within
+    cost = square[parent] + ((integers - exact[parent]) / u[parent] * period) ** 2
+    if len(cost) > 2:  # the second best is kept, for its position
         hopeless = cost > max(WORSE, float(np.partition(cost, 1)[1]))
         floor = min(floor, float(np.min(cost[hopeless], initial=np.inf)))
-        parent, now = parent[~hopeless], now[~hopeless]
-    return np.concatenate([cycles[parent], now[:, None]], axis=1), x[parent], floor
+        parent, integers = parent[~hopeless], integers[~hopeless]
+    return np.concatenate([cycles[parent], integers[:, None]], axis=1), x[parent], floor

@@ -1,13 +1,13 @@
-"""Pillars, and the zero, scale and cyclic terms of an instrument, from distances between pillars nearly in line.
+"""Adjustment of a baseline: pillars, and zero, scale and cyclic terms of an instrument.
 
-observed = (1 + scale) D + zero + cyclic + systematic effects + noise, along the slope. Pillars lie in a plane, x along
-the line from the first to the last and y to its left; with horizontal directions both are solved for, without them y
-stays as given.
+observed = (1 + scale) D + zero + cyclic + systematic effects + noise, along the slope. Pillars are nearly in line and
+in a plane, x along the line from the first to the last and y to its left; with horizontal directions both are
+estimated, without them y stays as given.
 
-Shots on one target from one set-up, a *set*, share the pointing, the centring and the air of their moment. The noise of
-a set's mean over n shots has the variance shot/n + set + air D², and the three components are estimated from the
-scatter within sets and between them. Effects common to all (thermometer, heights, a known scale) come as one column
-each, for one standard uncertainty, and give a full covariance.
+Shots on one target from one set-up, a *set*, share pointing, centring and momentary air. The noise of a set's mean over
+n shots has the variance shot/n + set + air D², and the three components are estimated from the scatter within sets and
+between them. Effects common to all (thermometer, heights, a known scale) are given as one column each, for one standard
+uncertainty, and give a full covariance.
 """
 
 from collections.abc import Sequence
@@ -20,33 +20,33 @@ from catseye.estimation.baseline.model import BaselineModel, BaselineSights, Cla
 
 FLOOR = np.array([1e-7, 1e-7, 1e-9]) ** 2  # m², m², ratio²: no distance meter is better
 CEILING = np.array([0.1, 0.1, 1e-3]) ** 2
-LEAST_FREEDOM = 4  # between sets; with less their scatter says too little, the claim stands for it
-SEPARABLE = 1e-3  # least singular value of columns of length 1: below it terms tell too little from each other
+LEAST_FREEDOM = 4  # between sets; below it the claim is used
+SEPARABLE = 1e-3  # smallest singular value of unit columns: below it terms are inseparable
 STEP = 1e-9  # m, that ends the iteration
-CONTROLLED = 1e-9  # share of a set's variance that its residual shows; less is rounding
-NEARLY = 0.05  # m, by which one order of the pillars must fit better than any other
-ORDERS = 256  # of the pillars, followed at a time
+CONTROLLED = 1e-9  # share of a set's variance in its residual; less is rounding
+NEARLY = 0.05  # m: minimum advantage of the best order of the pillars
+ORDERS = 256  # of the pillars, limit of candidates
 
 
 @dataclass(frozen=True, eq=False)
 class BaselineSolution:
-    """An adjusted baseline.
+    """Adjusted baseline.
 
     names        (u,) of the parameters: "x 1", "y 1" by the pillars' numbers, "zero", "scale", extras, "orientation 0"
     values       (u,) m, and rad for orientations
-    covariance   (u, u), with what the estimated noise adds
+    covariance   (u, u), including the uncertainty of the estimated noise
     x, y         (n,) m
     noise        variance components
-    u_noise      (3,) their standard uncertainties; nan where not estimated from these data
+    u_noise      (3,) their standard uncertainties; nan if not estimated from these data
     residual     (M,) of the sets' means, observed minus adjusted, m
-    redundancy   (M,) share of an error of a set that shows in its own residual
-    w_set        (M,) standardised residual of each set; nan where nothing controls it
-    alike        (M, M) correlation of these: sets of 1 or -1 cannot be told from each other
-    w_shot       (m,) of each shot; nan where it is alone in its set
+    redundancy   (M,) redundancy number of each set
+    w_set        (M,) standardised residual of each set; nan if unchecked
+    alike        (M, M) correlation of these: sets of 1 or -1 are inseparable
+    w_shot       (m,) of each shot; nan if single in its set
     freedom_sets, freedom_shots   redundant sets, redundant shots within sets
     sets_squares      weighted squares of all but the scatter within sets; without directions chi² of freedom_sets
     variance_factor   weighted squares of sets and shots over the degrees of freedom; expectation 1 under the noise
-    parts        standard deviation that each cause gives each parameter: cause -> (u,)
+    parts        standard deviation of each parameter by cause: cause -> (u,)
     used         the shots
     """
 
@@ -70,16 +70,17 @@ class BaselineSolution:
     used: BaselineSights
 
     def of(self, name: str) -> tuple[float, float]:
-        """A parameter and its standard uncertainty; nan, nan if it is not one."""
+        """Parameter and its standard uncertainty; nan, nan if unknown."""
         if name not in self.names:
             return float("nan"), float("nan")
         at = self.names.index(name)
         return float(self.values[at]), float(np.sqrt(self.covariance[at, at]))
 
     def freedom_of(self, name: str) -> float:
-        """Degrees of freedom of a parameter's u: those of the sets for what their scatter gives it, the rest is known.
+        """Effective degrees of freedom of a parameter's u (Welch-Satterthwaite).
 
-        Infinite where the noise is not estimated from these data. Source: [JCGM100] G.4.1, Welch and Satterthwaite.
+        Those of the sets for the part from their scatter, infinite for the other parts; infinite if the noise is not
+        estimated from these data. Source: [JCGM100] G.4.1, Welch and Satterthwaite.
         """
         at = self.names.index(name)
         if not np.isfinite(self.u_noise).any():
@@ -89,7 +90,7 @@ class BaselineSolution:
 
     @property
     def places(self) -> tuple[np.ndarray, np.ndarray]:
-        """(r,) rows of [x, y] that have an uncertainty, as in `KnownPlaces`, and their covariance (r, r), m²."""
+        """Rows (r,) of [x, y] with an uncertainty, as in `KnownPlaces`, and covariance (r, r), m²."""
         at = [i for i, name in enumerate(self.names) if name[:2] in ("x ", "y ")]
         rows = [int(self.names[i][2:]) + (len(self.x) if self.names[i][0] == "y" else 0) for i in at]
         return np.array(rows, int), self.covariance[np.ix_(at, at)]
@@ -97,10 +98,10 @@ class BaselineSolution:
 
 @dataclass(frozen=True, eq=False)
 class BaselineNoise:
-    """What is known of the noise before a baseline is adjusted.
+    """Prior information on the noise of a baseline.
 
-    noise        variances to use as they are; None estimates them
-    claim        variances to use where the data leave too little to estimate them from
+    noise        variances to use; None: estimate them
+    claim        variances to use if the data have too little redundancy to estimate them
     u_centring   of instrument and target across the line, for directions only, m
     """
 
@@ -122,16 +123,16 @@ def adjust_baseline(
     extra: Extra | None = None,
     before: BaselineNoise = ESTIMATED,
 ) -> BaselineSolution:
-    """Pillars and instrument by least squares, with variance components of the noise.
+    """Pillars and instrument constants by least squares, with variance components.
 
     sights       shots
-    x, y         (n,) approximate places, see `places_in_line`, m; without directions y is held as it is
-    known        places known before; else the pillar of least x holds x and y, the one of largest x its y
-    scale        True: the instrument's scale is unknown, for which `known` is needed
+    x, y         (n,) approximate positions, see `places_in_line`, m; without directions y is fixed
+    known        prior positions; else the pillar of smallest x fixes x and y, the one of largest x its y
+    scale        True: estimate the instrument's scale, which needs `known`
     extra        further terms
-    before       what is known of the noise; else it is estimated
+    before       prior information on the noise; else it is estimated
 
-    Raises EstimationError where the shots do not determine the parameters, or nothing tells the noise.
+    Raises EstimationError if the shots do not determine the parameters, or the noise.
     Source: least squares with correlated observations; restricted likelihood of the components, [PATTERSON71].
     """
     x, y = np.array(x, float), np.array(y, float)
@@ -145,13 +146,13 @@ def adjust_baseline(
         if np.max(np.abs(step[: model.lengths]), initial=0.0) < STEP:
             break
     else:
-        raise EstimationError("the pillars' places do not settle in 20 steps: give better approximate places")
+        raise EstimationError("the pillars' positions do not converge in 20 steps: give better approximate positions")
     freedom = model.freedom_sets
     u_noise = np.full((3, 3), np.nan)
     if noise is None and freedom < LEAST_FREEDOM:
         if claim is None:
             raise EstimationError(
-                f"{freedom} redundant sets do not tell the noise: say what the instrument is specified to"
+                f"{freedom} redundant sets cannot determine the noise: give the instrument's specification"
             )
         noise = claim
     elif noise is None:
@@ -163,7 +164,10 @@ def adjust_baseline(
 
 
 def _components(model: BaselineModel, values: np.ndarray) -> tuple[Claim, np.ndarray]:
-    """Restricted maximum likelihood of shot, set and air, none below its floor; and their covariance (3, 3)."""
+    """Restricted maximum likelihood of shot, set and air variances, with lower limits.
+
+    With covariance (3, 3).
+    """
     from scipy.optimize import minimize
 
     y, a = model.rows(values)
@@ -201,7 +205,7 @@ def _components(model: BaselineModel, values: np.ndarray) -> tuple[Claim, np.nda
 
 
 def _component_covariance(model, y, a, components, active, repeats):
-    """From the expected information, half the trace of P Q P Q."""
+    """Covariance from the expected information, half the trace of P Q P Q."""
     m = len(model.distance)
     normal = Normal(y, a, model.variance(Claim(*components)), model.names)
     cofactors = model.cofactors()
@@ -216,10 +220,10 @@ def _component_covariance(model, y, a, components, active, repeats):
 
 
 def _of_estimated_noise(model: BaselineModel, noise: Claim, covariance: np.ndarray, normal: Normal) -> np.ndarray:
-    """What estimated weights add to the covariance of the parameters.
+    """Additional covariance of the parameters due to estimated weights.
 
-    Once for the scatter that wrong weights cause, once because the weights fit the residuals and flatter themselves:
-    2 sum W_ij G Q_i P Q_j G', with G the gain, W the components' covariance. Components at their floor count as known.
+    One part is the scatter by wrong weights, the other the bias of weights fitted to the residuals: 2 sum W_ij G Q_i P
+    Q_j G', with G the gain, W the components' covariance. Components at their lower limit count as known.
 
     Source: [KENWARD97], for covariances linear in their components.
     """
@@ -295,21 +299,21 @@ def _parts(model: BaselineModel, noise: Claim, normal: Normal) -> dict[str, np.n
 def separation(
     sights: BaselineSights, solution: BaselineSolution, extra: Extra, *, known: KnownPlaces | None, scale: bool
 ) -> float:
-    """How well further terms are told from the others: least singular value, columns weighed and of length 1."""
+    """Separability of further terms: smallest singular value of weighted unit columns."""
     model = BaselineModel(sights, solution.x, solution.y, known, scale, extra, 2e-4)
     return model.step(np.zeros(len(model.names)), solution.noise)[1].separation
 
 
 def places_in_line(start: Sequence[int], end: Sequence[int], distance, *, count: int) -> np.ndarray:
-    """Approximate places (count,) of pillars along a line from distances between them, m; the lower number left.
+    """Approximate positions (count,) m of pillars along a line, from distances between them.
 
     start, end   (m,) numbers of pillars
     distance     (m,) m
     count        number of pillars
 
-    Raises EstimationError for a pillar whose side the distances do not tell.
+    The lower number is on the left. Raises EstimationError for a pillar whose side the distances do not determine.
 
-    Pillars are placed one after the other, on either side of those before them; the distances that close tell which.
+    Pillars are placed one after the other, on either side of the previous ones; closing distances determine the side.
     >>> places_in_line([0, 0, 1], [1, 2, 2], [20.0, 120.0, 100.0], count=3)
     array([  0.,  20., 120.])
     """
@@ -319,12 +323,12 @@ def places_in_line(start: Sequence[int], end: Sequence[int], distance, *, count:
     for p in range(count):
         ties = sum((p, q) in length for q in range(count))
         if ties < 2 < count:
-            raise EstimationError(f"pillar number {p} has {ties} distances to the others: measure it to two at least")
+            raise EstimationError(f"pillar number {p} has {ties} distances to the others: measure it to at least two")
     (low, high), longest = max(length.items(), key=lambda item: (item[1], -item[0][0]))
     low, high = min(low, high), max(low, high)
     orders = [(0.0, {low: 0.0, high: longest})]
-    while len(done := orders[0][1]) < count:
-        tied = {p: [(q, length[(p, q)]) for q in done if (p, q) in length] for p in range(count) if p not in done}
+    while len(placed := orders[0][1]) < count:
+        tied = {p: [(q, length[(p, q)]) for q in placed if (p, q) in length] for p in range(count) if p not in placed}
         pillar = max(tied, key=lambda p: len(tied[p]))
         if not tied[pillar]:
             raise EstimationError(f"no distance joins pillar number {pillar} to pillar number {low}: measure one")
@@ -332,7 +336,7 @@ def places_in_line(start: Sequence[int], end: Sequence[int], distance, *, count:
         for misfit, place in orders:
             guesses: list[float] = []
             for g in (place[q] + sign * d for q, d in tied[pillar] for sign in (1, -1)):
-                if all(abs(g - other) > NEARLY for other in guesses):
+                if all(abs(g - guess) > NEARLY for guess in guesses):
                     guesses.append(g)
             for g in guesses:
                 more = sum(abs(abs(g - place[q]) - d) for q, d in tied[pillar])
@@ -341,6 +345,6 @@ def places_in_line(start: Sequence[int], end: Sequence[int], distance, *, count:
     if len(orders) > 1 and orders[1][0] < orders[0][0] + NEARLY:
         side = next(p for p in range(count) if abs(orders[1][1][p] - orders[0][1][p]) > NEARLY)
         raise EstimationError(
-            f"the distances do not tell on which side pillar number {side} stands: measure more pairs"
+            f"the distances do not determine on which side pillar number {side} is: measure more pairs"
         )
     return np.array([orders[0][1][p] for p in range(count)])

@@ -1,4 +1,4 @@
-"""The full test procedure for electronic distance meters: distances between points on one line, all of equal weight.
+"""Full test procedure of ISO 17123-4 for distance meters: equal weights, points on one line.
 
 Every pair of p points is measured, d = |x_j - x_i| + zero + e. Unknown are the p - 1 lengths from the first point and
 the zero; the standard's correction delta is -zero. With all p (p - 1)/2 pairs measured once the solution is closed:
@@ -18,12 +18,12 @@ from catseye.errors import EstimationError
 
 @dataclass(frozen=True, eq=False)
 class FullTest:
-    """Outcome of the full test procedure.
+    """Result of the full test procedure.
 
-    x                    (p,) places along the line, the first point's zero, m
-    zero                 what the instrument shows too much, m; the standard's delta is -zero
+    x                    (p,) positions along the line, 0 for the first point, m
+    zero                 excess of the instrument's reading, m; the standard's delta is -zero
     u_zero               its standard uncertainty from s, m
-    s                    experimental standard deviation of a single distance, m (of unit weight, where sigma is given)
+    s                    experimental standard deviation of a single distance, m (of unit weight, if sigma is given)
     degrees_of_freedom   nu
     residual             (m,) observed minus adjusted, m
     """
@@ -38,7 +38,7 @@ class FullTest:
 
 @dataclass(frozen=True)
 class Outcome:
-    """A test: what was computed, what it must not exceed (nor fall below `lower`), and whether it passed."""
+    """Result of a test: statistic, limit (and `lower` limit), and if it passed."""
 
     statistic: float
     limit: float
@@ -47,16 +47,16 @@ class Outcome:
 
 
 def full_test(start, end, distance, *, order, sigma=None) -> FullTest:
-    """Places of points on a line and the zero of an instrument, by least squares.
+    """Positions of points on a line and the zero of an instrument, by least squares.
 
     start, end   (m,) numbers of the points of each distance, 0 to p - 1
     distance     (m,) along the line, m
-    order        (p,) numbers of the points as they follow each other
-    sigma        (m,) standard deviation claimed for each distance, m, for weights; None weighs all alike
+    order        (p,) numbers of the points in sequence along the line
+    sigma        (m,) claimed standard deviation of each distance, m, for weights; None: equal weights
 
-    With `sigma`, s is the root of the variance factor: 1 where the claims are right.
-    Source: [ISO12], full test procedure, there for seven points and 21 distances. Raises EstimationError where the
-    distances do not determine the zero, or leave nothing redundant.
+    With `sigma`, s is the root of the variance factor: 1 if the claims are right.
+    Source: [ISO12], full test procedure, there for seven points and 21 distances. Raises EstimationError if the
+    distances do not determine the zero, or have no redundancy.
 
     >>> result = full_test([0, 0, 1, 0, 1, 2], [1, 2, 2, 3, 3, 3], [1.1, 3.1, 2.1, 6.1, 5.1, 3.1], order=[0, 1, 2, 3])
     >>> round(result.zero, 12), result.degrees_of_freedom
@@ -78,11 +78,11 @@ def full_test(start, end, distance, *, order, sigma=None) -> FullTest:
     if np.linalg.matrix_rank(weight[:, None] * design, tol=1e-9 * weight.max()) < design.shape[1]:
         raise EstimationError(
             f"{len(distance)} distances between {len(order)} points do not determine the zero: "
-            "measure parts of a line and the whole of it"
+            "measure parts of a line and its full length"
         )
     if freedom < 1:
         raise EstimationError(
-            f"{len(distance)} distances for {design.shape[1]} unknowns leave nothing redundant: measure more pairs"
+            f"{len(distance)} distances for {design.shape[1]} unknowns have no redundancy: measure more pairs"
         )
     values = inverse @ (weight * distance)
     residual = distance - design @ values
@@ -94,11 +94,11 @@ def full_test(start, end, distance, *, order, sigma=None) -> FullTest:
 
 
 def within_claim(variance_factor: float, degrees_of_freedom: int, level: float = 0.05) -> Outcome:
-    """Question a): is s no larger than claimed? One-sided; the limit comes from the claim alone, never from s.
+    """Test a): s not larger than claimed (one-sided, limit from the claim alone).
 
-    variance_factor      s² over the square of what is claimed
+    variance_factor      s² over the claimed variance
     degrees_of_freedom   nu
-    level                share of good instruments that fail
+    level                false-alarm probability
 
     Source: [ISO12], statistical tests, s <= sigma sqrt(chi²/nu).
 
@@ -112,11 +112,11 @@ def within_claim(variance_factor: float, degrees_of_freedom: int, level: float =
 
 
 def same_precision(s: float, degrees_of_freedom: int, s_before: float, *, before: int, level: float = 0.05) -> Outcome:
-    """Question b): do two experimental standard deviations belong to one population? Two-sided.
+    """Test b): two experimental standard deviations of one population (two-sided).
 
     s, degrees_of_freedom   of this sample, any unit
     s_before, before        of the earlier one, the same unit, and its degrees of freedom
-    level                   share of equal pairs that fail
+    level                   false-alarm probability
 
     Source: [ISO12], statistical tests.
 
@@ -133,12 +133,12 @@ def same_precision(s: float, degrees_of_freedom: int, s_before: float, *, before
 
 
 def is_nothing(value: float, u: float, degrees_of_freedom: float, *, level: float = 0.05) -> Outcome:
-    """Question c): is a value, such as the zero, zero? Two-sided.
+    """Test c): a value, such as the zero, does not differ from zero (two-sided).
 
     value                any unit
     u                    its standard uncertainty, from a sample, the same unit
-    degrees_of_freedom   of u; infinite where u is known beforehand
-    level                share of true zeros that fail
+    degrees_of_freedom   of u; infinite if u is known a priori
+    level                false-alarm probability
 
     Source: [ISO12], statistical tests, |delta| <= t u.
 

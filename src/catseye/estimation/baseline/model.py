@@ -1,6 +1,6 @@
-"""The linear model of a baseline: shots averaged over their sets, directions, places known before; and its solution.
+"""Linear model of a baseline: set means, directions, prior positions; and its solution.
 
-See `adjustment` for what is modelled.
+The effects are described in `adjustment`.
 """
 
 from dataclasses import dataclass, replace
@@ -11,7 +11,7 @@ import numpy as np
 
 from catseye.errors import EstimationError
 
-LEAST_SEPARATION = 1e-4  # below it the parameters themselves are not determined; rounding and slopes fake as much
+LEAST_SEPARATION = 1e-4  # smallest singular value of determined parameters; rounding and slopes simulate as much
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,14 +19,14 @@ class BaselineSights:
     """Shots between pillars.
 
     start, end    (m,) numbers of pillars
-    set           (m,) number of the set, 0 to M - 1: shots in a row on one target
+    set           (m,) number of the set, 0 to M - 1: consecutive shots on one target
     setup         (m,) number of the set-up, 0 to K - 1
     distance      (m,) horizontal distance at the common height, m
-    stretch       (m,) what a metre more on the slope makes in it: 1 over the cosine of the slope
-    systematic    (m, q) what one standard uncertainty of each common effect adds, m
+    stretch       (m,) derivative of distance by slope length: 1 over the cosine of the slope
+    systematic    (m, q) m, effect of one standard uncertainty of each common effect
     effects       (q,) their names
-    direction     (m,) horizontal circle reading, clockwise, rad; nan where none
-    u_direction   (m,) rad, of the reading as printed
+    direction     (m,) horizontal circle reading, clockwise, rad; nan if none
+    u_direction   (m,) rad, of the recorded reading
     """
 
     start: np.ndarray
@@ -43,50 +43,50 @@ class BaselineSights:
     def __len__(self) -> int:
         return len(self.distance)
 
-    def only(self, keep: np.ndarray) -> "BaselineSights":
-        """Some of the shots, sets and set-ups numbered anew."""
-        one, setup = (np.unique(c[keep], return_inverse=True)[1] for c in (self.set, self.setup))
+    def only(self, mask: np.ndarray) -> "BaselineSights":
+        """Selected shots, with sets and set-ups renumbered."""
+        set_numbers, setup = (np.unique(c[mask], return_inverse=True)[1] for c in (self.set, self.setup))
         return replace(
             self,
-            start=self.start[keep],
-            end=self.end[keep],
-            set=one,
+            start=self.start[mask],
+            end=self.end[mask],
+            set=set_numbers,
             setup=setup,
-            distance=self.distance[keep],
-            stretch=self.stretch[keep],
-            systematic=self.systematic[keep],
-            direction=self.direction[keep],
-            u_direction=self.u_direction[keep],
+            distance=self.distance[mask],
+            stretch=self.stretch[mask],
+            systematic=self.systematic[mask],
+            direction=self.direction[mask],
+            u_direction=self.u_direction[mask],
         )
 
     @cached_property
     def shots(self) -> np.ndarray:
-        """Number of shots in each set, (M,)."""
+        """Number of shots (M,) per set."""
         return np.bincount(self.set)
 
     @cached_property
     def first(self) -> np.ndarray:
-        """(M,) first shot of each set."""
+        """First shot (M,) of each set."""
         return np.unique(self.set, return_index=True)[1]
 
     def mean(self, values: np.ndarray) -> np.ndarray:
-        """(M, ...) means over the sets."""
+        """Means (M, ...) over the sets."""
         total = np.zeros((len(self.shots), *values.shape[1:]))
         np.add.at(total, self.set, values)
         return total / self.shots.reshape(-1, *[1] * (values.ndim - 1))
 
     @cached_property
     def within(self) -> np.ndarray:
-        """(m,) each distance less its set's mean."""
+        """Distances (m,) less their set's mean."""
         return self.distance - self.mean(self.distance)[self.set]
 
 
 @dataclass(frozen=True, eq=False)
 class KnownPlaces:
-    """Places known before, with their covariance.
+    """Prior positions with covariance.
 
     x, y         (n,) m
-    rows         (r,) which of [x, y] are known with covariance: i for x of pillar i, n + i for y
+    rows         (r,) indices in [x, y] with prior: i for x of pillar i, n + i for y
     covariance   (r, r) m²
     """
 
@@ -98,10 +98,10 @@ class KnownPlaces:
 
 @dataclass(frozen=True, eq=False)
 class Extra:
-    """Further terms linear in their coefficients: cyclic terms, a response to the weather.
+    """Further linear terms: cyclic terms, response to the weather.
 
     names     (e,)
-    columns   (m, e) what a coefficient of 1 adds to each distance, m
+    columns   (m, e) effect of a unit coefficient on each distance, m
     """
 
     names: tuple[str, ...]
@@ -123,7 +123,7 @@ class Claim:
 
 
 class BaselineModel:
-    """The linear model at given values: sets' means, then directions, then places known before."""
+    """Linear model at given values: set means, directions, prior positions."""
 
     def __init__(self, sights, x, y, known, scale, extra, u_centring):
         self.sights, self.known, self.scale, self.extra, self.u_centring = sights, known, scale, extra, u_centring
@@ -133,9 +133,9 @@ class BaselineModel:
         self.setup = sights.setup[sights.first]
         self.distance, self.shots = sights.mean(sights.distance), sights.shots
         self.systematic, self.stretch = sights.mean(sights.systematic), sights.mean(sights.stretch)
-        seen = np.isfinite(sights.direction)
-        self.aimed = np.flatnonzero(np.bincount(sights.set, seen) > 0)
-        self.direction, self.var_direction = self._directions(seen)
+        measured = np.isfinite(sights.direction)
+        self.aimed = np.flatnonzero(np.bincount(sights.set, measured) > 0)
+        self.direction, self.var_direction = self._directions(measured)
         along = np.argsort(x, kind="stable")
         touched = np.zeros(n, bool)
         touched[self.start] = touched[self.end] = True
@@ -160,24 +160,24 @@ class BaselineModel:
         unknown = 1 + int(scale) + (len(extra.names) if extra is not None else 0)
         self.freedom_sets = len(self.distance) - unknown - (0 if known is not None else n - 1)
 
-    def _directions(self, seen):
-        """Mean of each aimed set, about its first reading, and the variance of the reading."""
+    def _directions(self, measured):
+        """Mean of each aimed set, about its first reading, and variance of the reading."""
         s = self.sights
         mean, variance = np.full(len(self.shots), np.nan), np.full(len(self.shots), np.nan)
         for k in self.aimed:
-            in_set = np.flatnonzero((s.set == k) & seen)
+            in_set = np.flatnonzero((s.set == k) & measured)
             turn = s.direction[in_set] - s.direction[in_set[0]]
             weight = 1.0 / s.u_direction[in_set] ** 2
             mean[k] = s.direction[in_set[0]] + np.sum(weight * np.arctan2(np.sin(turn), np.cos(turn))) / np.sum(weight)
-            variance[k] = np.min(s.u_direction[in_set]) ** 2  # repeats share what makes a reading wrong
+            variance[k] = np.min(s.u_direction[in_set]) ** 2  # repetitions share the reading's error
         return mean, variance
 
     def at(self, values):
-        """Places for given values."""
+        """Positions for given values."""
         n = len(self.x0)
-        both = np.concatenate([self.x0, self.y0])
-        both[self.free] += values[: self.lengths]
-        return both[:n], both[n:]
+        coordinates = np.concatenate([self.x0, self.y0])
+        coordinates[self.free] += values[: self.lengths]
+        return coordinates[:n], coordinates[n:]
 
     def rows(self, values):
         """Misclosures and design of all rows."""
@@ -185,14 +185,14 @@ class BaselineModel:
         i, j, n, m = self.start, self.end, len(x), len(self.distance)
         dx, dy = x[j] - x[i], y[j] - y[i]
         size = np.hypot(dx, dy)
-        every = np.zeros((m, 2 * n))
+        slopes = np.zeros((m, 2 * n))
         rows = np.arange(m)
         for column, slope in ((j, dx / size), (i, -dx / size), (n + j, dy / size), (n + i, -dy / size)):
-            every[rows, column] += slope
-        rate = self.stretch**2  # a scale works on the slope, which is D/cos, and shows in D by 1/cos again
+            slopes[rows, column] += slope
+        rate = self.stretch**2  # a scale acts on the slope length D/cos, and enters D by another 1/cos
         factor = 1.0 + rate * (values[self.lengths + 1] if self.scale else 0.0)
         design = np.zeros((m, len(self.names)))
-        design[:, : self.lengths] = factor[:, None] * every[:, self.free]
+        design[:, : self.lengths] = factor[:, None] * slopes[:, self.free]
         design[:, self.lengths] = self.stretch
         predicted = factor * size + self.stretch * values[self.lengths]
         at = self.lengths + 1
@@ -210,13 +210,13 @@ class BaselineModel:
         """Clockwise reading + orientation = -atan2(dy, dx)."""
         k, n = self.aimed, len(self.x0)
         design = np.zeros((len(k), len(self.names)))
-        every = np.zeros((len(k), 2 * n))
+        slopes = np.zeros((len(k), 2 * n))
         rows = np.arange(len(k))
         across, along = (dy / size**2)[k], (-dx / size**2)[k]
         i, j = self.start[k], self.end[k]
         for column, slope in ((j, across), (i, -across), (n + j, along), (n + i, -along)):
-            every[rows, column] += slope
-        design[:, : self.lengths] = every[:, self.free]
+            slopes[rows, column] += slope
+        design[:, : self.lengths] = slopes[:, self.free]
         orientation = np.array([self.orientation[int(s)] for s in self.setup[k]], int)
         design[rows, orientation] = -1.0
         turn = self.direction[k] + values[orientation] + np.arctan2(dy[k], dx[k])
@@ -227,11 +227,11 @@ class BaselineModel:
         if self.known is None:
             return np.zeros(0), design
         design[:, : self.lengths] = np.eye(self.lengths)
-        both = np.concatenate([self.known.x - self.x0, self.known.y - self.y0])
-        return both[self.free] - values[: self.lengths], design
+        offsets = np.concatenate([self.known.x - self.x0, self.known.y - self.y0])
+        return offsets[self.free] - values[: self.lengths], design
 
     def cofactors(self):
-        """(3, M) diagonals of the noise of the means."""
+        """Diagonals (3, M) of the noise cofactors of the means."""
         return np.stack([1.0 / self.shots, np.ones(len(self.shots)), self.distance**2])
 
     def noise_only(self, noise: Claim):
@@ -251,7 +251,7 @@ class BaselineModel:
         return v
 
     def step(self, values, noise: Claim):
-        """The next step and what it came from."""
+        """Next step and its normal equations."""
         y, a = self.rows(values)
         normal = Normal(y, a, self.variance(noise), self.names)
         return normal.values, normal
@@ -269,7 +269,7 @@ class Normal:
         if len(y) < len(names) or size[-1] < LEAST_SEPARATION:
             weak = ", ".join(names[i] for i in np.flatnonzero(np.abs(vt[-1]) > 0.2)[:6])
             raise EstimationError(
-                f"the distances do not determine {weak}: measure more pairs, parts of the line and the whole of it"
+                f"the distances do not determine {weak}: measure more pairs, parts of the line and its full length"
             )
         self.separation = float(size[-1])
         self.values = (vt.T @ ((u.T @ target) / size)) / length

@@ -1,1 +1,1 @@
-"""What moved between epochs: congruence, comparison, motions of groups."""
+"""Movements between epochs: congruence tests, comparison, group motions."""

@@ -1,4 +1,4 @@
-"""Many points of two epochs, each compared by itself with a frame of few: for networks too large for one joint test."""
+"""Comparison of single points with a frame of few, for networks too large for one joint test."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,13 +10,13 @@ from catseye.errors import EstimationError
 from catseye.estimation.deformation.common_points import far_points, listed
 from catseye.estimation.deformation.congruence import (
     DATUMS,
-    HELD,
+    FIXED,
     KNOWN,
     UNSEEN,
     CongruenceTest,
     Differences,
     differences,
-    seen_motions,
+    observable_motions,
 )
 from catseye.estimation.deformation.deformation import Deformation, moved_points
 from catseye.estimation.deformation.deletion import DeletionSearch
@@ -25,7 +25,7 @@ from catseye.estimation.network.model import NetworkSolution
 from catseye.estimation.shapes.place_covariances import turned_covariance
 from catseye.estimation.shapes.rigid_body import motion_columns
 
-TOO_MANY = "{n} points of the frame are too many for one joint test (limit {limit}); name fewer (frame=)"
+TOO_MANY = "{n} frame points are too many for one joint test (limit {limit}); name fewer (frame=)"
 
 
 def frame_points(
@@ -37,25 +37,25 @@ def frame_points(
     datum: str,
     limit: int,
 ) -> np.ndarray:
-    """Rows of the points that the others are compared with.
+    """Rows of the frame points, with which the others are compared.
 
-    frame   those named; None: those that define both datums, as many as the limit, evenly chosen; or of all points,
-            where these only just hold the datum, such as a few coordinates that are held as a mere convention
-    datum   what the datums may differ by
+    frame   names; None: the points that define both datums, up to the limit, evenly chosen; or of all points, if these
+            have no redundancy, such as a few coordinates fixed by convention
+    datum   allowed differences of the datums
     limit   points of one joint test
 
-    Raises EstimationError for a stranger, and for more than the limit.
+    Raises EstimationError for an unknown name, and for more than the limit.
     """
     if frame is None:
         marked = [s.network.points.fixed | s.network.points.datum for s in (first, second)]
         at = [np.array([s.index[name] for name in model.names]) for s in (first, second)]
         chosen = marked[0][at[0]].any(axis=1) & marked[1][at[1]].any(axis=1)
     else:
-        strange = [name for name in frame if name not in model.names]
-        if strange:
-            raise EstimationError(f"{listed(strange)} of the frame: not among the points compared")
+        unknown = [name for name in frame if name not in model.names]
+        if unknown:
+            raise EstimationError(f"{listed(unknown)} of the frame: not among the points compared")
         chosen = np.isin(model.names, list(frame))
-    chosen[model.carried // 3] = True
+    chosen[model.carried_indices // 3] = True
     inside = np.flatnonzero(chosen)
     if frame is not None:
         if len(inside) > limit:
@@ -66,12 +66,12 @@ def frame_points(
 
 
 def _evenly(rows: np.ndarray, most: int) -> np.ndarray:
-    """Rows, as many of them as that, evenly chosen."""
+    """Evenly chosen rows, at most so many."""
     return rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int))]
 
 
 def _checked(model: EpochModel, inside: np.ndarray, datum: str) -> bool:
-    """True if nothing floats beside these points, since they are held, or the rest shows which one of them moved."""
+    """True if these points are fixed, or each of them is checked by the others."""
     between = differences(model.epochs(inside), datum, np.ones(len(inside), dtype=bool))
     if not between.used.any():
         return not between.motions.shape[1]
@@ -80,53 +80,56 @@ def _checked(model: EpochModel, inside: np.ndarray, datum: str) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class _Others:
-    """Movements of k other points, each by itself; covariances with variance factor 1, nan where not compared."""
+class _Movements:
+    """Movements of k single points.
+
+    Covariances with variance factor 1, nan where not compared.
+    """
 
     displacement: np.ndarray
     covariance: np.ndarray
     statistic: np.ndarray
     rank: np.ndarray
-    held: np.ndarray
+    fixed: np.ndarray
 
 
 def beside_frame(
     model: EpochModel, inside: np.ndarray, options: dict[str, Any]
 ) -> tuple[Deformation, tuple[np.ndarray, np.ndarray]]:
-    """The frame's own congruence, then each other point against the frame's stable ones by itself.
+    """Congruence of the frame, then single tests of other points against its stable points.
 
     model     of all points
     inside    rows of the frame
-    options   as `moved_points`; half of the level is spent on the frame and half on the others, all of it on these
-              where every point of the frame is held
+    options   as `moved_points`; half of the level is used for the frame and half for the others; all for the
+              others if every frame point is fixed
 
     With d_F the frame's differences, M the datum's motions: d_i is predicted as M_i m + Q_iF P d_F, the best linear
     prediction, m and P of the fit of the frame alone. Exact for one point whatever its correlations.
     """
     level, factor, epochs = options["level"], options["variance_factor"], model.epochs(inside)
-    every = differences(epochs, options["datum"], np.ones(len(inside), dtype=bool))
-    tested = bool(every.used.any()) and every.fit().degrees_of_freedom > 0
+    all_differences = differences(epochs, options["datum"], np.ones(len(inside), dtype=bool))
+    tested = bool(all_differences.used.any()) and all_differences.fit().degrees_of_freedom > 0
     share = 0.5 * level if tested else level
     if tested:
         far = far_points(epochs, level=share, scaled=6 in DATUMS[options["datum"]])
         frame = moved_points(epochs, **{**options, "level": share}, far=far)
     else:
-        frame = _untested(every, options)
+        frame = _untested(all_differences, options)
     between = differences(epochs, options["datum"], frame.stable)
-    others = np.setdiff1d(np.arange(len(model.names)), inside)
-    best, plain = _predicted(model, between, frame.stable, (inside, others))
+    other_points = np.setdiff1d(np.arange(len(model.names)), inside)
+    best, plain = _predicted(model, between, frame.stable, (inside, other_points))
     p = np.where(best.rank > 0, factor.p(best.statistic, best.rank), np.nan)
     count = max(int(np.isfinite(p).sum()), 1)
     moved = p * count < share
     needed = {int(r): factor.noncentrality(int(r), share / count, options["power"]) for r in set(best.rank) if r}
     worst = _largest(best.covariance) * factor.value
-    at = np.concatenate([inside, others]).argsort()
+    at = np.concatenate([inside, other_points]).argsort()
 
-    def joined(first: np.ndarray, rest: np.ndarray) -> np.ndarray:
-        return np.concatenate([first, rest])[at]
+    def joined(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        return np.concatenate([first, second])[at]
 
-    text = f"frame {frame.status}; of the {len(others)} other points "
-    text += f"moved: {listed([model.names[i] for i in others[moved]])}" if moved.any() else "none moved"
+    text = f"frame {frame.status}; of the {len(other_points)} other points "
+    text += f"moved: {listed([model.names[i] for i in other_points[moved]])}" if moved.any() else "none moved"
     deformation = replace(
         frame,
         names=model.names,
@@ -136,117 +139,121 @@ def beside_frame(
         p=joined(frame.p, p),
         p_adjusted=joined(frame.p_adjusted, np.minimum(1.0, p * count)),
         moved=joined(frame.moved, moved),
-        held=joined(frame.held, best.held),
+        held=joined(frame.held, best.fixed),
         stable=joined(frame.stable, ~moved),
         detectable=joined(frame.detectable, np.sqrt([needed.get(int(r), np.nan) for r in best.rank] * worst)),
         level=level,
         status=text,
     )
-    own = between.blocks(*between.plain(frame.stable))
-    return deformation, (joined(own[0], plain.displacement), joined(own[1], plain.covariance))
+    frame_movements = between.blocks(*between.plain(frame.stable))
+    return deformation, (joined(frame_movements[0], plain.displacement), joined(frame_movements[1], plain.covariance))
 
 
 def _untested(between: Differences, options: dict[str, Any]) -> Deformation:
-    """A frame that is held, or only just holds the datum: nothing in it can be seen to move."""
+    """Result of a frame that is fixed or has no redundancy: no movement can be tested."""
     n = len(between.names)
     d, q = between.blocks(*between.plain(np.ones(n, dtype=bool)))
-    held = between.held.reshape(n, 3).any(axis=1) & ~between.used.reshape(n, 3).any(axis=1)
-    nothing, no = np.full(n, np.nan), np.zeros(n, dtype=bool)
-    none = CongruenceTest(0.0, 0, np.nan)
+    fixed = between.fixed.reshape(n, 3).any(axis=1) & ~between.used.reshape(n, 3).any(axis=1)
+    undefined, unmoved = np.full(n, np.nan), np.zeros(n, dtype=bool)
+    no_test = CongruenceTest(0.0, 0, np.nan)
     return Deformation(
         names=between.names,
         displacement=d,
         covariance=q * options["variance_factor"].value,
-        statistic=nothing,
-        p=nothing,
-        p_adjusted=nothing,
-        moved=no,
-        held=np.asarray(held),
-        stable=~no,
-        before=none,
-        after=none,
-        detectable=nothing,
+        statistic=undefined,
+        p=undefined,
+        p_adjusted=undefined,
+        moved=unmoved,
+        held=np.asarray(fixed),
+        stable=~unmoved,
+        before=no_test,
+        after=no_test,
+        detectable=undefined,
         level=options["level"],
         power=options["power"],
         datum=options["datum"],
         steps=(),
         conclusive=True,
-        status="held" if held.all() else "taken as stable",
+        status="fixed" if fixed.all() else "assumed stable",
     )
 
 
 def _largest(covariance: np.ndarray) -> np.ndarray:
-    """(k,) the largest eigenvalue of each (k, 3, 3), of what is known of it."""
-    known = np.where(np.isfinite(covariance), covariance, 0.0)
-    return np.linalg.eigvalsh(known)[:, -1] if len(known) else np.zeros(0)
+    """Largest eigenvalue (k,) of each (k, 3, 3), over the finite elements."""
+    finite = np.where(np.isfinite(covariance), covariance, 0.0)
+    return np.linalg.eigvalsh(finite)[:, -1] if len(finite) else np.zeros(0)
 
 
 def _predicted(
     model: EpochModel, between: Differences, stable: np.ndarray, rows: tuple[np.ndarray, np.ndarray]
-) -> tuple[_Others, _Others]:
-    """Best prediction and plain difference of the other points beside the stable points of the frame.
+) -> tuple[_Movements, _Movements]:
+    """Best prediction and plain difference of other points relative to the frame's stable points.
 
     between      of the frame, aligned on its stable points
     stable       (f,) bool
-    rows         of the frame and of the others in the model
+    rows         of the frame and of the other points in the model
     """
-    inside, others = rows
+    inside, other_points = rows
     used = between.used & np.repeat(stable, 3)
-    compared = model.compared.reshape(-1, 3)[others]
-    motions = motion_columns(model.x[others], between.pivot) @ between.combination
-    shown, unseen = seen_motions(between.motions[used])
-    lost = np.where(compared.ravel()[:, None], motions @ unseen, 0.0)
+    compared = model.compared.reshape(-1, 3)[other_points]
+    motions = motion_columns(model.x[other_points], between.pivot) @ between.combination
+    observable, unobservable = observable_motions(between.motions[used])
+    ambiguous = np.where(compared.ravel()[:, None], motions @ unobservable, 0.0)
     axes = compared.any(axis=0) & ~model.compared.reshape(-1, 3)[inside].any(axis=0)
-    if axes.any() or np.abs(lost).max(initial=0.0) > UNSEEN**0.5 * np.abs(motions).max(initial=0.0):
-        raise EstimationError(f"the {int(stable.sum())} stable points of the frame do not hold the datum; add more")
-    step = model.y[others] @ between.turned.T + between.shifted - model.x[others]
-    across = _across(model, others, inside, between.turned)[:, used]
-    own, q, d = model.of_points(others, between.turned), between.q[np.ix_(used, used)], between.d[used]
+    if axes.any() or np.abs(ambiguous).max(initial=0.0) > UNSEEN**0.5 * np.abs(motions).max(initial=0.0):
+        raise EstimationError(
+            f"the {int(stable.sum())} stable points of the frame do not determine the datum; add more"
+        )
+    step = model.y[other_points] @ between.turned.T + between.shifted - model.x[other_points]
+    across = _across(model, other_points, inside, between.turned)[:, used]
+    variances, q, d = model.of_points(other_points, between.turned), between.q[np.ix_(used, used)], between.d[used]
 
-    def by(gain: np.ndarray) -> _Others:
-        g, c = (a.reshape(len(others), 3, int(used.sum())) for a in (gain, across))
+    def movements_of(gain: np.ndarray) -> _Movements:
+        g, c = (a.reshape(len(other_points), 3, int(used.sum())) for a in (gain, across))
         mixed = c @ g.transpose(0, 2, 1)
-        spread = own - mixed - mixed.transpose(0, 2, 1) + g @ q @ g.transpose(0, 2, 1)
-        return _tested(step - g @ d, spread, compared, _spread(model, others))
+        spread = variances - mixed - mixed.transpose(0, 2, 1) + g @ q @ g.transpose(0, 2, 1)
+        return _tested(step - g @ d, spread, compared, _spread(model, other_points))
 
     if not used.any():
-        nothing = np.zeros((3 * len(others), 0))
-        return by(nothing), by(nothing)
+        no_gain = np.zeros((3 * len(other_points), 0))
+        return movements_of(no_gain), movements_of(no_gain)
     fit = replace(between, used=used).fit()
-    seen = motions @ shown
-    return by(seen @ fit.gain + across @ fit.weight), by(seen @ np.linalg.pinv(between.motions[used] @ shown))
+    visible = motions @ observable
+    return movements_of(visible @ fit.gain + across @ fit.weight), movements_of(
+        visible @ np.linalg.pinv(between.motions[used] @ observable)
+    )
 
 
 def _spread(model: EpochModel, points: np.ndarray) -> np.ndarray:
-    """(k, 3) m^2, sum of both epochs' variances of each coordinate."""
+    """Sum (k, 3) m^2 of both epochs' variances of each coordinate."""
     at = [columns.reshape(-1, 3)[points] for columns in model.columns]
     return np.sum([np.diagonal(q.blocks(c[:, 0]), axis1=1, axis2=2) for q, c in zip(model.q, at, strict=True)], axis=0)
 
 
-def _tested(displacement: np.ndarray, covariance: np.ndarray, compared: np.ndarray, spread: np.ndarray) -> _Others:
-    """Statistics of points (k, 3) each by itself, over the coordinates that are compared and not held."""
+def _tested(displacement: np.ndarray, covariance: np.ndarray, compared: np.ndarray, spread: np.ndarray) -> _Movements:
+    """Statistics of single points (k, 3), over the coordinates compared and not fixed."""
     variance = np.diagonal(covariance, axis1=1, axis2=2)
-    free = compared & (variance > HELD * spread)
-    both = compared[:, :, None] & compared[:, None, :]
+    free = compared & (variance > FIXED * spread)
+    pairs = compared[:, :, None] & compared[:, None, :]
     rank = free.sum(axis=1)
     statistic = np.full(len(rank), np.nan)
     for pattern in np.unique(free, axis=0) if len(free) else []:
-        axes, mine = np.flatnonzero(pattern), np.flatnonzero(np.all(free == pattern, axis=1))
+        axes, members = np.flatnonzero(pattern), np.flatnonzero(np.all(free == pattern, axis=1))
         if len(axes):
-            d, q = displacement[np.ix_(mine, axes)], covariance[np.ix_(mine, axes, axes)]
-            statistic[mine] = np.einsum("ni,ni->n", d, np.linalg.solve(q, d[..., None])[..., 0])
-    return _Others(
+            d, q = displacement[np.ix_(members, axes)], covariance[np.ix_(members, axes, axes)]
+            statistic[members] = np.einsum("ni,ni->n", d, np.linalg.solve(q, d[..., None])[..., 0])
+    return _Movements(
         np.where(compared, displacement, np.nan),
-        np.where(both, covariance, np.nan),
+        np.where(pairs, covariance, np.nan),
         statistic,
         rank,
         compared.any(axis=1) & (rank == 0),
     )
 
 
-def _across(model: EpochModel, others: np.ndarray, inside: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """Covariance (3k, 3f) of the differences of other points and of those inside, the second epoch turned."""
-    rows = (3 * others[:, None] + np.arange(3)).ravel()
+def _across(model: EpochModel, other_points: np.ndarray, inside: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """Covariance (3k, 3f) of the differences of other and frame points, the second epoch rotated."""
+    rows = (3 * other_points[:, None] + np.arange(3)).ravel()
     q1, q2, ahead, back = model.parts(rows, (3 * inside[:, None] + np.arange(3)).ravel())
     q2, ahead = turned_covariance(q2, turn, columns=True), turned_covariance(ahead, turn, columns=True)
     return q1 - ahead + turned_covariance(q2 - back, turn, columns=False)

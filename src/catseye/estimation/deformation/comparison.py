@@ -1,4 +1,4 @@
-"""Two adjusted epochs of a network compared: what moved, under the stochastic model that their connection calls for."""
+"""Comparison of two adjusted epochs of a network, with the joint stochastic model of both."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -26,23 +26,25 @@ LARGEST = 700  # common points of one joint test, whose work grows with their nu
 
 @dataclass(frozen=True, eq=False)
 class PointMovements:
-    """What moved between two epochs; arrays over the n points of `deformation`, in x east, y north, z up.
+    """Movements between two epochs.
+
+    Arrays over the n points of `deformation`, x east, y north, z up.
 
     first, second           as adjusted
     deformation             displacements relative to the stable points, each the best estimate if these did not move,
-                            with covariance, statistic, p, who moved, tests, detectable displacements, level and power
-    difference              (n, 3) m, plain: second less first in the datum of the held, else of the stable points; nan
-                            where the stable points do not hold it
+                            with covariance, statistic, p, moved points, tests, detectable displacements, level, power
+    difference              (n, 3) m, plain: second less first in the datum of the fixed, else of the stable points; nan
+                            if the stable points do not determine it
     difference_covariance   (n, 3, 3) m^2
-    carried                 points that the second epoch holds at the first's result
-    rounding                (largest departure of the held coordinates from that result, its standard uncertainty), m
-    frame                   the points that all others were compared with one by one; () where one joint test was made
-    apart                   name -> m: moved, and the median of its distances to the others changed by so much: is it
-                            the same point?
-    alike                   names that are not common, in pairs that differ only by upper and lower case
-    variance_factor         that the covariances are multiplied by
+    carried                 points that the second epoch fixes at the first's result
+    rounding                (largest departure of the fixed coordinates from that result, its standard uncertainty), m
+    frame                   the points that all others were compared with one by one; () for one joint test
+    apart                   name -> m: moved points, with the median change of their distances to the others: possibly
+                            another point of the same name
+    alike                   pairs of names that are not common and differ only by case
+    variance_factor         factor on the covariances
     homogeneity             p of equal variance factors in both epochs; nan without redundancy in either
-    words                   what was assumed and found, a line each
+    words                   assumptions and results, one line each
     """
 
     first: NetworkSolution
@@ -61,36 +63,39 @@ class PointMovements:
 
     @property
     def doubts(self) -> list[str]:
-        """Why the comparison is not beyond doubt, a line each; the epochs' own verdicts are not among them."""
+        """Reasons to doubt the comparison, one line each.
+
+        The epochs' own verdicts are not included.
+        """
         doubts = [] if self.deformation.conclusive else [self.deformation.status]
         if self.apart:
             text = ", ".join(f"{name} ({by:.3g} m)" for name, by in self.apart.items())
-            doubts.append(f"moved so far that it may be another point under the same name: {text}")
+            doubts.append(f"moved so far that it may be another point of the same name: {text}")
         if self.alike:
             text = listed([f"{a} and {b}" for a, b in self.alike])
-            doubts.append(f"not compared, since the names differ by upper and lower case: {text}")
+            doubts.append(f"not compared, as the names differ by upper and lower case: {text}")
         return doubts
 
     @property
     def u(self) -> np.ndarray:
-        """(n, 3) m, standard uncertainties of deformation.displacement."""
+        """Standard uncertainties (n, 3) m of deformation.displacement."""
         return np.sqrt(np.maximum(np.diagonal(self.deformation.covariance, axis1=1, axis2=2), 0.0))
 
     @property
     def u_difference(self) -> np.ndarray:
-        """(n, 3) m, standard uncertainties of the plain difference."""
+        """Standard uncertainties (n, 3) m of the plain difference."""
         return np.sqrt(np.maximum(np.diagonal(self.difference_covariance, axis1=1, axis2=2), 0.0))
 
 
 @dataclass(frozen=True)
 class ComparisonOptions:
-    """How `compare` tests two epochs.
+    """Settings of `compare`.
 
-    level, power, rule         as `moved_points`; with a frame half the level is spent on it and half on the others
+    level, power, rule         as `moved_points`; with a frame half the level is used for it and half for the others
     rounding                   m, the last digit of coordinates carried from the first epoch; their departure from its
                                result is an error of u = rounding / sqrt(12) each. 0: carried with all digits
-    same_point                 m: a point that moved and whose distances to others changed by more in the median is
-                               doubted: another point under the same name? It stays in the answer
+    same_point                 m: a moved point whose distances to others changed by more in the median may be another
+                               point of the same name; it is noted, and stays in the result
     scale_by_variance_factor   False: a priori covariances. True: times the pooled variance factor, F tests
     """
 
@@ -114,53 +119,53 @@ def compare(
     datum: str | None = None,
     options: ComparisonOptions = USUAL,
 ) -> PointMovements:
-    """What moved between two adjusted epochs of a network, with the covariance that their connection calls for.
+    """Movements between two adjusted epochs of a network, with their joint covariance.
 
     first, second              adjusted by `adjust_network`, in the same axes
     points                     names to compare, taken as the same points however far they moved; None: all common ones.
-                               Points that carry the datum always take part
-    frame                      stable points that each other point is compared with by itself, for large networks; None:
-                               those that define the datum, where there are more than 700 common points
-    datum                      what the datums may differ by, a key of `DATUMS`; None: found from the observations
+                               Points that define the datum are always included
+    frame                      stable points that single points are compared with, for large networks; None: those that
+                               define the datum, if there are more than 700 common points
+    datum                      allowed differences of the datums, a key of `DATUMS`; None: found from the observations
     options                    level and rule of the tests, rounding of carried coordinates
 
-    A coordinate that is absent in either epoch is not compared. Raises EstimationError where there is no answer to
-    compare, or where the epochs do not fit together.
+    A coordinate that is absent in either epoch is not compared. Raises EstimationError for an epoch without a solution,
+    or for incompatible epochs.
 
     Source: [PELZER71], [CASPARY87] (congruence); [FOERSTNER16] chapter 4 (propagation; see `epoch_model`).
     """
     _check_alike(first, second)
     common, alike = paired_names(first, second)
-    held = DatumConnection.of(first, second, datum, options.rounding)
-    names = _names(common, points, held)
-    model = EpochModel.of(first, second, names, held)
+    connection = DatumConnection.of(first, second, datum, options.rounding)
+    names = _names(common, points, connection)
+    model = EpochModel.of(first, second, names, connection)
     factor, homogeneity = _factor(first, second)
     factor = factor if options.scale_by_variance_factor else KNOWN
     tested: dict[str, Any] = {
-        "datum": held.datum,
+        "datum": connection.datum,
         "level": options.level,
         "power": options.power,
         "rule": options.rule,
         "variance_factor": factor,
     }
     if frame is not None or len(names) > LARGEST:
-        inside = frame_points(first, second, model, frame, datum=held.datum, limit=LARGEST)
+        inside = frame_points(first, second, model, frame, datum=connection.datum, limit=LARGEST)
         deformation, (difference, covariance) = beside_frame(model, inside, tested)
     else:
         inside = np.zeros(0, dtype=int)
         epochs = model.epochs(np.arange(len(names)))
-        far = far_points(epochs, level=options.level, scaled=6 in DATUMS[held.datum])
+        far = far_points(epochs, level=options.level, scaled=6 in DATUMS[connection.datum])
         deformation = moved_points(epochs, **tested, far=far)
-        plain = differences(epochs, held.datum, deformation.stable)
+        plain = differences(epochs, connection.datum, deformation.stable)
         difference, covariance = plain.blocks(*plain.plain(deformation.stable))
-    done = PointMovements(
+    movements = PointMovements(
         first=first,
         second=second,
         deformation=deformation,
         difference=difference,
         difference_covariance=covariance * factor.value,
-        carried=tuple(dict.fromkeys(name for name, _ in held.carried)),
-        rounding=(held.departure, held.u),
+        carried=tuple(dict.fromkeys(name for name, _ in connection.carried_coordinates)),
+        rounding=(connection.departure, connection.u),
         frame=tuple(names[i] for i in inside),
         apart=_apart(model, deformation.moved, options.same_point) if points is None else {},
         alike=tuple(alike) if points is None else (),
@@ -168,14 +173,14 @@ def compare(
         homogeneity=homogeneity,
         words=(),
     )
-    return replace(done, words=tuple(_words(done, options, held.same)))
+    return replace(movements, words=tuple(_words(movements, options, connection.common_fixed)))
 
 
 def _check_alike(first: NetworkSolution, second: NetworkSolution) -> None:
     a, b = first.network, second.network
     for which, solution in (("first", first), ("second", second)):
         if not solution.status.startswith(CONVERGED):
-            raise EstimationError(f"the {which} epoch has no answer to compare: {solution.status}")
+            raise EstimationError(f"the {which} epoch has no solution to compare: {solution.status}")
     if not np.array_equal(a.axes, b.axes) or a.axis_names != b.axis_names:
         raise EstimationError(
             f"the epochs have different axes: {', '.join(a.axis_names)} with {np.asarray(a.axes).tolist()} and "
@@ -184,85 +189,87 @@ def _check_alike(first: NetworkSolution, second: NetworkSolution) -> None:
 
 
 def _factor(first: NetworkSolution, second: NetworkSolution) -> tuple[VarianceFactor, float]:
-    """Variance factor of both epochs, or of the one that has redundancy, and the p of their being equal."""
-    known = [(s.variance_factor, s.degrees_of_freedom) for s in (first, second)]
-    known = [(f, v) for f, v in known if f > 0.0 and v > 0.0]
-    if len(known) == 2:
-        return pooled_variance_factor(known[0], known[1])
-    return (VarianceFactor(*known[0]) if known else KNOWN), float("nan")
+    """Variance factor of both epochs, or of the one with redundancy, and p of their equality."""
+    redundant = [(s.variance_factor, s.degrees_of_freedom) for s in (first, second)]
+    redundant = [(f, v) for f, v in redundant if f > 0.0 and v > 0.0]
+    if len(redundant) == 2:
+        return pooled_variance_factor(redundant[0], redundant[1])
+    return (VarianceFactor(*redundant[0]) if redundant else KNOWN), float("nan")
 
 
-def _names(common: tuple[str, ...], points: Sequence[str] | None, held: DatumConnection) -> tuple[str, ...]:
-    """Names to compare, those that carry the datum among them."""
+def _names(common: tuple[str, ...], points: Sequence[str] | None, connection: DatumConnection) -> tuple[str, ...]:
+    """Names to compare, including those that define the datum."""
     if points is None:
         return common
     for name in points:
         if name not in common:
             raise EstimationError(f"point {name!r} is not in both epochs; compare common points")
-    return tuple(dict.fromkeys([*points, *held.same, *(name for name, _ in held.carried)]))
+    return tuple(
+        dict.fromkeys([*points, *connection.common_fixed, *(name for name, _ in connection.carried_coordinates)])
+    )
 
 
 def _apart(model: EpochModel, moved: np.ndarray, same_point: float) -> dict[str, float]:
-    """Points that moved by more than a point is expected to, and how much their distances to others changed, m."""
+    """Points that moved implausibly far, with the median change of their distances to others, m."""
     if not moved.any():
         return {}
     change = distance_changes(model.x, model.y, model.compared.reshape(-1, 3))
     return {model.names[i]: float(change[i]) for i in np.flatnonzero(moved & (change > same_point))}
 
 
-def _words(done: PointMovements, options: ComparisonOptions, same: Sequence[str]) -> list[str]:
-    """What was assumed and found, a line each."""
-    words = [f"datums may differ as {done.deformation.datum!r}"]
-    if done.carried:
+def _words(movements: PointMovements, options: ComparisonOptions, common_fixed: Sequence[str]) -> list[str]:
+    """Assumptions and results, one line each."""
+    words = [f"datums may differ as {movements.deformation.datum!r}"]
+    if movements.carried:
         words[0] = (
-            f"the second epoch holds {listed(done.carried)} at the first's result: its errors are carried over, and "
-            "a movement of these points would look like one of all others"
+            f"the second epoch fixes {listed(movements.carried)} at the first's result: its errors are propagated, and "
+            "a movement of these points would appear as a movement of all others"
         )
-    elif same:
-        words[0] = f"{listed(same)} are held in both epochs: a movement of theirs would look like one of all others"
-    if done.rounding[1]:
+    elif common_fixed:
+        words[0] = f"{listed(common_fixed)} are fixed in both epochs: their movement would appear as one of all others"
+    if movements.rounding[1]:
         words.append(
-            f"held coordinates are up to {1e6 * done.rounding[0]:.2g} um off the first's result: taken as rounding to "
-            f"{1e6 * options.rounding:g} um, u = {1e6 * done.rounding[1]:.2g} um each"
+            f"fixed coordinates are up to {1e6 * movements.rounding[0]:.2g} um off the first's result: "
+            f"treated as rounding to {1e6 * options.rounding:g} um, u = {1e6 * movements.rounding[1]:.2g} um each"
         )
-    if done.apart:
-        text = ", ".join(f"{name} ({by:.3g} m)" for name, by in done.apart.items())
+    if movements.apart:
+        text = ", ".join(f"{name} ({by:.3g} m)" for name, by in movements.apart.items())
         words.append(
-            f"not the same point? {text}: distances to other points changed by more than {options.same_point:g} m"
+            f"possibly another point: {text}: distances to other points changed by more than {options.same_point:g} m"
         )
-    for which, a, b in (("first", done.first, done.second), ("second", done.second, done.first)):
+    for which, a, b in (("first", movements.first, movements.second), ("second", movements.second, movements.first)):
         alone = [name for name in a.index if name not in b.index]
         if alone:
             words.append(f"in the {which} epoch only: {listed(alone)}")
-    if done.frame:
-        words.append(f"each point by itself against the stable ones of {listed(done.frame)}, not in one joint test")
-    words.append(f"{_scatter(done)}; {_basis(done)}")
+    if movements.frame:
+        words.append(f"single points compared with the stable ones of {listed(movements.frame)}, no joint test")
+    words.append(f"{_scatter(movements)}; {_basis(movements)}")
     return [
         *words,
         *(
             f"the {w} epoch: {s.status}"
-            for w, s in (("first", done.first), ("second", done.second))
+            for w, s in (("first", movements.first), ("second", movements.second))
             if s.status != CONVERGED
         ),
-        done.deformation.status,
+        movements.deformation.status,
     ]
 
 
-def _scatter(done: PointMovements) -> str:
-    """The variance factors, or which epoch has none."""
-    a, b = done.first.variance_factor, done.second.variance_factor
-    if np.isfinite(done.homogeneity):
-        return f"variance factors {a:.3g} and {b:.3g}, equal with p = {done.homogeneity:.2g}"
+def _scatter(movements: PointMovements) -> str:
+    """Variance factors of both epochs, or the epoch without one."""
+    a, b = movements.first.variance_factor, movements.second.variance_factor
+    if np.isfinite(movements.homogeneity):
+        return f"variance factors {a:.3g} and {b:.3g}, equal with p = {movements.homogeneity:.2g}"
     bare = [which for which, value in (("first", a), ("second", b)) if not np.isfinite(value)]
     if len(bare) == 2:
-        return "nothing is redundant in either epoch: no variance factor shows if their uncertainties are right"
+        return "neither epoch has redundancy: no variance factor can check their uncertainties"
     if bare:
-        value, other = (b, "second") if bare == ["first"] else (a, "first")
-        return f"variance factor {value:.3g} of the {other} epoch, nothing is redundant in the {bare[0]}"
-    return f"variance factors {a:.3g} and {b:.3g}, too small to be compared"
+        value, which_epoch = (b, "second") if bare == ["first"] else (a, "first")
+        return f"variance factor {value:.3g} of the {which_epoch} epoch, no redundancy in the {bare[0]}"
+    return f"variance factors {a:.3g} and {b:.3g}, too small to compare"
 
 
-def _basis(done: PointMovements) -> str:
-    estimated = np.isfinite(done.variance_factor.degrees_of_freedom)
-    both = np.isfinite(done.homogeneity)
-    return ("pooled" if both else "applied to both") if estimated else "covariances a priori"
+def _basis(movements: PointMovements) -> str:
+    estimated = np.isfinite(movements.variance_factor.degrees_of_freedom)
+    pooled = np.isfinite(movements.homogeneity)
+    return ("pooled" if pooled else "applied to both") if estimated else "a-priori covariances"

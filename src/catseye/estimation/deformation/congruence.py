@@ -1,8 +1,8 @@
-"""Congruence of the points common to two epochs: their differences without the datum, and the global test.
+"""Congruence of the points common to two epochs: datum-free differences, and the global test.
 
-The coordinates of an epoch stand in its own datum. What two datums may differ by is the reader's to say ("rigid" for
-ranges alone, "levelled" where heights and plumb lines hold two turns). Every test here weights only what no such motion
-explains, so that decisions do not depend on how either datum was held.
+The coordinates of an epoch refer to its own datum. The caller states by which motions the datums may differ ("rigid"
+for ranges alone, "levelled" if heights and plumb lines determine two rotations). Every test here weights only the part
+that no such motion explains, so that decisions do not depend on how either datum was fixed.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,29 +27,29 @@ DATUMS: dict[str, tuple[int, ...]] = {
     "similarity": (0, 1, 2, 3, 4, 5, 6),
 }
 CHANGED = ([0], [1], [2], [1, 2], [0, 2], [0, 1], [0, 1, 2])  # axes along which each of MOTIONS moves points
-HELD = 1e-12  # of the epochs' variances: a difference with less variance is held, not measured
-HELD_APART = 1e-9  # m: held coordinates may differ by rounding, not more
-CURVED = 0.05  # of the smallest sigma: second-order effect of a turn that a linear datum motion may have
+FIXED = 1e-12  # of the epochs' variances: a difference with less variance is fixed, not measured
+FIXED_TOLERANCE = 1e-9  # m: fixed coordinates may differ by rounding only
+CURVED = 0.05  # of the smallest sigma: limit of a rotation's second-order effect in a linear datum motion
 ALIGNMENTS = 20
-UNSEEN = 1e-9  # of the largest singular value of the datum motions: beneath it a motion does not show
+UNSEEN = 1e-9  # of the largest singular value of the datum motions: below it a motion is not observed
 
 
 @dataclass(frozen=True)
 class VarianceFactor:
-    """What the covariances are multiplied by: known (infinite degrees, chi-square tests) or estimated (F tests)."""
+    """Factor on the covariances: known (infinite degrees, chi-square tests) or estimated (F tests)."""
 
     value: float = 1.0
     degrees_of_freedom: float = np.inf
 
     def p(self, pvv: float | np.ndarray, rank: float | np.ndarray) -> np.ndarray:
-        """Chance of a sum of squares at least as large as pvv, of `rank` degrees of freedom, if nothing moved."""
+        """Probability of a sum of squares at least pvv, of `rank` degrees of freedom, without movement."""
         pvv, rank = np.asarray(pvv) / self.value, np.maximum(rank, 1)
         if np.isinf(self.degrees_of_freedom):
             return special.chdtrc(rank, np.maximum(pvv, 0.0))
         return special.fdtrc(rank, self.degrees_of_freedom, np.maximum(pvv / rank, 0.0))
 
     def noncentrality(self, rank: int, level: float, power: float) -> float:
-        """Squared size, in sigmas, of an effect that a test of this level finds with this power.
+        """Squared size, in sigmas, of an effect that a test of this level and power detects.
 
         Source: [BAARDA68]; at rank 1, level 0.1 %, power 80 % the root is 4.13.
         """
@@ -65,7 +65,7 @@ KNOWN = VarianceFactor()
 
 
 def _crossing(rising: Callable[[float], float]) -> float:
-    """Where a rising function crosses zero, by bisection to double precision."""
+    """Zero of a rising function, by bisection to double precision."""
     low, high = 0.0, 1.0
     while rising(high) < 0.0:
         low, high = high, 2.0 * high
@@ -76,7 +76,7 @@ def _crossing(rising: Callable[[float], float]) -> float:
 
 
 def pooled_variance_factor(first: tuple[float, float], second: tuple[float, float]) -> tuple[VarianceFactor, float]:
-    """Variance factor of two epochs together, and the p-value of their being equal (two-sided F test).
+    """Pooled variance factor of two epochs, and p-value of their equality (two-sided F test).
 
     first, second   (variance factor, degrees of freedom) of each epoch, as `LeastSquaresSolution.variance_factor`
 
@@ -95,15 +95,15 @@ def pooled_variance_factor(first: tuple[float, float], second: tuple[float, floa
 
 @dataclass(frozen=True, eq=False)
 class Epochs:
-    """The points common to two epochs.
+    """Points common to two epochs.
 
     names               n, unique
     first, second       (n, 3) m, all finite
     covariance_first    (3n, 3n) m^2, joint, may be singular
     covariance_second   likewise
     cross               (3n, 3n) m^2, covariance of the first epoch (rows) with the second (columns); None: independent
-    compared            (n, 3) bool: False for a coordinate that is not common, such as of a benchmark known by height
-                        alone; it takes no part, its value only says where the point is. None: all are compared
+    compared            (n, 3) bool: False for a coordinate that is not common, e.g. of a benchmark with known height
+                        only; it is not tested, its value is only the position. None: all are compared
     """
 
     names: tuple[str, ...]
@@ -135,7 +135,7 @@ class CongruenceTest:
 
     pvv                 weighted sum of squares of the differences that no datum motion explains
     degrees_of_freedom  compared coordinates less datum motions
-    p                   chance of such a pvv or a larger one if nothing moved
+    p                   probability of a pvv at least as large if nothing moved
     """
 
     pvv: float
@@ -144,12 +144,12 @@ class CongruenceTest:
 
 
 def _combination(points: np.ndarray, datum: str, pivot: np.ndarray, axes: np.ndarray) -> np.ndarray:
-    """(7, g): motions of the datum, scaled to unit columns over the points, from those of `motion_columns`.
+    """Datum motions (7, g) from those of `motion_columns`, scaled to unit columns over the points.
 
-    axes   (3,) bool: compared in any point; a motion that changes no such coordinate is none
+    axes   (3,) bool: compared in any point; motions that change no such coordinate are omitted
     """
     if datum not in DATUMS:
-        raise EstimationError(f"datum {datum!r} is none of {', '.join(DATUMS)}")
+        raise EstimationError(f"unknown datum {datum!r} (expected one of {', '.join(DATUMS)})")
     chosen = np.eye(7)[:, [k for k in DATUMS[datum] if np.any(axes[CHANGED[k]])]]
     length = np.linalg.norm(motion_columns(points, pivot) @ chosen, axis=0)
     return chosen / np.where(length > 0.0, length, 1.0)
@@ -157,17 +157,17 @@ def _combination(points: np.ndarray, datum: str, pivot: np.ndarray, axes: np.nda
 
 @dataclass(frozen=True, eq=False)
 class Differences:
-    """Second less first of common points, aligned on chosen points, and what is needed to weight it.
+    """Coordinate differences, second less first, aligned on chosen points, with their weights' inputs.
 
     names         n
-    datum         what the two datums may differ by
+    datum         allowed differences of the two datums
     d             (3n,) m
     q             (3n, 3n) m^2, variance factor 1
-    used          (3n,) bool: compared and not held
-    held          (3n,) bool: compared, without variance
+    used          (3n,) bool: compared and not fixed
+    fixed         (3n,) bool: compared, without variance
     pivot         (3,) m
-    combination   (7, g): the datum motions that held coordinates leave free, about the pivot
-    motions       (3n, g): what they do to the points, m
+    combination   (7, g): datum motions left free by fixed coordinates, about the pivot
+    motions       (3n, g): their displacements of the points, m
     called        g names of them
     turned        (3, 3), and
     shifted       (3,) m: the second epoch was aligned as turned @ second + shifted
@@ -178,7 +178,7 @@ class Differences:
     d: np.ndarray
     q: np.ndarray
     used: np.ndarray
-    held: np.ndarray
+    fixed: np.ndarray
     pivot: np.ndarray
     combination: np.ndarray
     motions: np.ndarray
@@ -188,19 +188,22 @@ class Differences:
 
     @property
     def _visible(self) -> np.ndarray:
-        """(3n, r): motions that show in the compared coordinates; a turn about a line of points does not."""
-        return self.motions @ seen_motions(self.motions[self.used])[0]
+        """Motions (3n, r) observable in the compared coordinates.
+
+        A rotation about a line of points is not.
+        """
+        return self.motions @ observable_motions(self.motions[self.used])[0]
 
     def holds(self, stable: np.ndarray) -> bool:
-        """True if these points (n,) bool hold every motion of the datum that the compared coordinates show."""
+        """True if these points (n,) bool determine every observable datum motion."""
         motions = self._visible
         return bool(np.linalg.matrix_rank(motions[np.repeat(stable, 3) & self.used]) == motions.shape[1])
 
     def fit(self, extra: np.ndarray | None = None, called: Sequence[str] = ()) -> LinearEstimate:
-        """The differences explained by datum motions, and by extra columns (3n, k), as well as they can be."""
+        """Best fit of the differences by datum motions and extra columns (3n, k)."""
         rows = np.flatnonzero(self.used)
         if not len(rows):
-            raise EstimationError("no coordinate is compared: every common one is held or excluded")
+            raise EstimationError("no coordinate is compared: every common one is fixed or excluded")
         motions, names = self._visible[rows], self.called
         if motions.shape[1] < len(names):
             names = tuple(f"datum motion {i + 1}" for i in range(motions.shape[1]))
@@ -212,51 +215,51 @@ class Differences:
             rows=[f"{self.names[r // 3]} {'xyz'[r % 3]}" for r in rows],
         )
 
-    def seen_from(self, stable: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Plain differences (3n,) m and their covariance (3n, 3n) m^2 in the datum of stable points (n,) bool.
+    def in_datum(self, stable: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Plain differences (3n,) m and covariance (3n, 3n) m^2 in the datum of stable points (n,) bool.
 
-        Held coordinates come first; what they leave free is held by inner constraints on the stable points, by
-        S-transformation. Raises EstimationError if these do not hold it. Source: [BAARDA73].
+        Fixed coordinates come first; the remaining motions are fixed by inner constraints on the stable points, by
+        S-transformation. Raises EstimationError if these do not determine the datum. Source: [BAARDA73].
         """
         motions = self._visible
         conditions = np.where((np.repeat(stable, 3) & self.used)[:, None], motions, 0.0).T
         if not self.holds(stable):
             raise EstimationError(
-                f"{int(stable.sum())} stable points do not hold a {self.datum} datum; more are needed"
+                f"{int(stable.sum())} stable points do not determine a {self.datum} datum; more are needed"
             )
         moved, t = to_datum(self.d, np.zeros(len(self.d)), motions, conditions=conditions)
         s = np.eye(len(self.d)) - t @ conditions
         return self.d + moved, s @ self.q @ s.T
 
     def plain(self, stable: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Movements like `seen_from`; nan where stable points do not hold the datum, and where nothing is compared."""
+        """Differences as `in_datum`; nan if undetermined or not compared."""
         n = len(self.d)
-        d, q = self.seen_from(stable) if self.holds(stable) else (np.full(n, np.nan), np.full((n, n), np.nan))
-        seen = self.used | self.held
-        return np.where(seen, d, np.nan), np.where(seen[:, None] & seen, q, np.nan)
+        d, q = self.in_datum(stable) if self.holds(stable) else (np.full(n, np.nan), np.full((n, n), np.nan))
+        known_rows = self.used | self.fixed
+        return np.where(known_rows, d, np.nan), np.where(known_rows[:, None] & known_rows, q, np.nan)
 
     @staticmethod
     def blocks(d: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(n, 3) and (n, 3, 3) of each point from those of all, (3n,) and (3n, 3n)."""
+        """Displacements (n, 3) and covariances (n, 3, 3) of single points from (3n,) and (3n, 3n)."""
         n = len(d) // 3
         return d.reshape(n, 3), q.reshape(n, 3, n, 3)[np.arange(n), :, np.arange(n)]
 
 
-def seen_motions(motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Combinations (g, r) of motions (m, g) that show in these rows, and those (g, g - r) that do not."""
+def observable_motions(motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Combinations (g, r) of motions (m, g) observable in these rows, and the unobservable (g, g - r)."""
     _, s, vt = np.linalg.svd(np.linalg.qr(motions, mode="r"), full_matrices=True)
     rank = int(np.sum(s > UNSEEN * s.max(initial=0.0)))
     return (np.eye(len(vt)), np.zeros((len(vt), 0))) if rank == len(vt) else (vt[:rank].T, vt[rank:].T)
 
 
 def differences(epochs: Epochs, datum: str, stable: np.ndarray) -> Differences:
-    """The differences after the datum motion that fits the stable points best, unweighted, is taken out exactly.
+    """Differences with the best unweighted datum motion of the stable points removed exactly.
 
-    epochs   see there
-    datum    what the two datums may differ by, a key of `DATUMS`
+    epochs   see `Epochs`
+    datum    allowed differences of the two datums, a key of `DATUMS`
     stable   (n,) bool
 
-    Raises EstimationError where held coordinates differ, or where a large turn meets coordinates that are not common.
+    Raises EstimationError if fixed coordinates differ, or for a large rotation with partly compared coordinates.
     """
     x, y = (np.asarray(p, dtype=float) for p in (epochs.first, epochs.second))
     n = len(x)
@@ -264,20 +267,20 @@ def differences(epochs: Epochs, datum: str, stable: np.ndarray) -> Differences:
     cross = np.zeros((3 * n, 3 * n)) if epochs.cross is None else np.asarray(epochs.cross, dtype=float)
     compared = np.ones(3 * n, dtype=bool) if epochs.compared is None else np.ravel(epochs.compared).astype(bool)
     variance = np.diag(qx) + np.diag(qy)
-    held = compared & (np.diag(qx + qy - cross - cross.T) <= HELD * variance)
-    _check_held(epochs.names, np.where(held, np.abs((y - x).ravel()), 0.0))
-    fully_held = held.reshape(n, 3).all(axis=1)
-    pivot = x[fully_held].mean(axis=0) if fully_held.any() else x[stable].mean(axis=0)
+    fixed = compared & (np.diag(qx + qy - cross - cross.T) <= FIXED * variance)
+    _check_fixed(epochs.names, np.where(fixed, np.abs((y - x).ravel()), 0.0))
+    fixed_points = fixed.reshape(n, 3).all(axis=1)
+    pivot = x[fixed_points].mean(axis=0) if fixed_points.any() else x[stable].mean(axis=0)
     axes = np.asarray(compared.reshape(n, 3).any(axis=0))
     combination = _combination(x, datum, pivot, axes)
     base = motion_columns(x, pivot)
     called = tuple(MOTIONS[i] for i in DATUMS[datum] if np.any(axes[CHANGED[i]]))
-    if held.any() and combination.shape[1]:  # only motions that leave held coordinates where they are
-        _, s, vt = np.linalg.svd(base[held] @ combination)
-        left = vt[int(np.sum(s > UNSEEN * s.max(initial=0.0))) :].T
-        combination, called = combination @ left, tuple(f"datum motion {i + 1}" for i in range(left.shape[1]))
-    partial = not _turns_alike(compared.reshape(n, 3), held.reshape(n, 3), combination)
-    on = np.repeat(stable, 3) & compared & ~held
+    if fixed.any() and combination.shape[1]:  # only motions that leave fixed coordinates unchanged
+        _, s, vt = np.linalg.svd(base[fixed] @ combination)
+        free = vt[int(np.sum(s > UNSEEN * s.max(initial=0.0))) :].T
+        combination, called = combination @ free, tuple(f"datum motion {i + 1}" for i in range(free.shape[1]))
+    partial = not _turns_alike(compared.reshape(n, 3), fixed.reshape(n, 3), combination)
+    on = np.repeat(stable, 3) & compared & ~fixed
     turned = np.eye(3)
     aligned = y
     if combination.shape[1] and on.any():
@@ -290,8 +293,8 @@ def differences(epochs: Epochs, datum: str, stable: np.ndarray) -> Differences:
         datum=datum,
         d=(aligned - x).ravel(),
         q=qx + qy - cross - cross.T,
-        used=compared & ~held,
-        held=held,
+        used=compared & ~fixed,
+        fixed=fixed,
         pivot=pivot,
         combination=combination,
         motions=base @ combination,
@@ -301,27 +304,33 @@ def differences(epochs: Epochs, datum: str, stable: np.ndarray) -> Differences:
     )
 
 
-def _turns_alike(compared: np.ndarray, held: np.ndarray, combination: np.ndarray) -> bool:
-    """True if the datum's turns mix coordinates only of one state: held, compared or neither; (n, 3) bool each."""
+def _turns_alike(compared: np.ndarray, fixed: np.ndarray, combination: np.ndarray) -> bool:
+    """True if the datum's rotations mix only coordinates of one state.
+
+    The states, (n, 3) bool each, are fixed, compared or neither.
+    """
     axes = [0, 1, 2] if np.any(combination[3:5]) else [0, 1] if np.any(combination[5]) else [0]
-    return all(bool(np.all(part[:, axes] == part[:, :1])) for part in (compared, held))
+    return all(bool(np.all(part[:, axes] == part[:, :1])) for part in (compared, fixed))
 
 
-def _check_held(names: Sequence[str], apart: np.ndarray) -> None:
+def _check_fixed(names: Sequence[str], apart: np.ndarray) -> None:
     worst = int(np.argmax(apart))
-    if apart[worst] > HELD_APART:
+    if apart[worst] > FIXED_TOLERANCE:
         raise EstimationError(
-            f"{names[worst // 3]} is held: the difference of its {'xyz'[worst % 3]} has no variance, but is "
-            f"{apart[worst]:.3g} m; give it its covariance, or the same coordinate in both epochs"
+            f"{names[worst // 3]} is fixed: the difference of its {'xyz'[worst % 3]} has no variance, but is "
+            f"{apart[worst]:.3g} m; give its covariance, or the same coordinate in both epochs"
         )
 
 
 def _aligned(
     x: np.ndarray, y: np.ndarray, on: np.ndarray, pivot: np.ndarray, *, combination: np.ndarray, limit: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """y moved onto x by datum motions, exactly, and the matrix that did it; coordinates `on` are made to agree.
+    """y moved exactly onto x by datum motions, and the matrix used.
 
-    A finite `limit`, m, the smallest sigma, forbids turns: y stays, if the second order of the turn is nothing to it.
+    Coordinates `on` are fitted.
+
+    With a finite `limit`, m, the smallest sigma, y is returned unchanged if the second-order effect of the rotation is
+    negligible against it.
     """
     from scipy.spatial.transform import Rotation
 
@@ -336,7 +345,7 @@ def _aligned(
             if curved > CURVED * limit:
                 raise EstimationError(
                     f"the epochs' axes differ by {np.linalg.norm(motion[3:6]):.2g} rad, too much for points known or "
-                    "held in some coordinates only; bring both epochs to the same axes first"
+                    "fixed in some coordinates only; bring both epochs to the same axes first"
                 )
             return y, turned
         back = Rotation.from_rotvec(-motion[3:6]).as_matrix() / (1.0 + motion[6])
@@ -350,13 +359,13 @@ def _aligned(
 def congruence_test(epochs: Epochs, *, datum: str = "rigid", variance_factor: VarianceFactor = KNOWN) -> CongruenceTest:
     """Global test that no common point moved relative to the others.
 
-    epochs            see there
-    datum             what the two datums may differ by, a key of `DATUMS`
+    epochs            see `Epochs`
+    datum             allowed differences of the two datums, a key of `DATUMS`
     variance_factor   known (chi-square test) or estimated (F test), see `pooled_variance_factor`
 
     The quadratic form of the differences d with the pseudo-inverse of their covariance, after both are brought to one
     datum; here d' P d with P as in `best_linear_estimate`, which is the same for every datum. Raises EstimationError
-    where no redundancy is left, or where the covariance is singular beyond the datum.
+    without redundancy, or if the covariance is singular beyond the datum.
 
     Source: [PELZER71]; [CASPARY87].
     """
@@ -365,7 +374,12 @@ def congruence_test(epochs: Epochs, *, datum: str = "rigid", variance_factor: Va
 
 
 def global_test(pvv: float, degrees: int, variance_factor: VarianceFactor) -> CongruenceTest:
-    """The test of a sum of squares of so many degrees of freedom; EstimationError if there are none."""
+    """Test of a sum of squares with its degrees of freedom.
+
+    EstimationError if there are none.
+    """
     if degrees <= 0:
-        raise EstimationError("nothing to test: the compared coordinates only just hold the datum; compare more points")
+        raise EstimationError(
+            "nothing to test: the compared coordinates have no redundancy beyond the datum; compare more points"
+        )
     return CongruenceTest(pvv, degrees, float(variance_factor.p(pvv, degrees)))

@@ -1,4 +1,4 @@
-"""Search for the points that moved: deletion algebra, removal one by one, and the return of the innocent."""
+"""Backward search for moved points: deletion algebra, removal one by one, and readmission."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -7,18 +7,22 @@ import numpy as np
 
 from catseye.estimation.deformation.congruence import Differences, Epochs, VarianceFactor, differences
 
-UNDECIDED = "undecided: without {moved} the rest is still not congruent (p = {p:.2g}), and no more points can be spared"
-CIRCLES = "undecided: the search went in circles for {rounds} rounds, the last without {moved}"
+UNDECIDED = (
+    "undecided: without {moved} the other points are still not congruent (p = {p:.2g}), and no more can be removed"
+)
+CIRCLES = "undecided: the search did not settle in {rounds} rounds, the last without {moved}"
 TIE = "undecided: {one} or {other} moved, the observations cannot tell which"
-UNCHECKED = 1e-9  # of the largest precision, each in its coordinate's sigmas: with less nothing else checks it
-SINGLE = 1e-3  # of the level, spent on single points beside the global test: one far move drowns among hundreds
+UNCHECKED = 1e-9  # of the largest precision, in units of each coordinate's sigma: below it a point is unchecked
+SINGLE = (
+    1e-3  # of the level, for tests of single points: one large movement is diluted among hundreds in the global test
+)
 SEARCHES = 10
-TIED = 1e-6  # of a statistic: nearer than this two explanations are the same one
+TIED = 1e-6  # of a statistic: two explanations closer than this are tied
 
 
 @dataclass(frozen=True)
 class Step:
-    """One removal of the backward search: who went, with what p; who would have gone else; p of the rest then."""
+    """One removal of the backward search: point, p, runner-up, its p, and p of the remainder."""
 
     name: str
     p: float
@@ -29,7 +33,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class PointTest:
-    """One point's displacement (k,) over its k compared coordinates, its covariance, and its test."""
+    """Displacement (k,) of a point over its k compared coordinates, its covariance and test."""
 
     displacement: np.ndarray
     covariance: np.ndarray
@@ -39,7 +43,7 @@ class PointTest:
 
 @dataclass(frozen=True, eq=False)
 class DeletionState:
-    """Tests of all points (None: not checked by the others), pvv, degrees and p of the rest, with some left out."""
+    """Tests of all points (None: unchecked), and pvv, degrees and p of the remainder."""
 
     tests: list[PointTest | None]
     pvv: float
@@ -55,38 +59,44 @@ class DeletionState:
 
 
 class DeletionSearch:
-    """Deletion algebra: with P of all points at hand, leaving points out needs no new decomposition.
+    """Deletion algebra: with P of all points, removals need no new decomposition.
 
     The best estimate of displacements D of points M, all others unmoved, is P_MM^-1 (P d)_M with covariance P_MM^-1;
-    it lowers the pvv by D' P_MM D, and P of the rest is P - P_.M P_MM^-1 P_M.
+    it lowers the pvv by D' P_MM D, and P of the remainder is P - P_.M P_MM^-1 P_M.
     """
 
     def __init__(self, between: Differences, variance_factor: VarianceFactor) -> None:
         fit = between.fit()
         self.between = between
         self.precision, self.weighted, self.pvv = fit.weight, fit.weighted_residual, fit.pvv
-        self.absolute = len(fit.estimate) == 0  # held coordinates, or both datums alike: nothing floats
+        self.absolute = len(fit.estimate) == 0  # fixed coordinates, or identical datums: no free motion
         self.degrees, self.variance_factor = fit.degrees_of_freedom, variance_factor
-        spread = np.diag(between.q)[between.used]  # of a coordinate by itself: P times it is 1 or about it
+        spread = np.diag(between.q)[between.used]  # single-coordinate variance: P times it is about 1
         self.scale = np.sqrt(spread / max(float(np.max(spread * np.diag(fit.weight))), 1e-300))
         point = np.flatnonzero(between.used) // 3
         self.axes = np.flatnonzero(between.used) % 3
         self.rows = [np.flatnonzero(point == i) for i in range(len(between.names))]
 
-    def _holds(self, own: np.ndarray, rows: np.ndarray) -> bool:
-        """True if enough is left of the precision of these rows in every direction: the others check them."""
+    def _holds(self, precision: np.ndarray, rows: np.ndarray) -> bool:
+        """True if the precision of these rows is sufficient in every direction: the others check them."""
         scale = self.scale[rows]
-        return len(rows) == 0 or bool(np.linalg.eigvalsh(own * scale[:, None] * scale)[0] > UNCHECKED)
+        return len(rows) == 0 or bool(np.linalg.eigvalsh(precision * scale[:, None] * scale)[0] > UNCHECKED)
 
     def spares(self, out: Sequence[int]) -> bool:
-        """True if the datum holds without these points, and a test remains; none need where nothing floats."""
+        """True if the datum stays determined without these points, with a test remaining.
+
+        Without a free datum no test need remain.
+        """
         rows = np.concatenate([self.rows[i] for i in out])
-        left = self.degrees - len(rows)
-        enough = left > 0 or (left == 0 and self.absolute)
+        remaining = self.degrees - len(rows)
+        enough = remaining > 0 or (remaining == 0 and self.absolute)
         return enough and self._holds(self.precision[np.ix_(rows, rows)], rows)
 
     def without(self, out: Sequence[int]) -> DeletionState:
-        """The state with points `out` left out; each of those is itself tested against the rest."""
+        """State with points `out` left out.
+
+        Each of them is tested against the remainder.
+        """
         rows = np.concatenate([np.zeros(0, dtype=int), *(self.rows[i] for i in out)])
         covariance = np.linalg.inv(self.precision[np.ix_(rows, rows)])
         displacement = covariance @ self.weighted[rows]
@@ -98,9 +108,9 @@ class DeletionSearch:
                 at = np.flatnonzero(np.isin(rows, point))
                 tests.append(self._test(displacement[at], covariance[np.ix_(at, at)]))
                 continue
-            own = self.precision[np.ix_(point, point)] - self.precision[np.ix_(point, rows)] @ across[:, point]
-            if len(point) and self._holds(own, point):
-                inverse = np.linalg.inv(own)
+            precision = self.precision[np.ix_(point, point)] - self.precision[np.ix_(point, rows)] @ across[:, point]
+            if len(point) and self._holds(precision, point):
+                inverse = np.linalg.inv(precision)
                 tests.append(self._test(inverse @ weighted[point], inverse))
             else:
                 tests.append(None)
@@ -108,20 +118,23 @@ class DeletionSearch:
         return DeletionState(tests, pvv, degrees, float(self.variance_factor.p(pvv, degrees)) if degrees else 1.0)
 
     def unchecked(self, stable: np.ndarray) -> list[PointTest]:
-        """Each point in the datum of inner constraints on the stable points (n,) bool, where these hold it."""
+        """Tests of all points in the datum of inner constraints on the stable points (n,) bool.
+
+        On all points if the stable ones do not determine the datum.
+        """
         between = self.between
-        d, q = between.seen_from(stable if between.holds(stable) else np.ones(len(self.rows), dtype=bool))
+        d, q = between.in_datum(stable if between.holds(stable) else np.ones(len(self.rows), dtype=bool))
         at = np.flatnonzero(between.used)
         return [self._singular_test(d[at[rows]], q[np.ix_(at[rows], at[rows])]) for rows in self.rows]
 
     def _singular_test(self, displacement: np.ndarray, covariance: np.ndarray) -> PointTest:
-        """The test in the directions that have a variance, each coordinate in its own sigma."""
+        """Test in the directions of non-zero variance, coordinates scaled to unit sigma."""
         sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         sigma = np.where(sigma > 0.0, sigma, 1.0)
         values, vectors = np.linalg.eigh(covariance / sigma[:, None] / sigma)
-        seen = values > UNCHECKED
-        statistic = float(np.sum((displacement / sigma @ vectors[:, seen]) ** 2 / values[seen]))
-        p = float(self.variance_factor.p(statistic, int(seen.sum()))) if seen.any() else np.nan
+        significant = values > UNCHECKED
+        statistic = float(np.sum((displacement / sigma @ vectors[:, significant]) ** 2 / values[significant]))
+        p = float(self.variance_factor.p(statistic, int(significant.sum()))) if significant.any() else np.nan
         factor = self.variance_factor.value
         return PointTest(displacement, covariance * factor, statistic / factor, p)
 
@@ -132,13 +145,13 @@ class DeletionSearch:
         return PointTest(displacement, covariance * factor, statistic / factor, p)
 
     def detectable(self, noncentrality: float) -> tuple[np.ndarray, np.ndarray]:
-        """Per point the displacement of this noncentrality in the direction seen worst, and that direction."""
+        """Displacement of this noncentrality per point in its weakest direction, and that direction."""
         size, direction = np.full(len(self.rows), np.nan), np.full((len(self.rows), 3), np.nan)
         for i, point in enumerate(self.rows):
-            own = self.precision[np.ix_(point, point)]
-            if len(point) == 0 or not self._holds(own, point):
+            precision = self.precision[np.ix_(point, point)]
+            if len(point) == 0 or not self._holds(precision, point):
                 continue
-            values, vectors = np.linalg.eigh(own)
+            values, vectors = np.linalg.eigh(precision)
             size[i] = np.sqrt(noncentrality * self.variance_factor.value / values[0])
             direction[i] = 0.0
             direction[i, self.axes[point]] = vectors[:, 0]
@@ -148,7 +161,7 @@ class DeletionSearch:
 def backward(
     search: DeletionSearch, names: Sequence[str], level: float, rule: str, start: Sequence[int] = ()
 ) -> tuple[list[int], list[Step], str | None]:
-    """Points left out until the rest passes, `start` among them, the removals, and why it stopped short if it did."""
+    """Points removed until the remainder passes (with `start`), the removals, and why it stopped early."""
     out: list[int] = list(start)
     steps: list[Step] = []
     while True:
@@ -162,17 +175,17 @@ def backward(
         if not order:
             moved = ", ".join(names[i] for i in out) or "any point"
             return out, steps, UNDECIDED.format(moved=moved, p=state.rest_p)
-        (p, less, worst), (rival_p, rival_less, rival) = order[0], order[min(1, len(order) - 1)]
-        if rival != worst and rival_less - less < TIED * -less and abs(rival_p - p) <= TIED * p:
-            other = search.without([*out, worst]).tests[rival]
-            if other is None or other.p >= level:  # either explains what the other does
+        (p, cost, worst), (rival_p, rival_cost, rival) = order[0], order[min(1, len(order) - 1)]
+        if rival != worst and rival_cost - cost < TIED * -cost and abs(rival_p - p) <= TIED * p:
+            rival_test = search.without([*out, worst]).tests[rival]
+            if rival_test is None or rival_test.p >= level:  # either explains the same
                 return out, steps, TIE.format(one=names[min(worst, rival)], other=names[max(worst, rival)])
         out.append(worst)
         steps.append(Step(names[worst], p, names[rival], rival_p, np.nan))
 
 
 def returned(search: DeletionSearch, out: list[int], level: float, rule: str) -> list[int]:
-    """Points left out in the shadow of others come back, the least significant first, while the rest still passes."""
+    """Readmit insignificant points, the least significant first, while the remainder passes."""
     while len(out) > 1:
         tests = search.without(out).tests
         p, calmest = max((t.p, i) for i, t in enumerate(tests) if t is not None and i in out)
@@ -185,7 +198,7 @@ def returned(search: DeletionSearch, out: list[int], level: float, rule: str) ->
 
 @dataclass(frozen=True, eq=False)
 class MovedSet:
-    """Rows of points found to have moved, the search aligned on the others, the removals, and why it stopped short."""
+    """Moved points, the search aligned on the others, the removals, and why it stopped early."""
 
     search: DeletionSearch
     out: list[int]
@@ -194,7 +207,7 @@ class MovedSet:
 
     @property
     def rank(self) -> tuple[bool, int]:
-        """Less is better: conclusive before stopped, few moved before many."""
+        """Sort key, lower is better: conclusive first, then fewer moved points."""
         return self.stopped is not None, len(self.out)
 
 
@@ -208,11 +221,11 @@ def find_moved(
     far: Sequence[int],
     without: bool = False,
 ) -> MovedSet:
-    """The points that moved, datums aligned exactly on the others.
+    """Moved points, with datums aligned exactly on the others.
 
-    far       points that the datums are not first aligned on
-    without   the removal begins without these; else with all points
-    others as `moved_points`
+    far       points excluded from the first alignment
+    without   True: start the removal without these; else with all points
+    Other arguments as `moved_points`.
     """
     n = len(epochs.names)
     aligned = sorted(far)

@@ -1,8 +1,10 @@
-"""Movements of points from changes of ranges, with stations and points known only approximately; also constrained.
+"""Point movements from range changes, with approximate stations and points.
 
-A change of range is the exact difference of two distances, so no linearisation enters: with P the point's and S the
-station's approximate place, change = |P + dx - S| - |P - S|. What the approximation costs: an error e of a place turns
-the change's prediction by (u' - u).e, u and u' the unit vectors before and after, about |dx across| |e| / distance.
+Optionally constrained.
+
+A change of range is the exact difference of two distances, without linearisation: with P the point's and S the
+station's approximate position, change = |P + dx - S| - |P - S|. An error e of a position changes the predicted change
+by (u' - u).e, u and u' the unit vectors before and after, about |dx across| |e| / distance.
 """
 
 from collections.abc import Sequence
@@ -15,19 +17,19 @@ from catseye.errors import EstimationError
 from catseye.estimation.shapes.rigid_body import motion_columns
 
 DETERMINED = "determined"
-UNDETERMINED = "undetermined: {rank} of {wanted} directions seen by {channels} channels"
-NOT_CONVERGED = "not converged: the change is too large for a movement near the approximate place"
+UNDETERMINED = "undetermined: {rank} of {count} directions observed by {channels} channels"
+NOT_CONVERGED = "not converged: the change is too large for a movement near the approximate position"
 ITERATIONS = 30
-STEP = 1e-12  # of the mean distance: below it rounding rules
+STEP = 1e-12  # of the mean distance: rounding limit
 RANK = 1e-10  # of the largest eigenvalue of the scaled normal matrix
 
 
 @dataclass(frozen=True, eq=False)
 class GroupMovements:
-    """Movements of one group of n points that share q free parameters, for any batch of epochs (...).
+    """Movements of one group of n points with q free parameters, for any batch of epochs (...).
 
     displacement            (..., n, 3) m; nan where undetermined
-    covariance              (..., 3n, 3n) m^2, all below together
+    covariance              (..., 3n, 3n) m^2, sum of the three below
     noise                   (..., 3n, 3n) m^2, from the range changes
     approximation           (..., 3n, 3n) m^2, from the approximate coordinates, common to all epochs
     violation               (..., 3n, 3n) m^2, from movement in directions that the constraint excludes
@@ -36,13 +38,13 @@ class GroupMovements:
     basis                   (3n, q)
     sensitivity_points      (..., 3n, 3n) d displacement / d approximate points
     sensitivity_stations    (..., 3n, 3s) d displacement / d approximate stations
-    resolution              (..., 3n, 3n) H: what would be reported of a small true movement; H - 1 of a movement that
-                            violates the constraint is its bias
+    resolution              (..., 3n, 3n) H, response to a small true movement; (H - 1) times a movement that violates
+                            the constraint is its bias
     residual                (..., n, s) m, observed minus predicted change; nan for missing channels
     pvv                     (...) weighted sum of squares
     degrees_of_freedom      (...) channels less parameters
     rank                    (...) of q
-    status                  (...) text: "determined", or what is missing
+    status                  (...) text: "determined", or the reason why not
     """
 
     displacement: np.ndarray
@@ -63,20 +65,20 @@ class GroupMovements:
     status: np.ndarray
 
     def bias(self, movement: np.ndarray) -> np.ndarray:
-        """Error (..., n, 3) m of the answer where the true movement has this part (n, 3) m outside the constraint."""
+        """Bias (..., n, 3) m of the result for a true movement (n, 3) m outside the constraint."""
         movement = np.asarray(movement, dtype=float)
         reported = (self.resolution @ movement.ravel()).reshape(*self.resolution.shape[:-2], -1, 3)
         return reported - movement
 
 
 def change_of_range(stations: np.ndarray, points: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-    """Exact change (..., s) m of the distances from stations to points that move.
+    """Exact change (..., s) m of the distances from stations to moving points.
 
     stations       (s, 3) m
     points         (..., 3) m, before
     displacement   (..., 3) m
 
-    (2 a + dx).dx / (|a| + |a + dx|), a from the station to the point: no digit is lost to cancellation.
+    (2 a + dx).dx / (|a| + |a + dx|), a from the station to the point: free of cancellation.
 
     >>> change_of_range(np.zeros((1, 3)), np.array([3.0, 0.0, 0.0]), np.array([0.0, 4.0, 0.0]))
     array([2.])
@@ -96,7 +98,9 @@ def displacements(
     u_stations: np.ndarray | float = 0.0,
     u_points: np.ndarray | float = 0.0,
 ) -> GroupMovements:
-    """Movement of each point by itself from changes of its ranges; arrays come as of groups of one point (..., 1, 3).
+    """Movement of single points from changes of their ranges.
+
+    The result has the arrays of groups of one point (..., 1, 3).
 
     approximate_stations   (s, 3) m
     approximate_points     (..., 3) m, before the movement
@@ -109,7 +113,7 @@ def displacements(
     uncertainty from the approximate coordinates is first order in them, and grows with the movement; it is the same
     error in every epoch: propagate it between epochs with the sensitivities. Weights are those of the noise alone.
 
-    Source: [PARKER04] 3.2.4; exact differences and error budget ours.
+    Source: [PARKER04] 3.2.4; exact differences and error budget are ours.
 
     >>> stations = np.array([[50.0, 0, 0], [0, 50, 0], [0, 0, 50], [-30, -30, -30]])
     >>> truth = np.array([0.001, -0.002, 0.003])
@@ -132,7 +136,7 @@ def displacements(
 def allowed_directions(
     points: int, *, allowed: np.ndarray | None = None, forbidden: np.ndarray | None = None
 ) -> np.ndarray:
-    """Basis (3n, q) of movements of n points, each along `allowed` directions, or across `forbidden` ones.
+    """Basis (3n, q) of movements of n points along allowed or across forbidden directions.
 
     points      n
     allowed     (k, 3) directions, the same for all points, or
@@ -148,14 +152,14 @@ def allowed_directions(
         raise EstimationError(f"directions have shape {rows.shape}, expected (k, 3), finite and not zero")
     _, s, vt = np.linalg.svd(rows)
     rank = int(np.sum(s > 1e-9 * s[0]))
-    one = vt[rank:] if allowed is None else vt[:rank]
-    return np.kron(np.eye(points), one.T)
+    directions = vt[rank:] if allowed is None else vt[:rank]
+    return np.kron(np.eye(points), directions.T)
 
 
 def rigid_group(points: np.ndarray, motions: Sequence[int] = range(6), pivot: np.ndarray | None = None) -> np.ndarray:
-    """Basis (3n, q) of movements of points (n, 3) m as one body: translation and rotation (rad), or some of those six.
+    """Basis (3n, q) of rigid movements of points (n, 3) m: translation and rotation (rad), or a selection.
 
-    Small turns: second order, arm rotation^2 / 2, is left out. The pivot (3,) m is the centroid unless given.
+    For small rotations: second order, arm rotation^2 / 2, is neglected. The pivot (3,) m defaults to the centroid.
     """
     points = np.asarray(points, dtype=float)
     centre = points.mean(axis=0) if pivot is None else np.asarray(pivot, dtype=float)
@@ -173,20 +177,20 @@ def constrained(
     u_points: np.ndarray | float = 0.0,
     u_violation: float = 0.0,
 ) -> GroupMovements:
-    """Movements of a group of points that are restricted to a linear subspace.
+    """Movements of a group of points restricted to a linear subspace.
 
     approximate_stations   (s, 3) m
     approximate_points     (..., n, 3) m, before the movement
     range_changes          (..., n, s) m, after less before; nan where missing
     sigma                  broadcasts to (..., n, s), m; inf or nan leaves a channel out
-    basis                  (3n, q), from `allowed_directions`, `rigid_group` or any
+    basis                  (3n, q), from `allowed_directions`, `rigid_group` or other
     u_stations, u_points   m, standard uncertainty of approximate coordinates: one value, (s,) and (n,), or with 3
-    u_violation            m, standard uncertainty of movement in each excluded direction: enters the budget as a bias
-                           that is not known, not the weights
+    u_violation            m, standard uncertainty of movement in each excluded direction: an unknown bias in the
+                           budget, not in the weights
 
-    What the constraint wins is seen in the covariance beside that of `displacements`; what it costs where it does not
-    hold, in `bias`; if it holds, in `constraint_test`. Raises EstimationError for wrong shapes, a basis whose columns
-    depend on each other, or a point that stands on a station.
+    The gain by the constraint shows in the covariance compared with that of `displacements`; the error if it is
+    violated, in `bias`; its validity, in `constraint_test`. Raises EstimationError for wrong shapes, a basis with
+    linearly dependent columns, or a point that coincides with a station.
 
     Source: [PARKER04] 3.2.5; [FOERSTNER16] chapter 4 (Gauss-Markov model with constraints, here by elimination).
     """
@@ -194,12 +198,12 @@ def constrained(
         approximate_stations, approximate_points, range_changes, sigma, basis
     )
     batch, (n, s), q = changes.shape[:-2], changes.shape[-2:], basis.shape[1]
-    seen = weight > 0.0
+    available = weight > 0.0
     theta, size = np.zeros((*batch, q)), np.full(batch, np.inf)
     limit = STEP * float(np.linalg.norm(points[..., None, :] - stations, axis=-1).mean())
     for _ in range(ITERATIONS):
         moved = (theta @ basis.T).reshape(*batch, n, 3)
-        residual = np.where(seen, changes - change_of_range(stations, points, moved), 0.0)
+        residual = np.where(available, changes - change_of_range(stations, points, moved), 0.0)
         unit, turned = _directions(stations, points, moved)
         design = np.einsum("...nsi,niq->...nsq", unit, basis.reshape(n, 3, q)).reshape(*batch, n * s, q)
         inverse, rank = _inverse(np.swapaxes(design, -1, -2) @ (weight.reshape(*batch, n * s, 1) * design))
@@ -209,31 +213,31 @@ def constrained(
         if np.all((size < limit) | (rank < q)):
             break
         theta = theta + np.where((rank == q)[..., None], step, 0.0)
-    carried = basis @ gain  # changes -> displacement
-    approximation, by_points, by_stations = _from_places(carried, turned, u_stations, u_points)
-    resolution = _onto_points(carried, unit)
+    displacement_gain = basis @ gain  # changes -> displacement
+    approximation, by_points, by_stations = _from_places(displacement_gain, turned, u_stations, u_points)
+    resolution = _onto_points(displacement_gain, unit)
     outside = (resolution - np.eye(3 * n)) @ _complement(basis)
     noise = basis @ inverse @ basis.T
     violation = u_violation**2 * outside @ np.swapaxes(outside, -1, -2)
     good = (rank == q) & (size < limit)
-    channels = seen.sum(axis=(-1, -2))
-    known = [np.where(good[..., None, None], a, np.nan) for a in (
+    channels = available.sum(axis=(-1, -2))
+    results = [np.where(good[..., None, None], a, np.nan) for a in (
         moved, noise + approximation + violation, noise, approximation, violation, inverse, by_points, by_stations,
-        resolution, np.where(seen, residual, np.nan),
+        resolution, np.where(available, residual, np.nan),
     )]  # fmt: skip
     return GroupMovements(
-        displacement=known[0],
-        covariance=known[1],
-        noise=known[2],
-        approximation=known[3],
-        violation=known[4],
+        displacement=results[0],
+        covariance=results[1],
+        noise=results[2],
+        approximation=results[3],
+        violation=results[4],
         parameters=np.where(good[..., None], theta, np.nan),
-        parameters_covariance=known[5],
+        parameters_covariance=results[5],
         basis=basis,
-        sensitivity_points=known[6],
-        sensitivity_stations=known[7],
-        resolution=known[8],
-        residual=known[9],
+        sensitivity_points=results[6],
+        sensitivity_stations=results[7],
+        resolution=results[8],
+        residual=results[9],
         pvv=np.where(good, np.sum(weight * residual**2, axis=(-1, -2)), np.nan),
         degrees_of_freedom=np.where(good, channels - q, 0),
         rank=rank,
@@ -241,17 +245,17 @@ def constrained(
     )
 
 
-def _statuses(good: np.ndarray, rank: np.ndarray, channels: np.ndarray, wanted: int) -> np.ndarray:
-    """Status of each group: determined, or why not."""
+def _statuses(good: np.ndarray, rank: np.ndarray, channels: np.ndarray, count: int) -> np.ndarray:
+    """Status of each group: determined, or the reason why not."""
     status = np.full(good.shape, DETERMINED, dtype=object)
     for i in np.argwhere(~good):
-        short = UNDETERMINED.format(rank=rank[tuple(i)], wanted=wanted, channels=channels[tuple(i)])
-        status[tuple(i)] = short if rank[tuple(i)] < wanted else NOT_CONVERGED
+        short = UNDETERMINED.format(rank=rank[tuple(i)], count=count, channels=channels[tuple(i)])
+        status[tuple(i)] = short if rank[tuple(i)] < count else NOT_CONVERGED
     return status
 
 
 def constraint_test(restricted: GroupMovements, free: GroupMovements) -> tuple[np.ndarray, np.ndarray]:
-    """Chi-square statistic (...) and p-value (...) of the constraint that leads from `free` to `restricted`.
+    """Chi-square statistic (...) and p-value (...) of the constraint from `free` to `restricted`.
 
     restricted, free   movements of the same changes; the basis of the first lies within that of the second
 
@@ -261,7 +265,7 @@ def constraint_test(restricted: GroupMovements, free: GroupMovements) -> tuple[n
     if a.shape[0] != b.shape[0] or a.shape[1] >= b.shape[1]:
         raise EstimationError(f"bases of shapes {a.shape} and {b.shape}: the first must be a part of the second")
     if not np.allclose(b @ np.linalg.lstsq(b, a, rcond=None)[0], a, rtol=0.0, atol=1e-9 * np.abs(a).max()):
-        raise EstimationError("the restricted movements are not among the free ones: the bases do not nest")
+        raise EstimationError("the basis of the restricted movements is not a subspace of the free ones")
     statistic = np.maximum(restricted.pvv - free.pvv, 0.0)
     return statistic, special.chdtrc(b.shape[1] - a.shape[1], statistic)
 
@@ -269,7 +273,10 @@ def constraint_test(restricted: GroupMovements, free: GroupMovements) -> tuple[n
 def _checked(
     stations: np.ndarray, points: np.ndarray, changes: np.ndarray, sigma: np.ndarray | float, basis: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Everything as floats and broadcast; weights are zero where a change or its sigma is missing."""
+    """Validated float arrays, broadcast.
+
+    Weights are zero where a change or its sigma is missing.
+    """
     stations, points, changes, basis = (np.asarray(a, dtype=float) for a in (stations, points, changes, basis))
     s, n = len(stations), points.shape[-2] if points.ndim > 1 else 0
     if stations.shape != (s, 3) or points.shape[-1:] != (3,) or changes.shape[-2:] != (n, s):
@@ -283,7 +290,7 @@ def _checked(
         raise EstimationError(f"the basis has shape {basis.shape}, expected ({3 * n}, q), finite")
     length = np.linalg.norm(basis, axis=0)
     if not length.all() or np.linalg.matrix_rank(basis / length) < basis.shape[1]:
-        raise EstimationError(f"the {basis.shape[1]} columns of the basis depend on each other, or one is zero")
+        raise EstimationError(f"the {basis.shape[1]} columns of the basis are linearly dependent, or one is zero")
     sigma = np.asarray(sigma, dtype=float)
     if np.any(sigma <= 0.0):
         raise EstimationError(f"a range change has standard uncertainty {np.nanmin(sigma):.3g} m: it must be positive")
@@ -291,14 +298,14 @@ def _checked(
     changes = np.broadcast_to(changes, (*batch, n, s))
     sigma = np.broadcast_to(sigma, (*batch, n, s))
     if np.min(np.linalg.norm(points[..., None, :] - stations, axis=-1)) == 0.0:
-        raise EstimationError("a point stands on a station: its range has no direction")
-    there = np.isfinite(changes) & np.isfinite(sigma)
-    weight = np.where(there, 1.0 / np.where(there, sigma, 1.0) ** 2, 0.0)
-    return stations, np.broadcast_to(points, (*batch, n, 3)), np.where(there, changes, 0.0), weight, basis
+        raise EstimationError("a point coincides with a station: its range has no direction")
+    available = np.isfinite(changes) & np.isfinite(sigma)
+    weight = np.where(available, 1.0 / np.where(available, sigma, 1.0) ** 2, 0.0)
+    return stations, np.broadcast_to(points, (*batch, n, 3)), np.where(available, changes, 0.0), weight, basis
 
 
 def _directions(stations: np.ndarray, points: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors (..., n, s, 3) after the movement, and how much they turned, without cancellation."""
+    """Unit vectors (..., n, s, 3) after the movement, and their changes, free of cancellation."""
     before = points[..., None, :] - stations
     after = before + moved[..., None, :]
     old, new = (np.linalg.norm(a, axis=-1)[..., None] for a in (before, after))
@@ -308,33 +315,37 @@ def _directions(stations: np.ndarray, points: np.ndarray, moved: np.ndarray) -> 
 
 
 def _inverse(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Inverse of each normal matrix, and its rank; of a singular one the inverse on what is seen."""
+    """Inverse and rank of each normal matrix; pseudo-inverse if singular."""
     scale = 1.0 / np.sqrt(np.maximum(np.diagonal(normal, axis1=-2, axis2=-1), 1e-300))
     values, vectors = np.linalg.eigh(normal * scale[..., :, None] * scale[..., None, :])
-    seen = values > RANK * np.maximum(values[..., -1:], 1e-300)
-    seen &= values > 1e-12
-    root = vectors * np.sqrt(np.where(seen, 1.0 / np.where(seen, values, 1.0), 0.0))[..., None, :] * scale[..., :, None]
-    return root @ np.swapaxes(root, -1, -2), seen.sum(axis=-1)
+    significant = values > RANK * np.maximum(values[..., -1:], 1e-300)
+    significant &= values > 1e-12
+    root = (
+        vectors
+        * np.sqrt(np.where(significant, 1.0 / np.where(significant, values, 1.0), 0.0))[..., None, :]
+        * scale[..., :, None]
+    )
+    return root @ np.swapaxes(root, -1, -2), significant.sum(axis=-1)
 
 
-def _onto_points(carried: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Answers by the points' coordinates (..., 3n, 3n): carried times the derivatives of each point's channels."""
+def _onto_points(displacement_gain: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Derivatives (..., 3n, 3n) by the points' coordinates: gain times channel derivatives."""
     *batch, n, s, _ = vectors.shape
-    gain = carried.reshape(*batch, 3 * n, n, s)
+    gain = displacement_gain.reshape(*batch, 3 * n, n, s)
     return np.einsum("...ins,...nsj->...inj", gain, vectors).reshape(*batch, 3 * n, 3 * n)
 
 
 def _from_places(
-    carried: np.ndarray, turned: np.ndarray, u_stations: np.ndarray | float, u_points: np.ndarray | float
+    displacement_gain: np.ndarray, turned: np.ndarray, u_stations: np.ndarray | float, u_points: np.ndarray | float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Covariance from the approximate coordinates, and d displacement / d points, / d stations.
 
-    A prediction at the true places is (u' - u).(e_point - e_station) more than at the approximate ones, so the answer
-    errs by the gain times that; d / d approximate place, whose error is minus e, has the opposite sign.
+    A prediction at the true positions is (u' - u).(e_point - e_station) more than at the approximate ones, so the
+    result is off by the gain times that; d / d approximate position, whose error is minus e, has the opposite sign.
     """
     *batch, n, s, _ = turned.shape
-    gain = carried.reshape(*batch, 3 * n, n, s)
-    to_points = -_onto_points(carried, turned)
+    gain = displacement_gain.reshape(*batch, 3 * n, n, s)
+    to_points = -_onto_points(displacement_gain, turned)
     to_stations = np.einsum("...ins,...nsj->...isj", gain, turned).reshape(*batch, 3 * n, 3 * s)
     q = sum(
         (slope * _variances(u, count, name)) @ np.swapaxes(slope, -1, -2)
@@ -353,6 +364,6 @@ def _variances(u: np.ndarray | float, count: int, name: str) -> np.ndarray:
 
 
 def _complement(basis: np.ndarray) -> np.ndarray:
-    """Orthonormal base of what the columns leave out."""
+    """Orthonormal base of the orthogonal complement of the columns."""
     u, _, _ = np.linalg.svd(basis)
     return u[:, basis.shape[1] :]

@@ -1,4 +1,4 @@
-"""Points that belong together: how a group moved as one, and how it was strained."""
+"""Rigid motion and homogeneous strain of a group of points."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,19 +20,19 @@ from catseye.estimation.shapes.rigid_body import motion_columns
 
 @dataclass(frozen=True, eq=False)
 class GroupMotion:
-    """How a group of points moved as one: displacement = translation + rotation x arm + strain arm, arm from the pivot.
+    """Motion of a group of points: translation + rotation x arm + strain arm, arm from the pivot.
 
     names         of the group
     pivot         (3,) m
     translation   (3,) m, of the pivot, relative to the stable points
     rotation      (3,) rad
-    strain        (3, 3) symmetric; zero where it was not asked for
+    strain        (3, 3) symmetric; zero if not estimated
     covariance    (6 + s, 6 + s), translation, rotation, then the s strain components in the order of `components`
     components    names of the strain components, such as "xx" or, in other axes, "11"
-    motion        test that the group did not move at all, given that it is rigid (6 degrees of freedom)
-    rigid         test that it did not deform (strain zero); None where strain was not asked for
-    fit           test of what motion and strain leave over; None without redundancy
-    curvature     m, second-order effect of the rotation that this linear model leaves out; beyond the points' sigma
+    motion        test that the group did not move, given that it is rigid (6 degrees of freedom)
+    rigid         test that it did not deform (strain zero); None if strain was not estimated
+    fit           test of the residuals of motion and strain; None without redundancy
+    curvature     m, second-order effect of the rotation neglected by this linear model; if above the points' sigma
                   use `shapes.rigid_body.fit_transformation`
     """
 
@@ -59,31 +59,32 @@ def group_motion(
     pivot: np.ndarray | None = None,
     variance_factor: VarianceFactor = KNOWN,
 ) -> GroupMotion:
-    """Rigid motion of a group of points, and its homogeneous strain if asked, relative to stable points.
+    """Rigid motion of a group of points, optionally with homogeneous strain, relative to stable points.
 
-    epochs            see there
-    group             names of points that move together, three or more not on one line
+    epochs            see `Epochs`
+    group             names of points that move together, at least three, not collinear
     stable            names of points that did not move and define the datum; may be empty where datum is "absolute"
-    datum             what the two datums may differ by, as `congruence_test`
+    datum             allowed differences of the two datums, as `congruence_test`
     strain_axes       (3, k) orthonormal directions in which strain is allowed: np.eye(3) for all 6 components (four
-                      points not in one plane), the two axes of a plane for 3, one column for a stretch along a line;
+                      points, not coplanar), the two axes of a plane for 3, one column for a stretch along a line;
                       None: rigid
     pivot             (3,) m, default the centroid of the group
     variance_factor   known or estimated
 
     One weighted adjustment of the differences of stable points and group with all their correlations. Raises
-    EstimationError naming what floats. Source: [CASPARY87] (strain and rigid-body models); tests as `congruence_test`.
+    EstimationError naming undetermined parameters. Source: [CASPARY87] (strain and rigid-body models); tests as
+    `congruence_test`.
     """
     places = {name: i for i, name in enumerate(epochs.names)}
-    strangers = [name for name in [*group, *stable] if name not in places]
-    if strangers or set(group) & set(stable):
-        wrong = ", ".join(strangers or sorted(set(group) & set(stable)))
-        raise EstimationError(f"{wrong}: {'not common to both epochs' if strangers else 'both in group and stable'}")
-    of_group, others = [places[name] for name in group], [places[name] for name in stable]
+    unknown = [name for name in [*group, *stable] if name not in places]
+    if unknown or set(group) & set(stable):
+        wrong = ", ".join(unknown or sorted(set(group) & set(stable)))
+        raise EstimationError(f"{wrong}: {'not common to both epochs' if unknown else 'both in group and stable'}")
+    of_group, stable_rows = [places[name] for name in group], [places[name] for name in stable]
     n = len(epochs.names)
-    between = differences(epochs, datum, np.isin(np.arange(n), others))
-    kept = np.repeat(np.isin(np.arange(n), of_group + others), 3)
-    between = replace(between, used=between.used & kept)
+    between = differences(epochs, datum, np.isin(np.arange(n), stable_rows))
+    retained = np.repeat(np.isin(np.arange(n), of_group + stable_rows), 3)
+    between = replace(between, used=between.used & retained)
     points = np.asarray(epochs.first, dtype=float)
     centre = points[of_group].mean(axis=0) if pivot is None else np.asarray(pivot, dtype=float)
     on_group = np.repeat(np.isin(np.arange(n), of_group), 3)[:, None]
@@ -95,8 +96,8 @@ def group_motion(
     still = between.fit()
     moving = between.fit(rigid, names)
     full = between.fit(np.concatenate([rigid, stretch], axis=1), [*names, *(f"strain {c}" for c in components)])
-    own = slice(len(full.estimate) - 6 - len(components), None)
-    estimate, covariance = full.estimate[own], full.covariance[own, own] * variance_factor.value
+    block = slice(len(full.estimate) - 6 - len(components), None)
+    estimate, covariance = full.estimate[block], full.covariance[block, block] * variance_factor.value
     turn = estimate[3:6]
     return GroupMotion(
         names=tuple(group),
@@ -114,7 +115,7 @@ def group_motion(
 
 
 def _strain_base(axes: np.ndarray | None) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Symmetric tensors (c, 3, 3) whose coefficients are the tensor's components in the axes, and their names."""
+    """Base tensors (c, 3, 3) of the strain components in the axes, and component names."""
     if axes is None:
         return np.zeros((0, 3, 3)), ()
     e = np.asarray(axes, dtype=float)

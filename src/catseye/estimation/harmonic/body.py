@@ -1,14 +1,14 @@
-"""A body of points, shifted and turned by little: rows of its six unknowns, and the rigid part of displacements."""
+"""Rigid design of a body's points, and rigid part of their displacements."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-FLAT = 1e-9  # of points' spread: a singular value below it is a motion that the points do not show
+FLAT = 1e-9  # of the points' extent: a smaller singular value is an undetermined motion
 
 
 def rigid_design(arms: Array) -> Array:
-    """Displacement (n, 3, 6) of points for a unit of shift and of turn: turn x arm = -[arm] x turn.
+    """Displacement (n, 3, 6) of points per unit shift and rotation: turn x arm = -[arm] x turn.
 
     arms   (n, 3) m
     """
@@ -22,12 +22,15 @@ def rigid_design(arms: Array) -> Array:
 
 
 def moved(six: Array, arms: Array) -> Array:
-    """Displacement (P, n, 3), m, of points at arms (n, 3) m by small shifts and turns (P, 6)."""
+    """Displacement (P, n, 3), m, of points at arms (n, 3) m by small shifts and rotations (P, 6)."""
     return six[:, None, :3] + np.cross(six[:, None, 3:], arms)
 
 
 def rigid_part(arms: Array) -> Array | None:
-    """(6, n, 3) that takes displacements of points to their unweighted rigid part; None where they define none."""
+    """Matrix (6, n, 3) from displacements to their unweighted rigid part.
+
+    None if undetermined.
+    """
     r = rigid_design(arms)
     scale = np.repeat([1.0, float(np.sqrt(np.mean(np.sum((arms - arms.mean(axis=0)) ** 2, axis=1)))) or 1.0], 3)
     flat = r.reshape(-1, 6) / scale
@@ -37,5 +40,5 @@ def rigid_part(arms: Array) -> Array | None:
 
 
 def arms_of(design: Array) -> Array:
-    """(n, 3) m, the arms that a rigid design (n, 3, 6) was made of."""
+    """Arms (n, 3) m of a rigid design (n, 3, 6)."""
     return np.stack([design[:, 1, 5], design[:, 2, 3], design[:, 0, 4]], axis=1)

@@ -1,16 +1,16 @@
-"""Points of a body in many epochs: a rigid motion and own shifts, each linear in known functions of the epoch.
+"""Points of a body in many epochs: rigid motion and point shifts, linear in functions of the epoch.
 
 The displacement of point p in epoch t is
 
     y_tp = R_p C b_t + A_p o_t + U_tp z_t + e_tp,      R_p = (1, -[arm_p] x),
 
 C (6, K) shifts and turns of the body for each of its K functions b_t, A_p (3, m) shifts of the point's own for each of
-its m functions o_t, e_tp noise with a covariance (3, 3) of each point, and U_tp z_t what the points of an epoch share
-(z_t standard normal, r of them: a common refractivity, a body that no model foretells). Small turns: arms of 100 m
-turned by 1e-4 rad are off by half a micrometre.
+its m functions o_t, e_tp noise with a covariance (3, 3) of each point, and U_tp z_t effects shared by the points of an
+epoch (z_t standard normal, r of them: a common refractivity, an unmodelled body motion). Small rotations: arms of 100 m
+rotated by 1e-4 rad are off by half a micrometre.
 
 With a full covariance of each epoch all unknowns are solved at once (up to some thousand). With covariances of points
-and what they share, the points' own unknowns are eliminated one by one, and what is left, C and all z, is solved:
+and shared effects, the points' own unknowns are eliminated one by one, and the remaining C and all z are solved:
 thousands of points in thousands of epochs are a few matrix products.
 """
 
@@ -25,16 +25,16 @@ from catseye.estimation.harmonic.dense import solved_together
 from catseye.estimation.harmonic.eliminated import solved_by_elimination
 
 Array = NDArray[np.float64]
-TOGETHER = 3000  # unknowns: above it a full covariance is refused
+TOGETHER = 3000  # unknowns: limit with a full covariance
 
 
 @dataclass(frozen=True, eq=False)
 class Spread:
-    """Covariance of an epoch's points: `full`, or `points` and what they share.
+    """Covariance of an epoch's points: `full`, or `points` and shared effects.
 
     full     (T or 1, 3n, 3n) m^2
     points   (T or 1, n, 3, 3) m^2
-    shared   (T or 1, n, 3, r) m: factor U of what the points of an epoch share
+    shared   (T or 1, n, 3, r) m: factor U of the shared effects
     """
 
     full: Array | None = None
@@ -44,19 +44,19 @@ class Spread:
 
 @dataclass(frozen=True, eq=False)
 class HarmonicFit:
-    """What the epochs say.
+    """Harmonic fit of a body and its points.
 
-    rigid              (6, K) m and rad a unit of the body's functions
-    own                (n, 3, m) m a unit of the points' functions
+    rigid              (6, K) m and rad per unit of the body's functions
+    own                (n, 3, m) m per unit of the points' functions
     own_covariance     (n, 3 m, 3 m), function by function
     cross              (n, 3 m, 6 K) between a point's own and the body's, function by function
     rigid_covariance   (6 K, 6 K), function by function
-    six                (6, m) rigid part of the points' own shifts, unweighted; NaN where they define none
+    six                (6, m) rigid part of the points' own shifts, unweighted; NaN if undetermined
     six_covariance     (6 (K + m), 6 (K + m)) of the body's functions, then of `six`
-    shared             (T, r) the z that were found
-    residual           (T, n, 3) m, observed less R C b + A o: what is shared is in it; NaN where lost
+    shared             (T, r) estimated z
+    residual           (T, n, 3) m, observed less R C b + A o, shared effects included; NaN if not measured
     pvv, degrees_of_freedom
-    whole              covariance of all unknowns, the body's then the points', where they were solved together
+    whole              covariance of all unknowns, the body's then the points', if solved jointly
     """
 
     rigid: Array
@@ -74,7 +74,10 @@ class HarmonicFit:
 
     @property
     def variance_factor(self) -> float:
-        """[pvv] / degrees of freedom, expectation 1; NaN without any."""
+        """Variance factor [pvv] / degrees of freedom, expectation 1.
+
+        It is NaN without any.
+        """
         return self.pvv / self.degrees_of_freedom if self.degrees_of_freedom > 0 else float("nan")
 
     def displacement(self, body: Array, own: Array, arms: Array) -> Array:
@@ -86,7 +89,10 @@ class HarmonicFit:
         return moved(body @ self.rigid.T, arms) + np.einsum("pm,nim->pni", own, self.own)
 
     def covariance(self, body: Array, own: Array, arms: Array) -> Array:
-        """Covariance (P, n, 3, 3), m^2, of `displacement`, of each point by itself; arguments as there."""
+        """Covariance (P, n, 3, 3), m^2, of `displacement`, per point.
+
+        Arguments as for `displacement`.
+        """
         n, m = len(self.own), self.own.shape[2]
         r = rigid_design(arms)
         k = body.shape[1]
@@ -100,12 +106,12 @@ class HarmonicFit:
         )
 
     def whole_covariance(self, body: Array, own: Array, arms: Array) -> Array:
-        """Covariance (P, 3n, 3n), m^2, of `displacement` of all points; where they were solved together.
+        """Joint covariance (P, 3n, 3n), m^2, of `displacement` of all points, if solved jointly.
 
-        Raises ValidityError where points were eliminated: between them it is not kept.
+        Raises ValidityError if points were eliminated: covariances between them are not stored.
         """
         if self.whole is None:
-            raise ValidityError("points were eliminated one by one: no covariance between them was kept")
+            raise ValidityError("points were eliminated one by one: covariances between them are not stored")
         n = len(self.own)
         rows = np.concatenate(
             [
@@ -118,15 +124,15 @@ class HarmonicFit:
 
 
 def fit_harmonics(displacement: Array, arms: Array, *, body: Array, own: Array, spread: Spread) -> HarmonicFit:
-    """The motion of a body and of its points from many epochs.
+    """Motion of a body and of its points from many epochs.
 
-    displacement   (T, n, 3) m; NaN where a point was not measured (any coordinate: all three)
-    arms           (n, 3) m, points from the pivot of the turns
+    displacement   (T, n, 3) m; NaN if a point was not measured (any coordinate: all three)
+    arms           (n, 3) m, points from the pivot of the rotations
     body           (T, K) functions of the body's shift and turn; K may be 0
-    own            (T, m) functions of the points' own; m may be 0; none may be in both, nor a sum of the other's
+    own            (T, m) functions of the points; m may be 0; linearly independent of the body's
     spread         covariance of the displacements
 
-    Raises ValidityError for shapes that do not fit or covariances that are none, EstimationError for what floats.
+    Raises ValidityError for inconsistent shapes or invalid covariances, EstimationError for undetermined unknowns.
 
     Source: [RAO73] section 4a: least squares with a full covariance; the z are unknowns with their prior.
 
@@ -140,25 +146,25 @@ def fit_harmonics(displacement: Array, arms: Array, *, body: Array, own: Array, 
     """
     y = np.array(displacement, dtype=float)
     _refuse_shapes(y, arms, body, own)
-    seen = np.isfinite(y).all(axis=2)
-    y[~seen] = 0.0
+    measured = np.isfinite(y).all(axis=2)
+    y[~measured] = 0.0
     r = rigid_design(np.asarray(arms, dtype=float))
     if spread.full is not None:
         if 6 * body.shape[1] + 3 * len(arms) * own.shape[1] > TOGETHER:
             raise ValidityError(
-                f"{len(arms)} points with a full covariance are too many unknowns (expected {TOGETHER} at most): give "
-                "covariances of points and what they share"
+                f"{len(arms)} points with a full covariance are too many unknowns (expected at most {TOGETHER}): give "
+                "covariances of points and shared effects"
             )
-        solved = solved_together(y, seen, r, body=body, own=own, full=spread.full)
+        solved = solved_together(y, measured, r, body=body, local=own, full=spread.full)
     elif spread.points is not None:
-        solved = solved_by_elimination(y, seen, r, body=body, own=own, points=spread.points, shared=spread.shared)
+        solved = solved_by_elimination(y, measured, r, body=body, local=own, points=spread.points, shared=spread.shared)
     else:
         raise ValidityError("a spread has neither a full covariance nor those of points (expected one)")
     six, six_covariance = _rigid_parts(
         solved.own, np.asarray(arms, dtype=float), solved.six_link, solved.rigid_covariance
     )
     residual = y - moved(body @ solved.rigid.T, arms) - np.einsum("tm,nim->tni", own, solved.own)
-    residual[~seen] = np.nan
+    residual[~measured] = np.nan
     unknown = 6 * body.shape[1] + 3 * len(arms) * own.shape[1]
     return HarmonicFit(
         solved.rigid,
@@ -171,13 +177,13 @@ def fit_harmonics(displacement: Array, arms: Array, *, body: Array, own: Array, 
         solved.shared,
         residual,
         solved.pvv,
-        3 * int(seen.sum()) - unknown,
-        solved.whole,
+        3 * int(measured.sum()) - unknown,
+        solved.full_covariance,
     )
 
 
 def _rigid_parts(own: Array, arms: Array, link: Array | None, rigid_covariance: Array) -> tuple[Array, Array]:
-    """Rigid part (6, m) of own shifts and the covariance of it and of the body's functions."""
+    """Rigid part (6, m) of the points' shifts, and its joint covariance with the body's functions."""
     m = own.shape[2]
     if link is None:
         size = len(rigid_covariance) + 6 * m
@@ -196,7 +202,7 @@ def _refuse_shapes(y: Array, arms: Array, body: Array, own: Array) -> None:
         if rows.ndim != 2 or len(rows) != len(y) or not np.isfinite(rows).all():
             raise ValidityError(f"functions {name} have shape {rows.shape} (expected ({len(y)}, k), finite)")
     if not body.shape[1] and not own.shape[1]:
-        raise ValidityError("there is no function: neither of the body nor of the points")
+        raise ValidityError("no function of the body or of the points")
     never = np.flatnonzero(~np.isfinite(y).all(axis=2).any(axis=0))
     if len(never):
         raise EstimationError(f"point {never[0]} (counted from 0) was measured in no epoch: leave it out")

@@ -1,8 +1,8 @@
-"""Least squares: Gauss-Newton over groups of (correlated) observations, with the statistics that make it checkable.
+"""Gauss-Newton least squares over groups of (correlated) observations, with test statistics.
 
 Systematic effects are parameters with priors, and a prior is an observation like any other ([FOERSTNER16] chapter 4).
-The solver is scale-free: it converges on the size of a step in its own standard deviations, and judges rank on
-columns scaled to unit length. Small systems are solved dense, large ones sparse; the answer is the same.
+The solver is scale-free: it converges on the size of a step in its own standard deviations, and determines rank from
+columns scaled to unit length. Small systems are solved dense, large ones sparse, with the same result.
 """
 
 from collections.abc import Sequence
@@ -22,28 +22,28 @@ from catseye.estimation.observations.kinds import ObservationGroup
 CONVERGED = "converged"
 NOT_CONVERGED = "not converged: the last step was {step:.2g} standard deviations after {iterations} iterations; \
 check the starting coordinates"
-RANK_DEFICIENT = "rank deficient: {names} not held by any observation; add one, or give a prior"
-UNDEFINED = "undefined at the present values: {names} has no finite value or derivative there; \
+RANK_DEFICIENT = "rank deficient: {names} not determined by any observation; add one, or give a prior"
+UNDEFINED = "undefined at the current values: {names} has no finite value or derivative there; \
 two points may coincide, or an observation is not a number"
 
 NONCENTRALITY = 4.13  # two-sided test at 0.1 %, power 80 %, as [BAARDA68]: normal quantiles 3.29 + 0.84
-STEP_IN_SIGMAS = 1e-3  # of all parameters together: the step after one below this moves no answer
-ROUNDING = 1.0 + 1e-12  # of a sum of squares: a step of no consequence does not count as uphill
+STEP_IN_SIGMAS = 1e-3  # norm over all parameters: a further step changes no result
+ROUNDING = 1.0 + 1e-12  # of a sum of squares: an increase within rounding is accepted
 
 
 @dataclass(frozen=True)
 class GroupFit:
-    """How one group of observations fits; arrays over its m observations.
+    """Fit of one group of m observations.
 
-    name              the group's
-    active            took part in the solution
+    name              of the group
+    active            True for observations used in the solution
     residual          observed minus predicted
-    sigma             standard uncertainty of the observed value, as claimed before
-    redundancy        share of an error in the observation that shows in its own residual; 0 to 1 if uncorrelated
-    standardised      the residual's test statistic, N(0, 1) if the claim holds: Baarda's w with correlations; of an
-                      inactive observation that of its prediction by the others
-    estimated_error   the error in the observation that would explain it best
-    detectable_error  the smallest error that the test finds with power 80 % at the level 0.1 %
+    sigma             a-priori standard uncertainty of the observed value
+    redundancy        redundancy number: share of an error that shows in its own residual; 0 to 1 if uncorrelated
+    standardised      standardised residual, N(0, 1) if the a-priori covariance holds: Baarda's w with correlations;
+                      for an inactive observation that of its prediction from the others
+    estimated_error   estimate of a gross error in this observation alone
+    detectable_error  smallest gross error that the test detects with power 80 % at the level 0.1 %
     pvv               v' C^-1 v of the active ones
     """
 
@@ -60,15 +60,15 @@ class GroupFit:
 
 @dataclass(frozen=True)
 class LeastSquaresSolution:
-    """The answer of an adjustment.
+    """Result of an adjustment.
 
     x            (n,) parameters
-    q            their covariance; rows and columns of held parameters are zero, all nan where there is no answer
+    q            their covariance; zero rows and columns for fixed parameters, all nan without a solution
     status       "converged", or one line that says what to do
     iterations   Gauss-Newton steps taken
-    fits         one a group, in the order given
-    floating     (f, n) orthonormal directions that no observation holds, in parameters scaled to unit columns; f = 0
-                 unless the rank is deficient
+    fits         one per group, in input order
+    floating     (f, n) orthonormal null-space directions, in parameters scaled to unit columns; f = 0 unless the
+                 rank is deficient
     """
 
     x: np.ndarray
@@ -80,22 +80,24 @@ class LeastSquaresSolution:
 
     @cached_property
     def covariance(self) -> np.ndarray:
-        """(n, n), whole; EstimationError for a system too large for that."""
+        """Covariance (n, n); EstimationError for a system too large for it."""
         return self.q.matrix()
 
     def require_converged(self) -> "LeastSquaresSolution":
-        """This solution, or EstimationError with its status."""
+        """Return this solution, or raise EstimationError with its status."""
         if self.status != CONVERGED:
             raise EstimationError(self.status)
         return self
 
     @property
     def solved(self) -> bool:
-        """There is an answer, converged or on the way: every parameter is held."""
+        """True if every parameter is determined, converged or not."""
         return not len(self.floating) and not self.status.startswith(UNDEFINED[:9])
 
     def variance_factor(self, names: Sequence[str] | None = None) -> tuple[float, float]:
-        """[pvv] / degrees of freedom, expectation 1, and the degrees of freedom, over the groups named (all if None).
+        """Variance factor [pvv] / degrees of freedom (expectation 1), and the degrees of freedom.
+
+        names   of groups; all if None
 
         Over all groups the degrees of freedom are observations minus free parameters; over some they are the sum of
         their redundancy numbers.
@@ -109,13 +111,13 @@ class LeastSquaresSolution:
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """How `adjust` solves.
+    """Settings of `adjust`.
 
-    iterations   cap of Gauss-Newton steps; a step that raises the cost is halved, ten times at most
-    tests        False leaves the fits at residual and sigma and the covariance at zero, on the way to an answer
+    iterations   limit of Gauss-Newton steps; a step that raises the cost is halved, at most ten times
+    tests        False: only residuals and sigmas in the fits, zero covariance (for intermediate solutions)
     sparse       solve sparse or dense; chosen by size if None
-    border       eliminate everything off a border by blocks, see `bordered`; None: as `sparse` says
-    rough        with a border: tests good to a thousandth will do, on the way to a selection
+    border       eliminate the parameters outside a border by blocks, see `bordered`; None: as `sparse` says
+    rough        with a border: tests accurate to a thousandth are enough (while selecting observations)
     """
 
     iterations: int = 50
@@ -139,37 +141,38 @@ def adjust(
     names: Sequence[str] | None = None,
     solver: SolverSettings = COMPLETE,
 ) -> LeastSquaresSolution:
-    """The parameters that fit groups of observations best, with full covariance and a fit per observation.
+    """Least-squares parameters of groups of observations, with full covariance and fits.
 
     x0              (n,) start values
     groups          observations; groups are independent of each other, inside one they may be correlated
-    free            (n,) bool: False holds a parameter at its start value (default: all free)
+    free            (n,) bool: False fixes a parameter at its start value (default: all free)
     active          one (m,) bool array a group: False leaves an observation out, but still predicts it
     extra_variance  one (m,) array a group, added to the diagonal of its covariance (robust down-weighting)
     inflation       one (m,) array a group, a factor on its standard uncertainties; correlations stay
-    names           (n,) what the parameters are called, for the status
-    solver          cap of steps, whether tests are wanted, sparse or dense
+    names           (n,) parameter names, for the status
+    solver          step limit, tests or not, sparse or dense
 
-    Returns a Solution whose status says what happened; raises EstimationError only for a covariance that is none.
+    The status of the solution describes any failure; raises EstimationError only for a covariance that is not
+    positive definite.
 
     Source: [FOERSTNER16] chapter 4 (Gauss-Markov model), [BAARDA68] (w test, detectable errors; here correlated).
     """
     x = np.array(x0, dtype=float)
     n = len(x)
-    moving = np.arange(n) if free is None else np.flatnonzero(free)
-    given = [[None] * len(groups) if part is None else list(part) for part in (active, extra_variance, inflation)]
-    rows = [ActiveRows.of(g, *parts) for g, *parts in zip(groups, *given, strict=True)]
+    free_columns = np.arange(n) if free is None else np.flatnonzero(free)
+    options = [[None] * len(groups) if part is None else list(part) for part in (active, extra_variance, inflation)]
+    rows = [ActiveRows.of(g, *parts) for g, *parts in zip(groups, *options, strict=True)]
     tests, iterations = solver.tests, solver.iterations
-    normal = NormalEquations.of(rows, moving, n, solver.sparse, solver.border)
-    small = not normal.sparse and normal.border is None and len(moving) > 0
-    q: Covariance = Dense(np.zeros((n, n))) if small else _Nothing(n)
+    normal = NormalEquations.of(rows, free_columns, n, solver.sparse, solver.border)
+    small_dense = not normal.sparse and normal.border is None and len(free_columns) > 0
+    q: Covariance = Dense(np.zeros((n, n))) if small_dense else _NoCovariance(n)
     floating = np.zeros((0, n))
-    status, taken, size = NOT_CONVERGED, 0, np.inf
-    while taken < iterations:
-        taken += 1
+    status, steps, size = NOT_CONVERGED, 0, np.inf
+    while steps < iterations:
+        steps += 1
         step, size, cost = normal.step(x)
         if not np.isfinite(cost):
-            q = _Nothing(n, np.nan, moving)
+            q = _NoCovariance(n, np.nan, free_columns)
             status = UNDEFINED.format(names=", ".join(_undefined(rows, x)))
             break
         floating = normal.floating()
@@ -177,10 +180,10 @@ def adjust(
             part = np.sum(floating**2, axis=0)
             worst = [int(i) for i in np.argsort(-part) if part[i] > 1e-3 * part.max()]
             called = [names[i] if names is not None else f"parameter {i}" for i in worst[:4]]
-            q = _Nothing(n, np.nan, moving)  # zero would claim to know what nothing holds
+            q = _NoCovariance(n, np.nan, free_columns)  # zero would claim certainty of an undetermined parameter
             status = RANK_DEFICIENT.format(names=", ".join(called) + (" ..." if len(worst) > 4 else ""))
             break
-        if tests and (size < STEP_IN_SIGMAS or taken == iterations):
+        if tests and (size < STEP_IN_SIGMAS or steps == iterations):
             q = normal.covariance(rough=solver.rough)
         x, moved = _lower(rows, x, step, cost)
         if size < STEP_IN_SIGMAS:
@@ -189,13 +192,16 @@ def adjust(
         if not moved:
             break
     if status == NOT_CONVERGED:
-        status = NOT_CONVERGED.format(step=size, iterations=taken)
+        status = NOT_CONVERGED.format(step=size, iterations=steps)
     fits = tuple(_fit(r, x, q, tests) for r in rows)
-    return LeastSquaresSolution(x, q, status, taken, fits, floating)
+    return LeastSquaresSolution(x, q, status, steps, fits, floating)
 
 
 def _lower(rows: Sequence[ActiveRows], x: np.ndarray, step: np.ndarray, cost: float) -> tuple[np.ndarray, bool]:
-    """The first of x + step, x + step/2, ... that does not raise the cost; x itself where none does."""
+    """First of x + step, x + step/2, ... that does not raise the cost.
+
+    Returns x itself if none does.
+    """
     for halving in range(11):
         trial = x + step * 0.5**halving
         if sum(r.cost(trial) for r in rows) <= cost * ROUNDING:
@@ -204,8 +210,8 @@ def _lower(rows: Sequence[ActiveRows], x: np.ndarray, step: np.ndarray, cost: fl
 
 
 @dataclass(frozen=True, eq=False)
-class _Nothing:
-    """No covariance: zero for what was not asked for, nan where there is no answer."""
+class _NoCovariance:
+    """Placeholder covariance: zero if not computed, nan without a solution."""
 
     size: int
     value: float = 0.0
@@ -232,15 +238,15 @@ class _Nothing:
     def solve(self, b: np.ndarray) -> np.ndarray:
         return np.full(b.shape, self.value)
 
-    def carried(self, matrix: sparray, others: sparray | None = None) -> np.ndarray:
-        return np.full((matrix.shape[0], (matrix if others is None else others).shape[0]), self.value)
+    def carried(self, matrix: sparray, other_matrix: sparray | None = None) -> np.ndarray:
+        return np.full((matrix.shape[0], (matrix if other_matrix is None else other_matrix).shape[0]), self.value)
 
     def diagonal(self) -> np.ndarray:
         return np.full(self.size, self.value)
 
 
 def _undefined(rows: Sequence[ActiveRows], x: np.ndarray) -> list[str]:
-    """Names of the groups that have no finite value or derivative, each once."""
+    """Names of the groups without finite values or derivatives, each once."""
     bad = [r.group.name for r in rows for v in r.group.predict(x) if not np.isfinite(v[r.active]).all()]
     bad += [r.group.name for r in rows if not np.isfinite(r.group.observed[r.active]).all()]
     return list(dict.fromkeys(bad)) or ["the sum of squares"]
@@ -250,8 +256,8 @@ def _fit(rows: ActiveRows, x: np.ndarray, q: Covariance, tests: bool) -> GroupFi
     """Residuals and tests of one group, exact with correlations inside the group.
 
     With P = C^-1 and P_v = P - P A Q A' P over the active rows: w = (P v) / sqrt(diag P_v), estimated error
-    (P v) / diag P_v, redundancy diag(P_v C). An inactive row is predicted from the parameters and from the residuals
-    of the rows that it is correlated with.
+    (P v) / diag P_v, redundancy diag(P_v C). An inactive row is predicted from the parameters and from the
+    residuals of the rows it is correlated with.
     """
     group, on = rows.group, rows.active
     m = len(group.observed)
@@ -266,9 +272,10 @@ def _fit(rows: ActiveRows, x: np.ndarray, q: Covariance, tests: bool) -> GroupFi
         return fit
     wide = rows.spread(jacobian)
     design = np.where(on[:, None], wide, 0.0)
-    weighted, pv, own = rows.weigh(design), rows.weigh(v), rows.own_weight()
+    weighted, pv, weight_diagonal = rows.weigh(design), rows.weigh(v), rows.own_weight()
     spread = rows.products(q, weighted)
-    visible = np.maximum(own - np.sum(spread * weighted, axis=1), 1e-12 * own)  # without a check it stays finite
+    # the lower limit keeps unchecked observations finite
+    visible = np.maximum(weight_diagonal - np.sum(spread * weighted, axis=1), 1e-12 * weight_diagonal)
     redundancy[:] = 1.0 - np.sum(spread * design, axis=1)
     standardised[:] = pv / np.sqrt(visible)
     error[:] = pv / visible
@@ -276,11 +283,11 @@ def _fit(rows: ActiveRows, x: np.ndarray, q: Covariance, tests: bool) -> GroupFi
     out = np.flatnonzero(~on)
     if len(out):
         gain, expected = rows.prediction(out)
-        rest = wide[out] - gain @ design if gain is not None else wide[out]
-        surprise = residual[out] - gain @ v if gain is not None else residual[out]
-        expected = expected + np.sum(rows.products(q, rest, out) * rest, axis=1)
+        remaining_design = wide[out] - gain @ design if gain is not None else wide[out]
+        prediction_error = residual[out] - gain @ v if gain is not None else residual[out]
+        expected = expected + np.sum(rows.products(q, remaining_design, out) * remaining_design, axis=1)
         redundancy[out] = 1.0
-        standardised[out] = surprise / np.sqrt(expected)
-        error[out] = surprise
+        standardised[out] = prediction_error / np.sqrt(expected)
+        error[out] = prediction_error
         detectable[out] = NONCENTRALITY * np.sqrt(expected)
     return fit

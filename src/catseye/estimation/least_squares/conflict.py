@@ -1,4 +1,4 @@
-"""Observations that meet in one point and cannot all be right: which are the fewest that might be wrong?"""
+"""Search for the fewest wrong observations among those that meet in one point."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -13,20 +13,20 @@ from catseye.estimation.observations.kind import value
 from catseye.estimation.observations.kinds import Distances, MovingDistances, ObservationGroup
 
 MOST_AT_ONE_POINT = 2  # wrong observations searched for at one point, exhaustively
-LARGEST_SEARCH = 24  # observations at a point; a point with more has redundancy enough for the robust fit alone
-SEARCHES = 6  # at one point, each about the place that the one before found likeliest
-FAR = 6.0  # sigmas from what is known of a point besides, which its observations are then asked about
-SLACK = 2.0  # on sigma in the search, because everything but the point itself is held there
+LARGEST_SEARCH = 24  # observations at a point; more give enough redundancy for the robust fit alone
+SEARCHES = 6  # per point, each linearised at the likeliest position of the previous one
+FAR = 6.0  # sigmas from a point's prior information, beyond which its observations are searched
+SLACK = 2.0  # factor on sigma in the search, because everything but the point is fixed there
 
 
 @dataclass(frozen=True, eq=False)
 class LocalConflict:
-    """The observations that meet in one point, everything else held: which of them cannot all be right?
+    """Observations that meet in one point, everything else fixed, as a search problem.
 
     rows       (group, row) of each observation that may be wrong
     residual   (k,) over sigma
     slopes     (k, 3) derivatives by the point's coordinates, over sigma
-    prior      (q,) residuals over sigma of what is known of the point besides, and is not in doubt
+    prior      (q,) residuals over sigma of the point's prior information, which is trusted
     prior_slopes   (q, 3)
 
     >>> slopes = np.vstack([np.eye(3), np.ones((1, 3)), [[1.0, -1.0, 0.0]], [[0.0, 1.0, -1.0]]])
@@ -42,19 +42,22 @@ class LocalConflict:
     prior_slopes: np.ndarray
 
     def cost(self, out: Sequence[int]) -> float:
-        """Sum of squares at the best place for the point when some observations are left out."""
+        """Sum of squares at the best position of the point without some observations."""
         return self._best(out)[0]
 
     def _best(self, out: Sequence[int]) -> tuple[float, np.ndarray]:
-        keep = np.ones(len(self.rows), dtype=bool)
-        keep[list(out)] = False
-        v = np.concatenate([self.residual[keep], self.prior])
-        a = np.concatenate([self.slopes[keep], self.prior_slopes])
+        mask = np.ones(len(self.rows), dtype=bool)
+        mask[list(out)] = False
+        v = np.concatenate([self.residual[mask], self.prior])
+        a = np.concatenate([self.slopes[mask], self.prior_slopes])
         place = np.linalg.lstsq(a, v, rcond=None)[0]
         return float(np.sum((v - a @ place) ** 2)), place
 
     def likeliest_place(self) -> np.ndarray | None:
-        """Where the point moves (3,) when as many are left out as is searched for; None where the rest is no check."""
+        """Shift (3,) of the point for the best fit without the largest number searched for.
+
+        None if too few observations remain for a check.
+        """
         k = len(self.rows)
         size = min(MOST_AT_ONE_POINT, k + len(self.prior) - 4)
         if size < 1:
@@ -62,10 +65,12 @@ class LocalConflict:
         return min((self._best(out) for out in combinations(range(k), size)), key=lambda best: best[0])[1]
 
     def smallest_conflict(self) -> tuple[int, ...] | None:
-        """The fewest observations whose absence lets the rest agree, or None where two are not enough.
+        """Smallest set of observations whose removal lets the others agree.
 
-        The rest agrees when its sum of squares stays below the chi-square quantile at 99.9 %; of several sets of one
-        size the one with the best rest is taken.
+        None if two are not enough.
+
+        The others agree if their sum of squares is below the chi-square quantile at 99.9 %; of several sets of one
+        size the one that leaves the smallest sum is taken.
         """
         k = len(self.rows)
         for size in range(min(MOST_AT_ONE_POINT, k - 1) + 1):
@@ -79,30 +84,33 @@ class LocalConflict:
         return None
 
     def decisive(self, out: tuple[int, ...], margin: float) -> bool:
-        """True where leaving out any others, as many, leaves a sum of squares larger by the margin."""
+        """True if every other set of the same size leaves a sum of squares larger by the margin."""
         limit = self.cost(out) + margin
-        others = (each for each in combinations(range(len(self.rows)), len(out)) if each != out)
-        return all(self.cost(each) > limit for each in others)
+        alternatives = (rival for rival in combinations(range(len(self.rows)), len(out)) if rival != out)
+        return all(self.cost(rival) > limit for rival in alternatives)
 
 
 @dataclass(frozen=True, eq=False)
 class SharedErrors:
-    """Errors that m observations share with others, where these are parameters of the adjustment.
+    """Errors that m observations share with others, as parameters of the adjustment.
 
     columns    (m, w) of the parameters, -1 for none
     slopes     (m, w) derivatives of the observed values by them
-    variance   (m,) of the observed values, with all that they share
+    variance   (m,) of the observed values, shared errors included
 
-    An observation that contradicts its neighbours at a point is judged with all its errors, and not after these
-    parameters have taken up what they could: they were found with it.
+    An observation that contradicts its neighbours at a point is tested with all its errors, not after these parameters
+    have absorbed a part of them: they were estimated with it.
     """
 
     columns: np.ndarray
     slopes: np.ndarray
     variance: np.ndarray
 
-    def whole(self, residual: np.ndarray, x: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
-        """Residuals of some rows (all if None) as if nothing were known of what they share."""
+    def with_shared(self, residual: np.ndarray, x: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
+        """Residuals with the shared errors put back.
+
+        rows   selected rows; all if None
+        """
         columns, slopes = (self.columns, self.slopes) if rows is None else (self.columns[rows], self.slopes[rows])
         return np.asarray(residual + np.sum(slopes * value(x, columns), axis=1))
 
@@ -110,27 +118,28 @@ class SharedErrors:
 def whole_residuals(
     fits: Sequence[GroupFit], x: np.ndarray, shared: Sequence[SharedErrors | None]
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Residual and sigma of each group's observations with all their errors."""
-    every = [*shared, *[None] * (len(fits) - len(shared))]
+    """Residuals and sigmas of each group, shared errors included."""
+    padded = [*shared, *[None] * (len(fits) - len(shared))]
     return [
-        (f.residual, f.sigma) if s is None else (s.whole(f.residual, x), np.sqrt(s.variance))
-        for f, s in zip(fits, every, strict=True)
+        (f.residual, f.sigma) if s is None else (s.with_shared(f.residual, x), np.sqrt(s.variance))
+        for f, s in zip(fits, padded, strict=True)
     ]
 
 
 @dataclass(frozen=True, eq=False)
 class MeetingLines:
-    """Where observations and what is known besides stand, so that those that meet in a point are quickly found.
+    """Index of observations and prior information by the parameters they depend on.
 
     groups, removable   as of `adjust_robustly`
-    advice              what is known of single points besides
+    advice              prior information on single points
     x                   (n,) parameters
     residual, sigma     one (m,) a group, at x
     jacobians           one a group, at x
-    by_column           columns in order, and group and row of the entries that stand in them
-    advice_at           column of a point: index of an advice
+    by_column           sorted columns, with group and row of each entry
+    advice_at           column of a point: indices of its advice
     shared              of the first groups
-    settled             columns that so many observations know that who depends on them and a point depends on that
+    settled             columns that many observations determine: rows that depend on them and one point count as the
+                        point's alone
     """
 
     groups: Sequence[ObservationGroup]
@@ -154,20 +163,20 @@ class MeetingLines:
         shared: Sequence[SharedErrors | None] = (),
         settled: Sequence[int] = (),
     ) -> "MeetingLines":
-        """Of a solution of the groups."""
+        """Index the groups of a solution."""
         advice_at: dict[int, list[int]] = {}
-        for i, one in enumerate(advice):
-            for column in np.unique(one.columns).tolist():
+        for i, prior_group in enumerate(advice):
+            for column in np.unique(prior_group.columns).tolist():
                 advice_at.setdefault(column, []).append(i)
         jacobians = [g.predict(solution.x)[1] for g in groups]
-        whole = whole_residuals(solution.fits, solution.x, shared)
+        totals = whole_residuals(solution.fits, solution.x, shared)
         return MeetingLines(
             groups,
             removable,
             advice,
             solution.x,
-            [residual for residual, _ in whole],
-            [sigma for _, sigma in whole],
+            [residual for residual, _ in totals],
+            [sigma for _, sigma in totals],
             jacobians,
             _by_column(groups, jacobians),
             advice_at,
@@ -176,15 +185,15 @@ class MeetingLines:
         )
 
     def rows(self, columns: np.ndarray) -> list[tuple[int, np.ndarray]]:
-        """Groups, and their rows, that depend on some columns."""
+        """Groups, and their rows, that depend on given columns."""
         order, group, row = self.by_column
         ends = np.searchsorted(order, columns), np.searchsorted(order, columns, side="right")
         near = np.concatenate([np.arange(low, high) for low, high in zip(*ends, strict=True)])
-        of = group[near]
-        return [(int(i), np.unique(row[near[of == i]])) for i in np.unique(of)]
+        groups = group[near]
+        return [(int(i), np.unique(row[near[groups == i]])) for i in np.unique(groups)]
 
     def at(self, x: np.ndarray, columns: np.ndarray) -> "MeetingLines":
-        """The same at other parameters, as far as some columns reach; elsewhere it is not to be asked."""
+        """Linearised at other parameters, valid only for observations of the given columns."""
         residual, jacobians = list(self.residual), list(self.jacobians)
         for i, near in self.rows(columns):
             group = self.groups[i]
@@ -194,9 +203,11 @@ class MeetingLines:
             if part is group:
                 residual[i], jacobians[i] = group.observed - values, slopes
             else:
-                one = self.shared[i] if i < len(self.shared) else None
-                left = part.observed - values
-                residual[i][near] = left if one is None else one.whole(left, x, near)
+                shared_errors = self.shared[i] if i < len(self.shared) else None
+                partial_residual = part.observed - values
+                residual[i][near] = (
+                    partial_residual if shared_errors is None else shared_errors.with_shared(partial_residual, x, near)
+                )
                 jacobians[i][near] = slopes
         return replace(self, x=x, residual=residual, jacobians=jacobians)
 
@@ -204,20 +215,23 @@ class MeetingLines:
 def _by_column(
     groups: Sequence[ObservationGroup], jacobians: Sequence[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Every entry of the Jacobians that is not zero, by its column: column, group, row."""
-    columns, of, rows = [], [], []
+    """Non-zero Jacobian entries sorted by column: column, group, row."""
+    columns, owners, rows = [], [], []
     for i, (group, jacobian) in enumerate(zip(groups, jacobians, strict=True)):
-        row, place = np.nonzero(jacobian)
-        columns.append(group.columns[place] if group.columns.ndim == 1 else group.columns[row, place])
-        of.append(np.full(len(row), i))
+        row, entry = np.nonzero(jacobian)
+        columns.append(group.columns[entry] if group.columns.ndim == 1 else group.columns[row, entry])
+        owners.append(np.full(len(row), i))
         rows.append(row)
     column = np.concatenate(columns)
     order = np.argsort(column, kind="stable")
-    return column[order], np.concatenate(of)[order], np.concatenate(rows)[order]
+    return column[order], np.concatenate(owners)[order], np.concatenate(rows)[order]
 
 
 def _part(group: ObservationGroup, rows: np.ndarray) -> ObservationGroup:
-    """Some rows of a group of independent lengths; any other group itself."""
+    """Selected rows of a group of independent lengths.
+
+    Returns any other group unchanged.
+    """
     if group.covariance.ndim != 1 or not isinstance(group, Distances | MovingDistances):
         return group
     m = len(group.observed)
@@ -230,36 +244,39 @@ def _part(group: ObservationGroup, rows: np.ndarray) -> ObservationGroup:
 
 
 def search(columns: np.ndarray, meeting: MeetingLines) -> tuple[LocalConflict, tuple[int, ...] | None]:
-    """The smallest conflict at a point; where there is none, searched again about the place of the best explanation.
+    """Smallest conflict at a point, searched again at the likeliest position if there is none.
 
-    A wrong range of half a metre carries its point so far that slopes taken there explain nothing to 25 um.
+    A wrong range of half a metre moves its point so far that derivatives there are not accurate to 25 um.
     """
     for _ in range(SEARCHES):
         local = at_point(columns, meeting, slack=SLACK)
         if not 2 <= len(local.rows) <= LARGEST_SEARCH:
             return local, None
-        wrong = local.smallest_conflict()
-        place = local.likeliest_place()
-        if wrong is not None or place is None:
-            return local, wrong
+        conflict = local.smallest_conflict()
+        shift = local.likeliest_place()
+        if conflict is not None or shift is None:
+            return local, conflict
         x = meeting.x.copy()
-        x[columns] += place
+        x[columns] += shift
         meeting = meeting.at(x, columns)
     return local, None
 
 
 def at_point(columns: np.ndarray, meeting: MeetingLines, *, slack: float) -> LocalConflict:
-    """What meets in a point: removable observations that depend on it; others, and advice, that depend on it alone."""
+    """Observations that meet in a point.
+
+    Removable ones are those that depend on it; others, and advice, count if they depend on it alone.
+    """
     rows: list[tuple[int, int]] = []
-    doubted: list[tuple[float, np.ndarray]] = []
+    removable: list[tuple[float, np.ndarray]] = []
     prior: list[tuple[float, np.ndarray]] = []
     for i, near in meeting.rows(columns):
         slope, alone = _slopes(columns, meeting.groups[i].columns, meeting.jacobians[i], near, meeting.settled)
-        residual, sigma, may = meeting.residual[i][near], meeting.sigma[i][near], meeting.removable[i][near]
-        for k in np.flatnonzero(may):
-            doubted.append((residual[k] / (slack * sigma[k]), slope[k] / (slack * sigma[k])))
+        residual, sigma, mask = meeting.residual[i][near], meeting.sigma[i][near], meeting.removable[i][near]
+        for k in np.flatnonzero(mask):
+            removable.append((residual[k] / (slack * sigma[k]), slope[k] / (slack * sigma[k])))
             rows.append((i, int(near[k])))
-        prior += [(residual[k] / sigma[k], slope[k] / sigma[k]) for k in np.flatnonzero(alone & ~may)]
+        prior += [(residual[k] / sigma[k], slope[k] / sigma[k]) for k in np.flatnonzero(alone & ~mask)]
     for i in dict.fromkeys(i for c in columns.tolist() for i in meeting.advice_at.get(c, ())):
         group = meeting.advice[i]
         values, jacobian = group.predict(meeting.x)
@@ -267,27 +284,27 @@ def at_point(columns: np.ndarray, meeting: MeetingLines, *, slack: float) -> Loc
         sigma, residual = np.sqrt(variances(group)), group.observed - values
         prior += [(residual[k] / sigma[k], slope[k] / sigma[k]) for k in np.flatnonzero(alone)]
     (residual, slopes), (prior_residual, prior_slopes) = (
-        (np.array([v for v, _ in part]), np.array([a for _, a in part]).reshape(-1, 3)) for part in (doubted, prior)
+        (np.array([v for v, _ in part]), np.array([a for _, a in part]).reshape(-1, 3)) for part in (removable, prior)
     )
     return LocalConflict(rows, residual, slopes, prior_residual, prior_slopes)
 
 
 def _slopes(
-    columns: np.ndarray, own: np.ndarray, jacobian: np.ndarray, rows: np.ndarray, settled: np.ndarray
+    columns: np.ndarray, group_columns: np.ndarray, jacobian: np.ndarray, rows: np.ndarray, settled: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives (k, 3) of some rows of a group by a point, and which of them depend on nothing else that is open."""
-    at, jacobian = (own if own.ndim == 1 else own[rows]), jacobian[rows]
-    here = at[..., None] == columns  # in any order, and perhaps not all three
-    known = here.any(axis=-1) | np.isin(at, settled)
-    if here.ndim == 2:
-        slope, others = jacobian @ here, jacobian[:, ~known]
+    """Derivatives (k, 3) of selected rows by a point, and mask of those that depend on it alone."""
+    at, jacobian = (group_columns if group_columns.ndim == 1 else group_columns[rows]), jacobian[rows]
+    on_point = at[..., None] == columns  # in any order, and perhaps not all three
+    fixed = on_point.any(axis=-1) | np.isin(at, settled)
+    if on_point.ndim == 2:
+        slope, remainder = jacobian @ on_point, jacobian[:, ~fixed]
     else:
-        slope, others = np.einsum("mw,mwa->ma", jacobian, here), np.where(known, 0.0, jacobian)
-    return slope, np.any(slope != 0.0, axis=1) & ~np.any(others != 0.0, axis=1)
+        slope, remainder = np.einsum("mw,mwa->ma", jacobian, on_point), np.where(fixed, 0.0, jacobian)
+    return slope, np.any(slope != 0.0, axis=1) & ~np.any(remainder != 0.0, axis=1)
 
 
 def contradicted(points: Sequence[np.ndarray], meeting: MeetingLines) -> list[np.ndarray]:
-    """The points that are far from what is known of each besides its observations, for all that these agree."""
+    """Points far from their prior information although their observations agree."""
     far = [
         ~may & (np.abs(v) > FAR * sigma)
         for v, sigma, may in zip(meeting.residual, meeting.sigma, meeting.removable, strict=True)
@@ -302,7 +319,7 @@ def contradicted(points: Sequence[np.ndarray], meeting: MeetingLines) -> list[np
 
 
 def touched(points: Sequence[np.ndarray], meeting: MeetingLines, *, chosen: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """The points that the chosen observations depend on."""
+    """Points that the chosen observations depend on."""
     columns = {
         int(c)
         for group, jacobian, rows in zip(meeting.groups, meeting.jacobians, chosen, strict=True)
@@ -313,6 +330,6 @@ def touched(points: Sequence[np.ndarray], meeting: MeetingLines, *, chosen: Sequ
 
 
 def _columns_of(group: ObservationGroup, jacobian: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Columns that some rows of a group depend on."""
+    """Columns that selected rows of a group depend on."""
     used = jacobian[rows] != 0.0
     return group.columns[np.any(used, axis=0)] if group.columns.ndim == 1 else group.columns[rows][used]

@@ -1,4 +1,7 @@
-"""Covariances of all parameters, dense or sparse, behind one face: only what is asked for is computed."""
+"""Covariance of all parameters, dense or sparse, through one protocol.
+
+Only the requested blocks are computed.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,49 +12,59 @@ from scipy.sparse import csr_array, sparray
 
 from catseye.errors import EstimationError
 
-LARGEST_MATRIX = 12_000  # parameters: a full matrix of more takes over a gigabyte
-SOLVED = 100  # points whose block is solved for at once, where the factor's pattern does not hold it; or looked at
+LARGEST_MATRIX = 12_000  # parameters; a larger full matrix takes over a gigabyte
+SOLVED = 100  # points per batch, of blocks outside the factor's pattern or of products
 
 
 class Covariance(Protocol):
-    """Covariance of n parameters; rows and columns of held ones are zero."""
+    """Covariance of n parameters.
+
+    Rows and columns of fixed ones are zero.
+    """
 
     def matrix(self) -> np.ndarray:
-        """All of it, (n, n); EstimationError where that is too large."""
+        """Full matrix (n, n); EstimationError if it is too large."""
         ...
 
     def across(self, columns: np.ndarray) -> np.ndarray:
-        """(n, k) of all parameters with some."""
+        """Columns (n, k): all parameters with selected ones."""
         ...
 
     def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
-        """(m, w) sum over j of Q_ij a_j for each row of columns, a (m, w), which meet in one observation."""
+        """Products (m, w): sum over j of Q_ij a_j for each row of columns.
+
+        a is (m, w); the columns of a row meet in one observation.
+        """
         ...
 
     def within(self, columns: np.ndarray) -> np.ndarray:
-        """(k, k) of some parameters."""
+        """Block (k, k) of selected parameters."""
         ...
 
     def blocks(self, first: np.ndarray) -> np.ndarray:
-        """(k, 3, 3) of the triples of parameters that begin at `first` (k,)."""
+        """Blocks (k, 3, 3) of the parameter triples that begin at `first` (k,)."""
         ...
 
     def diagonal(self) -> np.ndarray:
-        """The variances of all parameters, (n,)."""
+        """Variances (n,) of all parameters."""
         ...
 
     def solve(self, b: np.ndarray) -> np.ndarray:
-        """The covariance times b, (n,) or (n, k)."""
+        """Covariance times b, (n,) or (n, k)."""
         ...
 
-    def carried(self, matrix: sparray, others: sparray | None = None) -> np.ndarray:
-        """(k, k) covariance of k combinations of parameters, the rows of a sparse matrix (k, n); or (k, m) with m."""
+    def carried(self, matrix: sparray, other_matrix: sparray | None = None) -> np.ndarray:
+        """Covariance (k, k) of k linear combinations of the parameters.
+
+        matrix          (k, n) sparse, a combination per row
+        other_matrix    (m, n) sparse; given it, the cross-covariance (k, m)
+        """
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Dense:
-    """A covariance held whole."""
+    """Covariance stored as a full matrix."""
 
     full: np.ndarray
 
@@ -84,16 +97,18 @@ class Dense:
     def solve(self, b: np.ndarray) -> np.ndarray:
         return np.asarray(self.full @ b)
 
-    def carried(self, matrix: sparray, others: sparray | None = None) -> np.ndarray:
-        return np.asarray(matrix @ ((matrix if others is None else others) @ self.full).T)
+    def carried(self, matrix: sparray, other_matrix: sparray | None = None) -> np.ndarray:
+        return np.asarray(matrix @ ((matrix if other_matrix is None else other_matrix) @ self.full).T)
 
 
 @dataclass(frozen=True, eq=False)
 class Sparse:
-    """The inverse of a sparse normal matrix, held on the pattern of its factor; the rest is solved for when asked.
+    """Inverse of a sparse normal matrix, stored on the pattern of its factor.
+
+    The remainder is solved for on request.
 
     size          n, all parameters
-    place         (n,) where each stands in the factor, -1 where held
+    place         (n,) index of each in the factor, -1 if fixed
     scale         (k,) of the scaled matrix, in the factor's order
     lp, li, lx, d the factor, see `sparse_kernel`
     """
@@ -126,16 +141,16 @@ class Sparse:
         from catseye.estimation.least_squares.sparse_kernel import solve
 
         inside = np.zeros((len(self.scale), b.shape[1]))
-        moving = self.place >= 0
-        at = self.place[moving]
-        inside[at] = b[moving] * self.scale[at][:, None]
+        free = self.place >= 0
+        at = self.place[free]
+        inside[at] = b[free] * self.scale[at][:, None]
         solve(self.lp, self.li, self.lx, self.d, inside)
         result = np.zeros_like(b)
-        result[moving] = inside[at] * self.scale[at][:, None]
+        result[free] = inside[at] * self.scale[at][:, None]
         return result
 
-    def carried(self, matrix: sparray, others: sparray | None = None) -> np.ndarray:
-        return np.asarray(matrix @ self.solve((matrix if others is None else others).T.toarray()))
+    def carried(self, matrix: sparray, other_matrix: sparray | None = None) -> np.ndarray:
+        return np.asarray(matrix @ self.solve((matrix if other_matrix is None else other_matrix).T.toarray()))
 
     def across(self, columns: np.ndarray) -> np.ndarray:
         unit = np.zeros((self.size, len(columns)))
@@ -157,27 +172,27 @@ class Sparse:
         at = first[:, None] + np.arange(3)
         units = [np.tile(row, (len(at), 1)) for row in np.eye(3)]
         result = np.stack([self.products(at, unit) for unit in units], axis=2)
-        loose = np.flatnonzero(np.isnan(result).any(axis=(1, 2)))  # axes of a point that no observation joins
-        for part in np.split(loose, np.arange(SOLVED, len(loose), SOLVED)):
+        missing = np.flatnonzero(np.isnan(result).any(axis=(1, 2)))  # axes of a point that no observation has in common
+        for part in np.split(missing, np.arange(SOLVED, len(missing), SOLVED)):
             if len(part):
-                own = self.within(at[part].ravel()).reshape(len(part), 3, len(part), 3)
-                result[part] = own[np.arange(len(part)), :, np.arange(len(part))]
+                local = self.within(at[part].ravel()).reshape(len(part), 3, len(part), 3)
+                result[part] = local[np.arange(len(part)), :, np.arange(len(part))]
         return result
 
     def diagonal(self) -> np.ndarray:
         result = np.zeros(self.size)
-        moving = self.place >= 0
-        at = self.place[moving]
-        result[moving] = self._selected[1][at] * self.scale[at] ** 2
+        free = self.place >= 0
+        at = self.place[free]
+        result[free] = self._selected[1][at] * self.scale[at] ** 2
         return result
 
 
 @dataclass(frozen=True, eq=False)
 class Transformed:
-    """A covariance carried to another datum: S Q S' with S = 1 - T G, an S-transformation ([BAARDA73]).
+    """Covariance transformed to another datum: S Q S' with S = 1 - T G, an S-transformation ([BAARDA73]).
 
-    inner   Q, of any datum that holds what floats
-    t       (n, d) = H (G H)^-1, with H the motions that float
+    inner   Q, in any datum that fixes the null space
+    t       (n, d) = H (G H)^-1, with H the datum motions (null space)
     b       (n, d) = Q G'
     c       (d, d) = G Q G'
     """
@@ -218,8 +233,8 @@ class Transformed:
         at, ab = self.t.T @ b, self.b.T @ b
         return np.asarray(self.inner.solve(b) - self.t @ (ab - self.c @ at) - self.b @ at)
 
-    def carried(self, matrix: sparray, others: sparray | None = None) -> np.ndarray:
-        return np.asarray(matrix @ self.solve((matrix if others is None else others).T.toarray()))
+    def carried(self, matrix: sparray, other_matrix: sparray | None = None) -> np.ndarray:
+        return np.asarray(matrix @ self.solve((matrix if other_matrix is None else other_matrix).T.toarray()))
 
     def diagonal(self) -> np.ndarray:
         low_rank = 2.0 * np.sum(self.t * self.b, axis=1) - np.einsum("nd,de,ne->n", self.t, self.c, self.t)
@@ -228,10 +243,10 @@ class Transformed:
 
 @dataclass(frozen=True, eq=False)
 class Widened:
-    """A covariance and what else is considered: Q + R R'.
+    """Covariance with considered effects added: Q + R R'.
 
     inner   Q
-    reach   (n, d): what all parameters move by, for one standard uncertainty of each thing considered
+    reach   (n, d): shift of all parameters for one standard uncertainty of each considered effect
     """
 
     inner: Covariance
@@ -248,8 +263,8 @@ class Widened:
 
     def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
         part = np.where((columns < 0)[..., None], 0.0, self.reach[columns])
-        both = np.einsum("mw,mwd->md", np.where(columns < 0, 0.0, a), part)
-        return self.inner.products(columns, a) + np.einsum("mwd,md->mw", part, both)
+        combined = np.einsum("mw,mwd->md", np.where(columns < 0, 0.0, a), part)
+        return self.inner.products(columns, a) + np.einsum("mwd,md->mw", part, combined)
 
     def blocks(self, first: np.ndarray) -> np.ndarray:
         part = self.reach[first[:, None] + np.arange(3)]
@@ -258,22 +273,22 @@ class Widened:
     def solve(self, b: np.ndarray) -> np.ndarray:
         return np.asarray(self.inner.solve(b) + self.reach @ (self.reach.T @ b))
 
-    def carried(self, matrix: sparray, others: sparray | None = None) -> np.ndarray:
-        moved = np.asarray(matrix @ self.reach)
-        also = moved if others is None else np.asarray(others @ self.reach)
-        return _widened(self.inner.carried(matrix, others), moved, also)
+    def carried(self, matrix: sparray, other_matrix: sparray | None = None) -> np.ndarray:
+        shift = np.asarray(matrix @ self.reach)
+        other_shift = shift if other_matrix is None else np.asarray(other_matrix @ self.reach)
+        return _widened(self.inner.carried(matrix, other_matrix), shift, other_shift)
 
     def diagonal(self) -> np.ndarray:
         return self.inner.diagonal() + np.sum(self.reach**2, axis=1)
 
 
-def _held_whole(q: Covariance) -> bool:
-    return isinstance(q, Dense) or (isinstance(q, Widened) and _held_whole(q.inner))
+def _is_dense(q: Covariance) -> bool:
+    return isinstance(q, Dense) or (isinstance(q, Widened) and _is_dense(q.inner))
 
 
 @dataclass(frozen=True, eq=False)
 class JointPoints:
-    """The joint covariance of p points, of which only what is asked for is computed.
+    """Joint covariance of p points, computed block by block on request.
 
     q         of all parameters
     columns   (p, 3) of the points' coordinates
@@ -284,18 +299,24 @@ class JointPoints:
 
     @staticmethod
     def of(q: Covariance, columns: np.ndarray) -> "JointPoints":
-        """Of some parameters; a covariance that is whole is cut to them."""
-        if not _held_whole(q):
+        """Joint covariance of selected parameters.
+
+        A dense one is cut to them.
+        """
+        if not _is_dense(q):
             return JointPoints(q, columns)
         return JointPoints(Dense(q.within(columns.ravel())), np.arange(columns.size).reshape(columns.shape))
 
     def matrix(self) -> np.ndarray:
-        """(3p, 3p), x y z point by point; EstimationError where that is too large."""
+        """Full matrix (3p, 3p), x y z point by point.
+
+        EstimationError if it is too large.
+        """
         self.check_size()
         return self.block(np.arange(len(self.columns)))
 
     def check_size(self) -> None:
-        """Raise EstimationError where the matrix would be too large."""
+        """Raise EstimationError if the full matrix would be too large."""
         if self.columns.size > LARGEST_MATRIX:
             raise EstimationError(
                 f"the full covariance of {len(self.columns)} points takes {8e-9 * self.columns.size**2:.0f} GB "
@@ -303,50 +324,53 @@ class JointPoints:
             )
 
     def block(self, rows: np.ndarray) -> np.ndarray:
-        """(3k, 3k) of some points."""
+        """Block (3k, 3k) of selected points."""
         return self.q.within(self.columns[rows].ravel())
 
     def held(self) -> "JointPoints":
-        """The same with all its matrix at hand, for who asks for much of it; itself where that would be too large."""
+        """Dense copy, for many requests.
+
+        Returns itself if a dense one would be too large.
+        """
         if isinstance(self.q, Dense) or self.columns.size > LARGEST_MATRIX:
             return self
         return JointPoints(Dense(self.matrix()), np.arange(self.columns.size).reshape(-1, 3))
 
     def times(self, a: np.ndarray) -> np.ndarray:
-        """(3p, k) the points' covariance times a (3p, k)."""
-        own = self.columns.ravel()
+        """The points' covariance times a (3p, k)."""
+        columns = self.columns.ravel()
         right = np.zeros((len(self.q.diagonal()), a.shape[1]))
-        right[own] = a
-        return self.q.solve(right)[own]
+        right[columns] = a
+        return self.q.solve(right)[columns]
 
     def of_points(self, rows: np.ndarray) -> "JointPoints":
-        """The joint covariance of some of the points."""
+        """Joint covariance of selected points."""
         return JointPoints(self.q, self.columns[rows])
 
-    def between(self, some: np.ndarray, others: np.ndarray) -> np.ndarray:
-        """(3k, 3m) of some points with others."""
+    def between(self, rows: np.ndarray, other_rows: np.ndarray) -> np.ndarray:
+        """Cross-covariance (3k, 3m) of selected points with others."""
         if isinstance(self.q, Dense):
-            return self.q.full[np.ix_(self.columns[some].ravel(), self.columns[others].ravel())]
-        return self.q.carried(self._picked(some), self._picked(others))
+            return self.q.full[np.ix_(self.columns[rows].ravel(), self.columns[other_rows].ravel())]
+        return self.q.carried(self._selection(rows), self._selection(other_rows))
 
-    def _picked(self, some: np.ndarray) -> csr_array:
-        """(3k, n) that takes some points' coordinates out of all parameters."""
-        k = 3 * len(some)
-        at = (np.arange(k), self.columns[some].ravel())
+    def _selection(self, rows: np.ndarray) -> csr_array:
+        """Selection matrix (3k, n) of the points' coordinates among all parameters."""
+        k = 3 * len(rows)
+        at = (np.arange(k), self.columns[rows].ravel())
         return csr_array((np.ones(k), at), shape=(k, len(self.q.diagonal())))
 
     @cached_property
     def blocks(self) -> np.ndarray:
-        """(p, 3, 3) of each point."""
+        """Covariance blocks (p, 3, 3), one per point."""
         return self.q.blocks(self.columns[:, 0])
 
     @property
     def u(self) -> np.ndarray:
-        """(p, 3) standard uncertainties of the coordinates."""
+        """Standard uncertainties (p, 3) of the coordinates."""
         return np.asarray(np.sqrt(np.maximum(np.diagonal(self.blocks, axis1=1, axis2=2), 0.0)))
 
     def along(self, rows: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """(k, k) of some points' components along directions (k, 3)."""
+        """Covariance (k, k) of selected points' components along directions (k, 3)."""
         k = len(rows)
         if isinstance(self.q, Dense):
             parts = (slice(low, low + SOLVED) for low in range(0, k, SOLVED))
@@ -356,7 +380,10 @@ class JointPoints:
 
 
 def _widened(q: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """q + a b', without another matrix of its size; a q that nobody else has is written over."""
+    """q + a b', without a temporary matrix of its size.
+
+    A q that owns its memory is overwritten.
+    """
     total = q if q.flags.owndata and q.flags.writeable else q.copy()
     for k in range(0, len(total), SOLVED):
         total[k : k + SOLVED] += a[k : k + SOLVED] @ b.T
@@ -364,6 +391,6 @@ def _widened(q: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _combined(q: np.ndarray, directions: np.ndarray, part: slice) -> np.ndarray:
-    """(c, k) of some points' components with all, from their rows (3c, 3k)."""
-    seen = np.einsum("rmj,mj->rm", q.reshape(len(q), -1, 3), directions)
-    return np.asarray(np.einsum("ci,cim->cm", directions[part], seen.reshape(-1, 3, len(directions))))
+    """Covariance (c, k) of selected components with all, from their rows (3c, 3k)."""
+    projected = np.einsum("rmj,mj->rm", q.reshape(len(q), -1, 3), directions)
+    return np.asarray(np.einsum("ci,cim->cm", directions[part], projected.reshape(-1, 3, len(directions))))

@@ -1,4 +1,4 @@
-"""What leaving out observations does to the tests of all others, from one solution and without another."""
+"""Effect of leaving out observations on all other tests, without a new solution."""
 
 from collections.abc import Sequence
 
@@ -8,24 +8,24 @@ from catseye.estimation.least_squares.adjustment import NONCENTRALITY, LeastSqua
 from catseye.estimation.least_squares.rows import ActiveRows
 from catseye.estimation.observations.kinds import ObservationGroup
 
-UNSEEN = 1e-6  # share of a pattern that the parameters leave, below which it is rounding
-AT_ONCE = 32  # observations whose influence is computed together
+UNSEEN = 1e-6  # share of a pattern left by the parameters, below which it is rounding
+BATCH = 32  # observations per batch
 
 
 class Influence:
-    """The tests of an adjustment's observations while some are left out, one after the other.
+    """Test statistics of an adjustment as observations are left out one by one.
 
     With P_v = P - P A Q A' P and g = P v over the active rows, an error in observation k adds a parameter to the model;
-    without k they are P_v - c c' / c_k and g - c g_k / c_k, c being column k of P_v. That is what the adjustment
-    without k would give, as far as the model is linear.
+    without k they are P_v - c c' / c_k and g - c g_k / c_k, c being column k of P_v. That equals the
+    adjustment without k, as far as the model is linear.
 
-    Source: [BAARDA68] for w = g / sqrt(diag P_v); bordering a matrix by a row, as any book of linear algebra has it.
+    Source: [BAARDA68] for w = g / sqrt(diag P_v); bordering a matrix by a row (any textbook of linear algebra).
     """
 
     def __init__(self, groups: Sequence[ObservationGroup], solution: LeastSquaresSolution):
-        """All rows of all groups, one after the other.
+        """Stack the rows of all groups.
 
-        groups, solution   as `adjust` took and gave them
+        groups, solution   input and result of `adjust`
         """
         fits = solution.fits
         self._q = solution.q
@@ -41,7 +41,7 @@ class Influence:
         self.weighed = np.concatenate([f.standardised for f in fits]) * np.sqrt(self.visible)
         self._least = 1e-9 * self.visible
         self._columns: dict[int, np.ndarray] = {}
-        self._out = np.zeros((0, len(self.active)))  # columns over the roots of their own element, as they left
+        self._out = np.zeros((0, len(self.active)))  # columns / root of diagonal, in order
 
     @property
     def standardised(self) -> np.ndarray:
@@ -50,22 +50,23 @@ class Influence:
 
     @property
     def left_out(self) -> int:
-        """How many rows are left out beyond the solution's own."""
+        """Number of rows left out beyond the solution's own."""
         return len(self._out)
 
     @property
     def detectable(self) -> np.ndarray:
-        """The smallest error of every row that its test finds, as in `GroupFit`."""
+        """Detectable error of every row, as in `GroupFit`."""
         return NONCENTRALITY / np.sqrt(self.visible)
 
     def leave_out(self, k: int, likely: np.ndarray) -> None:
-        """One more row without which the tests are.
+        """Leave out one more row.
 
-        likely   rows that may be asked for next; they cost little together
+        k        row
+        likely   rows that may be left out next; cheaper in one batch
         """
         if k not in self._columns:
-            wanted = [k, *(int(j) for j in likely if j != k and j not in self._columns)][:AT_ONCE]
-            self._columns.update(zip(wanted, self._of(np.array(wanted)), strict=True))
+            batch = [k, *(int(j) for j in likely if j != k and j not in self._columns)][:BATCH]
+            self._columns.update(zip(batch, self._of(np.array(batch)), strict=True))
         column = self._columns.pop(k) - self._out[:, k] @ self._out
         root = np.sqrt(max(column[k], self._least[k]))
         self.weighed = self.weighed - column * (self.weighed[k] / root**2)
@@ -74,26 +75,26 @@ class Influence:
         self._out = np.concatenate([self._out, (column / root)[None]])
 
     def errors_of(self, patterns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """An error of each of k patterns (rows, k) in the observations, by itself: estimate (k,) and its u (k,).
+        """Error of each of k patterns (rows, k) in the observations: estimates (k,) and their u (k,).
 
-        Of the solution itself, before any row is left out; patterns are 0 in inactive rows. What the parameters take up
-        wholly has an infinite u.
+        Each is estimated by itself, from the solution before any row is left out; patterns are 0 in inactive rows.
+        A pattern that the parameters absorb completely has infinite u.
         """
-        seen = np.sum(patterns * self._through(patterns).T, axis=0)
+        information = np.sum(patterns * self._through(patterns).T, axis=0)
         usual = np.sum(patterns**2 * self.visible[:, None], axis=0)
-        shown = seen > UNSEEN * np.maximum(usual, 1e-300)
-        seen = np.where(shown, seen, 1.0)
-        estimate = np.where(shown, patterns.T @ self.weighed / seen, 0.0)
-        return estimate, np.where(shown, seen**-0.5, np.inf)
+        estimable = information > UNSEEN * np.maximum(usual, 1e-300)
+        information = np.where(estimable, information, 1.0)
+        estimate = np.where(estimable, patterns.T @ self.weighed / information, 0.0)
+        return estimate, np.where(estimable, information**-0.5, np.inf)
 
-    def _of(self, wanted: np.ndarray) -> np.ndarray:
-        """Columns of P_v of the solution itself, a row each."""
-        unit = np.zeros((int(self.first[-1]), len(wanted)))
-        unit[wanted, np.arange(len(wanted))] = 1.0
+    def _of(self, batch: np.ndarray) -> np.ndarray:
+        """Columns of P_v of the original solution, one per row."""
+        unit = np.zeros((int(self.first[-1]), len(batch)))
+        unit[batch, np.arange(len(batch))] = 1.0
         return self._through(unit)
 
     def _through(self, vectors: np.ndarray) -> np.ndarray:
-        """P_v times vectors (rows, k), a row each."""
+        """P_v times vectors (rows, k), one product per row."""
         unit, right = [], np.zeros((len(self._q.diagonal()), vectors.shape[1]))
         for rows, design, low, high in zip(self._rows, self._designs, self.first, self.first[1:], strict=False):
             one = vectors[low:high]
@@ -114,9 +115,9 @@ class Influence:
                 shift = design @ moved[rows.columns]
             else:
                 at = rows.row_columns()
-                held = np.where(at < 0, 0.0, design)
+                masked = np.where(at < 0, 0.0, design)
                 shift = np.zeros_like(one)
                 for j in range(at.shape[1]):
-                    shift += held[:, j : j + 1] * moved[at[:, j]]
+                    shift += masked[:, j : j + 1] * moved[at[:, j]]
             columns.append(one - rows.weigh(shift))
         return np.concatenate(columns).T

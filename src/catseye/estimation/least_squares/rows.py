@@ -1,4 +1,4 @@
-"""The rows of one group as the solver needs them: whitened by the Cholesky factor of their covariance."""
+"""Observation rows of one group, whitened by the Cholesky factor of their covariance."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from catseye.estimation.observations.kinds import ObservationGroup
 
 
 def shared(columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Columns (k,) that rows (m, w) share, sorted, and where each row's own ones are among them (k: none)."""
+    """Sorted distinct columns (k,) of rows (m, w), and each entry's index among them (k: none)."""
     distinct, position = np.unique(columns, return_inverse=True)
     position = position.reshape(columns.shape)
     if len(distinct) and distinct[0] < 0:
@@ -20,34 +20,37 @@ def shared(columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def dense_jacobian(jacobian: np.ndarray, position: np.ndarray, width: int) -> np.ndarray:
-    """(m, w) of each row's own columns as (m, width) of shared ones; repeats add up."""
+    """Jacobian (m, w) over each row's own columns as (m, width) over shared ones.
+
+    Repeats add up.
+    """
     m = len(jacobian)
     flat = (np.arange(m)[:, None] * (width + 1) + position).ravel()
     return np.bincount(flat, jacobian.ravel(), m * (width + 1)).reshape(m, width + 1)[:, :width]
 
 
 def full_jacobian(group: ObservationGroup, x: np.ndarray) -> np.ndarray:
-    """(m, n) derivatives of a group by all n parameters, whichever form its columns have."""
+    """Derivatives (m, n) of a group by all n parameters."""
     jacobian = group.predict(x)[1]
     columns = np.broadcast_to(group.columns, jacobian.shape)
     return dense_jacobian(jacobian, np.where(columns < 0, len(x), columns), len(x))
 
 
 def variances(group: ObservationGroup) -> np.ndarray:
-    """(m,) variances of the observed values."""
+    """Variances (m,) of the observed values."""
     c = group.covariance
     return c if c.ndim == 1 else np.diag(c) if c.ndim == 2 else np.diagonal(c, axis1=1, axis2=2).ravel()
 
 
 @dataclass(frozen=True, eq=False)
 class ActiveRows:
-    """The active rows of a group.
+    """Active observation rows of a group.
 
-    group       whose
-    active      (m,) bool; rows that are not stay in place with zeros, so that blocks keep their shape
-    factor      root of variances (m,), Cholesky factors (m, m) or (b, r, r) with rows that are not active cut out
+    group       the observation group
+    active      (m,) bool; inactive rows stay in place with zeros, so that blocks keep their shape
+    factor      root of variances (m,), Cholesky factors (m, m) or (b, r, r) without the inactive rows
     weight      (m,) 1 for active rows, 0 for others
-    position    where rows' own columns stand among the shared ones, for groups with one covariance matrix; or None
+    position    index of each row's columns among the shared ones, for groups with one covariance matrix; or None
     columns     (k,) shared; or (m, w) of independent rows, or (b, r w) of blocks
     """
 
@@ -66,11 +69,13 @@ class ActiveRows:
         extra: np.ndarray | None = None,
         inflation: np.ndarray | None = None,
     ) -> "ActiveRows":
-        """Rows of a group; EstimationError where the covariance of the active ones is none.
+        """Rows of a group.
+
+        EstimationError if the active ones' covariance is not positive definite.
 
         active      (m,) bool, all if None
         extra       (m,) added to the variances
-        inflation   (m,) factor on the standard uncertainties; correlations stay as they are
+        inflation   (m,) factor on the standard uncertainties; correlations are unchanged
         """
         m = len(group.observed)
         chosen = np.ones(m, dtype=bool) if active is None else np.asarray(active, dtype=bool)
@@ -117,13 +122,13 @@ class ActiveRows:
         return float(np.sum(self.whiten(np.where(self.active, v, 0.0)) ** 2))
 
     def linear(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Whitened residuals (m,) and the whitened Jacobian over `self.columns`."""
+        """Whitened residuals (m,) and Jacobian over `self.columns`."""
         values, jacobian = self.group.predict(x)
         v = self.whiten(np.where(self.active, self.group.observed - values, 0.0))
         return v, self.whiten(self.spread(np.where(self.active[:, None], jacobian, 0.0)))
 
     def spread(self, jacobian: np.ndarray) -> np.ndarray:
-        """A group's Jacobian over `self.columns`, a row an observation."""
+        """Jacobian over `self.columns`, one row per observation."""
         if self.position is not None:
             return dense_jacobian(jacobian, self.position, len(self.columns))
         if self.factor.ndim == 3 and self.columns.ndim == 2:
@@ -135,14 +140,17 @@ class ActiveRows:
         return jacobian
 
     def row_columns(self) -> np.ndarray:
-        """(m, w) columns of every row, whichever form."""
+        """Columns (m, w) of every row."""
         m = len(self.active)
         if self.columns.ndim == 1:
             return np.broadcast_to(self.columns, (m, len(self.columns)))
         return self.columns if len(self.columns) == m else np.repeat(self.columns, self.factor.shape[1], axis=0)
 
     def products(self, q: Covariance, a: np.ndarray, chosen: np.ndarray | None = None) -> np.ndarray:
-        """Q a' for each row of a, over `self.columns` or its row; of the rows `chosen`, all if None."""
+        """Q a' for each row of a, over `self.columns` or its row's columns.
+
+        chosen   rows; all if None
+        """
         if self.columns.ndim == 1:
             return a @ q.within(self.columns)
         columns = self.row_columns()
@@ -159,7 +167,10 @@ class ActiveRows:
         return np.linalg.solve(self.factor.transpose(0, 2, 1), inside).reshape(a.shape)
 
     def own_weight(self) -> np.ndarray:
-        """(m,) diagonal of C^-1 over the active rows; 1 for those that are not."""
+        """Diagonal (m,) of C^-1 over the active rows.
+
+        1 for inactive ones.
+        """
         if self.factor.ndim == 1:
             return 1.0 / self.factor**2
         if self.factor.ndim == 2:
@@ -168,7 +179,10 @@ class ActiveRows:
         return np.sum(np.linalg.inv(self.factor) ** 2, axis=1).ravel()
 
     def prediction(self, out: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
-        """How rows left out follow from the residuals of active ones: gain (o, m) or None, and variance left (o,)."""
+        """Gain (o, m) that predicts left-out rows from active residuals, and remaining variance (o,).
+
+        The gain is None for independent rows.
+        """
         c = self.group.covariance
         if c.ndim == 1:
             return None, c[out]

@@ -1,9 +1,9 @@
-"""Best linear unbiased estimates from values whose covariance may be singular, as that of free networks is.
+"""Best linear unbiased estimates from values of singular covariance, such as free networks have.
 
-What is estimated takes the null space in: only the part of the values that no parameter explains is weighted, by the
+The parameters absorb the null space: only the part of the values that no parameter explains is weighted, by the
 inverse of its own covariance. So the sum of squares and its degrees of freedom do not depend on any datum.
 
-A covariance is factorised once; what is asked of it later is solved for by triangles.
+A covariance is factorised once; later requests are triangular solves.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,27 +15,29 @@ from scipy.linalg import blas, lapack
 
 from catseye.errors import EstimationError
 
-NO_COVARIANCE = "the covariance is none: scaled to unit variances its smallest eigenvalue is {value:.2g}"
+NO_COVARIANCE = "invalid covariance: scaled to unit variances its smallest eigenvalue is {value:.2g}"
 FLOATING = 1e-10  # of the largest singular value of a design with unit columns
-SINGULAR = 1e-11  # of the weighted part's condition: beyond it a covariance claims to know something exactly
-NEGATIVE = 1e-9  # of the number of rows: an eigenvalue below minus that is no rounding (scaled to unit variances)
-REFINED = 1e-10  # of two standard uncertainties' product: a covariance is refined until it changes by less,
-REFINEMENTS = 10  # or as often, where rounding keeps it from that
-PANEL = 512  # columns of an inverse that are solved for together: some MB, and products as quick as any
+SINGULAR = 1e-11  # limit of the weighted part's condition: beyond it a combination has zero variance
+NEGATIVE = 1e-9  # of the number of rows: an eigenvalue below minus this is not rounding (scaled to unit variances)
+REFINED = 1e-10  # of the product of two standard uncertainties: refinement stops at smaller changes,
+REFINEMENTS = 10  # or after so many, if rounding prevents it
+PANEL = 512  # columns of an inverse solved for together: some MB, at full speed
 
 
 @dataclass(frozen=True, eq=False)
 class FactoredModel:
-    """Values = design @ parameters + errors of covariance Q, factorised once; Q may be singular.
+    """Values = design @ parameters + errors of covariance Q, factorised once.
 
-    With U an orthonormal base of the design and N one of the rest: P = N (N'QN)^-1 N', computed without N from the
-    projected covariance, and gain U'(1 - QP). All is scaled to unit variances.
+    Q may be singular.
+
+    With U an orthonormal base of the design and N one of its complement: P = N (N'QN)^-1 N', computed without N from
+    the projected covariance, and gain U'(1 - QP). All is scaled to unit variances.
 
     sigma    (m,) units of the rows
     base     (m, p) U
     back     (p, p) from that base to the parameters
-    level    by which F = (1 - UU')Q(1 - UU') + level UU' holds the base
-    factor   (m, m) F's lower triangle of Cholesky, in Fortran's order; what is above it is nothing. None where m = p
+    level    regularisation of the base in F = (1 - UU')Q(1 - UU') + level UU'
+    factor   (m, m) lower Cholesky factor of F, in Fortran order, undefined above the diagonal; None if m = p
     gain     (p, m) of scaled values in terms of U
     spread   (p, p) covariance of the base's parameters
     """
@@ -57,9 +59,9 @@ class FactoredModel:
         rows: Sequence[str],
         overwrite: bool = False,
     ) -> "FactoredModel":
-        """The model factorised; arguments and errors as of `best_linear_estimate`.
+        """Factorise a model; arguments and errors as of `best_linear_estimate`.
 
-        overwrite   the factor takes the covariance's place, where this is in rows; else the place of a copy
+        overwrite   store the factor in the covariance's memory (if it is in C order); else in a copy
         """
         m, p = design.shape
         sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -78,7 +80,7 @@ class FactoredModel:
         qu = (covariance @ (u / sigma[:, None])) / sigma[:, None]
         level, factor, gain = 1.0, None, u.T
         if m > p:
-            level, factor = _factor_beside(covariance, sigma, u, qu, rows=rows, overwrite=overwrite)
+            level, factor = _projected_factor(covariance, sigma, u, qu, rows=rows, overwrite=overwrite)
             gain = gain - (_solved(factor, qu) - u @ (u.T @ qu) / level).T
         spread = gain @ qu  # gain Q gain', as gain Q = gain Q U U'
         if p and (least := float(np.linalg.eigvalsh(0.5 * (spread + spread.T))[0])) < -NEGATIVE * m:
@@ -86,9 +88,12 @@ class FactoredModel:
         return FactoredModel(sigma, u, vt.T / s / length[:, None], level, factor, gain, spread)
 
     def solve(self, values: np.ndarray, closure: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Weighted residuals l (m,) or (m, k) and parameters x (p,) or (p, k): Q l + design x = values, design' l = c.
+        """Weighted residuals l and parameters x: Q l + design x = values, design' l = c.
 
-        closure   c, (p,) or (p, k); zero without, which is least squares
+        values    (m,) or (m, k)
+        closure   c, (p,) or (p, k); zero if None, which is least squares
+
+        Returns l (m,) or (m, k) and x (p,) or (p, k).
         """
         unit = self.sigma if values.ndim == 1 else self.sigma[:, None]
         scaled = values / unit
@@ -102,10 +107,10 @@ class FactoredModel:
         return weighted / unit, self.back @ along
 
     def refined(self, design: np.ndarray, times: Callable[[np.ndarray], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """Gain (p, m) and covariance (p, p) of a model that is nearly the one factorised.
+        """Gain (p, m) and covariance (p, p) of a model close to the factorised one.
 
-        design   (m, p) of the other
-        times    its covariance times (m, p)
+        design   (m, p) of that model
+        times    product of its covariance with an (m, p) array
         """
         unit = np.eye(design.shape[1])
         weighted, along = self.solve(np.zeros(design.shape), unit)
@@ -119,25 +124,25 @@ class FactoredModel:
 
     @property
     def parameter_gain(self) -> np.ndarray:
-        """(p, m): parameters = gain @ values."""
+        """Gain (p, m): parameters = gain @ values."""
         return np.asarray(self.back @ self.gain / self.sigma)
 
     @cached_property
     def weight(self) -> np.ndarray:
-        """(m, m) P, the whole matrix."""
+        """Weight matrix P, (m, m)."""
         if self.factor is None:
             return np.zeros((len(self.sigma),) * 2)
         inverse = np.tril(lapack.dpotri(self.factor, lower=1)[0])
-        whole = inverse + np.tril(inverse, -1).T - (self.base @ self.base.T) / self.level
-        return np.asarray(whole / self.sigma[:, None] / self.sigma)
+        full = inverse + np.tril(inverse, -1).T - (self.base @ self.base.T) / self.level
+        return np.asarray(full / self.sigma[:, None] / self.sigma)
 
     @cached_property
     def weight_diagonal(self) -> np.ndarray:
-        """(m,) P_ii, at half the price of `weight` and without its memory."""
+        """Diagonal (m,) of P, at half the cost of `weight` and without its memory."""
         if self.factor is None:
             return np.zeros(len(self.sigma))
-        own = _inverse_diagonal(self.factor) - np.sum(self.base**2, axis=1) / self.level
-        return np.asarray(own / self.sigma**2)
+        diagonal = _inverse_diagonal(self.factor) - np.sum(self.base**2, axis=1) / self.level
+        return np.asarray(diagonal / self.sigma**2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +156,7 @@ class LinearEstimate:
     pvv                 values' P values
     degrees_of_freedom  m - p
     design              (m, p)
-    model               what it was solved with
+    model               factorised model it was solved with
     """
 
     estimate: np.ndarray
@@ -165,17 +170,20 @@ class LinearEstimate:
 
     @property
     def redundancy(self) -> np.ndarray:
-        """(m,) share of each row in the degrees of freedom: (QP)_ii = (1 - design gain)_ii."""
+        """Redundancy numbers (m,): (QP)_ii = (1 - design gain)_ii."""
         return np.asarray(1.0 - np.sum(self.design * self.gain.T, axis=1))
 
     @property
     def weight(self) -> np.ndarray:
-        """(m, m) P: P values is the weighted residual, (P_ii)^-1 the covariance of values i foretold by all others."""
+        """Weight matrix P (m, m): weighted residual = P values.
+
+        (P_ii)^-1 is the covariance of values i given all others.
+        """
         return self.model.weight
 
     @property
     def weight_diagonal(self) -> np.ndarray:
-        """(m,) the diagonal of P alone."""
+        """Diagonal (m,) of the weight matrix P."""
         return self.model.weight_diagonal
 
 
@@ -187,15 +195,15 @@ def best_linear_estimate(
     parameters: Sequence[str],
     rows: Sequence[str],
 ) -> LinearEstimate:
-    """Parameters of values = design @ parameters + errors, where the covariance of the errors may be singular.
+    """Parameters of values = design @ parameters + errors of (possibly singular) covariance.
 
     design       (m, p), of full column rank; p may be 0
     values       (m,)
-    covariance   (m, m), positive definite on what the design leaves over
+    covariance   (m, m), positive definite on the complement of the design
     parameters   p names, and
     rows         m names, for errors
 
-    Raises EstimationError if parameters float, or if the covariance leaves a combination of rows exactly known.
+    Raises EstimationError for undetermined parameters, or a covariance that makes a combination of rows exactly known.
 
     Source: [RAO73] section 4i (unified least squares).
 
@@ -219,13 +227,16 @@ def best_linear_estimate(
 
 
 def _floating(names: Sequence[str]) -> str:
-    return f"not held by these points: {', '.join(names)}; add points, or fit fewer parameters"
+    return f"not determined by these points: {', '.join(names)}; add points, or fit fewer parameters"
 
 
-def _factor_beside(
+def _projected_factor(
     covariance: np.ndarray, sigma: np.ndarray, u: np.ndarray, qu: np.ndarray, *, rows: Sequence[str], overwrite: bool
 ) -> tuple[float, np.ndarray]:
-    """Level and Cholesky's factor of (1 - UU')Q(1 - UU') + level UU', Q scaled and U orthonormal columns."""
+    """Level and Cholesky factor of (1 - UU')Q(1 - UU') + level UU'.
+
+    Q is scaled, the columns of U are orthonormal.
+    """
     m, p = u.shape
     q = np.divide(covariance, sigma[:, None], out=covariance if overwrite else np.empty((m, m)))
     q /= sigma
@@ -240,15 +251,15 @@ def _factor_beside(
     factor, failed = lapack.dpotrf(filled, lower=1, clean=0, overwrite_a=1)
     condition = 0.0 if failed else lapack.dpocon(factor, norm, uplo="L")[0]
     if condition < SINGULAR:
-        above = np.triu(factor, 1)  # is still the matrix
+        above = np.triu(factor, 1)  # still holds the matrix
         values, vectors = np.linalg.eigh(above + above.T + np.diag(variances))
         if values[0] < -NEGATIVE * m:
             raise EstimationError(NO_COVARIANCE.format(value=values[0]))
         part = np.sum(vectors[:, values < 10.0 * SINGULAR * values[-1]] ** 2, axis=1)
         named = [rows[int(i)] for i in np.argsort(-part)[:4] if part[i] > 1e-3 * part.max()]
         raise EstimationError(
-            f"the covariance claims to know a combination of {', '.join(named)} exactly, and no motion that is left "
-            "free explains it; free more of the datum, or give held points their covariance"
+            f"singular covariance: a combination of {', '.join(named)} has zero variance, and no free motion explains "
+            "it; free more of the datum, or give fixed points their covariance"
         )
     return level, factor
 
@@ -258,7 +269,7 @@ def _solved(factor: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def _inverse_diagonal(factor: np.ndarray) -> np.ndarray:
-    """Diagonal of (L L')^-1: the squares of L^-1's columns, a panel at a time."""
+    """Diagonal of (L L')^-1: squared norms of the columns of L^-1, a panel at a time."""
     m = len(factor)
     result = np.empty(m)
     for first in range(0, m, PANEL):

@@ -1,13 +1,13 @@
-"""Sparse L D L' and the entries of the inverse on its pattern, compiled. Imported only when a large problem needs it.
+"""Compiled sparse L D L' factor, and the inverse on its pattern.
 
-All arrays are of the permuted upper triangle in compressed columns (ap, ai, ax), as [DAVIS05] has them; the plain form
-that these are tested against is numpy's dense inverse.
+Imported only for large problems. All arrays are of the permuted upper triangle in compressed columns (ap, ai, ax), as
+in [DAVIS05]; tested against numpy's dense inverse.
 """
 
 import numpy as np
 from numba import njit
 
-SMALLEST_PIVOT = 1e-14  # of a matrix of unit diagonal: what falls below is raised to it, so that null vectors appear
+SMALLEST_PIVOT = 1e-14  # of a matrix of unit diagonal: smaller pivots are raised to it, so that null vectors appear
 
 
 @njit(cache=True, error_model="numpy")
@@ -32,7 +32,10 @@ def symbolic(n, ap, ai):
 
 @njit(cache=True, error_model="numpy")
 def numeric(n, ap, ai, ax, parent, lp):
-    """L (rows and values, unit diagonal left out), D (n,) and if a pivot was raised. [DAVIS05] ldl_numeric."""
+    """L (rows and values, unit diagonal left out), D (n,), and True if a pivot was raised.
+
+    Source: [DAVIS05] ldl_numeric.
+    """
     li, lx, d = np.empty(lp[n], np.int64), np.empty(lp[n]), np.empty(n)
     y, pattern, flag, filled = np.zeros(n), np.empty(n, np.int64), np.full(n, -1), np.zeros(n, np.int64)
     raised = False
@@ -70,7 +73,7 @@ def numeric(n, ap, ai, ax, parent, lp):
 
 @njit(cache=True, error_model="numpy")
 def solve(lp, li, lx, d, b):
-    """b (n, k) becomes (L D L')^-1 b."""
+    """Overwrite b (n, k) with (L D L')^-1 b."""
     n, k = b.shape
     for j in range(n):
         for p in range(lp[j], lp[j + 1]):
@@ -86,21 +89,24 @@ def solve(lp, li, lx, d, b):
 
 @njit(cache=True, error_model="numpy")
 def selected_inverse(lp, li, lx, d):
-    """The inverse on the pattern of L: values as `lx` is laid out, and the diagonal. Source: [TAKAHASHI73]."""
+    """Inverse on the pattern of L: values in the order of `lx`, and the diagonal.
+
+    Source: [TAKAHASHI73].
+    """
     n = len(d)
     z, diagonal = np.zeros(len(lx)), np.zeros(n)
-    own, total, mark = np.zeros(n), np.zeros(n), np.full(n, -1)
+    column, total, mark = np.zeros(n), np.zeros(n), np.full(n, -1)
     for j in range(n - 1, -1, -1):
         for p in range(lp[j], lp[j + 1]):
-            mark[li[p]], own[li[p]], total[li[p]] = j, lx[p], 0.0
+            mark[li[p]], column[li[p]], total[li[p]] = j, lx[p], 0.0
         for p in range(lp[j], lp[j + 1]):
             k = li[p]
-            total[k] += diagonal[k] * own[k]
+            total[k] += diagonal[k] * column[k]
             for q in range(lp[k], lp[k + 1]):
                 i = li[q]
                 if mark[i] == j:
-                    total[i] += z[q] * own[k]
-                    total[k] += z[q] * own[i]
+                    total[i] += z[q] * column[k]
+                    total[k] += z[q] * column[i]
         diagonal[j] = 1.0 / d[j]
         for p in range(lp[j], lp[j + 1]):
             z[p] = -total[li[p]]
@@ -110,7 +116,7 @@ def selected_inverse(lp, li, lx, d):
 
 @njit(cache=True, error_model="numpy")
 def entry(lp, li, z, diagonal, i, j):
-    """One entry of the selected inverse; nan off the pattern."""
+    """Entry (i, j) of the selected inverse; nan off the pattern."""
     if i == j:
         return diagonal[i]
     row, column = max(i, j), min(i, j)
@@ -128,7 +134,10 @@ def entry(lp, li, z, diagonal, i, j):
 
 @njit(cache=True, error_model="numpy")
 def products(lp, li, z, diagonal, columns, a):
-    """sum over j of Q_ij a_j for each row of columns, a (m, w); -1 among the columns is skipped."""
+    """Sum over j of Q_ij a_j for each row of columns, a (m, w).
+
+    -1 in columns is skipped.
+    """
     m, w = columns.shape
     result = np.zeros((m, w))
     for row in range(m):

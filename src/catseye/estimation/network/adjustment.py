@@ -1,4 +1,4 @@
-"""A network adjusted: starts found, datum chosen, solved, and what went wrong said in one line."""
+"""Network adjustment: start values, datum, solution, and a diagnosis in one line."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -30,25 +30,25 @@ from catseye.estimation.network.diagnosis import contradicted, diagnosed, floati
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork
 from catseye.estimation.observations.kinds import Linear, ObservationGroup
 
-FEWEST_POINTS = 200  # from which exchanged points are tried only where the ranging engine serves
-PASSES = 8  # of solving with the fewest coordinates held and moving into the datum
-REACHED = 0.9  # of the variance factor, from which another start reached nothing better
+FEWEST_POINTS = 200  # above which exchanged points are tried only with the ranging engine
+PASSES = 8  # limit of passes: solve with minimal constraints, transform to the datum
+REACHED = 0.9  # of the variance factor: above it another start was no improvement
 
-NO_DATUM = "rank deficient: the network floats ({motions}) and nothing holds it; hold coordinates, mark datum points, \
+NO_DATUM = "rank deficient: the network floats ({motions}) without a datum; hold coordinates, mark datum points, \
 or adjust it free (--datum free)"
 WEAK_DATUM = "rank deficient: the datum's coordinates do not hold the network against {motions}; mark more of them"
-NOT_SETTLED = "not converged: the network does not come to rest in its datum after {passes} passes; \
+NOT_SETTLED = "not converged: the network did not settle in its datum after {passes} passes; \
 check the starting coordinates"
 NOT_PLACED = "no approximate coordinates: {points}; give some, or observe more"
 
 
 @dataclass(frozen=True)
 class NetworkSettings:
-    """How far `adjust_network` goes.
+    """Settings of `adjust_network`.
 
-    iterations   cap of Gauss-Newton steps of each pass
-    tests        False leaves out covariance and test statistics
-    diagnose     False leaves the status at "converged" or "not converged", without looking for the cause
+    iterations   limit of Gauss-Newton steps of each pass
+    tests        False: no covariance and test statistics
+    diagnose     False: status "converged" or "not converged" only, without the cause
     """
 
     iterations: int = 50
@@ -56,7 +56,7 @@ class NetworkSettings:
     diagnose: bool = True
 
 
-ALL_THE_WAY = NetworkSettings()
+COMPLETE = NetworkSettings()
 
 
 def adjust_network(
@@ -67,29 +67,29 @@ def adjust_network(
     inflation: Sequence[np.ndarray] | None = None,
     alone: bool = False,
     start: NetworkSolution | None = None,
-    settings: NetworkSettings = ALL_THE_WAY,
+    settings: NetworkSettings = COMPLETE,
     engine: str | None = None,
 ) -> NetworkSolution:
-    """The coordinates of a network with their covariance, and a fit per observation.
+    """Coordinates of a network with covariance, and a fit of every observation.
 
     network     points, parameters, observations
     datum       None as marked, or "free" or "fixed", see `with_datum`
     active      one (m,) bool a group: False leaves an observation out, but still predicts it
     inflation   one (m,) a group, a factor on its standard uncertainties (robust estimation); infinite leaves out
-    alone       inflation of a correlated observation adds to its own variance and dilutes its correlations; else they
-                stay, as when a whole group is scaled
-    start       an earlier solution of the same network to begin from
-    settings    cap of steps, whether tests and the cause of a failure are wanted
-    engine      "dense", "sparse" or "ranging" (pure ranging networks only); the fastest that serves if None
+    alone       True: inflation of a correlated observation is added to its variance only, which reduces its
+                correlations; False: they stay, as when a complete group is scaled
+    start       an earlier solution of the same network, as start values
+    settings    limit of steps, tests and diagnosis or not
+    engine      "dense", "sparse" or "ranging" (pure ranging networks only); None: the fastest suitable one
 
-    Returns a NetworkSolution whose status says what happened, and where.
+    The status of the solution describes any failure and its place.
 
     Source: [FOERSTNER16] chapter 4; datum by S-transformation, [BAARDA73].
     """
     network = with_reference(with_datum(network, datum))
     if inflation is not None:
-        kept = [np.isfinite(f) for f in inflation]
-        active = kept if active is None else [a & k for a, k in zip(active, kept, strict=True)]
+        finite = [np.isfinite(f) for f in inflation]
+        active = finite if active is None else [a & k for a, k in zip(active, finite, strict=True)]
     diagnose = settings.tests and settings.diagnose
     if engine in (None, "ranging"):
         from catseye.estimation.network.ranging_engine import adjusted_as_ranges
@@ -125,14 +125,14 @@ def adjust_network(
 def fits_near(
     network: ObservationNetwork, near: NetworkSolution
 ) -> Callable[[Sequence[np.ndarray]], tuple[GroupFit, ...] | None]:
-    """The fits of a network with its observations weighed otherwise, one solution after another, quickly.
+    """Function that refits a network near a solution with inflated sigmas, quickly.
 
     network   with its datum marked
-    near      its solution, where each begins
+    near      its solution, as start values
 
-    What is returned takes an inflation as `adjust_network` does, each observation's alone, and gives one fit a group;
-    None where there is no answer. Coordinates are held against what floats, instead of the datum's conditions: that
-    changes no residual and no test, and the datum is not looked for again and again.
+    The function takes an inflation as `adjust_network` with `alone`, and returns one fit per group, or None without a
+    solution. A minimal set of coordinates is fixed instead of the datum's conditions: that changes no residual and no
+    test, and saves the search for the datum.
     """
     problem = _Problem.of(network, near)
     rows = [ActiveRows.of(group, None) for group in problem.groups]
@@ -145,8 +145,8 @@ def fits_near(
 
     def solve(inflation: Sequence[np.ndarray]) -> tuple[GroupFit, ...] | None:
         _, added = problem._inflated(inflation, True)
-        kept = _padded([np.isfinite(f) for f in inflation], problem.groups, True)
-        solution = adjust(problem.x0, problem.groups, free=free, active=kept, extra_variance=added)
+        active = _padded([np.isfinite(f) for f in inflation], problem.groups, True)
+        solution = adjust(problem.x0, problem.groups, free=free, active=active, extra_variance=added)
         return solution.fits[: len(network.groups)] if solution.status == CONVERGED else None
 
     return solve
@@ -158,27 +158,27 @@ def _from_observations(
     inflation: tuple[Sequence[np.ndarray] | None, bool],
     solver: SolverSettings,
 ) -> NetworkSolution:
-    """The better of a solution and one that begins where the observations put the points, not the given coordinates.
+    """Better of a solution and one started from the observations instead of the given coordinates.
 
-    A poor start may end in another minimum, or in none. What is held or in the datum stays as it is given.
+    A poor start may end in another minimum, or in none. Fixed and datum coordinates stay as given.
     """
     points = solution.network.points
-    begun = points.free & ~points.datum & np.isfinite(points.xyz)
-    if not begun.any():
+    replaceable = points.free & ~points.datum & np.isfinite(points.xyz)
+    if not replaceable.any():
         return solution
-    network = replace(solution.network, points=replace(points, xyz=np.where(begun, np.nan, points.xyz)))
+    network = replace(solution.network, points=replace(points, xyz=np.where(replaceable, np.nan, points.xyz)))
     problem = _Problem.of(network, None)
     trial = problem if problem.missing else problem.solve(active, inflation, solver)
     if isinstance(trial, _Problem) or trial.status != CONVERGED or not trial.answered:
         return solution
     if solution.status == CONVERGED and trial.variance_factor > REACHED * solution.variance_factor:
         return solution
-    moved = tuple(points.names[i] for i in np.flatnonzero(begun.any(axis=1)))
+    moved = tuple(points.names[i] for i in np.flatnonzero(replaceable.any(axis=1)))
     return replace(trial, network=solution.network, approximate=solution.approximate, replaced=moved)
 
 
 def _trial(network: ObservationNetwork, inflation: Sequence[np.ndarray] | None) -> NetworkSolution:
-    """A trial of a copy: coordinates and variance factor; tests only where single observations are weighed."""
+    """Trial adjustment of a copy: coordinates and variance factor, tests only with inflation."""
     large = len(network.points.names) >= FEWEST_POINTS
     weighed = inflation is not None
     settings = NetworkSettings(iterations=50 if weighed else 15, tests=weighed, diagnose=False)
@@ -190,7 +190,7 @@ def _trial(network: ObservationNetwork, inflation: Sequence[np.ndarray] | None) 
             settings=settings,
             engine="ranging" if large and not weighed else None,
         )
-    except EstimationError:  # large, and of another kind: it would take too long to try
+    except EstimationError:  # large, and not a ranging network: a trial would take too long
         if weighed:
             raise
         return replace(_Problem.of(network, None).unanswered("not tried"), variance_factor=np.inf)
@@ -203,7 +203,7 @@ def _listed(reasons: dict[str, str], most: int = 4) -> str:
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """The network as one vector of parameters."""
+    """Network as one parameter vector."""
 
     network: ObservationNetwork
     x0: np.ndarray
@@ -228,23 +228,25 @@ class _Problem:
         else:
             from catseye.estimation.network.approximate.start import approximate
 
-            begin = approximate(network)
-            xyz, values, found = begin.xyz, begin.parameters, begin.found
-            missing, assumed, replaced = begin.missing, begin.assumed, begin.replaced
+            start_values = approximate(network)
+            xyz, values, found = start_values.xyz, start_values.parameters, start_values.found
+            missing, assumed, replaced = start_values.missing, start_values.assumed, start_values.replaced
         sigma = np.array([p.sigma for p in parameters])
         offset = 3 * len(points.names)
-        known = np.flatnonzero((sigma > 0.0) & np.isfinite(sigma))
+        with_prior = np.flatnonzero((sigma > 0.0) & np.isfinite(sigma))
         groups = list(network.groups)
-        if len(known):
-            observed = np.array([parameters[k].start for k in known])
-            groups.append(Linear("priors", observed, sigma[known] ** 2, offset + known, np.eye(len(known))))
+        if len(with_prior):
+            observed = np.array([parameters[k].start for k in with_prior])
+            groups.append(
+                Linear("priors", observed, sigma[with_prior] ** 2, offset + with_prior, np.eye(len(with_prior)))
+            )
         free = np.concatenate([points.free.ravel(), sigma > 0.0])
         xyz = np.where(points.absent, 0.0, xyz)  # any value: no observation depends on it
         return cls(network, np.concatenate([xyz.ravel(), values]), free, groups, found, missing, assumed, replaced)
 
     @property
     def names(self) -> list[str]:
-        """What each parameter is called."""
+        """Names of all parameters."""
         axes = self.network.axis_names
         return [f"{axis} of {p}" for p in self.network.points.names for axis in axes] + [
             p.name for p in self.network.parameters
@@ -256,13 +258,13 @@ class _Problem:
         inflation: tuple[Sequence[np.ndarray] | None, bool],
         solver: SolverSettings,
     ) -> NetworkSolution:
-        """The solution in its datum, in as many passes as it takes."""
+        """Solution in its datum, in as many passes as needed."""
         points = self.network.points
         n = 3 * len(points.names)
         chosen = _padded(active, self.groups, True)
         larger, added = self._inflated(*inflation)
         rows = [ActiveRows.of(g, None if chosen is None else chosen[i]) for i, g in enumerate(self.groups)]
-        x, taken = self.x0, 0
+        x, iterations = self.x0, 0
         datum = points.datum & self.free[:n].reshape(-1, 3) & np.isfinite(points.xyz)
         solution: LeastSquaresSolution | None = None
         settled = False
@@ -273,43 +275,44 @@ class _Problem:
                 text = WEAK_DATUM if datum.any() else NO_DATUM
                 status = unconnected(self.network, self._afloat(rows, x))
                 return self.unanswered(status or text.format(motions=floating.words(loose)), x)
-            held = self.free.copy()
-            held[minimal_coordinates(conditions)] = False
+            free_columns = self.free.copy()
+            free_columns[minimal_coordinates(conditions)] = False
             solution = adjust(
                 x,
                 self.groups,
-                free=held,
+                free=free_columns,
                 active=chosen,
                 inflation=larger,
                 extra_variance=added,
                 names=self.names,
                 solver=solver,
             )
-            taken += solution.iterations
+            iterations += solution.iterations
             x = solution.x
             settled = not len(conditions)
             if not solution.solved or settled:
                 break
             floating = self._floating(rows, x)
-            if floating.motions.shape[1] != len(conditions):  # told wrongly from a poor start: once more from here
+            if floating.motions.shape[1] != len(conditions):  # wrong from a poor start: repeat from here
                 continue
             conditions, _ = datum_conditions(floating, datum, points.xyz)
             moved, t = to_datum(x, points.xyz.ravel(), floating.motions, conditions=conditions)
             x = x + moved
-            u = np.sqrt(np.maximum(solution.q.diagonal()[:n][held[:n]], 0.0)) if solver.tests else np.zeros(0)
+            u = np.sqrt(np.maximum(solution.q.diagonal()[:n][free_columns[:n]], 0.0)) if solver.tests else np.zeros(0)
             settled = bool(np.abs(moved[:n]).max() <= motion_limit(x[:n].reshape(-1, 3), points.existing, u))
             if settled and solver.tests:
                 solution = replace(solution, q=transformed(solution.q, t, conditions))
             if settled:
                 break
         assert solution is not None
-        solution = replace(solution, x=x, iterations=taken)
+        solution = replace(solution, x=x, iterations=iterations)
         if not settled and solution.status == CONVERGED:
             solution = replace(solution, status=NOT_SETTLED.format(passes=PASSES))
         if len(solution.floating):
             status = unconnected(self.network, self._afloat(rows, x)) or floating_text(self.network, solution)
             return self.unanswered(status, solution.x)
-        degrees = sum(int(r.active.sum()) for r in rows) - int(held.sum())  # the sum of redundancies, without rounding
+        # sum of redundancy numbers, without rounding
+        degrees = sum(int(r.active.sum()) for r in rows) - int(free_columns.sum())
         factor = sum(f.pvv for f in solution.fits) / degrees if degrees else float("nan")
         answer = self.answer(solution, solution.q, self._datum_words(floating, datum))
         return replace(answer, degrees_of_freedom=float(degrees), variance_factor=factor)
@@ -319,20 +322,23 @@ class _Problem:
         return floating_motions(rows, x, x[: absent.size].reshape(-1, 3), free=self.free, absent=absent)
 
     def _afloat(self, rows: list[ActiveRows], x: np.ndarray) -> Callable[[np.ndarray], bool]:
-        """Tells of some points (n,) bool whether they can move as a whole, the others left out of sight."""
+        """Predicate: True if given points (n,) bool can move together, the others ignored."""
 
         def afloat(piece: np.ndarray) -> bool:
             absent = self.network.points.absent | ~piece[:, None]
             xyz = x[: absent.size].reshape(-1, 3)
             try:
                 return floating_motions(rows, x, xyz, free=self.free, absent=absent).motions.shape[1] > 0
-            except np.linalg.LinAlgError:  # too poor a start to tell
+            except np.linalg.LinAlgError:  # start too poor to decide
                 return True
 
         return afloat
 
     def _motions(self, rows: list[ActiveRows], x: np.ndarray) -> Floating:
-        """Motions at x that nothing holds; none where the start is too poor to tell them."""
+        """Floating motions at x.
+
+        None if the start is too poor to determine them.
+        """
         try:
             return self._floating(rows, x)
         except np.linalg.LinAlgError:
@@ -341,7 +347,10 @@ class _Problem:
     def _inflated(
         self, inflation: Sequence[np.ndarray] | None, alone: bool
     ) -> tuple[list[np.ndarray] | None, list[np.ndarray] | None]:
-        """Factors on standard uncertainties, one array a group; or, `alone`, variances to add instead."""
+        """Factors on standard uncertainties per group.
+
+        With `alone`, variances to add instead.
+        """
         factors = _padded(inflation, self.groups, 1.0)
         if factors is None or not alone:
             return factors, None
@@ -350,8 +359,8 @@ class _Problem:
 
     def _datum_words(self, floating: Floating, datum: np.ndarray) -> str:
         points = self.network.points
-        held = int(np.sum(points.fixed))
-        words = [f"{held} coordinates held"] if held else []
+        fixed_count = int(np.sum(points.fixed))
+        words = [f"{fixed_count} coordinates held"] if fixed_count else []
         if floating.motions.shape[1]:
             on = int(datum.any(axis=1).sum())
             words.append(f"inner constraints on {on} points against {floating.words()}")
@@ -360,7 +369,7 @@ class _Problem:
     def answer(self, solution: LeastSquaresSolution, q: Covariance, datum: str) -> NetworkSolution:
         absent = self.network.points.absent
         count = len(absent)
-        own = solution.fits[: len(self.network.groups)]
+        fits = solution.fits[: len(self.network.groups)]
         factor, degrees = solution.variance_factor()
         covariance = q.blocks(3 * np.arange(count)) if count else np.zeros((0, 3, 3))
         return NetworkSolution(
@@ -371,7 +380,7 @@ class _Problem:
             u_parameters=np.sqrt(np.maximum(q.diagonal()[3 * count :], 0.0)),
             status=solution.status,
             iterations=solution.iterations,
-            fits=own,
+            fits=fits,
             variance_factor=factor,
             degrees_of_freedom=degrees,
             datum=datum,
@@ -382,10 +391,10 @@ class _Problem:
         )
 
     def unanswered(self, status: str, x: np.ndarray | None = None) -> NetworkSolution:
-        """No answer: the start, or where it stopped, with residuals and no covariance."""
+        """Solution without an answer: start or last values, residuals, no covariance."""
         at = self.x0 if x is None else x
-        nothing = np.zeros(len(at), dtype=bool)
-        solution = adjust(at, self.groups, free=nothing, solver=SolverSettings(tests=False, iterations=1))
+        all_fixed = np.zeros(len(at), dtype=bool)
+        solution = adjust(at, self.groups, free=all_fixed, solver=SolverSettings(tests=False, iterations=1))
         count = len(self.network.points.names)
         answer = self.answer(replace(solution, status=status), solution.q, "none")
         return replace(
@@ -398,9 +407,9 @@ class _Problem:
 
 
 def _padded(
-    given: Sequence[np.ndarray] | None, groups: Sequence[ObservationGroup], rest: float
+    arrays: Sequence[np.ndarray] | None, groups: Sequence[ObservationGroup], constant: float
 ) -> list[np.ndarray] | None:
-    """One array a group: those given, then for the priors' group all the same."""
-    if given is None:
+    """One array per group: the given ones, then a constant for the priors' group."""
+    if arrays is None:
         return None
-    return [*given, *(np.full(len(g.observed), rest) for g in groups[len(given) :])]
+    return [*arrays, *(np.full(len(g.observed), constant) for g in groups[len(arrays) :])]

@@ -1,7 +1,7 @@
-"""Reasons for observations that contradict each other, each tried on a copy of the network before it is named.
+"""Causes of contradictory observations, each tested on a copy of the network.
 
-A reason is named only if the network with its cure adjusts inside the limits of its variance factor, and no other cure
-that changes as little does as well. The network itself stays as it is.
+A cause is named only if the network with its correction adjusts within the limits of its variance factor, and no other
+correction with as few changes does. The network itself is not changed.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -18,21 +18,21 @@ from catseye.estimation.observations.kinds import Distances, ObservationGroup
 from catseye.estimation.quality.reliability import TOO_LARGE, global_test
 from catseye.estimation.quality.robustness import MOST_INFLATION, SnoopingOptions, estimate_robustly, snoop
 
-# How a copy is adjusted: the network, and an inflation of its sigmas (none if None).
+# Adjusts a copy: the network, and an inflation of its sigmas (none if None).
 Adjust = Callable[[ObservationNetwork, Sequence[np.ndarray] | None], NetworkSolution]
 
-LEVEL = 0.05  # of the limits of the variance factor, as reports print them
-EXCHANGE_FROM, EXCHANGE_GAIN = 1e3, 1e-2  # variance factor from which exchanged points are tried, and its fall if true
-EXCHANGE_ALL = 300  # points up to which all pairs are tried, and observations are searched one by one
-EXCHANGEABLE = 20  # points with the most observations, that are tried: 190 pairs
+LEVEL = 0.05  # of the limits of the variance factor, as printed in reports
+EXCHANGE_FROM, EXCHANGE_GAIN = 1e3, 1e-2  # variance factor from which exchanges are tried, and its required reduction
+EXCHANGE_ALL = 300  # points up to which all pairs and single observations are tried
+EXCHANGEABLE = 20  # points with the most observations that are tried: 190 pairs
 SEARCHED = 60  # points up to which several wrong observations are searched for: some hundred adjustments
-SINGLES = 60  # observations with the largest residuals, that are left out one at a time
-MANY = 0.1  # of the observations: where more had to go, other weights would explain as well
+SINGLES = 60  # observations with the largest residuals that are left out one at a time
+MANY = 0.1  # of the observations: if more must be rejected, wrong weights are as likely
 NAMED = 3  # observations in a sentence
-NEARER = 10.0  # times in squares: of several exchanges that fit, the one that leaves the points where they are given
-HALF_TURN = 0.01  # rad beside pi, within which an angle's error counts as half a turn
-TURNING = ("direction", "angle", "azimuth")  # kinds with a sense, clockwise or not
-MIRRORED = "the sense of the horizontal angles is mirrored: counted the other way the variance factor is {factor}"
+NEARER = 10.0  # ratio of squares: of several exchanges that fit, the one closest to the given coordinates
+HALF_TURN = 0.01  # rad from pi, within which an angle's error counts as half a turn
+TURNING = ("direction", "angle", "azimuth")  # kinds with a sense of rotation
+MIRRORED = "the sense of the horizontal angles is mirrored: reversed, the variance factor is {factor}"
 EXCHANGED = "with {first} and {second} exchanged the variance factor is {factor}"
 WITHOUT = "without {names} the variance factor is {factor}"
 OPPOSITE = "{names} is half a turn off: without it the variance factor is {factor}"
@@ -40,7 +40,7 @@ OPPOSITE = "{names} is half a turn off: without it the variance factor is {facto
 
 @dataclass(frozen=True)
 class Cure:
-    """A reason in words, how many things it changes, and the variance factor with its cure."""
+    """Cause in words, number of changes, and variance factor after the correction."""
 
     text: str
     changes: int
@@ -49,17 +49,20 @@ class Cure:
 
 @dataclass(frozen=True)
 class NetworkReason:
-    """The end of a status, "" for none, and whether it names a cause rather than a place."""
+    """End of a status, "" for none.
+
+    `named` is True for a cause, False for a place.
+    """
 
     text: str
     named: bool
 
 
 def reason(solution: NetworkSolution, adjust: Adjust | None) -> NetworkReason:
-    """The one reason whose cure fits, or else where most of the contradiction is.
+    """Unique cause whose correction fits, or else the place of the largest contradiction.
 
-    solution   an answer that its observations contradict, or that did not converge
-    adjust     how copies of its network are adjusted, without tests; None: nothing is tried
+    solution   with contradictory observations, or not converged
+    adjust     adjusts copies of the network, without tests; None: no trials
     """
     if adjust is None:
         return NetworkReason(_where(solution), named=False)
@@ -76,7 +79,7 @@ def reason(solution: NetworkSolution, adjust: Adjust | None) -> NetworkReason:
 
 
 def fits(solution: NetworkSolution) -> bool:
-    """True for a solution that converged within the limits of its variance factor."""
+    """True if the solution converged within the limits of its variance factor."""
     degrees = solution.degrees_of_freedom
     if solution.status != CONVERGED or not degrees > 0.5:
         return False
@@ -84,7 +87,7 @@ def fits(solution: NetworkSolution) -> bool:
 
 
 def turned_round(network: ObservationNetwork) -> ObservationNetwork | None:
-    """The network with its horizontal angles counted the other way; None where it has none."""
+    """Network with reversed horizontal angles, or None if it has none."""
     groups, any_turned = [], False
     for group in network.groups:
         turning = np.isin(np.asarray(getattr(group, "kinds", np.zeros(len(group.observed)))), TURNING)
@@ -109,13 +112,13 @@ def _mirrored(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure]:
 
 
 def _exchanged(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure]:
-    """The exchange of two points whose coordinates refer to something, held or in the datum."""
+    """Exchange of two points with fixed or datum coordinates."""
     network, names = solution.network, solution.network.points.names
     if not solution.variance_factor > EXCHANGE_FROM or _one_explains(solution):
         return
     total, number = _by_point(solution)
     likely = np.argsort(-number, kind="stable")[:EXCHANGEABLE]
-    if len(names) > EXCHANGE_ALL:  # only the worst fitting of them, for the trials take long
+    if len(names) > EXCHANGE_ALL:  # only the worst fitting ones, as trials take long
         likely = likely[np.argsort(-total[likely] / np.maximum(number[likely], 1.0))][:6]
     marked = (network.points.fixed | network.points.datum).any(axis=1)
     trials = []
@@ -134,7 +137,7 @@ def _exchanged(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure]:
 
 
 def _without_one(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure]:
-    """Single observations without which the others agree, tried one by one from the largest residual on."""
+    """Single observations whose removal reconciles the others, largest residual first."""
     network = solution.network
     if len(network.points.names) > EXCHANGE_ALL:
         return
@@ -153,7 +156,7 @@ def _without_one(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure]:
 
 
 def _without_several(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure]:
-    """The observations that data snooping from a robust start leaves out, in networks that are not too large."""
+    """Observations rejected by data snooping with a robust start, for small networks."""
     network = solution.network
     if len(network.points.names) > SEARCHED:
         return
@@ -165,13 +168,13 @@ def _without_several(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure
     try:
         start = estimate_robustly(solve, sizes, places=targets_of_ranges(network))
         options = SnoopingOptions(level=LEVEL)
-        found = snoop(solve, sizes, options=options, start=start.rejected, doubtful=start.undecided)
-    except EstimationError:  # what is left does not hold the network
+        snooped = snoop(solve, sizes, options=options, start=start.rejected, doubtful=start.undecided)
+    except EstimationError:  # the remainder does not determine the network
         return
-    out = [(g, int(r)) for g, part in enumerate(found.rejected) for r in np.flatnonzero(part)]
-    if not out or any(part.any() for part in found.undecided) or len(out) > max(2, MANY * sum(sizes)):
+    out = [(g, int(r)) for g, part in enumerate(snooped.rejected) for r in np.flatnonzero(part)]
+    if not out or any(part.any() for part in snooped.undecided) or len(out) > max(2, MANY * sum(sizes)):
         return
-    trial = _tried(network, [np.where(part, np.inf, 1.0) for part in found.rejected], adjust)
+    trial = _tried(network, [np.where(part, np.inf, 1.0) for part in snooped.rejected], adjust)
     if trial is not None and fits(trial):
         more = f" and {len(out) - NAMED} more" if len(out) > NAMED else ""
         named = ", ".join(label(network, g, r) for g, r in out[:NAMED]) + more
@@ -179,7 +182,7 @@ def _without_several(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure
 
 
 def _tried(network: ObservationNetwork, inflation: list[np.ndarray], adjust: Adjust) -> NetworkSolution | None:
-    """A trial; None where what is left does not hold the network."""
+    """Trial adjustment; None if the remainder does not determine the network."""
     try:
         return adjust(network, inflation)
     except EstimationError:
@@ -187,24 +190,24 @@ def _tried(network: ObservationNetwork, inflation: list[np.ndarray], adjust: Adj
 
 
 def targets_of_ranges(network: ObservationNetwork) -> list[np.ndarray]:
-    """For the search at single points: the target of each range, -1 for other observations."""
+    """Target of each range, -1 for other observations, for the search at single points."""
     return [points_of(g)[1] if isinstance(g, Distances) else np.full(len(g.observed), -1) for g in network.groups]
 
 
 def inflation_of(rejected: Sequence[np.ndarray], undecided: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Factors on sigmas, one (m,) array a group, that leave out the rejected and give the undecided next to nothing."""
+    """Factors on sigmas, one (m,) per group: infinite for rejected, large for undecided."""
     return [np.where(r, np.inf, np.where(u, MOST_INFLATION, 1.0)) for r, u in zip(rejected, undecided, strict=True)]
 
 
 def _one_explains(solution: NetworkSolution) -> bool:
-    """True if a single observation makes all but a hundredth of [pvv], which would fall by its w^2 without it."""
+    """True if one observation causes 99 % of [pvv], which falls by its w^2 without it."""
     largest = max(float(np.max(np.where(f.active, f.standardised**2, 0.0), initial=0.0)) for f in solution.fits)
     squares = solution.variance_factor * solution.degrees_of_freedom
     return solution.status == CONVERGED and squares - largest < EXCHANGE_GAIN * squares
 
 
 def _by_point(solution: NetworkSolution) -> tuple[np.ndarray, np.ndarray]:
-    """Sum of squared residuals in sigmas, and number, of the observations at each point (n,)."""
+    """Sum of squared residuals in sigmas, and number of observations, at each point (n,)."""
     count = len(solution.network.points.names)
     total, number = np.zeros(count), np.zeros(count)
     for group, fit in zip(solution.network.groups, solution.fits, strict=True):
@@ -216,7 +219,7 @@ def _by_point(solution: NetworkSolution) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _where(solution: NetworkSolution) -> str:
-    """The two points with most of the contradiction, if they stand out."""
+    """Text naming the two points with the largest contradiction, if they stand out."""
     total, number = _by_point(solution)
     share = total / np.maximum(number, 1.0)
     usual = np.median(share[number > 0]) if np.any(number > 0) else np.inf

@@ -1,4 +1,4 @@
-"""What is wrong with a network, in one line that names it: pieces, points that float, observations that contradict."""
+"""Diagnosis of a network in one line: pieces, floating points, contradictory observations."""
 
 from collections.abc import Callable
 from itertools import combinations
@@ -18,18 +18,18 @@ or hold {loose}"
 FLOATS = "rank deficient: {points} floats; {advice}"
 CONTRADICTS = "converged, but the observations contradict each other: variance factor {factor:.3g} with \
 {degrees:.0f} degrees of freedom, worst {worst}{guess}"
-TIED_BY_PARAMETERS = ("rigid_body", "frame_point", "tilt", "joint")  # kinds whose points hang together by a pose
-ADVICE = "; check the starting coordinates"  # of a solution without answer, wrong where a reason is known
-DATUM_EXCHANGED = "converged, but {first} and {second} lie at each other's given places: the datum's coordinates fit \
-the measured shape to {now:.3g} m, with the two exchanged to {best:.3g} m; exchange them, or take them out of the datum"
-DISPLACED = 0.01  # of the network's size: a worse fit of the datum's given coordinates is looked into
-EXCHANGED_BACK = 0.1  # of the misfit, below which it falls when the right two are exchanged
-LIKELY = 1e-6  # probability of [pvv] below which, with the next two, observations contradict
-GROSS_FACTOR, GROSS_TEST = 9.0, 10.0  # variance factor, |w|: what wrong weights or a single blunder would not explain
+TIED_BY_PARAMETERS = ("rigid_body", "frame_point", "tilt", "joint")  # kinds whose points are connected by a pose
+ADVICE = "; check the starting coordinates"  # of a failed solution; removed if the cause is known
+DATUM_EXCHANGED = "converged, but {first} and {second} appear exchanged: the datum's coordinates fit the measured \
+shape to {misfit:.3g} m, with the two exchanged to {best:.3g} m; exchange them, or take them out of the datum"
+DISPLACED = 0.01  # of the network's size: a worse fit of the datum coordinates is investigated
+EXCHANGED_BACK = 0.1  # of the misfit: below it after the correct exchange
+LIKELY = 1e-6  # probability of [pvv] below which, with the next two, observations are contradictory
+GROSS_FACTOR, GROSS_TEST = 9.0, 10.0  # variance factor, |w|: above what wrong weights would explain
 
 
 def pieces_of(network: ObservationNetwork) -> np.ndarray:
-    """Number (n,) of the piece that each point belongs to; no observation joins two pieces."""
+    """Index (n,) of the connected piece of each point."""
     count = len(network.points.names)
     size = 3 * count + len(network.parameters)
     pairs = [np.stack([np.arange(3 * count) // 3 * 3, np.arange(3 * count)])]
@@ -46,9 +46,11 @@ def pieces_of(network: ObservationNetwork) -> np.ndarray:
 
 
 def unconnected(network: ObservationNetwork, afloat: Callable[[np.ndarray], bool]) -> str | None:
-    """The status of a network in pieces; None where it is in one, or each piece is held by itself.
+    """Status of a disconnected network.
 
-    afloat   whether a piece of the network, (n,) bool of its points, can move as a whole
+    None if connected, or if each piece is held by itself.
+
+    afloat   True if a piece of the network, (n,) bool of its points, can move as a whole
     """
     label = pieces_of(network)
     number = int(label.max(initial=-1)) + 1
@@ -69,23 +71,25 @@ def _members(network: ObservationNetwork, piece: np.ndarray) -> str:
 
 
 def floating_text(network: ObservationNetwork, solution: LeastSquaresSolution) -> str:
-    """The status of a solution in which something floats: which points, why, and what would hold them."""
+    """Status of a floating solution: points, reason and remedy."""
     names, count = network.points.names, len(network.points.names)
     directions = solution.floating
     part = np.sum(directions**2, axis=0)
-    own = part[: 3 * count].reshape(-1, 3).sum(axis=1)
-    worst = [int(i) for i in np.argsort(-own, kind="stable") if own[i] > 1e-2 * max(part.max(), 1e-300)]
-    others = [p.name for k, p in enumerate(network.parameters) if part[3 * count + k] > 1e-2 * part.max()]
+    by_point = part[: 3 * count].reshape(-1, 3).sum(axis=1)
+    worst = [int(i) for i in np.argsort(-by_point, kind="stable") if by_point[i] > 1e-2 * max(part.max(), 1e-300)]
+    floating_parameters = [p.name for k, p in enumerate(network.parameters) if part[3 * count + k] > 1e-2 * part.max()]
     if not worst:
-        return FLOATS.format(points=", ".join(others[:4]), advice="observe it, hold it, or give it a prior")
+        return FLOATS.format(
+            points=", ".join(floating_parameters[:4]), advice="observe it, hold it, or give it a prior"
+        )
     observations = _observations_at(network, worst[:4])
     words = [
         f"{names[i]} ({number} observations)" if number != 1 else f"{names[i]} (1 observation)"
         for i, number in zip(worst[:4], observations, strict=True)
     ]
     text = ", ".join(words) + (f" and {len(worst) - 4} more" if len(worst) > 4 else "")
-    if others:
-        text += f", with {', '.join(others[:3])},"
+    if floating_parameters:
+        text += f", with {', '.join(floating_parameters[:3])},"
     return FLOATS.format(points=text, advice=_advice(network, solution, worst[0]))
 
 
@@ -97,7 +101,7 @@ def _observations_at(network: ObservationNetwork, points: list[int]) -> list[int
 
 
 def _advice(network: ObservationNetwork, solution: LeastSquaresSolution, point: int) -> str:
-    """The range to another point, or the coordinate, that would hold a floating point best."""
+    """Range to another point, or coordinate, that would best hold a floating point."""
     count = len(network.points.names)
     x = solution.x[: 3 * count].reshape(-1, 3)
     raw = solution.floating[:, : 3 * count].reshape(-1, count, 3)
@@ -118,10 +122,10 @@ def _advice(network: ObservationNetwork, solution: LeastSquaresSolution, point: 
 
 
 def contradicted(solution: NetworkSolution) -> bool:
-    """True for a solution that did not converge, or whose observations contradict each other grossly.
+    """True if a solution did not converge, or its observations are grossly contradictory.
 
     Grossly: the a-priori chi-square test fails at one in a million and either the variance factor exceeds 9, which
-    wrong weights hardly explain, or a test statistic exceeds 10. Smaller contradictions are the suspects' business.
+    wrong weights hardly explain, or a test statistic exceeds 10. Smaller contradictions are reported as suspects.
     """
     factor, degrees = solution.variance_factor, solution.degrees_of_freedom
     if not degrees > 0.5:
@@ -136,10 +140,10 @@ def _tests(solution: NetworkSolution) -> list[np.ndarray]:
 
 
 def diagnosed(solution: NetworkSolution, adjust: Adjust | None) -> str:
-    """The status of a solution, which says more where it did not converge or its observations contradict grossly.
+    """Status of a solution, with a diagnosis if not converged or grossly contradictory.
 
-    solution   with an answer, converged or not
-    adjust     how copies of the network are tried, see `cures.reason`; None where weights are tried already
+    solution   converged or not
+    adjust     adjusts copies of the network, see `cures.reason`; None if weights are already inflated
     """
     if not solution.degrees_of_freedom > 0.5:
         return solution.status
@@ -152,44 +156,44 @@ def diagnosed(solution: NetworkSolution, adjust: Adjust | None) -> str:
     group = int(np.argmax([float(t.max(initial=0.0)) for t in tests]))
     row = int(np.argmax(tests[group]))
     unit = getattr(network.groups[group], "unit", "m")
-    shown = f"{solution.fits[group].residual[row]:+.4g} {unit}, {tests[group][row]:.3g} standard deviations"
+    residual_text = f"{solution.fits[group].residual[row]:+.4g} {unit}, {tests[group][row]:.3g} standard deviations"
     return CONTRADICTS.format(
         factor=solution.variance_factor,
         degrees=solution.degrees_of_freedom,
-        worst=f"{label(network, group, row)} (residual {shown})",
+        worst=f"{label(network, group, row)} (residual {residual_text})",
         guess=reason(solution, adjust).text,
     )
 
 
 def _datum_exchanged(solution: NetworkSolution) -> str | None:
-    """The status where the shape that was measured fits the datum's given coordinates only with two of them exchanged.
+    """Status if the measured shape fits the datum coordinates only with two of them exchanged.
 
-    No observation shows that: the network is right in itself, and turned and shifted by the wrong coordinates.
+    No observation shows this: the network is consistent, but rotated and shifted by the wrong coordinates.
     """
     points = solution.network.points
     on = np.flatnonzero(points.datum.all(axis=1) & np.isfinite(points.xyz).all(axis=1))
     if not 4 <= len(on) <= EXCHANGE_ALL:
         return None
-    x, given = solution.x[on], points.xyz[on]
-    size = float(np.linalg.norm(np.ptp(given, axis=0)))
-    now = _misfit(x, given)
-    if now < DISPLACED * size:
+    x, reference = solution.x[on], points.xyz[on]
+    size = float(np.linalg.norm(np.ptp(reference, axis=0)))
+    misfit_given = _misfit(x, reference)
+    if misfit_given < DISPLACED * size:
         return None
     best, i, j = np.inf, 0, 0
     for a, b in combinations(range(len(on)), 2):
         order = np.arange(len(on))
         order[[a, b]] = b, a
-        misfit = _misfit(x, given[order])
+        misfit = _misfit(x, reference[order])
         if misfit < best:
             best, i, j = misfit, a, b
-    if best > EXCHANGED_BACK * now:
+    if best > EXCHANGED_BACK * misfit_given:
         return None
     first, second = points.names[on[i]], points.names[on[j]]
-    return DATUM_EXCHANGED.format(first=first, second=second, now=now, best=best)
+    return DATUM_EXCHANGED.format(first=first, second=second, misfit=misfit_given, best=best)
 
 
-def _misfit(x: np.ndarray, given: np.ndarray) -> float:
-    """Root mean square departure, m, of points (n, 3) from given ones after the best rigid motion."""
-    rotation, _ = closed_form(x, given)
-    off = (x - x.mean(axis=0)) @ rotation.T - (given - given.mean(axis=0))
+def _misfit(x: np.ndarray, reference: np.ndarray) -> float:
+    """RMS departure, m, of points (n, 3) from reference points after the best rigid motion."""
+    rotation, _ = closed_form(x, reference)
+    off = (x - x.mean(axis=0)) @ rotation.T - (reference - reference.mean(axis=0))
     return float(np.sqrt(np.mean(np.sum(off**2, axis=1))))

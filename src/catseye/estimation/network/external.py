@@ -1,20 +1,20 @@
-"""External reliability: what an error that just escapes the test does to the points that its observation names."""
+"""External reliability: effect of an undetected error on the points of its observation."""
 
 import numpy as np
 
 from catseye.estimation.least_squares.rows import ActiveRows
 from catseye.estimation.network.model import NetworkSolution
 
-BATCH = 50_000  # observations at a time, so that memory stays bounded
+BATCH = 50_000  # observations per batch, to bound memory
 
 
 def effects_at_ends(solution: NetworkSolution) -> tuple[np.ndarray, ...]:
-    """How far an error of the detectable size moves the point it moves most, of those the observation names.
+    """Largest movement of a named point by an error of the detectable size, one (m,) array a group, m.
 
-    solution   with an answer; claimed uncertainties, none weighed down
+    solution   with covariance; a-priori weights, no inflation
 
-    Returns one (m,) array a group, m; zero where every point named is held, nan for kinds that name none and for
-    observations left out. The point need not be the one moved most of all, but mostly is.
+    Zero if all named points are fixed, nan for kinds that name none and for observations left out. Usually the named
+    point is the one that moves most in the network, but not always.
 
     Source: [BAARDA68] (external reliability): dx = Q A' P e_i times the detectable error.
     """
@@ -39,13 +39,13 @@ def effects_at_ends(solution: NetworkSolution) -> tuple[np.ndarray, ...]:
 
 
 def _largest(moved: np.ndarray, columns: np.ndarray, ends: list[np.ndarray]) -> np.ndarray:
-    """The largest of the lengths (m,) by which points at `ends` are moved, of the products `moved` over `columns`."""
+    """Largest movement (m,) of the points at `ends`, from products `moved` over `columns`."""
     largest = np.zeros(len(columns))
     for end in ends:
         squares = np.zeros(len(columns))
         for axis in range(3):
-            here = (columns == (end + axis)[:, None]) & (end >= 0)[:, None]
-            first = here & (np.cumsum(here, axis=1) == 1)  # a column that repeats holds the same product
+            matches = (columns == (end + axis)[:, None]) & (end >= 0)[:, None]
+            first = matches & (np.cumsum(matches, axis=1) == 1)  # a repeated column holds the same product
             squares += np.sum(np.where(first, moved, 0.0), axis=1) ** 2
         largest = np.maximum(largest, squares)
     return np.sqrt(largest)

@@ -1,7 +1,7 @@
-"""A network of points and observations, whatever file it came from, and its adjusted answer.
+"""Network of points and observations, independent of the file format, and its adjusted solution.
 
 Axes here are x east, y north, z up, right-handed; azimuths and directions run clockwise from north (from +y to +x).
-A file with other axes is turned into these by its reader, and `axes` turns the answer back.
+A file with other axes is converted to these by its reader, and `axes` converts the result back.
 The parameters of the whole network are one vector: point i at 3 i, 3 i + 1, 3 i + 2, then the others in their order.
 """
 
@@ -20,14 +20,14 @@ from catseye.estimation.observations.kinds import ObservationGroup
 
 @dataclass(frozen=True, eq=False)
 class NetworkPoints:
-    """The points of a network.
+    """Points of a network.
 
     names   unique
-    xyz     (n, 3) m, where the file puts them; nan where unknown: an approximation is then searched for
+    xyz     (n, 3) m, from the file; nan if unknown: an approximation is then computed
     fixed   (n, 3) bool: coordinates held at xyz
     datum   (n, 3) bool: coordinates that take part in the inner constraints, relative to xyz
-    absent  (n, 3) bool: coordinates that do not exist, which nobody gave and nothing measures: heights of a plane
-            network, places of a levelling network. Their xyz is nan; they are neither held nor datum nor free
+    absent  (n, 3) bool: coordinates that do not exist, neither given nor measured: heights of a plane network,
+            positions of a levelling network. Their xyz is nan; they are neither held nor datum nor free
 
     A stochastic point is a free one with an observation of its coordinates, of kind `ObservedCoordinates`.
     """
@@ -50,40 +50,40 @@ class NetworkPoints:
 
     @property
     def existing(self) -> np.ndarray:
-        """(n, 3) bool: coordinates that the network has."""
+        """Mask (n, 3) of coordinates that the network has."""
         return ~self.absent
 
     @property
     def free(self) -> np.ndarray:
-        """(n, 3) bool: coordinates that an adjustment may change."""
+        """Mask (n, 3) of coordinates that an adjustment may change."""
         return ~(self.fixed | self.absent)
 
     @property
     def unplaced(self) -> np.ndarray:
-        """(n, 3) bool: coordinates of the network that have no value yet."""
+        """Mask (n, 3) of existing coordinates without a value."""
         return self.existing & ~np.isfinite(self.xyz)
 
 
 def absent_coordinates(xyz: np.ndarray, marked: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    """Coordinates (n, 3) that do not exist: nobody gave them, nothing measures them, nobody marked them.
+    """Mask (n, 3) of coordinates that are neither given, measured nor marked.
 
-    xyz        (n, 3) m, nan where not given
+    xyz        (n, 3) m, nan if not given
     marked     (n, 3) bool: held or datum
     measured   (n, 3) bool: an observation depends on it
 
-    A point of which nothing at all is given or measured exists: it is not a levelled or a plane one, but unobserved.
+    A point without any given or measured coordinate exists: it is not a levelled or a plane one, but unobserved.
     """
-    known = np.isfinite(xyz) | marked | measured
-    return ~known & known.any(axis=1, keepdims=True)
+    present = np.isfinite(xyz) | marked | measured
+    return ~present & present.any(axis=1, keepdims=True)
 
 
 @dataclass(frozen=True)
 class NetworkParameter:
-    """An unknown beside the points.
+    """Unknown of a network other than a coordinate.
 
     name    for reports: "zero ZY101", "scale ZY101", "orientation 4901 set 1", "refractivity morning", "x of FRAME"
-    start   where the iteration begins
-    sigma   0 holds it at `start`; infinite leaves it free; else its prior is `start` with this standard uncertainty
+    start   start value of the iteration
+    sigma   0: held at `start`; infinite: free; else the prior is `start` with this standard uncertainty
     unit    "m", "rad" or "1" (a ratio)
     """
 
@@ -97,18 +97,18 @@ class NetworkParameter:
 class ObservationNetwork:
     """Points, other parameters and groups of observations.
 
-    points       see there
+    points       see `NetworkPoints`
     parameters   beside the points, in the order of the parameter vector after 3 n coordinates
     groups       of observations, over columns of the parameter vector; see `catseye.estimation.observations`
-    places       one tuple a group with where each of its rows stands in the file ("line 12"), or () where unknown
+    places       one tuple per group with the place of each row in the file ("line 12"), or () if unknown
     claims       one (m, 3) a group, or None: a, b, c of standard uncertainties a + b D^c (m, m, 1) of lengths D, which
-                 a plan computes from the points; where b is 0 the covariance says all. () where there are none
+                 a plan computes from the points; if b is 0 the covariance is complete. () if there are none
     axes         (3, 3) signed permutation: coordinates here = axes @ coordinates of the file
-    axis_names   what the file calls its axes, in its order
-    source       the file's name, for reports
-    description  the file's own words
-    notes        what a person should know of how the file was read, one line each
-    doubts       what in it is unlikely, one line each: no answer that rests on it is good
+    axis_names   of the file's axes, in its order
+    source       name of the file, for reports
+    description  from the file
+    notes        remarks on reading the file, one line each
+    doubts       implausible contents, one line each: a result based on them is not good
     """
 
     points: NetworkPoints
@@ -130,25 +130,25 @@ class ObservationNetwork:
 
 @dataclass(frozen=True, eq=False)
 class NetworkSolution:
-    """The adjusted network, in the axes of this package (`network.axes` turns it into the file's).
+    """Adjusted network, in the axes of this package (`network.axes` converts to the file's).
 
-    network              what was adjusted
-    x                    (n, 3) m; nan where a coordinate is absent
-    covariance           (n, 3, 3) m^2 of each point, a priori (variance factor 1); zero where held; nan without answer
-                         and in the rows and columns of absent coordinates
+    network              the adjusted network
+    x                    (n, 3) m; nan if absent
+    covariance           (n, 3, 3) m^2 of each point, a priori (variance factor 1); zero if held; nan without a
+                         solution and in the rows and columns of absent coordinates
     parameters           (p,) values of network.parameters
     u_parameters         (p,) their standard uncertainties
-    status               "converged", or one line that says what is wrong, where, and what to do
+    status               "converged", or one line with problem, place and remedy
     iterations           steps taken
-    fits                 one a group of the network, in its order
+    fits                 one per group of the network, in its order
     variance_factor      [pvv] / degrees of freedom, expectation 1; nan without redundancy
     degrees_of_freedom   observations less parameters plus the datum's conditions
-    datum                in words, how the free directions are held
-    approximate          names of the points whose approximate coordinates were found, not given
-    assumed              names of those placed on a side that nothing decides
-    replaced             names of those whose given coordinates the observations contradict grossly: the iteration began
-                         where they put them instead
-    q                    covariance of the whole parameter vector, for what is not above; zero where held or absent
+    datum                in words
+    approximate          names of the points whose approximate coordinates were computed, not given
+    assumed              names of those on an assumed side of a mirror plane
+    replaced             names of those whose given coordinates grossly contradict the observations: the iteration
+                         started from the observations instead
+    q                    covariance of the full parameter vector; zero if held or absent
     """
 
     network: ObservationNetwork
@@ -169,29 +169,31 @@ class NetworkSolution:
 
     @cached_property
     def index(self) -> PointIndex:
-        """Row of each point by its name, however it is written."""
+        """Row of each point by its name, in any spelling."""
         return PointIndex(self.network.points.names)
 
     @cached_property
     def state(self) -> np.ndarray:
-        """The whole parameter vector, for `predict`: finite, 0 in the place of an absent coordinate."""
+        """Full parameter vector for `predict`: finite, 0 for absent coordinates."""
         return np.concatenate([np.where(self.network.points.absent, 0.0, self.x).ravel(), self.parameters])
 
     @cached_property
     def answered(self) -> bool:
         """True if every coordinate of the network has a covariance."""
         points = self.network.points
-        known = np.isfinite(self.covariance) | points.absent[:, :, None] | points.absent[:, None, :]
-        return bool(known.all())
+        complete = np.isfinite(self.covariance) | points.absent[:, :, None] | points.absent[:, None, :]
+        return bool(complete.all())
 
     def block(self, names: Sequence[str]) -> np.ndarray:
-        """Joint covariance (3k, 3k) of some points, m^2, in the order given; nan in rows of absent coordinates.
+        """Joint covariance (3k, 3k) m^2 of some points, in the given order.
+
+        Rows of absent coordinates are nan.
 
         Raises EstimationError for a name that is not in the network.
         """
-        strange = [name for name in names if name not in self.index]
-        if strange:
-            raise EstimationError(f"point {strange[0]!r} is not in the network (expected one of its names)")
+        unknown = [name for name in names if name not in self.index]
+        if unknown:
+            raise EstimationError(f"point {unknown[0]!r} is not in the network (expected one of its names)")
         first = 3 * np.array([self.index[name] for name in names], dtype=int)
         at = (first[:, None] + np.arange(3)).ravel()
         absent = self.network.points.absent.ravel()[at]
@@ -199,12 +201,15 @@ class NetworkSolution:
 
 
 def points_of(group: ObservationGroup) -> tuple[np.ndarray, ...]:
-    """For each role of an observation, from, to and so on, the rows (m,) of its points in the network; -1 for none."""
+    """Point rows (m,) of the observations by role (from, to, ...).
+
+    -1 for none.
+    """
     return tuple(np.where(end < 0, -1, end // 3) for end in getattr(group, "ends", ()))
 
 
 def label(network: ObservationNetwork, group: int, row: int) -> str:
-    """Name of an observation: its kind, its points, and its place in the file."""
+    """Label of an observation: kind, points, and place in the file."""
     kind = getattr(network.groups[group], "kind", network.groups[group].name).replace("_", " ")
     ends = [network.points.names[int(end[row])] for end in points_of(network.groups[group]) if end[row] >= 0]
     where = network.places[group][row] if network.places and network.places[group] else ""

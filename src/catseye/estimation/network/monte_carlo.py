@@ -1,4 +1,4 @@
-"""A network measured many times on paper: noise, air and blunders drawn, each time adjusted."""
+"""Monte Carlo simulation of a network: noise, air and blunders drawn, each run adjusted."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -17,10 +17,10 @@ XY = np.arange(2)
 
 @dataclass(frozen=True)
 class Disturbance:
-    """What goes wrong beside the claimed noise.
+    """Disturbances in addition to the claimed noise.
 
-    common_ppm    standard deviation of a scale error of all ranges together: the index of air, wrong all over
-    station_ppm   the same of each ranger for itself: its own thermometer
+    common_ppm    standard deviation of a scale error common to all ranges: the index of air
+    station_ppm   standard deviation of a scale error per ranger: its own thermometer
     refraction    standard deviation of the coefficient k of vertical refraction, which bends all zenith angles
     blunders      share of observations with a gross error
     size          standard deviations of such an error, either sign
@@ -35,15 +35,15 @@ class Disturbance:
 
 @dataclass(frozen=True, eq=False)
 class MonteCarloScatter:
-    """What came of the runs.
+    """Result of the runs.
 
-    runs          that converged, of those asked for
-    asked         runs asked for
+    runs          that converged
+    asked         runs requested
     rms           (n, 3) m, root mean square departure of each coordinate from the truth
     predicted     (n, 3) m, claimed standard uncertainties
     ratio         root mean square of departure over claim, all free coordinates: 1 when the claim holds
-    found         share of the blunders that were left out, nan without any
-    false         share of the good observations that were left out
+    found         share of the blunders that were rejected, nan without any
+    false         share of the good observations that were rejected
     """
 
     runs: int
@@ -58,13 +58,13 @@ class MonteCarloScatter:
 def measured(
     network: ObservationNetwork, truth: np.ndarray, generator: np.random.Generator, *, disturbance: Disturbance
 ) -> tuple[ObservationNetwork, list[np.ndarray]]:
-    """The network with observations drawn about a truth, and which of them (m,) bool a group are blunders.
+    """Network with observations drawn about a truth, and masks (m,) of the blunders per group.
 
     truth   parameter vector: coordinates and other parameters
     """
     groups, wrong = [], []
     common = generator.standard_normal() * disturbance.common_ppm * PPM
-    own = generator.standard_normal(len(network.points.names)) * disturbance.station_ppm * PPM
+    station_scale = generator.standard_normal(len(network.points.names)) * disturbance.station_ppm * PPM
     bend = generator.standard_normal() * disturbance.refraction
     for group in network.groups:
         values = group.predict(truth)[0]
@@ -78,7 +78,7 @@ def measured(
             factor = np.linalg.cholesky(group.covariance.reshape(b, r, r))
             noise = np.einsum("bij,bj->bi", factor, noise.reshape(b, r)).ravel()
         if isinstance(group, Distances):
-            noise = noise + values * (common + own[points_of(group)[0]])
+            noise = noise + values * (common + station_scale[points_of(group)[0]])
         if isinstance(group, ZenithAngles):
             along = truth[group.target[:, None] + XY] - truth[group.origin[:, None] + XY]
             noise = noise - bend * np.hypot(*along.T) / (2.0 * group.radius)
@@ -98,49 +98,49 @@ def scatter(
     disturbance: Disturbance | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> MonteCarloScatter:
-    """How well the claimed uncertainties hold when the network is measured `runs` times.
+    """Scatter of a network simulated `runs` times, compared with the claimed uncertainties.
 
     network      its coordinates and parameters are the truth of every run
-    solve        how a network is adjusted, rejection and all
-    runs, seed   how many, and of which generator
-    disturbance  beside the claimed noise; none if None
+    solve        adjusts a network, rejection included
+    runs, seed   number of runs, and seed of the generator
+    disturbance  in addition to the claimed noise; none if None
 
-    Parameters with priors are drawn from them in each run; so the claim must hold with them, too.
+    Parameters with priors are drawn from them in each run; so the claim includes them.
     Raises EstimationError when no run converges.
     """
     generator = np.random.default_rng(seed)
-    given = disturbance or Disturbance()
+    applied = disturbance or Disturbance()
     starts = np.array([p.start for p in network.parameters])
     sigma = np.array([p.sigma if np.isfinite(p.sigma) else 0.0 for p in network.parameters])
-    squares, normalised, claims, done = 0.0, 0.0, 0.0, 0
-    hit, blunders, lost, good = 0, 0, 0, 0
+    squares, normalised, claims, converged = 0.0, 0.0, 0.0, 0
+    hit, blunders, false_rejections, good = 0, 0, 0, 0
     status, truth = "", np.where(network.points.absent, 0.0, network.points.xyz).ravel()
     for run in range(runs):
         if progress is not None:
-            progress("measuring on paper", run, runs)
+            progress("Monte Carlo runs", run, runs)
         values = starts + sigma * generator.standard_normal(len(starts))
-        drawn, wrong = measured(network, np.concatenate([truth, values]), generator, disturbance=given)
+        drawn, wrong = measured(network, np.concatenate([truth, values]), generator, disturbance=applied)
         solution = solve(drawn)
         if not solution.status.startswith(CONVERGED):
             status = solution.status
             continue
-        done += 1
+        converged += 1
         departure = solution.x - network.points.xyz
         claim = np.einsum("nii->ni", solution.covariance)
         squares, claims = squares + departure**2, claims + claim
-        held = ~(claim > 0.0)  # or absent
-        normalised += float(np.mean((departure**2 / np.where(held, 1.0, claim))[~held]))
+        certain = ~(claim > 0.0)  # or absent
+        normalised += float(np.mean((departure**2 / np.where(certain, 1.0, claim))[~certain]))
         for fit, bad in zip(solution.fits, wrong, strict=True):
             hit, blunders = hit + int(np.sum(bad & ~fit.active)), blunders + int(bad.sum())
-            lost, good = lost + int(np.sum(~bad & ~fit.active)), good + int(np.sum(~bad))
-    if not done:
-        raise EstimationError(f"none of {runs} runs on paper converged: {status}")
+            false_rejections, good = false_rejections + int(np.sum(~bad & ~fit.active)), good + int(np.sum(~bad))
+    if not converged:
+        raise EstimationError(f"none of {runs} Monte Carlo runs converged: {status}")
     return MonteCarloScatter(
-        runs=done,
+        runs=converged,
         asked=runs,
-        rms=np.sqrt(squares / done),
-        predicted=np.sqrt(claims / done),
-        ratio=(normalised / done) ** 0.5,
+        rms=np.sqrt(squares / converged),
+        predicted=np.sqrt(claims / converged),
+        ratio=(normalised / converged) ** 0.5,
         found=hit / blunders if blunders else float("nan"),
-        false=lost / good if good else 0.0,
+        false=false_rejections / good if good else 0.0,
     )

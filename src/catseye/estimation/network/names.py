@@ -1,43 +1,43 @@
-"""Names of points in one normal form, so that two ways to write a name are one point.
+"""Point names in one normal form, so that different spellings give one point.
 
-Unicode in its composed form (NFC), blanks at the ends gone, those within counted as one; and a whole number that a
-program wrote with decimals, 1.0, is the name 1. A point keeps the name by which it was first written, in that form but
-with its decimals; a name that differs in nothing else finds it.
+Unicode in composed form (NFC), without leading and trailing blanks, inner blanks reduced to one; an integer written
+with decimals, 1.0, is the name 1. A point keeps its first spelling in that form, but with its decimals; other spellings
+find it.
 """
 
 import re
 import unicodedata
 from collections.abc import Iterable
 
-WHOLE = re.compile(r"([+-]?[0-9]+)\.0+")  # what spreadsheets and data frames make of a whole number
+INTEGER = re.compile(r"([+-]?[0-9]+)\.0+")  # integers as written by spreadsheets and data frames
 
 
 def spelled(name: str) -> str:
-    """A name as it is shown: composed, without needless blanks.
+    """Name as displayed: composed, without superfluous blanks.
 
     >>> spelled("  P   5 "), spelled("Su\\u0308d") == "S\\u00fcd"
     ('P 5', True)
     """
     if name.isascii() and " " not in name and name.isprintable():
-        return name  # by far the most
+        return name  # the usual case
     return " ".join(unicodedata.normalize("NFC", name).split())
 
 
 def name_key(name: str) -> str:
-    """The key by which names are compared.
+    """Key for the comparison of names.
 
     >>> name_key("1.0"), name_key("1.10"), name_key("P  5")
     ('1', '1.10', 'P 5')
     """
     text = spelled(name)
-    whole = WHOLE.fullmatch(text)
-    return whole[1] if whole else text
+    integer = INTEGER.fullmatch(text)
+    return integer[1] if integer else text
 
 
 class PointIndex(dict[str, int]):
-    """Number of each point by its name, found however the name is written.
+    """Index of each point by its name, in any spelling.
 
-    aliases   names that were asked for and written otherwise -> the point's name
+    aliases   requested names in another spelling -> the point's name
     """
 
     def __init__(self, names: Iterable[str] = ()) -> None:
@@ -52,15 +52,15 @@ class PointIndex(dict[str, int]):
         super().__setitem__(name, number)
 
     def __missing__(self, name: str) -> int:
-        known = self._by_key[name_key(name)]
-        self.aliases[name] = known
-        return super().__getitem__(known)
+        stored = self._by_key[name_key(name)]
+        self.aliases[name] = stored
+        return super().__getitem__(stored)
 
     def __contains__(self, name: object) -> bool:
         return super().__contains__(name) or (isinstance(name, str) and name_key(name) in self._by_key)
 
     def notes(self) -> tuple[str, ...]:
-        """One line about names that were written in more than one way; none where all agree."""
+        """Note about names in several spellings; none if all agree."""
         if not self.aliases:
             return ()
         some = [f"{alias!r} is {name!r}" for alias, name in list(self.aliases.items())[:3]]

@@ -1,6 +1,6 @@
-"""A network before it is measured: what it will be worth, where it is weak, and what to measure next.
+"""Network planning: predicted uncertainties, weak points and best next ranges.
 
-Everything here follows from geometry and claimed standard uncertainties; no observed value enters.
+Based on geometry and claimed standard uncertainties only; no observed value is used.
 """
 
 from collections.abc import Sequence
@@ -16,21 +16,21 @@ from catseye.estimation.network.datum import with_datum
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
 from catseye.estimation.observations.kinds import Distances, ObservationGroup
 
-BATCH = 200  # ranges whose effect is computed at once
+BATCH = 200  # ranges per batch
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """The predicted worth of a network.
+    """Predicted quality of a network.
 
     solution      the network solved with its predicted observations: covariance, redundancy, detectable errors
-    interest      (n,) bool: points whose mean variance the values below are about
+    interest      (n,) bool: points whose mean variance is evaluated below
     mean_u        m, root of the mean variance of a coordinate of those points
     weakest       (n,) m, largest semi-axis of each point's standard ellipsoid
     direction     (n, 3) unit vector along it, upwards
-    worth         one (m,) array a group: growth of mean_u were the observation left out, m; infinite where the network
-                  would fall apart
-    candidates    ranges that could be measured besides, best first
+    worth         one (m,) array a group: increase of mean_u without the observation, m; infinite if the network would
+                  then be undetermined
+    candidates    further ranges that could be measured, best first
     """
 
     solution: NetworkSolution
@@ -44,13 +44,13 @@ class Plan:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A further range between two points.
+    """Possible further range between two points.
 
     from_, to   names
-    u           m, standard uncertainty it would have
+    u           m, predicted standard uncertainty
     mean_u      m, of the points of interest with it; for a schedule, with it and all before it
-    gain        m, how much smaller that is
-    at_s        s, when the ranger is done with it; nan outside a schedule
+    gain        m, reduction of mean_u
+    at_s        s, time of completion; nan outside a schedule
     """
 
     from_: str
@@ -62,17 +62,17 @@ class Candidate:
 
 
 def predicted(network: ObservationNetwork) -> ObservationNetwork:
-    """The network with every observation replaced by what its points and parameters predict, and its sigma by theirs.
+    """Network with observations predicted from its points and parameters, and their sigmas.
 
     Observed values may be nan: not measured yet.
-    Raises EstimationError where a point has no coordinates: a plan needs a place for everything.
+    Raises EstimationError if a point has no coordinates.
     """
     points = network.points
-    lost = [points.names[i] for i in np.flatnonzero(points.unplaced.any(axis=1))]
-    if lost:
-        more = f" and {len(lost) - 4} more" if len(lost) > 4 else ""
+    unplaced = [points.names[i] for i in np.flatnonzero(points.unplaced.any(axis=1))]
+    if unplaced:
+        more = f" and {len(unplaced) - 4} more" if len(unplaced) > 4 else ""
         raise EstimationError(
-            f"{', '.join(lost[:4])}{more}: no coordinates (expected approximate ones of every point, to plan with)"
+            f"{', '.join(unplaced[:4])}{more}: no coordinates (expected approximate ones of every point, to plan with)"
         )
     x = np.concatenate([np.where(points.absent, 0.0, points.xyz).ravel(), [p.start for p in network.parameters]])
     groups = []
@@ -87,7 +87,7 @@ def predicted(network: ObservationNetwork) -> ObservationNetwork:
 
 
 def _claimed(group: ObservationGroup, claim: np.ndarray | None, length: np.ndarray) -> np.ndarray:
-    """The covariance of a group whose uncertainties grow with its lengths (m,), at the planned ones."""
+    """Covariance of a group whose uncertainties depend on its lengths (m,), at the planned ones."""
     if claim is None or not claim[:, 1].any():
         return group.covariance
     a, b, c = claim.T
@@ -102,15 +102,14 @@ def _claimed(group: ObservationGroup, claim: np.ndarray | None, length: np.ndarr
 def plan(
     network: ObservationNetwork, *, datum: str | None = None, interest: Sequence[str] | None = None, most: int = 20
 ) -> Plan:
-    """What a network will be worth, and which further ranges would help it most.
+    """Predicted quality of a network, and the further ranges that improve it most.
 
-    network    coordinates of all points; observed values are not looked at
+    network    coordinates of all points; observed values are not used
     datum      as for `adjust_network`
-    interest   names of the points that matter; all that are not held if None
+    interest   names of the points of interest; all that are not held if None
     most       candidates to list
 
-    Raises EstimationError where a point has no coordinates, or the network as planned does not hold together: its
-    text is the status that says what floats.
+    Raises EstimationError if a point has no coordinates, or the planned network is undetermined, with its status.
     """
     problem = predicted(with_datum(network, datum))
     solution = adjust_network(problem)
@@ -137,40 +136,43 @@ def plan(
 def schedule(
     chosen: Plan, *, budget_s: float, shot_s: float, most: int = 1000, repeats: bool = True
 ) -> tuple[Candidate, ...]:
-    """The ranges to add, in order, while every ranger has time left: each the best after those before it.
+    """Ranges to add, in order, each the best after those before it, within the time of every ranger.
 
-    budget_s   s, of every ranger; rangers work side by side
+    budget_s   s, of every ranger; rangers work in parallel
     shot_s     s, of one range with slewing
-    most       cap of ranges
-    repeats    whether a pair that is measured already, or chosen already, may be measured again
+    most       limit of ranges
+    repeats    True: a measured or chosen pair may be measured again
 
     Greedy: each range is the one that lowers the mean variance most, given those before ([FEDOROV72] calls such
     steps sequential design). Source: rank-one update of the inverse, Sherman and Morrison 1950.
     """
     if not (budget_s > 0.0 and shot_s > 0.0):
-        raise EstimationError(f"budget {budget_s:g} s, shot {shot_s:g} s (expected both above zero)")
+        raise EstimationError(f"budget {budget_s:g} s, shot {shot_s:g} s (expected both above 0)")
     solution, names = chosen.solution, chosen.solution.network.points.names
     full = _full(solution).copy()
     coordinates = _coordinates(solution, chosen.interest)
     total = float(np.trace(full[np.ix_(coordinates, coordinates)]))
     pairs, sigma = _pairs(solution, repeats)
     spent, inside = np.zeros(len(names)), np.isin(np.arange(len(full)), coordinates)
-    shown, own = _effects(solution.x, full, coordinates, pairs)
+    effect, variance = _effects(solution.x, full, coordinates, pairs)
     unit = _unit(solution.x, pairs) if len(pairs) else np.zeros((0, 3))
     open_ = np.full(len(pairs), shot_s <= budget_s)
     picked: list[Candidate] = []
     while len(picked) < most and open_.any():
-        gains = np.where(open_, shown / (sigma**2 + own), -1.0)
+        gains = np.where(open_, effect / (sigma**2 + variance), -1.0)
         best = int(np.argmax(gains))
         if gains[best] <= 1e-9 * total:
             break
         i, j = pairs[best]
-        q, left = _across(solution.x, full, pairs[best : best + 1])[0], sigma[best] ** 2 + own[best]
-        # Q becomes Q - q q' / left; what every other pair sees of it follows from two numbers a pair
-        felt, common = _onto_ranges(q, pairs, unit) / left, _onto_ranges(full[:, inside] @ q[inside], pairs, unit)
-        shown = np.maximum(shown - 2.0 * felt * common + felt**2 * float(q[inside] @ q[inside]), 0.0)
-        own = np.maximum(own - felt**2 * left, 0.0)
-        full -= np.outer(q, q / left)
+        q, innovation_variance = _across(solution.x, full, pairs[best : best + 1])[0], sigma[best] ** 2 + variance[best]
+        # Q becomes Q - q q' / innovation_variance; its effect on another pair follows from two numbers
+        felt, common = (
+            _onto_ranges(q, pairs, unit) / innovation_variance,
+            _onto_ranges(full[:, inside] @ q[inside], pairs, unit),
+        )
+        effect = np.maximum(effect - 2.0 * felt * common + felt**2 * float(q[inside] @ q[inside]), 0.0)
+        variance = np.maximum(variance - felt**2 * innovation_variance, 0.0)
+        full -= np.outer(q, q / innovation_variance)
         before, total = total, total - float(gains[best])
         spent[i] += shot_s
         count = len(coordinates)
@@ -186,39 +188,39 @@ def _interest(solution: NetworkSolution, names: Sequence[str] | None) -> np.ndar
     points = solution.network.points
     if names is None:
         return np.asarray(points.free.any(axis=1))
-    strange = [name for name in names if name not in solution.index]
-    if strange:
-        raise EstimationError(f"point {strange[0]!r} is not in the network (expected one of its names)")
+    unknown = [name for name in names if name not in solution.index]
+    if unknown:
+        raise EstimationError(f"point {unknown[0]!r} is not in the network (expected one of its names)")
     chosen = np.zeros(len(points.names), dtype=bool)
     chosen[[solution.index[name] for name in names]] = True
     return chosen
 
 
 def _coordinates(solution: NetworkSolution, chosen: np.ndarray) -> np.ndarray:
-    """Columns of the coordinates of some points (n,) bool that can be known better: neither held nor absent."""
+    """Columns of the free coordinates of some points (n,) bool."""
     free = solution.network.points.free & chosen[:, None]
     if not free.any():
         names = [solution.network.points.names[i] for i in np.flatnonzero(chosen)]
-        raise EstimationError(f"{', '.join(names[:4]) or 'no point'}: every coordinate is held; nothing is to plan")
+        raise EstimationError(f"{', '.join(names[:4]) or 'no point'}: every coordinate is held; nothing to plan")
     return np.flatnonzero(free)
 
 
 def _full(solution: NetworkSolution) -> np.ndarray:
-    """Covariance of all coordinates, whole."""
+    """Full covariance matrix of all coordinates."""
     count = 3 * len(solution.network.points.names)
     if count > LARGEST_MATRIX:
         raise EstimationError(
-            f"{count // 3} points are too many to weigh every further range (limit {LARGEST_MATRIX // 3}); "
+            f"{count // 3} points are too many to evaluate every further range (limit {LARGEST_MATRIX // 3}); "
             "plan with the points of interest and the stations alone"
         )
     return solution.q.within(np.arange(count))
 
 
 def _pairs(solution: NetworkSolution, repeats: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs (k, 2) of points that could be ranged, and the standard uncertainty (k,) each would have.
+    """Pairs (k, 2) of points that could be ranged, and predicted standard uncertainties (k,).
 
-    Who ranges now may range to whatever is ranged to now. The uncertainty follows sigma^2 = a^2 + (b D)^2, fitted to
-    the claims of the ranges there are.
+    Every point that ranges may range to every target. The uncertainty follows sigma^2 = a^2 + (b D)^2, fitted to the
+    claims of the existing ranges.
     """
     network = solution.network
     ranges = [g for g in network.groups if isinstance(g, Distances)]
@@ -246,7 +248,7 @@ def _unit(x: np.ndarray, pairs: np.ndarray) -> np.ndarray:
 
 
 def _across(x: np.ndarray, full: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """Q a (k, n) of ranges between pairs."""
+    """Products Q a (k, n) of ranges between pairs."""
     unit = _unit(x, pairs)
     result = np.zeros((len(pairs), len(full)))
     for axis in range(3):
@@ -255,7 +257,7 @@ def _across(x: np.ndarray, full: np.ndarray, pairs: np.ndarray) -> np.ndarray:
 
 
 def _onto_ranges(vector: np.ndarray, pairs: np.ndarray, unit: np.ndarray) -> np.ndarray:
-    """a'v (k,) of ranges between pairs, v over all coordinates."""
+    """Products a'v (k,) of ranges between pairs, v over all coordinates."""
     v = vector.reshape(-1, 3)
     return np.sum(unit * (v[pairs[:, 1]] - v[pairs[:, 0]]), axis=1)
 
@@ -265,31 +267,32 @@ def _effects(
 ) -> tuple[np.ndarray, np.ndarray]:
     """|(Q a)_I|^2 over some coordinates, and a'Qa, of each range between pairs.
 
-    Their quotient shown / (sigma^2 + own) is the fall of the sum of variances of these coordinates by that range.
+    The quotient effect / (sigma^2 + variance) is the reduction of the sum of variances of these coordinates by that
+    range.
     """
-    shown, own = np.empty(len(pairs)), np.empty(len(pairs))
+    effect, variance = np.empty(len(pairs)), np.empty(len(pairs))
     inside = np.zeros(len(full), dtype=bool)
     inside[coordinates] = True
     for low in range(0, len(pairs), BATCH):
         part = slice(low, low + BATCH)
         across, unit = _across(x, full, pairs[part]), _unit(x, pairs[part])
         moved, k = across.reshape(len(across), -1, 3), np.arange(len(across))
-        own[part] = np.sum(unit * (moved[k, pairs[part, 1]] - moved[k, pairs[part, 0]]), axis=1)
-        shown[part] = np.sum(across[:, inside] ** 2, axis=1)
-    return shown, own
+        variance[part] = np.sum(unit * (moved[k, pairs[part, 1]] - moved[k, pairs[part, 0]]), axis=1)
+        effect[part] = np.sum(across[:, inside] ** 2, axis=1)
+    return effect, variance
 
 
 def _best(
     solution: NetworkSolution, full: np.ndarray, coordinates: np.ndarray, total: float, most: int
 ) -> tuple[Candidate, ...]:
     pairs, sigma = _pairs(solution, repeats=True)
-    shown, own = _effects(solution.x, full, coordinates, pairs)
-    gains = shown / (sigma**2 + own)
+    effect, variance = _effects(solution.x, full, coordinates, pairs)
+    gains = effect / (sigma**2 + variance)
     names, count = solution.network.points.names, len(coordinates)
-    now = (total / count) ** 0.5
+    current = (total / count) ** 0.5
     after = np.sqrt(np.maximum(total - gains, 0.0) / count)
     return tuple(
-        Candidate(names[i], names[j], float(sigma[k]), float(after[k]), float(now - after[k]))
+        Candidate(names[i], names[j], float(sigma[k]), float(after[k]), float(current - after[k]))
         for k in np.argsort(-gains, kind="stable")[:most]
         for i, j in [pairs[k]]
     )
@@ -298,13 +301,13 @@ def _best(
 def _worth(
     solution: NetworkSolution, full: np.ndarray, coordinates: np.ndarray, total: float
 ) -> tuple[np.ndarray, ...]:
-    """Growth of the mean standard uncertainty were one observation left out, m: |(Q a)_I|^2 / (s^2 r)."""
+    """Increase of the mean standard uncertainty without an observation, m: |(Q a)_I|^2 / (s^2 r)."""
     x = solution.state
     count, chosen = len(coordinates), np.ascontiguousarray(full[:, coordinates])
-    if len(x) > len(full):  # parameters beside the points are seen too
-        others = solution.q.across(np.arange(len(full), len(x)))[coordinates]
-        chosen = np.concatenate([chosen, others.T])
-    now = (total / count) ** 0.5
+    if len(x) > len(full):  # parameters beside the points
+        other_columns = solution.q.across(np.arange(len(full), len(x)))[coordinates]
+        chosen = np.concatenate([chosen, other_columns.T])
+    current = (total / count) ** 0.5
     result = []
     for group, fit in zip(solution.network.groups, solution.fits, strict=True):
         slopes = group.predict(x)[1]
@@ -314,10 +317,10 @@ def _worth(
         for low in range(0, len(slopes), BATCH):
             part = slice(low, low + BATCH)
             across = np.zeros((len(slopes[part]), count))
-            for own, at in zip(slopes[part].T, columns[part].T, strict=True):
-                across += chosen[at] * own[:, None]
+            for slope, at in zip(slopes[part].T, columns[part].T, strict=True):
+                across += chosen[at] * slope[:, None]
             gained[part] = np.einsum("mc,mc->m", across, across)
-        left = fit.sigma**2 * np.where(fit.redundancy > 1e-9, fit.redundancy, 0.0)
+        residual_variance = fit.sigma**2 * np.where(fit.redundancy > 1e-9, fit.redundancy, 0.0)
         with np.errstate(divide="ignore"):
-            result.append(np.sqrt((total + gained / left) / count) - now)
+            result.append(np.sqrt((total + gained / residual_variance) / count) - current)
     return tuple(result)

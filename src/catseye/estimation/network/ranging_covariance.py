@@ -1,4 +1,4 @@
-"""The covariance of a ranging solution over the parameter vector of its network."""
+"""Covariance of a ranging solution over the parameter vector of its network."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,16 +8,16 @@ from scipy.sparse import csc_array, sparray
 
 from catseye.estimation.network.multilateration.solution import Mapped, RangingSolution
 
-ROWS = 5_000  # observations whose products are formed at once
+ROWS = 5_000  # observations per batch
 
 
 @dataclass(frozen=True, eq=False)
 class RangingCovariance:
-    """See `covariance.Covariance`: stations' parameters held whole, targets by how they follow them.
+    """Covariance (see `covariance.Covariance`) with dense stations and targets that follow them.
 
-    solution          the answer
+    solution          of the ranging network
     station, target   (points,) index among its stations, or targets; -1
-    zero, scale       (stations,) which parameter of the network it is, counted after the points; -1
+    zero, scale       (stations,) parameter index, counted after the points; -1
     """
 
     solution: RangingSolution
@@ -27,8 +27,11 @@ class RangingCovariance:
     scale: np.ndarray
 
     @cached_property
-    def _own(self) -> np.ndarray:
-        """(N,) where each parameter of the network stands among the stations' parameters; -1 for targets'."""
+    def _station_columns(self) -> np.ndarray:
+        """Index (N,) of each parameter among the stations' parameters.
+
+        -1 for targets.
+        """
         count, width = len(self.station), self.solution.width
         used = sum(int(np.sum(c >= 0)) for c in (self.zero, self.scale))
         place = np.full(3 * count + used, -1)
@@ -41,13 +44,13 @@ class RangingCovariance:
 
     @cached_property
     def _all(self) -> Mapped:
-        own, n = self._own, len(self.solution.covariance)
-        maps, target = np.zeros((len(own), n)), np.full(len(own), -1)
-        at_station, late = np.flatnonzero(own >= 0), np.flatnonzero(own < 0)
-        maps[at_station, own[at_station]] = 1.0
+        station_columns, n = self._station_columns, len(self.solution.covariance)
+        maps, target = np.zeros((len(station_columns), n)), np.full(len(station_columns), -1)
+        at_station, late = np.flatnonzero(station_columns >= 0), np.flatnonzero(station_columns < 0)
+        maps[at_station, station_columns[at_station]] = 1.0
         target[late] = self.target[late // 3]
         maps[late] = self.solution.following(np.arange(len(self.solution.targets)))[target[late], late % 3]
-        return Mapped(maps, target, np.arange(len(own)) % 3)
+        return Mapped(maps, target, np.arange(len(station_columns)) % 3)
 
     def matrix(self) -> np.ndarray:
         return self.solution.joined(self._all, self._all)
@@ -60,7 +63,7 @@ class RangingCovariance:
         return self.solution.joined(chosen, chosen)
 
     def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
-        """Rows of the stations' parameters and of one target's coordinates."""
+        """Products for rows of the stations' parameters and of one target's coordinates."""
         at, a, everything = np.maximum(columns, 0), np.where(columns < 0, 0.0, a), self._all
         result = np.empty(at.shape)
         for low in range(0, len(at), ROWS):
@@ -72,10 +75,10 @@ class RangingCovariance:
         met = np.flatnonzero(np.any(b.reshape(len(b), -1) != 0.0, axis=1))
         return np.asarray(self.across(met) @ b[met])
 
-    def carried(self, matrix: sparray, others: sparray | None = None) -> np.ndarray:
-        both = [csc_array(each) for each in ((matrix,) if others is None else (matrix, others))]
-        met = np.flatnonzero(sum(np.diff(each.indptr) for each in both))
-        return np.asarray(both[0][:, met] @ (both[-1][:, met] @ self.within(met)).T)
+    def carried(self, matrix: sparray, other_matrix: sparray | None = None) -> np.ndarray:
+        pair = [csc_array(item) for item in ((matrix,) if other_matrix is None else (matrix, other_matrix))]
+        met = np.flatnonzero(sum(np.diff(item.indptr) for item in pair))
+        return np.asarray(pair[0][:, met] @ (pair[-1][:, met] @ self.within(met)).T)
 
     def blocks(self, first: np.ndarray) -> np.ndarray:
         result = np.empty((len(self.station), 3, 3))
@@ -84,9 +87,9 @@ class RangingCovariance:
         return result[first // 3]
 
     def diagonal(self) -> np.ndarray:
-        own = self._own
-        result = np.empty(len(own))
-        late = np.flatnonzero(own < 0)
-        result[own >= 0] = np.diag(self.solution.covariance)[own[own >= 0]]
+        station_columns = self._station_columns
+        result = np.empty(len(station_columns))
+        late = np.flatnonzero(station_columns < 0)
+        result[station_columns >= 0] = np.diag(self.solution.covariance)[station_columns[station_columns >= 0]]
         result[late] = self.solution.covariance_targets[self.target[late // 3], late % 3, late % 3]
         return result

@@ -1,4 +1,4 @@
-"""Networks of ranges alone, handed to the block elimination of `multilateration` and back."""
+"""Adapter of pure ranging networks to the block elimination of `multilateration`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,8 +15,8 @@ from catseye.estimation.network.multilateration.terms import PointPriors, Statio
 from catseye.estimation.network.ranging_covariance import RangingCovariance
 from catseye.estimation.observations.kinds import Distances, ObservedCoordinates
 
-FEWEST_POINTS = 200  # below it the dense form is as fast, and names what is wrong with more care
-MOST_STATIONS = 600  # their parameters make a dense system
+FEWEST_POINTS = 200  # below it the dense form is as fast, with a better diagnosis
+MOST_STATIONS = 600  # their parameters form a dense system
 
 
 def adjusted_as_ranges(
@@ -29,17 +29,19 @@ def adjusted_as_ranges(
     tests: bool,
     forced: bool,
 ) -> NetworkSolution | None:
-    """The answer of a network of ranges; None where it is of another kind, small, or has no answer.
+    """Solution of a ranging network.
+
+    None if unsuitable, small, or without a solution.
 
     network      every group of ranges or of whole coordinates, each parameter one station's zero or scale
     active       as for `adjust_network`
     inflation    likewise
     start        an earlier solution
-    iterations   cap of Gauss-Newton steps
+    iterations   limit of Gauss-Newton steps
     tests        as for `adjust_network`
-    forced       raise EstimationError for another kind of network instead of None, and keep an answer that is none
+    forced       raise EstimationError for an unsuitable network instead of None, and keep a failed solution
 
-    What has no answer is left to the general engine, which says why.
+    Without a solution the general engine is used, which gives the reason.
     """
     if not forced and len(network.points.names) < FEWEST_POINTS:
         return None
@@ -54,22 +56,22 @@ def adjusted_as_ranges(
         if forced:
             raise EstimationError(problem)
         return None
-    given = _inflation(network, active, inflation, split)
-    if given is None:
+    factors = _inflation(network, active, inflation, split)
+    if factors is None:
         if forced:
             raise EstimationError("the ranging engine does not weigh coordinates robustly; use another engine")
         return None
-    solution = adjust_ranges(problem[0], tests=tests, iterations=iterations, inflation=given)
-    if solution.status.startswith("contradictory"):  # an answer all the same; `diagnosis` says what and where
+    solution = adjust_ranges(problem[0], tests=tests, iterations=iterations, inflation=factors)
+    if solution.status.startswith("contradictory"):  # still a solution; `diagnosis` adds what and where
         solution = replace(solution, status=CONVERGED)
     if solution.status != CONVERGED and not forced:
         return None
-    return _answer(network, split, solution, problem[1], given)
+    return _answer(network, split, solution, problem[1], factors)
 
 
 @dataclass(frozen=True, eq=False)
 class _Split:
-    """Which points are stations and which targets, and where each range stands.
+    """Roles of the points (station or target) and rows of the ranges.
 
     station, target     (n,) index among stations, or targets; -1
     ranges              (group, rows) of the ranges from stations to targets
@@ -88,7 +90,7 @@ class _Split:
 
 
 def _split(network: ObservationNetwork) -> tuple[str, _Split | None]:
-    """The roles, or why there are none."""
+    """Roles of the points, or the reason why the network is unsuitable."""
     count = len(network.points.names)
     from_ = np.zeros(count, dtype=bool)
     gauge = {"zero": np.full(count, -1), "scale": np.full(count, -1)}
@@ -96,8 +98,8 @@ def _split(network: ObservationNetwork) -> tuple[str, _Split | None]:
     for k, group in enumerate(network.groups):
         if isinstance(group, ObservedCoordinates) and len(group.observed) % 3 == 0:
             shape = group.covariance.shape
-            whole = np.array_equal(group.axis, np.tile(np.arange(3), len(group.axis) // 3))
-            if whole and (len(shape) == 1 or shape[1:] == (3, 3) or shape == (3, 3)):
+            complete = np.array_equal(group.axis, np.tile(np.arange(3), len(group.axis) // 3))
+            if complete and (len(shape) == 1 or shape[1:] == (3, 3) or shape == (3, 3)):
                 priors.append(k)
                 continue
         if not isinstance(group, Distances) or group.covariance.ndim != 1:
@@ -113,9 +115,9 @@ def _split(network: ObservationNetwork) -> tuple[str, _Split | None]:
                 continue
             if columns.shape[1] > 1 or np.any(factor != 1.0):
                 return f"group {group.name!r} has more than a zero and a scale", None
-            own, origin = np.where(columns[:, 0] < 0, -1, columns[:, 0] - 3 * count), group.origin // 3
-            gauge[what][origin] = own
-            if np.any(gauge[what][origin] != own):
+            parameter, origin = np.where(columns[:, 0] < 0, -1, columns[:, 0] - 3 * count), group.origin // 3
+            gauge[what][origin] = parameter
+            if np.any(gauge[what][origin] != parameter):
                 return f"group {group.name!r}: a station has several {what}s", None
         from_[group.origin // 3] = True
         plain.append(k)
@@ -148,7 +150,7 @@ def _split(network: ObservationNetwork) -> tuple[str, _Split | None]:
 def _problem(
     network: ObservationNetwork, split: _Split, start: NetworkSolution | None
 ) -> tuple[RangingNetwork, tuple[tuple[str, ...], tuple[str, ...]]] | str:
-    """The ranging network and the names of points placed, and of those assumed; or why it cannot start."""
+    """Ranging network with names of computed and of assumed points, or the reason why it cannot start."""
     points, groups = network.points, network.groups
     placed_by: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
     if start is not None:
@@ -158,16 +160,16 @@ def _problem(
         if start is None:
             from catseye.estimation.network.approximate.start import approximate
 
-            begin = approximate(network)
-            if begin.missing:
-                return f"no approximate coordinates of {next(iter(begin.missing))}"
-            placed, placed_by = begin.xyz, (begin.found, begin.assumed)
+            approximation = approximate(network)
+            if approximation.missing:
+                return f"no approximate coordinates of {next(iter(approximation.missing))}"
+            placed, placed_by = approximation.xyz, (approximation.found, approximation.assumed)
         else:
             placed = start.x
-        known = np.isfinite(xyz)
-        if np.any(points.datum & ~known):
+        has_xyz = np.isfinite(xyz)
+        if np.any(points.datum & ~has_xyz):
             return "a datum point has no coordinates"
-        # what is held or in the datum refers to the given coordinates, all else may begin where it was placed
+        # fixed and datum coordinates stay as given, all others start from the computed ones
         xyz = np.where(points.fixed | points.datum, xyz, placed)
     on_station, on_target = np.flatnonzero(split.station >= 0), np.flatnonzero(split.target >= 0)
 
@@ -182,7 +184,7 @@ def _problem(
     sigma = np.array([p.sigma for p in network.parameters])
     begin_at = np.array([p.start for p in network.parameters])
 
-    def own(columns: np.ndarray, values: np.ndarray) -> np.ndarray | None:
+    def by_station(columns: np.ndarray, values: np.ndarray) -> np.ndarray | None:
         return np.where(columns >= 0, np.append(values, 0.0)[columns], 0.0) if np.any(columns >= 0) else None
 
     return RangingNetwork(
@@ -196,10 +198,10 @@ def _problem(
         held_targets=points.fixed[on_target],
         datum_stations=points.datum[on_station] & ~points.fixed[on_station],
         datum_targets=points.datum[on_target] & ~points.fixed[on_target],
-        zero_start=own(split.zero, begin_at),
-        zero_sigma=own(split.zero, sigma),
-        scale_start=own(split.scale, begin_at),
-        scale_sigma=own(split.scale, sigma),
+        zero_start=by_station(split.zero, begin_at),
+        zero_sigma=by_station(split.zero, sigma),
+        scale_start=by_station(split.scale, begin_at),
+        scale_sigma=by_station(split.scale, sigma),
         station_priors=_priors(network, split, split.station),
         target_priors=_priors(network, split, split.target),
         between=between,
@@ -209,7 +211,7 @@ def _problem(
 
 
 def _priors(network: ObservationNetwork, split: _Split, role: np.ndarray) -> PointPriors | None:
-    """Coordinates observed of the points of one role."""
+    """Observed coordinates of the points of one role."""
     index, observed, covariance = [], [], []
     for k in split.priors:
         group = network.groups[k]
@@ -231,14 +233,17 @@ def _inflation(
     inflation: Sequence[np.ndarray] | None,
     split: _Split,
 ) -> np.ndarray | None:
-    """The factor on each range's sigma, infinite where left out; None where other observations are touched."""
+    """Factor on each range's sigma, infinite if left out.
+
+    None if other observations are changed.
+    """
     factor = [np.ones(len(g.observed)) for g in network.groups]
     if inflation is not None:
         factor = [f * i for f, i in zip(factor, inflation, strict=True)]
     if active is not None:
         factor = [np.where(a, f, np.inf) for f, a in zip(factor, active, strict=True)]
-    others = [(k, rows) for k, rows in split.between] + [(k, np.arange(len(factor[k]))) for k in split.priors]
-    if any(np.any(factor[k][rows] != 1.0) for k, rows in others):
+    other_rows = [(k, rows) for k, rows in split.between] + [(k, np.arange(len(factor[k]))) for k in split.priors]
+    if any(np.any(factor[k][rows] != 1.0) for k, rows in other_rows):
         return None
     return np.concatenate([factor[k][rows] for k, rows in split.ranges])
 
@@ -262,8 +267,8 @@ def _answer(
     ):
         values[columns[columns >= 0]], u[columns[columns >= 0]] = value[columns >= 0], u_value[columns >= 0]
     on_datum = int((network.points.datum & ~network.points.fixed).any(axis=1).sum())
-    held = int(network.points.fixed.sum())
-    words = [f"{held} coordinates held"] if held else []
+    fixed_count = int(network.points.fixed.sum())
+    words = [f"{fixed_count} coordinates held"] if fixed_count else []
     words += [f"inner constraints on {on_datum} points"] if on_datum else []
     return NetworkSolution(
         network=network,
@@ -286,7 +291,7 @@ def _answer(
 def _fits(
     network: ObservationNetwork, split: _Split, solution: RangingSolution, inflation: np.ndarray
 ) -> tuple[GroupFit, ...]:
-    """The fits in the groups and the order of the network."""
+    """Fits in the groups and the order of the network."""
     by_name = {f.name: f for f in solution.fits}
     fields = ("active", "residual", "sigma", "redundancy", "standardised", "estimated_error", "detectable_error")
     columns = [

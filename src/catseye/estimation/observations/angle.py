@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import ObservationKind, beside
+from catseye.estimation.observations.kind import ObservationKind, joined_columns
 from catseye.estimation.observations.sight import bearing, nearest_turn, sight, triples
 
 
@@ -14,12 +14,12 @@ from catseye.estimation.observations.sight import bearing, nearest_turn, sight, 
 class HorizontalAngles(ObservationKind):
     """observed = azimuth of foresight - azimuth of backsight + error, both from the point `at`.
 
-    name             what the group is, for reports
+    name             of the group, for reports
     observed         (m,) rad, clockwise seen from above, on any turn
     covariance       of the observed values, see `ObservationGroup`
     at               (m,) column of the x of the point where the instrument stands
-    backsight        (m,) the same of the point sighted first
-    foresight        (m,) the same of the point sighted second
+    backsight        (m,) column of the x of the point sighted first
+    foresight        (m,) column of the x of the point sighted second
     backsight_shift  (m, 3) or (3,) m, added to backsight minus at, or None; only eccentricities matter
     foresight_shift  the same for the foresight
     """
@@ -38,8 +38,8 @@ class HorizontalAngles(ObservationKind):
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """(m, 9): at, backsight, foresight."""
-        return beside(self.name, len(self.observed), *map(triples, (self.at, self.backsight, self.foresight)))
+        """Columns (m, 9): at, backsight, foresight."""
+        return joined_columns(self.name, len(self.observed), *map(triples, (self.at, self.backsight, self.foresight)))
 
     @property
     def ends(self) -> tuple[np.ndarray, ...]:
@@ -47,7 +47,9 @@ class HorizontalAngles(ObservationKind):
         return self.at, self.backsight, self.foresight
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values (m,), on the turn nearest to the observed, and Jacobian (m, 9); nan for a vertical sight.
+        """Values (m,) and Jacobian (m, 9); nan for a vertical sight.
+
+        Values are on the turn nearest to the observed ones.
 
         >>> a = HorizontalAngles("a", np.ones(1), np.ones(1), np.array([0]), np.array([3]), np.array([6]))
         >>> a.predict(np.array([0.0, 0.0, 0.0, 0.0, 9.0, 0.0, 2.0, 0.0, 0.0]))[0] == np.pi / 2

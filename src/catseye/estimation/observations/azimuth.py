@@ -6,19 +6,19 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import ObservationKind, beside
-from catseye.estimation.observations.sight import bearing, both, nearest_turn, sight, triples
+from catseye.estimation.observations.kind import ObservationKind, joined_columns
+from catseye.estimation.observations.sight import bearing, by_ends, nearest_turn, sight, triples
 
 
 @dataclass(frozen=True, eq=False)
 class Azimuths(ObservationKind):
     """observed = azimuth of target from origin + error.
 
-    name         what the group is, for reports
+    name         of the group, for reports
     observed     (m,) rad, on any turn
     covariance   of the observed values, see `ObservationGroup`
     origin       (m,) column of the x of the point measured from
-    target       (m,) the same of the point measured to
+    target       (m,) column of the x of the point measured to
     shift        (m, 3) or (3,) m, added to target minus origin, or None; only eccentricities matter
     """
 
@@ -34,19 +34,21 @@ class Azimuths(ObservationKind):
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """Columns of origin and target, (m, 6)."""
-        return beside(self.name, len(self.observed), triples(self.origin), triples(self.target))
+        """Columns (m, 6) of origin and target."""
+        return joined_columns(self.name, len(self.observed), triples(self.origin), triples(self.target))
 
     @property
     def ends(self) -> tuple[np.ndarray, ...]:
         return self.origin, self.target
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values (m,), on the turn nearest to the observed, and Jacobian (m, 6); nan for a vertical sight.
+        """Values (m,) and Jacobian (m, 6); nan for a vertical sight.
+
+        Values are on the turn nearest to the observed ones.
 
         >>> a = Azimuths("a", np.full(1, 4.7), np.ones(1), np.array([0]), np.array([3]))
         >>> a.predict(np.array([0.0, 0.0, 0.0, -7.0, 0.0, 1.0]))[0] == 1.5 * np.pi
         array([ True])
         """
         azimuth, slope = bearing(sight(x, self.origin, self.target, shift=self.shift))
-        return nearest_turn(azimuth, self.observed), both(slope)
+        return nearest_turn(azimuth, self.observed), by_ends(slope)

@@ -1,4 +1,4 @@
-"""What kinds of length between two points share: the points, and how an instrument's reading follows from a length."""
+"""Common fields of lengths between two points, and their conversion to readings."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -6,13 +6,16 @@ from typing import Protocol
 
 import numpy as np
 
-from catseye.estimation.observations.kind import ObservationKind, beside
+from catseye.estimation.observations.kind import ObservationKind, joined_columns
 from catseye.estimation.observations.reading import Scaled, reading_columns
 from catseye.estimation.observations.sight import triples
 
 
 class ReadPair(Scaled, Protocol):
-    """Two points and the reading of the length between them; see `BetweenPoints`."""
+    """Protocol of two points and a reading of the length between them.
+
+    See `BetweenPoints`.
+    """
 
     @property
     def name(self) -> str: ...
@@ -24,13 +27,14 @@ class ReadPair(Scaled, Protocol):
 
 @dataclass(frozen=True, eq=False)
 class BetweenPoints:
-    """First fields of a kind of length between two points; fields of `Scaled` follow.
+    """First fields of a kind of length between two points.
+    Fields of `Scaled` follow.
 
-    name         what the group is, for reports
+    name         of the group, for reports
     observed     (m,) metres
     covariance   of the observed values, see `ObservationGroup`
     origin       (m,) column of the x of the point measured from (y and z follow it)
-    target       (m,) the same of the point measured to
+    target       (m,) column of the x of the point measured to
     """
 
     name: str
@@ -41,8 +45,10 @@ class BetweenPoints:
 
     @cached_property
     def columns(self: ReadPair) -> np.ndarray:
-        """(m, 6 + q + s): origin, target, nuisance, scaling."""
-        return beside(self.name, len(self.observed), triples(self.origin), triples(self.target), *reading_columns(self))
+        """Columns (m, 6 + q + s): origin, target, nuisance, scaling."""
+        return joined_columns(
+            self.name, len(self.observed), triples(self.origin), triples(self.target), *reading_columns(self)
+        )
 
     @property
     def ends(self) -> tuple[np.ndarray, ...]:
@@ -51,11 +57,13 @@ class BetweenPoints:
 
 @dataclass(frozen=True, eq=False)
 class LengthsBetweenPoints(BetweenPoints, ObservationKind):
-    """Fields of a length between points that stand still: those of `BetweenPoints`, then how it is read.
+    """Fields of a length between static points.
+    They are those of `BetweenPoints`, then the reading's.
 
-    scale                 (m,) or one: what a metre of distance reads, e.g. the group index of the path
+    scale                 (m,) or one: reading per metre of distance, e.g. the group index of the path
     offset                (m,) or one, metres
-    nuisance              (m, q) columns that act linearly, e.g. a ranger's zero (repeats allowed, -1 for none)
+    nuisance              (m, q) columns of linear nuisance parameters, e.g. a ranger's zero (repeats allowed, -1 for
+                          none)
     coefficient           (m, q) or one: their derivatives, metres per unit
     shift                 (m, 3) or (3,) m, added to target minus origin: (0, 0, target less instrument height)
     scaling               (m, s) columns that multiply the distance: a ranger's scale, the refractivity of an epoch

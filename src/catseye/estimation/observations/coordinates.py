@@ -1,4 +1,4 @@
-"""Coordinates: points known from elsewhere, all three or some, with their covariance."""
+"""Observed coordinates of points, all three or some, with their covariance."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,15 +7,15 @@ from typing import ClassVar
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.observations.kind import ObservationKind, beside
+from catseye.estimation.observations.kind import ObservationKind, joined_columns
 from catseye.estimation.observations.sight import triples
 
 
 @dataclass(frozen=True, eq=False)
 class ObservedCoordinates(ObservationKind):
-    """observed = coordinate of a point + error, a row a coordinate.
+    """observed = coordinate of a point + error, one row per coordinate.
 
-    name         what the group is, for reports
+    name         of the group, for reports
     observed     (m,) metres
     covariance   of the observed values, see `ObservationGroup`
     point        (m,) column of the point's x
@@ -33,9 +33,9 @@ class ObservedCoordinates(ObservationKind):
 
     @classmethod
     def of_points(cls, name: str, xyz: np.ndarray, covariance: np.ndarray, point: np.ndarray) -> "ObservedCoordinates":
-        """All three coordinates of b points.
+        """Observe all three coordinates of b points.
 
-        name         what the group is, for reports
+        name         of the group, for reports
         xyz          (b, 3) m
         covariance   (3b,), (3b, 3b) or (b, 3, 3) m^2, point by point
         point        (b,) columns of their x
@@ -47,12 +47,12 @@ class ObservedCoordinates(ObservationKind):
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """Column of the coordinate, (m, 1)."""
+        """Columns (m, 1) of the coordinates."""
         if not np.isin(self.axis, (0, 1, 2)).all():
             raise EstimationError(
                 f"{self.name}: an axis is {np.setdiff1d(self.axis, (0, 1, 2))[0]}, expected 0, 1 or 2"
             )
-        return beside(self.name, len(self.observed), triples(self.point)[:, :1] + self.axis[:, None])
+        return joined_columns(self.name, len(self.observed), triples(self.point)[:, :1] + self.axis[:, None])
 
     @property
     def ends(self) -> tuple[np.ndarray, ...]:

@@ -1,4 +1,4 @@
-"""Horizontal directions: readings of a circle whose zero points anywhere."""
+"""Horizontal directions: circle readings with an unknown orientation."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -6,8 +6,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import ObservationKind, beside, optional, value
-from catseye.estimation.observations.sight import bearing, both, nearest_turn, sight, triples
+from catseye.estimation.observations.kind import ObservationKind, joined_columns, optional, value
+from catseye.estimation.observations.sight import bearing, by_ends, nearest_turn, sight, triples
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,11 +16,11 @@ class Directions(ObservationKind):
 
     The orientation is the azimuth of the circle's zero: azimuth = reading + orientation.
 
-    name          what the group is, for reports
+    name          of the group, for reports
     observed      (m,) rad, on any turn
     covariance    of the observed values, see `ObservationGroup`
     origin        (m,) column of the x of the point where the instrument stands
-    target        (m,) the same of the point sighted
+    target        (m,) column of the x of the point sighted
     orientation   (m,) column of the set's orientation, rad
     shift         (m, 3) or (3,) m, added to target minus origin, or None; only eccentricities matter
     """
@@ -38,21 +38,23 @@ class Directions(ObservationKind):
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """(m, 7): origin, target, orientation."""
+        """Columns (m, 7): origin, target, orientation."""
         turn = optional(self.orientation, len(self.observed))
-        return beside(self.name, len(self.observed), triples(self.origin), triples(self.target), turn)
+        return joined_columns(self.name, len(self.observed), triples(self.origin), triples(self.target), turn)
 
     @property
     def ends(self) -> tuple[np.ndarray, ...]:
         return self.origin, self.target
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values (m,), on the turn nearest to the observed, and Jacobian (m, 7); nan for a vertical sight.
+        """Values (m,) and Jacobian (m, 7); nan for a vertical sight.
+
+        Values are on the turn nearest to the observed ones.
 
         >>> d = Directions("d", np.ones(1), np.ones(1), np.array([0]), np.array([3]), np.array([6]))
         >>> d.predict(np.array([0.0, 0.0, 0.0, 5.0, 5.0, 1.0, 0.25]))[0].round(6)
         array([0.535398])
         """
         azimuth, slope = bearing(sight(x, self.origin, self.target, shift=self.shift))
-        jacobian = np.concatenate([both(slope), np.where(self.orientation < 0, 0.0, -1.0)[:, None]], axis=1)
+        jacobian = np.concatenate([by_ends(slope), np.where(self.orientation < 0, 0.0, -1.0)[:, None]], axis=1)
         return nearest_turn(azimuth - value(x, self.orientation), self.observed), jacobian

@@ -1,4 +1,4 @@
-"""Differences of two slope distances: an interferometer's count, or a time difference of arrival."""
+"""Differences of two slope distances: interferometer count, or time difference of arrival."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -6,9 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import ObservationKind, beside
+from catseye.estimation.observations.kind import ObservationKind, joined_columns
 from catseye.estimation.observations.reading import reading, reading_columns
-from catseye.estimation.observations.sight import both, length, sight, triples
+from catseye.estimation.observations.sight import by_ends, length, sight, triples
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,7 +18,7 @@ class DistanceDifferences(ObservationKind):
     With one target, origin B and origin_2 A it is |P - B| - |P - A|; the four points may all differ.
 
     origin, target       (m,) columns of the ends of the distance counted positive
-    origin_2, target_2   (m,) of the one counted negative
+    origin_2, target_2   (m,) of the distance counted negative
     shift, shift_2       (m, 3) or (3,) m, added to each target minus its origin, or None
     others               as those of `Distances`
     """
@@ -44,9 +44,9 @@ class DistanceDifferences(ObservationKind):
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """(m, 12 + q + s): origin, target, origin_2, target_2, nuisance, scaling."""
+        """Columns (m, 12 + q + s): origin, target, origin_2, target_2, nuisance, scaling."""
         points = (self.origin, self.target, self.origin_2, self.target_2)
-        return beside(self.name, len(self.observed), *map(triples, points), *reading_columns(self))
+        return joined_columns(self.name, len(self.observed), *map(triples, points), *reading_columns(self))
 
     @property
     def ends(self) -> tuple[np.ndarray, ...]:
@@ -54,7 +54,9 @@ class DistanceDifferences(ObservationKind):
         return self.origin, self.target, self.origin_2, self.target_2
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values (m,) and Jacobian (m, 12 + q + s) at the parameters x; nan where the ends of a distance coincide.
+        """Values (m,) and Jacobian (m, 12 + q + s).
+
+        Values are nan where the ends of a distance coincide.
 
         >>> at = np.array([0]), np.array([3]), np.array([0]), np.array([6])
         >>> d = DistanceDifferences("d", np.ones(1), np.ones(1), *at)
@@ -63,4 +65,4 @@ class DistanceDifferences(ObservationKind):
         """
         first, unit = length(sight(x, self.origin, self.target, shift=self.shift))
         second, unit_2 = length(sight(x, self.origin_2, self.target_2, shift=self.shift_2))
-        return reading(self, x, first - second, slope=np.concatenate([both(unit), -both(unit_2)], axis=1))
+        return reading(self, x, first - second, slope=np.concatenate([by_ends(unit), -by_ends(unit_2)], axis=1))

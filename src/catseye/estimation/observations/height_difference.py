@@ -1,4 +1,4 @@
-"""Height differences: what levelling gives."""
+"""Height differences, as from levelling."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import ObservationKind, beside
+from catseye.estimation.observations.kind import ObservationKind, joined_columns
 from catseye.estimation.observations.sight import sight, triples
 
 
@@ -14,11 +14,11 @@ from catseye.estimation.observations.sight import sight, triples
 class HeightDifferences(ObservationKind):
     """observed = z of target - z of origin + shift_z + error.
 
-    name         what the group is, for reports
+    name         of the group, for reports
     observed     (m,) metres
     covariance   of the observed values, see `ObservationGroup`
     origin       (m,) column of the x of the point measured from
-    target       (m,) the same of the point measured to
+    target       (m,) column of the x of the point measured to
     shift        (m, 3) or (3,) m, added to target minus origin, or None; only z matters
     """
 
@@ -34,8 +34,8 @@ class HeightDifferences(ObservationKind):
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """(m, 2): z of origin, z of target."""
-        return beside(self.name, len(self.observed), triples(self.origin)[:, 2:], triples(self.target)[:, 2:])
+        """Columns (m, 2): z of origin, z of target."""
+        return joined_columns(self.name, len(self.observed), triples(self.origin)[:, 2:], triples(self.target)[:, 2:])
 
     @property
     def ends(self) -> tuple[np.ndarray, ...]:

@@ -1,4 +1,4 @@
-"""Several groups as one, with one covariance: for errors that are common to different kinds."""
+"""Several groups as one group with a common covariance, for shared errors."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -11,9 +11,11 @@ from catseye.estimation.observations.kind import ObservationKind, Reported
 
 @dataclass(frozen=True, eq=False)
 class Joint(ObservationKind):
-    """The rows of all parts in order; what the parts say of their own covariances does not count.
+    """Rows of all parts in order.
 
-    name         what the group is, for reports
+    The parts' own covariances are ignored.
+
+    name         of the group, for reports
     observed     (m,) of all parts in order
     covariance   of the observed values, (m, m) or another form of `ObservationGroup`
     parts        groups of any kind, m rows together
@@ -28,19 +30,19 @@ class Joint(ObservationKind):
 
     @classmethod
     def of(cls, name: str, parts: tuple[Reported, ...], covariance: np.ndarray) -> "Joint":
-        """Parts with their own observed values and a new covariance."""
+        """Join parts with their own observed values and a new covariance."""
         return cls(name, np.concatenate([p.observed for p in parts]), covariance, parts)
 
     @cached_property
     def _parts(self) -> tuple[Reported, ...]:
-        """Parts whose observed values are the group's: angles choose their turn by them."""
+        """Parts with the group's observed values, which select the turn of angles."""
         cuts = np.cumsum([len(p.observed) for p in self.parts])[:-1]
         shares = np.split(self.observed, cuts)
         return tuple(replace(cast(Any, p), observed=o) for p, o in zip(self.parts, shares, strict=True))
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """(m, w) with w of the widest part, filled with -1."""
+        """Columns (m, w) with w of the widest part, padded with -1."""
         return _stacked([_rows(p.columns, len(p.observed)) for p in self.parts], -1)
 
     @property
@@ -64,17 +66,17 @@ class Joint(ObservationKind):
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Values (m,) and Jacobian (m, w) at the parameters x."""
-        answers = [p.predict(x) for p in self._parts]
-        return np.concatenate([a[0] for a in answers]), _stacked([a[1] for a in answers], 0)
+        predictions = [p.predict(x) for p in self._parts]
+        return np.concatenate([a[0] for a in predictions]), _stacked([a[1] for a in predictions], 0)
 
 
 def _rows(columns: np.ndarray, m: int) -> np.ndarray:
-    """Columns (m, w), whichever form they have."""
+    """Columns (m, w) from either form."""
     return columns if columns.ndim == 2 else np.broadcast_to(columns, (m, len(columns)))
 
 
 def _stacked(parts: list[np.ndarray], filling: int) -> np.ndarray:
-    """Matrices below each other, the narrow ones filled up on the right."""
+    """Stack matrices, padding the narrow ones on the right."""
     width = max(p.shape[1] for p in parts)
     wide = [np.pad(p, ((0, 0), (0, width - p.shape[1])), constant_values=filling) for p in parts]
     return np.concatenate(wide)

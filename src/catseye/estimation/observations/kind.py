@@ -1,4 +1,4 @@
-"""What the solver asks of a group of observations, and what every kind of ours carries beside it for reports."""
+"""Protocol of a group of observations for the solver, and the base class of all kinds."""
 
 from typing import ClassVar, Protocol
 
@@ -8,14 +8,14 @@ from catseye.errors import EstimationError
 
 
 class ObservationGroup(Protocol):
-    """A group of m observations whose errors may be correlated with each other, but not with another group's.
+    """Group of m observations, possibly correlated, but not with other groups.
 
-    name         what the group is, for reports
+    name         of the group, for reports
     observed     (m,) values
     covariance   of the observed values: (m,) variances of independent ones; (m, m); or (b, r, r), b blocks of r rows
                  that follow each other, b r = m
     columns      indices of the parameters that the group depends on: (k,) shared by all rows, without repeats; or
-                 (m, w), each row its own, where repeats add up and -1 stands for none
+                 (m, w) per row, where repeats add up and -1 stands for none
     """
 
     @property
@@ -28,12 +28,12 @@ class ObservationGroup(Protocol):
     def columns(self) -> np.ndarray: ...
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values (m,) and Jacobian, (m, k) or (m, w) as `columns` is, at the parameters x."""
+        """Values (m,) and Jacobian, (m, k) or (m, w) as `columns`, at the parameters x."""
         ...
 
 
 class Reported(ObservationGroup, Protocol):
-    """A group that can be named row by row: any kind of ours; see `ObservationKind`."""
+    """Group whose rows can be named in a report; see `ObservationKind`."""
 
     kind: ClassVar[str]
     unit: ClassVar[str]
@@ -49,7 +49,7 @@ class Reported(ObservationGroup, Protocol):
 
 
 class ObservationKind:
-    """Base of the kinds: shapes are checked when a group is made, and a report can name each row.
+    """Base of the kinds: checks shapes, names rows for reports.
 
     kind   what one observation is
     unit   "m" or "rad"; "" where rows differ, see `units`
@@ -67,38 +67,45 @@ class ObservationKind:
                 f"expected ({m},), ({m}, {m}) or square blocks that fill {m} rows"
             )
         if columns.ndim == 2 and len(columns) != m:
-            raise EstimationError(f"{self.name}: {len(columns)} rows of columns for {m} observations; give one each")
+            raise EstimationError(
+                f"{self.name}: {len(columns)} rows of columns for {m} observations; expected one per row"
+            )
 
     @property
     def units(self: Reported) -> np.ndarray:
-        """(m,) unit of each observed value."""
+        """Units (m,) of the observed values."""
         return np.full(len(self.observed), self.unit)
 
     @property
     def kinds(self: Reported) -> np.ndarray:
-        """The kind of each row, (m,)."""
+        """Observation kinds (m,) of the rows."""
         return np.full(len(self.observed), self.kind)
 
     @property
     def component(self: ObservationGroup) -> np.ndarray:
-        """(m,) "x", "y" or "z" ("1" or "2" across a line) where a row is one component of a vector, else ""."""
+        """Components (m,) "x", "y" or "z" ("1" or "2" across a line) of vector rows, else ""."""
         return np.full(len(self.observed), "")
 
     @property
     def ends(self) -> tuple[np.ndarray, ...]:
-        """(m,) columns of the points by role, in the order from, to, third; -1 for none."""
+        """Columns (m,) of the points by role: from, to, third.
+
+        -1 for none.
+        """
         return ()
 
 
-def beside(name: str, m: int, *parts: np.ndarray) -> np.ndarray:
-    """Columns (m, w) from parts side by side, each (m, w_i) or (1, w_i) shared by all rows; else EstimationError.
+def joined_columns(name: str, m: int, *parts: np.ndarray) -> np.ndarray:
+    """Columns (m, w) joined from parts (m, w_i) or (1, w_i).
 
-    >>> beside("a", 2, np.array([[0, 1]]), np.array([[5], [6]])).tolist()
+    Raises EstimationError for other shapes.
+
+    >>> joined_columns("a", 2, np.array([[0, 1]]), np.array([[5], [6]])).tolist()
     [[0, 1, 5], [0, 1, 6]]
     """
     for part in parts:
         if part.ndim != 2 or len(part) not in (1, m):
-            raise EstimationError(f"{name}: indices of shape {part.shape} for {m} rows; expected one row each")
+            raise EstimationError(f"{name}: indices of shape {part.shape} for {m} rows; expected {m} rows or 1")
     return np.concatenate([np.broadcast_to(part, (m, part.shape[1])) for part in parts], axis=1)
 
 
@@ -113,5 +120,8 @@ def optional(columns: np.ndarray | None, m: int, width: int = 1) -> np.ndarray:
 
 
 def value(x: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Parameters at columns of any shape; 0 where a column is -1."""
+    """Parameters at columns of any shape.
+
+    0 where a column is -1.
+    """
     return np.where(columns < 0, 0.0, x[columns])

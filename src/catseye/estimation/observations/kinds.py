@@ -1,10 +1,10 @@
-"""Kinds of observation, one file each: what is predicted from the parameters, its derivatives, its covariance.
+"""Observation kinds, one file each: predicted values, derivatives, covariance.
 
 The solver knows only the protocol `ObservationGroup`. A new kind is a new file and one line here.
 
-Points are known by the column of their x in the parameter vector; y and z follow it. Other parameters are known by
-their own column, and -1 stands for none. Axes are x east, y north, z up; azimuths run clockwise from +y to +x, zenith
-angles from +z. Angles are predicted on the turn nearest to the observed value.
+Points are identified by the column of their x in the parameter vector; y and z follow it. Other parameters are
+identified by their own column, and -1 stands for none. Axes are x east, y north, z up; azimuths run clockwise from +y
+to +x, zenith angles from +z. Angles are predicted on the turn nearest to the observed value.
 """
 
 from catseye.estimation.observations.angle import HorizontalAngles

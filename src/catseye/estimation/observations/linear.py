@@ -12,10 +12,10 @@ from catseye.estimation.observations.kind import ObservationKind, value
 class Linear(ObservationKind):
     """observed = matrix @ x[columns] + error.
 
-    name         what the group is, for reports
+    name         of the group, for reports
     observed     (m,)
     covariance   of the observed values, see `ObservationGroup`
-    columns      (k,) indices of parameters, without repeats; or (m, w), each row its own, -1 for none
+    columns      (k,) indices of parameters, without repeats; or (m, w) per row, -1 for none
     matrix       (m, k) or (m, w)
     """
 

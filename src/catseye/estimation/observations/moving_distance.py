@@ -1,4 +1,4 @@
-"""Distances between points that are carried: each shot finds both ends turned and shifted."""
+"""Distances between moving points: rotated and shifted to the instant of each shot."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -15,8 +15,8 @@ from catseye.estimation.observations.sight import length, triples
 class MovingDistances(BetweenPoints, ObservationKind):
     """observed = scale |B target + b - A origin - a| + offset + sum c_q x[nuisance_q] + error.
 
-    The parameters are the points at one instant, the epoch; A, a and B, b carry them to the instant of each shot, as a
-    rigid telescope would. First come the fields of `BetweenPoints`, last those of `LengthsBetweenPoints` but `shift`.
+    The parameters are the points at one instant, the epoch; A, a and B, b transform them to the instant of each shot,
+    as rigid motions. First come the fields of `BetweenPoints`, last those of `LengthsBetweenPoints` without `shift`.
 
     origin_turn, target_turn     (m, 3, 3) A, B: rotations
     origin_shift, target_shift   (m, 3) a, b, m
@@ -37,13 +37,15 @@ class MovingDistances(BetweenPoints, ObservationKind):
     scaling_coefficient: np.ndarray | float = 1.0
 
     def ends_at_shots(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Origins and targets (m, 3) where each shot found them."""
+        """Origins and targets (m, 3) at the instants of the shots."""
         a = np.einsum("mij,mj->mi", self.origin_turn, x[triples(self.origin)]) + self.origin_shift
         b = np.einsum("mij,mj->mi", self.target_turn, x[triples(self.target)]) + self.target_shift
         return a, b
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values (m,) and Jacobian (m, 6 + q + s) at the parameters x; nan where two points coincide.
+        """Values (m,) and Jacobian (m, 6 + q + s).
+
+        Values are nan where two points coincide.
 
         >>> turn = np.array([[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]])
         >>> still = np.eye(3)[None], np.zeros((1, 3))

@@ -1,4 +1,4 @@
-"""What an instrument reads of a length: scaled, with an offset, both known and to be found."""
+"""Instrument reading of a length: scale and offset, known and estimated."""
 
 from typing import Protocol
 
@@ -8,7 +8,7 @@ from catseye.estimation.observations.kind import optional, value
 
 
 class Scaled(Protocol):
-    """Fields of a kind of length; see `reading`."""
+    """Fields of a length observation; see `reading`."""
 
     @property
     def observed(self) -> np.ndarray: ...
@@ -27,14 +27,16 @@ class Scaled(Protocol):
 
 
 def reading_columns(group: Scaled) -> tuple[np.ndarray, np.ndarray]:
-    """Columns (m, q) of a group's nuisance and (m, s) of its scaling."""
+    """Columns (m, q) of a group's nuisance and (m, s) of its scaling parameters."""
     m = len(group.observed)
     first, second = (optional(c, m, 0) if c is None else c for c in (group.nuisance, group.scaling))
     return first, second
 
 
 def reading(group: Scaled, x: np.ndarray, length: np.ndarray, *, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Values (m,) and Jacobian (m, w + q + s) of (scale + sum c x[scaling]) length + offset + sum c x[nuisance].
+    """Values (m,) and Jacobian (m, w + q + s) of readings of a length.
+
+    reading = (scale + sum c x[scaling]) length + offset + sum c x[nuisance].
 
     group    its scale, offset, nuisance (m, q), scaling (m, s) and their coefficients
     x        parameters

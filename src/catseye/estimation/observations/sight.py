@@ -1,7 +1,8 @@
-"""The line of sight from an origin to a target, its length and angles, each with derivatives along x, y, z.
+"""Line of sight from origin to target: length and angles, with derivatives by x, y, z.
 
 A sight is (m, 3), target minus origin in metres. Derivatives are by the sight: by the target they are the same, by the
-origin the opposite. A sight of no length, or straight up where its azimuth is asked, has no direction: nan.
+origin the opposite. Results are nan for a sight of zero length, and
+for azimuths of a vertical sight.
 """
 
 import numpy as np
@@ -13,18 +14,21 @@ XYZ = np.arange(3)
 
 
 def triples(first: np.ndarray) -> np.ndarray:
-    """Columns (m, 3) of points whose x is at `first` (m,); EstimationError where that is negative."""
+    """Columns (m, 3) of points whose x is at `first` (m,).
+
+    EstimationError if negative.
+    """
     if first.size and first.min() < 0:
         raise EstimationError(f"row {int(np.argmin(first))} names no point (column {int(first.min())}); give its own")
     return first[:, None] + XYZ
 
 
 def sight(x: np.ndarray, origin: np.ndarray, target: np.ndarray, *, shift: np.ndarray | None) -> np.ndarray:
-    """Target minus origin (m, 3), plus the shift that instrument and target heights make.
+    """Target minus origin (m, 3), plus the shift by instrument and target heights.
 
     x        parameters
     origin   (m,) column of the x of the point measured from
-    target   (m,) the same of the point measured to
+    target   (m,) column of the x of the point measured to
     shift    (m, 3) or (3,) m, or None
     """
     along = x[triples(target)] - x[triples(origin)]
@@ -43,7 +47,7 @@ def length(along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def level_length(along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Length (m,) of the sight seen from above, and its derivative (m, 3).
+    """Horizontal length (m,) of the sight, and its derivative (m, 3).
 
     >>> level_length(np.array([[3.0, 4.0, 12.0]]))[0]
     array([5.])
@@ -53,7 +57,7 @@ def level_length(along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def bearing(along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Azimuth (m,) clockwise from +y to +x, in (-pi, pi], and its derivative (m, 3).
+    """Azimuth (m,) clockwise from +y to +x, in (-pi, pi], and derivative (m, 3).
 
     tan A = e / n gives dA = (n de - e dn) / (e^2 + n^2).
 
@@ -67,7 +71,7 @@ def bearing(along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def elevation(along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Angle (m,) of the sight above the horizontal, and its derivative (m, 3).
+    """Elevation angle (m,) of the sight, and its derivative (m, 3).
 
     tan a = u / h gives da = (h du - u dh) / (h^2 + u^2), with h the level length.
 
@@ -82,13 +86,13 @@ def elevation(along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.arctan2(up, _or_nan(level)), slope / _or_nan(square)[:, None]
 
 
-def both(slope: np.ndarray) -> np.ndarray:
-    """Derivatives (m, 6) by the origin and the target."""
+def by_ends(slope: np.ndarray) -> np.ndarray:
+    """Derivatives (m, 6) by origin and target."""
     return np.concatenate([-slope, slope], axis=1)
 
 
 def nearest_turn(predicted: np.ndarray, observed: np.ndarray) -> np.ndarray:
-    """The predicted angles on the turn where observed less predicted lies in (-pi, pi].
+    """Predicted angles shifted by turns so that observed less predicted is in (-pi, pi].
 
     >>> nearest_turn(np.array([0.1]), np.array([TWO_PI])).round(12)
     array([6.38318531])

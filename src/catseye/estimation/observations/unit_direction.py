@@ -1,4 +1,4 @@
-"""A unit vector with two parameters, safe within a right angle of a start, and the axes that it carries along."""
+"""Unit vector with two parameters, regular within a right angle of its start, and its moving axes."""
 
 from dataclasses import dataclass
 
@@ -9,10 +9,12 @@ from catseye.errors import EstimationError
 
 @dataclass(frozen=True, eq=False)
 class Direction:
-    """u = (u0 + a_1 e_1 + a_2 e_2) / |...|, with e_1, e_2 across u0; small a are angles, a right angle is infinite.
+    """u = (u0 + a_1 e_1 + a_2 e_2) / |...|, with e_1, e_2 across u0.
+
+    Small a are angles, a right angle is infinite.
 
     u     (m, 3)
-    f     (m, 2, 3) e_1, e_2 turned with u by the shortest way
+    f     (m, 2, 3) e_1, e_2 turned with u by the shortest rotation
     du    (m, 2, 3) derivatives of u by a_1, a_2
     df    (m, 2, 2, 3) derivatives of f: df[:, i, j] is that of f_i by a_j
     """
@@ -24,15 +26,15 @@ class Direction:
 
 
 def require_direction(name: str, what: str, start: np.ndarray) -> None:
-    """Refuse vectors (3,) or (m, 3) that point nowhere; EstimationError."""
+    """Raise EstimationError for vectors (3,) or (m, 3) without a direction."""
     if not np.all(np.linalg.norm(start, axis=-1) > 0.0):
-        raise EstimationError(f"{name}: the {what} has no length or is not a number; give a direction")
+        raise EstimationError(f"{name}: the {what} has zero length or is not a number; give a direction")
 
 
 def across(start: np.ndarray) -> np.ndarray:
-    """e_1 and e_2 (m, 2, 3) that make a right-handed set with unit vectors start (m, 3), e_1 x e_2 = start.
+    """Right-handed e_1, e_2 (m, 2, 3) across unit vectors start (m, 3), e_1 x e_2 = start.
 
-    e_1 is the coordinate axis that is farthest from the start, made square to it.
+    e_1 is the coordinate axis farthest from the start, made perpendicular to it.
 
     >>> across(np.array([[0.0, 0.0, 1.0]])).tolist()
     [[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]]
@@ -44,7 +46,7 @@ def across(start: np.ndarray) -> np.ndarray:
 
 
 def direction(start: np.ndarray, a: np.ndarray) -> Direction:
-    """The direction at parameters a, with derivatives.
+    """Direction at parameters a, with derivatives.
 
     With n = sqrt(1 + a_1^2 + a_2^2): f_i = e_i - a_i / (n + 1) (u0 + u), the image of e_i by the rotation about
     u0 x u that takes u0 to u.

@@ -6,19 +6,19 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import ObservationKind, beside
+from catseye.estimation.observations.kind import ObservationKind, joined_columns
 from catseye.estimation.observations.sight import sight, triples
 
 
 @dataclass(frozen=True, eq=False)
 class Vectors(ObservationKind):
-    """observed = target - origin + shift + error, three rows x, y, z a vector.
+    """observed = target - origin + shift + error, three rows x, y, z per vector.
 
-    name         what the group is, for reports
+    name         of the group, for reports
     observed     (3b,) metres, vector by vector
     covariance   of the observed values: (b, 3, 3), or another form of `ObservationGroup`
     origin       (b,) column of the x of the point measured from
-    target       (b,) the same of the point measured to
+    target       (b,) column of the x of the point measured to
     shift        (b, 3) or (3,) m, added to target minus origin: (0, 0, target less instrument height); or None
     """
 
@@ -34,9 +34,9 @@ class Vectors(ObservationKind):
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """(3b, 2): the coordinate of the origin, that of the target."""
+        """Columns (3b, 2): coordinate of the origin, of the target."""
         ends = (triples(p).reshape(-1, 1) for p in (self.origin, self.target))
-        return beside(self.name, len(self.observed), *ends)
+        return joined_columns(self.name, len(self.observed), *ends)
 
     @property
     def ends(self) -> tuple[np.ndarray, ...]:

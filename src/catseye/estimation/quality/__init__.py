@@ -1,1 +1,1 @@
-"""How good an answer is: covariance, ellipsoids, reliability, robustness, variance components."""
+"""Quality of a result: covariance, ellipsoids, reliability, robustness, variance components."""

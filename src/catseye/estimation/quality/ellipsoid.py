@@ -1,8 +1,8 @@
-"""Standard and confidence ellipsoids of points, their ellipses in plan and elevation, and relative ones of pairs.
+"""Standard and confidence ellipsoids of points, ellipses in plan and elevation, relative ellipsoids.
 
-Axes are x east, y north, z up. A covariance may be singular (a held coordinate has none): its ellipsoid is then flat.
-Where a point has no answer its covariance is nan, and so is everything here. A coordinate that does not exist has nan
-in its row and column alone: the ellipsoid is that of the others, and its last semi-axes are nan.
+Axes are x east, y north, z up. A covariance may be singular (a fixed coordinate has zero variance): its ellipsoid is
+then flat. A point without a solution has a covariance of nan, and so are all results. A coordinate that does not exist
+has nan in its row and column only: the ellipsoid is that of the others, and its last semi-axes are nan.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from scipy.special import chdtr, chdtri, fdtr, fdtri
 from catseye.errors import EstimationError
 
 PLAN = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # east to the right, north up
-ROUNDING = 1e-10  # of the largest eigenvalue: a negative one below this is zero, a larger one is no covariance
+ROUNDING = 1e-10  # of the largest eigenvalue: a smaller negative one is zero, a larger one invalid
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class Ellipsoid:
 
 @dataclass(frozen=True, eq=False)
 class Ellipse:
-    """Standard ellipse in a plane with an axis to the right and one up (in plan: east and north).
+    """Standard ellipse in a plane with axes right and up (in plan: east and north).
 
     major, minor   (...) m, semi-axes
     bearing        (...) rad of the major axis, clockwise from the axis up (in plan: from north), 0 to pi; 0 of a circle
@@ -43,30 +43,33 @@ class Ellipse:
 
 
 def _square_roots(values: np.ndarray) -> np.ndarray:
-    """Roots of eigenvalues, ascending in the last axis; those that rounding made negative are zero."""
+    """Square roots of ascending eigenvalues; negative rounding errors give zero."""
     with np.errstate(invalid="ignore"):
         negative = np.fmin.reduce(values, axis=-1) < -ROUNDING * np.abs(values[..., -1])
     if np.any(negative):
         where = np.unravel_index(np.argmax(negative), negative.shape)
         raise EstimationError(
-            f"covariance {', '.join(str(int(i)) for i in where) or 'given'} is none: its smallest eigenvalue is "
-            f"{values[where][0]:.3g} beside a largest of {values[where][-1]:.3g}; it must not be negative"
+            f"covariance {', '.join(str(int(i)) for i in where) or 'given'} is invalid: its smallest eigenvalue is "
+            f"{values[where][0]:.3g}, its largest {values[where][-1]:.3g}; it must not be negative"
         )
     return np.sqrt(np.where(values < 0.0, 0.0, values))
 
 
 def _eigen(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues and vectors, ascending; nan for a matrix that is not finite, and first those of nan rows."""
+    """Ascending eigenvalues and eigenvectors.
+
+    Values are nan for matrices that are not finite, nan rows first.
+    """
     size = covariance.shape[-1]
-    gone = np.isnan(np.diagonal(covariance, axis1=-2, axis2=-1))
-    pairs = ~(gone[..., :, None] | gone[..., None, :])
-    known = (np.isfinite(covariance) | ~pairs).all(axis=(-2, -1))
-    inside = np.where(pairs & known[..., None, None], covariance, 0.0)
+    missing = np.isnan(np.diagonal(covariance, axis1=-2, axis2=-1))
+    pairs = ~(missing[..., :, None] | missing[..., None, :])
+    valid = (np.isfinite(covariance) | ~pairs).all(axis=(-2, -1))
+    inside = np.where(pairs & valid[..., None, None], covariance, 0.0)
     scale = np.abs(inside).max(axis=(-2, -1))[..., None]
-    last = np.where(gone, np.where(scale > 0.0, scale, 1.0), 0.0)  # below all others, and no larger: rounding
+    last = np.where(missing, np.where(scale > 0.0, scale, 1.0), 0.0)  # below all others, and no larger: rounding
     values, vectors = np.linalg.eigh(inside - last[..., None] * np.eye(size))
-    there = known[..., None] & (np.arange(size) >= gone.sum(axis=-1)[..., None])
-    return np.where(there, values, np.nan), np.where(there[..., None, :], vectors, np.nan)
+    defined = valid[..., None] & (np.arange(size) >= missing.sum(axis=-1)[..., None])
+    return np.where(defined, values, np.nan), np.where(defined[..., None, :], vectors, np.nan)
 
 
 def ellipsoid(covariance: np.ndarray) -> Ellipsoid:
@@ -88,19 +91,19 @@ def ellipsoid(covariance: np.ndarray) -> Ellipsoid:
 
 
 def _upright(vectors: np.ndarray) -> np.ndarray:
-    """The vectors or their opposites, largest component positive: one of two equal answers, always the same."""
+    """Vectors with the sign that makes their largest component positive."""
     largest = np.take_along_axis(vectors, np.argmax(np.abs(vectors), axis=-1)[..., None], axis=-1)
     return np.where(largest < 0.0, -vectors, vectors)
 
 
 def confidence_scale(probability: float, dimensions: int, degrees_of_freedom: float = np.inf) -> float:
-    """What multiplies the standard ellipsoid (3), ellipse (2) or interval (1) to hold the truth with a probability.
+    """Factor on the standard ellipsoid (3), ellipse (2) or interval (1) for a coverage probability.
 
     probability          0 to 1, both ends excluded
     dimensions           1, 2 or 3 (any other number of quantities taken together as well)
-    degrees_of_freedom   of the variance factor, where the covariance was multiplied by it; infinite for a-priori ones
+    degrees_of_freedom   of the variance factor, if the covariance was multiplied by it; infinite for a-priori ones
 
-    An ellipse in plan with the factor of 3 dimensions is the shadow of the ellipsoid, and holds more.
+    An ellipse in plan with the factor of 3 dimensions is the projection of the ellipsoid, of higher probability.
 
     Source: [JCGM102] clause 6.5.2 (chi-square; Fisher's F with an estimated variance factor).
 
@@ -118,7 +121,7 @@ def confidence_scale(probability: float, dimensions: int, degrees_of_freedom: fl
 
 
 def contained_probability(scale: float, dimensions: int, degrees_of_freedom: float = np.inf) -> float:
-    """Probability that the truth lies in `scale` times the standard region; the inverse of `confidence_scale`.
+    """Coverage probability of `scale` times the standard region; inverse of `confidence_scale`.
 
     Source: [JCGM102] clause 6.5.2.
 
@@ -131,7 +134,7 @@ def contained_probability(scale: float, dimensions: int, degrees_of_freedom: flo
 
 
 def elevation_view(bearing: float) -> np.ndarray:
-    """Axes (2, 3) to the right and up of a view along a horizontal bearing, clockwise from north, rad.
+    """Axes (2, 3) right and up of a view along a horizontal bearing, clockwise from north, rad.
 
     >>> elevation_view(0.0) + 0.0  # looking north, east is to the right
     array([[1., 0., 0.],
@@ -141,7 +144,7 @@ def elevation_view(bearing: float) -> np.ndarray:
 
 
 def projected(covariance: np.ndarray, view: np.ndarray) -> np.ndarray:
-    """Covariance (..., 2, 2) in a view: the shadow of the ellipsoid, by propagation.
+    """Covariance (..., 2, 2) in a view: the projection of the ellipsoid.
 
     covariance   (..., 3, 3) m^2
     view         (2, 3) orthonormal axes to the right and up: PLAN, or `elevation_view`
@@ -152,7 +155,7 @@ def projected(covariance: np.ndarray, view: np.ndarray) -> np.ndarray:
 
 
 def ellipse(covariance: np.ndarray) -> Ellipse:
-    """Standard ellipse of each (..., 2, 2) covariance in a plane with an axis to the right and one up.
+    """Standard ellipse of each (..., 2, 2) covariance, axes right and up.
 
     Raises EstimationError for a matrix with a negative eigenvalue.
 
@@ -160,13 +163,13 @@ def ellipse(covariance: np.ndarray) -> Ellipse:
     """
     covariance = np.asarray(covariance, dtype=float)
     values = _square_roots(_eigen(covariance)[0])
-    right, up, both = covariance[..., 0, 0], covariance[..., 1, 1], covariance[..., 0, 1]
-    bearing = np.mod(0.5 * np.arctan2(2.0 * both, up - right), np.pi)
+    right, up, cross = covariance[..., 0, 0], covariance[..., 1, 1], covariance[..., 0, 1]
+    bearing = np.mod(0.5 * np.arctan2(2.0 * cross, up - right), np.pi)
     return Ellipse(values[..., 1], values[..., 0], bearing)
 
 
 def horizontal_ellipse(covariance: np.ndarray) -> Ellipse:
-    """Standard ellipse in plan of each (..., 3, 3) covariance; its bearing is clockwise from north.
+    """Standard ellipse in plan of each (..., 3, 3) covariance, bearing clockwise from north.
 
     >>> e = horizontal_ellipse(np.array([[2.5, 1.5, 0.0], [1.5, 2.5, 0.0], [0.0, 0.0, 9.0]]))  # longest to the NE
     >>> round(float(np.degrees(e.bearing)), 9), round(float(e.major), 9), round(float(e.minor), 9)
@@ -176,7 +179,9 @@ def horizontal_ellipse(covariance: np.ndarray) -> Ellipse:
 
 
 def outline(covariance: np.ndarray, *, scale: float = 1.0, corners: int = 72) -> np.ndarray:
-    """Closed polygon (..., corners + 1, 2) of the ellipse of each (..., 2, 2) covariance, right and up, for drawing.
+    """Closed polygon (..., corners + 1, 2) of each ellipse, right and up, for drawing.
+
+    covariance   (..., 2, 2)
 
     It starts at the end of the major axis and runs clockwise.
     """
@@ -188,7 +193,7 @@ def outline(covariance: np.ndarray, *, scale: float = 1.0, corners: int = 72) ->
 
 
 def relative_covariance(joint: np.ndarray) -> np.ndarray:
-    """Covariance (..., 3, 3) of the vector between two points from their joint one.
+    """Covariance (..., 3, 3) of the vector between two points from their joint covariance.
 
     joint   (..., 6, 6) m^2, first point first
 
@@ -200,7 +205,7 @@ def relative_covariance(joint: np.ndarray) -> np.ndarray:
 
 
 def point_uncertainty(covariance: np.ndarray) -> np.ndarray:
-    """Helmert's point error (...): root of the trace, the same in every frame, m.
+    """Helmert's point error (...), m: root of the trace, the same in every frame.
 
     covariance   (..., d, d) m^2; in plan give the upper left (..., 2, 2)
 
@@ -213,12 +218,12 @@ def point_uncertainty(covariance: np.ndarray) -> np.ndarray:
 
 
 def mean_coordinate_uncertainty(covariance: np.ndarray) -> np.ndarray:
-    """Root mean square (...) of the coordinates' standard uncertainties, (..., d, d) m^2 to m."""
+    """RMS (...) of the coordinates' standard uncertainties, (..., d, d) m^2 to m."""
     return point_uncertainty(covariance) / np.sqrt(np.shape(covariance)[-1])
 
 
 def weakest_direction(joint: np.ndarray) -> tuple[float, np.ndarray]:
-    """What a network knows least: the standard uncertainty of its weakest direction, m, and how each point moves in it.
+    """Standard uncertainty, m, of a network's weakest direction, and each point's motion in it.
 
     joint   (3k, 3k) m^2, joint covariance of k points
 
@@ -235,6 +240,6 @@ def weakest_direction(joint: np.ndarray) -> tuple[float, np.ndarray]:
 
     joint = np.asarray(joint, dtype=float)
     if not np.isfinite(joint).all():
-        raise EstimationError("the weakest direction of a covariance with nan: some point has no answer; leave it out")
+        raise EstimationError("no weakest direction of a covariance with nan: a point has no solution; leave it out")
     values, vectors = eigh(joint, subset_by_index=[len(joint) - 1, len(joint) - 1])
     return float(np.sqrt(values[0])), _upright(vectors[:, 0]).reshape(-1, 3)

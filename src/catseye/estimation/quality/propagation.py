@@ -1,8 +1,8 @@
-"""From inputs with uncertainties to the uncertainty of one result: the budget, and the Monte Carlo that checks it.
+"""Uncertainty budget of one result from its inputs, and its check by Monte Carlo.
 
-A model is a function of an array (n, k) of inputs, one row an evaluation, that gives (n,) results. The budget is first
-order: it needs the slopes of the model at the best values. The Monte Carlo needs no slopes and bends where the model
-does; where the two disagree the Monte Carlo is right.
+A model is a function of an array (n, k) of inputs, one row per evaluation, that returns (n,) results. The budget is
+first order: it needs the derivatives of the model at the best values. The Monte Carlo needs no derivatives and includes
+nonlinearity; if the two disagree the Monte Carlo is right.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,25 +15,25 @@ from catseye.errors import ValidityError
 Model = Callable[[np.ndarray], np.ndarray]
 Draw = Callable[[np.random.Generator, int], np.ndarray]
 
-BATCH = 20_000  # draws in work at a time
+BATCH = 20_000  # draws per batch
 SAMPLERS: dict[str, Callable[[np.random.Generator, int], np.ndarray]] = {  # mean 0, standard deviation 1
     "normal": lambda g, n: g.standard_normal(n),
     "rectangular": lambda g, n: g.uniform(-np.sqrt(3.0), np.sqrt(3.0), n),
     "triangular": lambda g, n: g.triangular(-np.sqrt(6.0), 0.0, np.sqrt(6.0), n),
     "arcsine": lambda g, n: np.sqrt(2.0) * np.sin(g.uniform(0.0, 2.0 * np.pi, n)),
 }
-STUDENT = "t"  # a mean of few readings: u is its scale, and it needs degrees of freedom
+STUDENT = "t"  # a mean of few readings: u is its scale; needs degrees of freedom
 
 
 @dataclass(frozen=True)
 class Input:
     """One input of a model.
 
-    name                 for people, each once
+    name                 unique, for reports
     value                best value, in its own unit
     u                    standard uncertainty, at least 0, same unit; the scale of a t distribution
     distribution         "normal", "rectangular", "triangular", "arcsine" or "t"
-    degrees_of_freedom   how well u itself is known; infinite where u is not an estimate
+    degrees_of_freedom   of u; infinite if u is not an estimate
     """
 
     name: str
@@ -46,25 +46,27 @@ class Input:
         if not (np.isfinite(self.value) and np.isfinite(self.u) and self.u >= 0.0):
             raise ValidityError(f"input {self.name!r}: value {self.value}, u {self.u} (expected finite, u 0 or more)")
         if self.distribution not in (*SAMPLERS, STUDENT):
-            known = ", ".join((*SAMPLERS, STUDENT))
-            raise ValidityError(f"input {self.name!r}: distribution {self.distribution!r} (expected one of {known})")
+            distributions = ", ".join((*SAMPLERS, STUDENT))
+            raise ValidityError(
+                f"input {self.name!r}: distribution {self.distribution!r} (expected one of {distributions})"
+            )
         degrees = self.degrees_of_freedom
         if not degrees > 0.0 or (self.distribution == STUDENT and np.isinf(degrees)):
-            wanted = "above 0, and finite for a t distribution"
-            raise ValidityError(f"input {self.name!r}: {degrees} degrees of freedom (expected {wanted})")
+            expected = "above 0, and finite for a t distribution"
+            raise ValidityError(f"input {self.name!r}: {degrees} degrees of freedom (expected {expected})")
 
 
 @dataclass(frozen=True, eq=False)
 class Budget:
-    """The uncertainty of one result, input by input, in the result's unit where nothing else is said.
+    """Uncertainty of one result, input by input, in the result's unit unless stated.
 
     inputs               k of them
     sensitivity          (k,) slope of the result by each input, result's unit over input's
     correlation          (k, k) of the inputs
     value, u             of the result
     contribution         (k,) sensitivity times u of the input, with its sign
-    share                (k,) of u squared; they sum to 1, and one may be negative where correlation helps
-    degrees_of_freedom   effective ones of u
+    share                (k,) of u squared; they sum to 1, and may be negative with correlation
+    degrees_of_freedom   effective, of u
     probability          of the coverage interval
     coverage_factor      k_p of that probability
     expanded             coverage factor times u
@@ -85,14 +87,14 @@ class Budget:
 
 @dataclass(frozen=True, eq=False)
 class Scattered:
-    """What the draws of a Monte Carlo say of the result.
+    """Result of a Monte Carlo: mean, uncertainty and coverage intervals.
 
     values            (draws,) of the result
-    mean, u           of them; they mean nothing where an input's t distribution has no variance (2 degrees of freedom)
-    low, high         ends of the coverage interval that leaves out as much on either side
+    mean, u           of them; meaningless if an input's t distribution has no variance (2 degrees of freedom)
+    low, high         ends of the probabilistically symmetric coverage interval
     shortest          ends of the shortest interval of the same probability
     probability       of both
-    settled           False where an adaptive run met its cap before its digits stood still
+    settled           False if an adaptive run reached its limit before its digits were stable
     """
 
     values: np.ndarray
@@ -113,7 +115,7 @@ def propagate(
     correlation: np.ndarray | None = None,
     probability: float = 0.95,
 ) -> Budget:
-    """The first-order budget of a result.
+    """First-order budget of a result.
 
     inputs        k of them
     sensitivity   (k,) slope of the result by each
@@ -121,8 +123,8 @@ def propagate(
     correlation   (k, k) of the inputs; uncorrelated if None
     probability   of the coverage interval, 0 to 1
 
-    Raises ValidityError for a correlation that is none, or between inputs of finite degrees of freedom, for which the
-    rule of the effective ones does not hold.
+    Raises ValidityError for an invalid correlation, or one between inputs of finite degrees of freedom, for which the
+    Welch-Satterthwaite formula does not hold.
 
     Source: [JCGM100] eqs. 13, 16 and G.2b. Exact for a linear model; the interval is that of a t distribution.
 
@@ -162,11 +164,13 @@ def propagate(
 def effective_degrees_of_freedom(
     contribution: np.ndarray, degrees_of_freedom: np.ndarray, *, u: float | None = None
 ) -> float:
-    """Degrees of freedom of a combined standard uncertainty (Welch-Satterthwaite); infinite without an estimate in it.
+    """Effective degrees of freedom (Welch-Satterthwaite) of a combined standard uncertainty.
+
+    Infinite if no input is an estimate.
 
     contribution         (k,) of each input, in the result's unit, any sign
     degrees_of_freedom   (k,) of each, above 0, infinite allowed
-    u                    combined, where correlation makes it differ from the root of the sum of squares
+    u                    combined, if correlation makes it differ from the root sum of squares
 
     Source: [JCGM100] eq. G.2b, for uncorrelated estimates. Not truncated to a whole number.
 
@@ -180,7 +184,9 @@ def effective_degrees_of_freedom(
 
 
 def numerical_sensitivity(model: Model, inputs: Sequence[Input]) -> np.ndarray:
-    """Slopes (k,) of a model by central differences over one and over half a standard uncertainty, extrapolated.
+    """Derivatives (k,) of a model by extrapolated central differences.
+
+    The steps are one and half a standard uncertainty.
 
     Source: [JCGM100] clause 5.1.3 note 2, with Richardson's extrapolation: exact for polynomials of degree 4. An input
     of u = 0 is stepped by a millionth of its value, or by 1e-9 about zero.
@@ -200,7 +206,7 @@ def numerical_sensitivity(model: Model, inputs: Sequence[Input]) -> np.ndarray:
 def draw_inputs(
     inputs: Sequence[Input], generator: np.random.Generator, draws: int, *, correlation: np.ndarray | None = None
 ) -> np.ndarray:
-    """Values (draws, k) of the inputs, each from its distribution.
+    """Draws (draws, k) of the inputs from their distributions.
 
     correlation   (k, k); only normal inputs can be correlated
 
@@ -209,11 +215,11 @@ def draw_inputs(
     k = len(inputs)
     r = np.eye(k) if correlation is None else _checked(np.asarray(correlation, dtype=float), inputs)
     unit = np.empty((draws, k))
-    for column, each in enumerate(inputs):
-        if each.distribution == STUDENT:
-            unit[:, column] = generator.standard_t(each.degrees_of_freedom, draws)
+    for column, item in enumerate(inputs):
+        if item.distribution == STUDENT:
+            unit[:, column] = generator.standard_t(item.degrees_of_freedom, draws)
         else:
-            unit[:, column] = SAMPLERS[each.distribution](generator, draws)
+            unit[:, column] = SAMPLERS[item.distribution](generator, draws)
     joined = np.flatnonzero(np.any(r != np.eye(k), axis=1))
     if len(joined):
         values, vectors = np.linalg.eigh(r[np.ix_(joined, joined)])
@@ -224,7 +230,7 @@ def draw_inputs(
 def monte_carlo(
     model: Model, draw: Draw, *, draws: int, generator: np.random.Generator, probability: float = 0.95
 ) -> Scattered:
-    """The distribution of a result by a given number of draws of its inputs.
+    """Distribution of a result by a fixed number of draws of its inputs.
 
     model         (n, k) -> (n,)
     draw          function of a generator and a number n that gives (n, k) inputs
@@ -253,21 +259,21 @@ def adaptive_monte_carlo(
     probability: float = 0.95,
     most: int = 5_000_000,
 ) -> Scattered:
-    """The same with as many draws as it takes until mean, u and both ends stand still in the wanted digits of u.
+    """Distribution of a result, with draws until mean, u and interval ends are stable.
 
     digits   significant decimal digits of u, 1 or 2; a second digit costs a hundred times the draws
-    most     draws; a run that meets this cap says so in `settled`
+    most     limit of draws; a run that reaches it has `settled` False
 
-    Source: [JCGM101] clause 7.9, in sets of 10^4 draws: still when twice the standard deviation of each of the four
-    from set to set is below half a unit of the last digit.
+    Source: [JCGM101] clause 7.9, in sets of 10^4 draws: stable when twice the standard deviation of each of the four
+    between sets is below half a unit of the last of the significant digits of u.
     """
     size = max(10_000, int(np.ceil(100.0 / (1.0 - probability))))
     pieces: list[np.ndarray] = []
     rounds: list[tuple[float, float, float, float]] = []
     while True:
         pieces.append(model(draw(generator, size)))
-        one = _summary(pieces[-1], probability)
-        rounds.append((one.mean, one.u, one.low, one.high))
+        batch_summary = _summary(pieces[-1], probability)
+        rounds.append((batch_summary.mean, batch_summary.u, batch_summary.low, batch_summary.high))
         sets = len(rounds)
         if sets < 2:
             continue
@@ -279,7 +285,7 @@ def adaptive_monte_carlo(
 
 
 def numerical_tolerance(u: float, digits: int = 2) -> float:
-    """Half a unit of the last of the significant digits of u: differences below it do not matter.
+    """Numerical tolerance: half a unit of the last significant digit of u.
 
     Source: [JCGM101] clause 7.9.2.
 
@@ -292,7 +298,7 @@ def numerical_tolerance(u: float, digits: int = 2) -> float:
 
 
 def agrees(budget: Budget, scattered: Scattered, digits: int = 2) -> bool:
-    """Whether both ends of the budget's interval are those of the Monte Carlo, to so many digits of u.
+    """True if both ends of the budget's interval match the Monte Carlo's, to so many digits of u.
 
     Source: [JCGM101] clause 8.1.
     """
@@ -301,7 +307,9 @@ def agrees(budget: Budget, scattered: Scattered, digits: int = 2) -> bool:
 
 
 def agreement(budget: Budget, scattered: Scattered, digits: int = 2) -> bool | None:
-    """As `agrees`; None where an end would come out elsewhere with other draws: too few to tell.
+    """Result of `agrees`.
+
+    None if there are too few draws to decide.
 
     Source: [JCGM101] clauses 7.9.4 and 8.2: twice an end's standard deviation must be below the tolerance, here with
     that deviation from the binomial scatter of its rank.
@@ -318,36 +326,36 @@ def agreement(budget: Budget, scattered: Scattered, digits: int = 2) -> bool | N
 
 
 def _summary(values: np.ndarray, probability: float, settled: bool = True) -> Scattered:
-    """Mean, deviation and intervals; the values are large beside their scatter, so they are first reduced."""
+    """Mean, deviation and intervals of values, reduced by the first one for precision."""
     start = float(values[0])
-    rest = np.sort(values - start)
-    n = len(rest)
+    reduced = np.sort(values - start)
+    n = len(reduced)
     inside = min(max(round(probability * n), 1), n - 1)
-    left = round(0.5 * (n - inside))
-    width = rest[inside:] - rest[: n - inside]
+    low_index = round(0.5 * (n - inside))
+    width = reduced[inside:] - reduced[: n - inside]
     best = int(np.argmin(width))
     return Scattered(
         values=values,
-        mean=start + float(rest.mean()),
-        u=float(rest.std(ddof=1)),
-        low=start + float(rest[left]),
-        high=start + float(rest[min(left + inside, n - 1)]),
-        shortest=(start + float(rest[best]), start + float(rest[best + inside])),
+        mean=start + float(reduced.mean()),
+        u=float(reduced.std(ddof=1)),
+        low=start + float(reduced[low_index]),
+        high=start + float(reduced[min(low_index + inside, n - 1)]),
+        shortest=(start + float(reduced[best]), start + float(reduced[best + inside])),
         probability=probability,
         settled=settled,
     )
 
 
 def _checked(correlation: np.ndarray, inputs: Sequence[Input]) -> np.ndarray:
-    """The correlation, when it is one and joins only normal inputs whose u is no estimate."""
+    """Validated correlation: joins only normal inputs whose u is not an estimate."""
     k = len(inputs)
     wrong = correlation.shape != (k, k) or not np.allclose(correlation, correlation.T, rtol=0.0, atol=1e-12)
     if wrong or np.any(np.diag(correlation) != 1.0) or np.linalg.eigvalsh(correlation).min() < -1e-9:
         raise ValidityError(f"correlation of {k} inputs (expected symmetric, diagonal of ones, no eigenvalue below 0)")
-    for joined, each in zip(np.any(correlation != np.eye(k), axis=1), inputs, strict=True):
-        if joined and (each.distribution != "normal" or np.isfinite(each.degrees_of_freedom)):
+    for joined, item in zip(np.any(correlation != np.eye(k), axis=1), inputs, strict=True):
+        if joined and (item.distribution != "normal" or np.isfinite(item.degrees_of_freedom)):
             raise ValidityError(
-                f"input {each.name!r} is correlated but {each.distribution} with {each.degrees_of_freedom:g} degrees "
+                f"input {item.name!r} is correlated but {item.distribution} with {item.degrees_of_freedom:g} degrees "
                 "of freedom (expected normal, infinite)"
             )
     return correlation

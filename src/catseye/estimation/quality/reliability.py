@@ -1,8 +1,8 @@
-"""Reliability: tests of single observations and of the whole, what they can find, and what escapes them.
+"""Reliability: global test, tests of single observations, and internal and external reliability.
 
 w tests trust the claimed sigmas: w = standardised residual, N(0, 1). tau tests take sigma from the same adjustment:
-tau = w / s0, never more than the root of the degrees of freedom. Of an unchecked observation (nothing else would show
-its error) no test says anything: it is named unchecked, never accepted.
+tau = w / s0, never more than the root of the degrees of freedom. An unchecked observation (no other would reveal
+its error) cannot be tested: it is reported as unchecked, never accepted.
 """
 
 from collections.abc import Sequence
@@ -14,20 +14,22 @@ from scipy.special import chdtr, chdtrc, chdtri, nctdtr, ndtr, ndtri, stdtr, std
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit
 
-TOO_GOOD = 1e-4  # probability of a [pvv] so small, below which the claimed sigmas are doubtful: a unit, most likely
-UNCHECKED = 1e-4  # sigma^2 over the variance of the estimated error below which w is a ratio of rounding and curvature
+TOO_GOOD = 1e-4  # probability of a smaller [pvv], below which the claimed sigmas are doubtful, probably by a unit error
+UNCHECKED = (
+    1e-4  # sigma^2 over the variance of the estimated error, below which w is dominated by rounding and curvature
+)
 
 ACCEPTED = "accepted"
 SUSPECT = "suspect"
-NOT_CHECKED = "unchecked: no other observation would show its error"
+NOT_CHECKED = "unchecked: no other observation would reveal its error"
 LEFT_OUT = "left out"
-TOO_LARGE = "too large: observations are worse than claimed, wrong ones among them, or something is not modelled"
+TOO_LARGE = "too large: observations are worse than claimed, some are wrong, or an effect is not modelled"
 TOO_SMALL = "too small: observations are better than claimed"
 NO_REDUNDANCY = "not tested: no degrees of freedom"
 
 
 def w_probability(w: np.ndarray) -> np.ndarray:
-    """Two-sided p-value of each w, sigma known.
+    """Two-sided p-value of each w, with known sigma.
 
     Source: [BAARDA68] (the conventional alternative hypothesis, one observation wrong).
 
@@ -38,13 +40,15 @@ def w_probability(w: np.ndarray) -> np.ndarray:
 
 
 def tau_probability(tau: np.ndarray, degrees_of_freedom: float) -> np.ndarray:
-    """Two-sided p-value of each tau = w / s0, s0^2 = [pvv] / degrees of freedom of the same adjustment.
+    """Two-sided p-value of each tau = w / s0.
+
+    s0^2 is [pvv] / degrees of freedom of the same adjustment.
 
     tau                  (...)
     degrees_of_freedom   f, more than 1: with one, every |tau| is 1
 
     t = tau sqrt((f - 1) / (f - tau^2)) is Student's with f - 1 degrees of freedom, exactly.
-    Raises EstimationError for f <= 1 or |tau| beyond sqrt(f), which no adjustment gives.
+    Raises EstimationError for f <= 1 or |tau| beyond sqrt(f), which is impossible within one adjustment.
 
     Source: [POPE76] (tau and its relation to Student's t).
     """
@@ -55,12 +59,12 @@ def tau_probability(tau: np.ndarray, degrees_of_freedom: float) -> np.ndarray:
             f"tau of {np.sqrt(square.max()):.6g} is beyond the root of {f:g} degrees of freedom; "
             "the variance factor belongs to another adjustment"
         )
-    with np.errstate(divide="ignore"):  # at the very end t is infinite and p is zero
+    with np.errstate(divide="ignore"):  # at the limit t is infinite and p is zero
         return 2.0 * stdtr(f - 1.0, -np.sqrt(square * (f - 1.0) / np.maximum(f - square, 0.0)))
 
 
 def w_critical(level: float) -> float:
-    """|w| exceeded with probability `level`, both sides together.
+    """Critical |w| of the two-sided test at `level`.
 
     Source: [BAARDA68].
 
@@ -71,7 +75,9 @@ def w_critical(level: float) -> float:
 
 
 def tau_critical(level: float, degrees_of_freedom: float) -> float:
-    """|tau| exceeded with probability `level`, both sides together; EstimationError for f <= 1.
+    """Critical |tau| of the two-sided test at `level`.
+
+    EstimationError for f <= 1.
 
     Source: [POPE76] (tau and its relation to Student's t).
 
@@ -93,12 +99,12 @@ def _at_least_one(degrees_of_freedom: float) -> float:
 
 def _probability(name: str, value: float) -> float:
     if not 0.0 < value < 1.0:
-        raise EstimationError(f"{name} {value:g} is no probability between 0 and 1")
+        raise EstimationError(f"{name} {value:g} is not a probability between 0 and 1")
     return float(value)
 
 
 def single_level(family_level: float, tests: int, correction: str = "sidak") -> float:
-    """Level of each of m tests, so that the chance of any false alarm among them is at most `family_level`.
+    """Level of each of m tests for a family-wise false-alarm probability `family_level`.
 
     family_level   0 to 1
     tests          m
@@ -112,16 +118,18 @@ def single_level(family_level: float, tests: int, correction: str = "sidak") -> 
     """
     level = _probability("family level", family_level)
     if tests < 1:
-        raise EstimationError("no observation is checked by others, so none can be tested")
+        raise EstimationError("no observation is checked by others; none can be tested")
     if correction == "sidak":
         return float(-np.expm1(np.log1p(-level) / tests))
     if correction in ("bonferroni", "none"):
         return level / tests if correction == "bonferroni" else level
-    raise EstimationError(f"correction {correction!r} has no level of a single test; known: sidak, bonferroni, none")
+    raise EstimationError(f"correction {correction!r} has no single-test level (expected sidak, bonferroni or none)")
 
 
 def adjusted_probability(p: np.ndarray, correction: str = "sidak") -> np.ndarray:
-    """p-values (m,) corrected for their number: below a family level exactly where the corrected test rejects.
+    """p-values (m,) corrected for multiple testing.
+
+    One is below a family level exactly if the corrected test rejects.
 
     correction   as `single_level`; or "benjamini-hochberg": the level is then the share of false alarms among alarms
 
@@ -145,11 +153,11 @@ def adjusted_probability(p: np.ndarray, correction: str = "sidak") -> np.ndarray
         return np.minimum(stepped[np.argsort(order)], 1.0)
     if correction == "none":
         return p
-    raise EstimationError(f"correction {correction!r} is unknown; known: sidak, bonferroni, benjamini-hochberg, none")
+    raise EstimationError(f"unknown correction {correction!r} (expected sidak, bonferroni, benjamini-hochberg or none)")
 
 
 def power(noncentrality: float, level: float, degrees_of_freedom: float = np.inf) -> float:
-    """Probability that the two-sided test finds an error of `noncentrality` standard uncertainties of its estimate.
+    """Power of the two-sided test for an error of given noncentrality.
 
     noncentrality        error of the observation over the standard uncertainty of its estimated error
     level                of the single test
@@ -169,7 +177,7 @@ def power(noncentrality: float, level: float, degrees_of_freedom: float = np.inf
 
 
 def noncentrality(level: float, wanted_power: float, degrees_of_freedom: float = np.inf) -> float:
-    """Baarda's delta_0: the noncentrality at which the two-sided test of this level has the wanted power.
+    """Baarda's delta_0: noncentrality for which the two-sided test of this level has a given power.
 
     Solved exactly, both tails counted; arguments as `power`. Raises EstimationError for a power not above the level.
 
@@ -179,18 +187,20 @@ def noncentrality(level: float, wanted_power: float, degrees_of_freedom: float =
     4.1321
     """
     if not _probability("level", level) < _probability("power", wanted_power):
-        raise EstimationError(f"a power of {wanted_power:g} is not above the level {level:g}: nothing to be found")
+        raise EstimationError(f"a power of {wanted_power:g} is not above the level {level:g}")
     low, high = 0.0, 1.0
     while power(high, level, degrees_of_freedom) < wanted_power:
         low, high = high, 2.0 * high
-    for _ in range(60):  # halved to rounding; the power grows with the noncentrality
+    for _ in range(60):  # bisection to rounding; the power grows with the noncentrality
         middle = 0.5 * (low + high)
         low, high = (middle, high) if power(middle, level, degrees_of_freedom) < wanted_power else (low, middle)
     return 0.5 * (low + high)
 
 
 def detectable_bias(sigma: np.ndarray, redundancy: np.ndarray, delta0: float) -> np.ndarray:
-    """Smallest error that the test finds (internal reliability), in the observation's unit; infinite if unchecked.
+    """Smallest detectable error (internal reliability), in the observation's unit.
+
+    It is infinite if unchecked.
 
     sigma        (...) standard uncertainty of the observation
     redundancy   (...) its redundancy number, independent observations
@@ -206,8 +216,9 @@ def detectable_bias(sigma: np.ndarray, redundancy: np.ndarray, delta0: float) ->
 
 
 def bias_to_noise(redundancy: np.ndarray, delta0: float) -> np.ndarray:
-    """Effect of the largest undetected error (external reliability): on any function of the parameters, at most this
-    many of its standard uncertainties; infinite if unchecked.
+    """Bias-to-noise ratio of the largest undetected error (external reliability).
+
+    It biases any function of the parameters by at most this many of its standard uncertainties; infinite if unchecked.
 
     redundancy   (...) of independent observations
     delta0       `noncentrality`
@@ -223,14 +234,14 @@ def bias_to_noise(redundancy: np.ndarray, delta0: float) -> np.ndarray:
 
 
 def effects_of_bias(q: np.ndarray, jacobian: np.ndarray, covariance: np.ndarray, *, bias: np.ndarray) -> np.ndarray:
-    """What an error of each observation alone does to the parameters: rows of (Q A' P) times the error.
+    """Effect of an error of each observation on the parameters: rows of (Q A' P) times the error.
 
     q            (n, n) covariance of the parameters
     jacobian     (m, n)
     covariance   of the observations: (m,) variances of independent ones, or (m, m)
     bias         (m,) errors, such as detectable ones; where infinite (unchecked) the effect is infinite or 0
 
-    Returns (m, n): row i is the change of the parameters by bias i, its sign with it.
+    Returns (m, n): row i is the signed change of the parameters by bias i.
 
     Source: [BAARDA68] (external reliability); [FOERSTNER16] chapter 4.
     """
@@ -243,7 +254,7 @@ def effects_of_bias(q: np.ndarray, jacobian: np.ndarray, covariance: np.ndarray,
 
 
 def worst_effects(effects: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which observation's undetected error moves each point most, and how far.
+    """Observation whose undetected error moves each point most, and the movement.
 
     effects   (m, 3k) of `effects_of_bias`, for the coordinates of k points
 
@@ -259,9 +270,9 @@ class GlobalTest:
     """Two-sided test of the variance factor against its a-priori value 1.
 
     factor        [pvv] / degrees of freedom
-    lower, upper  the interval in which it must lie; it depends on the degrees of freedom and the level alone
+    lower, upper  acceptance interval; it depends on the degrees of freedom and the level only
     p             two-sided p-value; nan without redundancy
-    outcome       "accepted", or what it means
+    outcome       "accepted", or the reason for rejection
     """
 
     factor: float
@@ -272,11 +283,11 @@ class GlobalTest:
 
 
 def global_test(pvv: float, degrees_of_freedom: float, level: float = 0.05) -> GlobalTest:
-    """Chi-square test of [pvv] against the claimed sigmas, both sides: it fails where they are wrong.
+    """Two-sided chi-square test of [pvv] against the claimed sigmas.
 
     pvv                  v' C^-1 v
-    degrees_of_freedom   f, need not be whole
-    level                chance of a false alarm
+    degrees_of_freedom   f, need not be an integer
+    level                false-alarm probability
 
     The interval is about the a-priori value 1. One about [pvv] / f itself (a known bug elsewhere) could never fail.
 
@@ -295,7 +306,7 @@ def global_test(pvv: float, degrees_of_freedom: float, level: float = 0.05) -> G
 
 
 def too_good(pvv: float, degrees_of_freedom: float) -> bool:
-    """True for a [pvv] that chance makes so small less often than once in ten thousand.
+    """True if [pvv] is implausibly small, with a probability below one in ten thousand.
 
     >>> too_good(1e-5, 10.0), too_good(2.0, 10.0)
     (True, False)
@@ -305,13 +316,13 @@ def too_good(pvv: float, degrees_of_freedom: float) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class ObservationTests:
-    """Tests of all observations; tuples with one (m,) array a group.
+    """Tests of all observations; tuples with one (m,) array per group.
 
-    statistic   w, or tau where sigma was estimated; nan of the unchecked and of those left out
+    statistic   w, or tau for an estimated sigma; nan for unchecked and left-out observations
     p           its p-value; nan likewise
     adjusted    p corrected for the number of tests
     outcome     (m,) texts: ACCEPTED, SUSPECT, NOT_CHECKED or LEFT_OUT
-    tests       how many were made
+    tests       number of tests
     """
 
     statistic: tuple[np.ndarray, ...]
@@ -323,7 +334,7 @@ class ObservationTests:
 
 @dataclass(frozen=True)
 class SuspectObservation:
-    """An observation that the tests reject: group and row, statistic, p-values, estimated and detectable error."""
+    """Rejected observation: group and row, statistic, p-values, estimated and detectable error."""
 
     group: int
     row: int
@@ -335,7 +346,10 @@ class SuspectObservation:
 
 
 def checked(fit: GroupFit) -> np.ndarray:
-    """Which (m,) observations the others check; right with correlations too, where redundancy numbers mislead."""
+    """Mask (m,) of observations checked by the others.
+
+    Valid with correlations too.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         return fit.sigma**2 > UNCHECKED * (fit.detectable_error / NONCENTRALITY) ** 2
 
@@ -343,10 +357,10 @@ def checked(fit: GroupFit) -> np.ndarray:
 def observation_tests(
     fits: Sequence[GroupFit], *, level: float = 0.05, correction: str = "sidak", known_sigma: bool = True
 ) -> ObservationTests:
-    """The test of every observation of an adjustment, corrected for their number.
+    """Test of every observation of an adjustment, corrected for multiple testing.
 
     fits          all groups of one adjustment
-    level         of the family: the chance of any false alarm (of the share of false ones, "benjamini-hochberg")
+    level         family-wise false-alarm probability (false discovery rate for "benjamini-hochberg")
     correction    as `adjusted_probability`
     known_sigma   True: w tests; False: tau tests with the variance factor of all groups together
 
@@ -381,9 +395,9 @@ def _filled(where: np.ndarray, values: np.ndarray) -> np.ndarray:
 def suspects(
     fits: Sequence[GroupFit], *, level: float = 0.05, correction: str = "sidak", known_sigma: bool = True
 ) -> list[SuspectObservation]:
-    """Observations that the tests reject, worst first; arguments as `observation_tests`.
+    """Rejected observations, worst first; arguments as `observation_tests`.
 
-    One wrong observation can make its neighbours suspect too; `robustness.snoop` tells them apart.
+    One wrong observation can make its neighbours suspect too; `robustness.snoop` distinguishes them.
 
     Source: [BAARDA68]; [POPE76].
     """

@@ -1,4 +1,4 @@
-"""Repeatability: how readings scatter within a set, and how much more from set to set."""
+"""Repeatability: scatter of readings within sets and between sets."""
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
@@ -11,15 +11,17 @@ from catseye.errors import ValidityError
 
 @dataclass(frozen=True)
 class Repeatability:
-    """One-way analysis of variance of readings in sets; in the unit of the readings.
+    """One-way analysis of variance of readings in sets.
 
-    mean, u_mean       mean of the sets' means weighted by what each is worth, and its standard uncertainty
+    In the unit of the readings.
+
+    mean, u_mean       weighted mean of the sets' means, and its standard uncertainty
     within             standard deviation of a reading within its set, `degrees_within` degrees of freedom
-    between            standard deviation from set to set beyond that, 0 where none shows
+    between            additional standard deviation between sets, 0 if not significant
     intermediate       of one reading at another time: root of within^2 + between^2
     f, f_limit         ratio of the mean squares and its limit at `level`; above it the sets differ
     degrees_within, degrees_between
-    usual              readings a set, as unequal sets count
+    usual              effective readings per set for unequal sets
     """
 
     mean: float
@@ -42,15 +44,15 @@ class Repeatability:
 
 
 def repeatability(values: ArrayLike, sets: Sequence[Hashable], *, level: float = 0.05) -> Repeatability:
-    """Standard deviations within and between sets of readings that should agree.
+    """Standard deviations within and between sets of readings of one quantity.
 
     values   (n,) readings, any unit
-    sets     (n,) what each belongs to: a day, a pointing, an operator; at least two sets, one with two readings
+    sets     (n,) set of each reading: a day, a pointing, an operator; at least two sets, one with two readings
     level    of the F test that the sets agree
 
-    Where between-set scatter comes out negative it is zero and `f` tells by how little it shows.
+    A negative estimate of the between-set variance is set to zero; `f` shows its size.
 
-    Raises ValidityError where the sets do not separate the two scatters.
+    Raises ValidityError if the sets cannot separate the two components.
 
     Source: [ISO19] part 2, 7.4 (unequal sets too); moments, exact for equal sets.
 
@@ -60,17 +62,19 @@ def repeatability(values: ArrayLike, sets: Sequence[Hashable], *, level: float =
     """
     y = np.asarray(values, dtype=float)
     if y.ndim != 1 or len(sets) != y.size or not np.all(np.isfinite(y)):
-        raise ValidityError(f"{y.shape} readings in {len(sets)} places of sets (expected as many, all of them numbers)")
+        raise ValidityError(
+            f"{y.shape} readings with {len(sets)} set labels (expected equal numbers, all readings finite)"
+        )
     names = list(dict.fromkeys(sets))
     rows = [np.array([s == name for s in sets]) for name in names]
     count = np.array([int(r.sum()) for r in rows])
     n, k = y.size, len(names)
     if k < 2 or n == k:
-        raise ValidityError(f"{n} readings in {k} sets do not tell scatter within from scatter between sets")
+        raise ValidityError(f"{n} readings in {k} sets cannot separate scatter within and between sets")
     means = np.array([y[r].mean() for r in rows])
     square_within = float(sum(np.sum((y[r] - m) ** 2) for r, m in zip(rows, means, strict=True)) / (n - k))
     if square_within == 0.0:
-        raise ValidityError("readings agree to the last digit within every set: give more digits")
+        raise ValidityError("readings agree to the last digit within every set; give more digits")
     square_between = float(np.sum(count * (means - y.mean()) ** 2) / (k - 1))
     usual = (n - float(np.sum(count**2)) / n) / (k - 1)
     between = max(0.0, (square_between - square_within) / usual)

@@ -1,11 +1,11 @@
-"""Robust estimation and data snooping over any engine that solves least squares.
+"""Robust estimation and data snooping with any least-squares engine.
 
 The engine is one function: `solve(inflation)` adjusts with the sigma of each observation multiplied by its inflation
 (one (m,) array a group, 1 or more; infinite leaves it out) and returns one `GroupFit` a group. In the fits, `sigma` is
 the claimed one, not inflated; the tests belong to the inflated one. Of correlated observations, inflation k adds
 (k^2 - 1) sigma^2 to the variance of that one alone. An observation left out is inactive, and its `standardised` is that
-of its prediction by the others. Each call should start from the same approximate parameters: an answer on the way may
-be far off. Where the parameters are not held, solve raises EstimationError (or returns nan).
+of its prediction by the others. Each call should start from the same approximate parameters, since intermediate
+solutions may be far off. If the parameters are not determined, solve raises EstimationError (or returns nan).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,42 +21,54 @@ Solve = Callable[[Sequence[np.ndarray]], Sequence[GroupFit]]
 
 NOT_CONVERGED = "not converged: weights still changed by {change:.2g} after {iterations} iterations"
 UNDECIDED = (
-    "undecided: observations (group:row) {rows} contradict others and nothing tells which is wrong; "
-    "what only they hold is held with their sigmas times {size:.3g}"
+    "undecided: observations (group:row) {rows} contradict others, and which are wrong cannot be decided; "
+    "parameters that only they determine use their sigmas times {size:.3g}"
 )
-NOT_ENDED = "not ended after {rounds} rounds of data snooping; the worst |w| is {worst:.3g} (limit {limit:.3g})"
+UNFINISHED = "not finished after {rounds} rounds of data snooping; the worst |w| is {worst:.3g} (limit {limit:.3g})"
 
 MAD_TO_SIGMA = 1.482602218505602  # of normal errors: 1 / 0.6744897501960817
-MOST_INFLATION = 1e3  # where a weight is zero on the way: 1e-6 no longer moves an answer, and the row stays predicted
-SETTLED = 1e-3  # change of the root of a weight, beside the largest, below which reweighting ends
-DECISIVE = 9.0  # difference of [pvv] between two explanations below which neither is believed
-LEAST_AGREEMENT = 2  # rows beyond those that hold a place: one more may agree by chance where several were rejected
-MOST_RETURNS = 2  # of one observation to the solution; so the rounds end
+MOST_INFLATION = 1e3  # for zero weights: a weight of 1e-6 no longer affects the result, and the row stays predicted
+SETTLED = 1e-3  # relative change of the root of a weight, below which reweighting ends
+DECISIVE = 9.0  # difference of [pvv] between two explanations, below which neither is accepted
+LEAST_AGREEMENT = 2  # rows beyond those that determine a place: one more may agree by chance if several were rejected
+MOST_RETURNS = 2  # readmissions of one observation, so that the rounds end
 
 
 def huber(t: np.ndarray, k: float = 1.345) -> np.ndarray:
-    """Huber's weights min(1, k / |t|); k = 1.345 keeps 95 % efficiency with normal errors. Source: [HUBER09]."""
+    """Huber's weights min(1, k / |t|).
+
+    k = 1.345 gives 95 % efficiency for normal errors. Source: [HUBER09].
+    """
     return np.minimum(1.0, k / np.maximum(np.abs(t), k))
 
 
 def l1(t: np.ndarray, epsilon: float = 0.1) -> np.ndarray:
-    """Weights epsilon / |t| of the least sum of absolute residuals, 1 below epsilon. Source: [HUBER09]."""
+    """Weights epsilon / |t| of least absolute residuals, 1 below epsilon. Source: [HUBER09]."""
     return huber(t, epsilon)
 
 
 def biweight(t: np.ndarray, c: float = 4.685) -> np.ndarray:
-    """Tukey's biweight (1 - (t/c)^2)^2, zero from c on; c = 4.685 keeps 95 % efficiency. Source: [BEATON74]."""
+    """Tukey's biweight (1 - (t/c)^2)^2, zero beyond c. Source: [BEATON74].
+
+    c = 4.685 gives 95 % efficiency for normal errors.
+    """
     return np.square(np.maximum(1.0 - np.square(t / c), 0.0))
 
 
 def igg3(t: np.ndarray, k0: float = 2.0, k1: float = 6.0) -> np.ndarray:
-    """IGG III weights: 1 up to k0, falling to zero at k1; its constants are our choice. Source: [YANG02]."""
+    """IGG III weights: 1 up to k0, falling to zero at k1. Source: [YANG02].
+
+    The constants are our choice.
+    """
     a = np.maximum(np.abs(t), k0)
     return k0 / a * np.square(np.maximum(k1 - a, 0.0) / (k1 - k0))
 
 
 def geman_mcclure(t: np.ndarray, c: float = 3.0) -> np.ndarray:
-    """Geman and McClure's weights 1 / (1 + (t/c)^2)^2, never zero; the constant is our choice. Source: [GEMAN87]."""
+    """Geman-McClure weights 1 / (1 + (t/c)^2)^2, never zero. Source: [GEMAN87].
+
+    The constant is our choice.
+    """
     return 1.0 / np.square(1.0 + np.square(t / c))
 
 
@@ -73,11 +85,13 @@ STARTS = ("annealed", "l1", "none")
 
 @dataclass(frozen=True, eq=False)
 class RobustEstimate:
-    """The end of a robust estimation; tuples hold one (m,) array a group.
+    """Result of a robust estimation.
 
-    weights      1e-6 (for none) to 1
+    Tuples hold one (m,) array per group.
+
+    weights      1e-6 (for zero) to 1
     rejected     |statistic| beyond the limit
-    undecided    rows at places where another choice of wrong observations explains the rest as well
+    undecided    rows at places where another choice of wrong observations fits about as well
     statistic    w of each observation against all the others at their weights, over the scale; nan where unchecked
     scale        1, or estimated from the median of the standardised residuals
     iterations   solutions computed
@@ -96,7 +110,7 @@ class RobustEstimate:
 
 
 class _Rows:
-    """The observations of all groups in one row: solves, counts, and knows which may be wrong."""
+    """Observations of all groups in one sequence, with the solver and the removable mask."""
 
     def __init__(self, solve: Solve, sizes: Sequence[int], removable: Sequence[np.ndarray] | None) -> None:
         self._solve, self._cuts, self.solved = solve, np.cumsum(sizes)[:-1], 0
@@ -128,13 +142,14 @@ class _Rows:
         return group, int(row - (self._cuts[group - 1] if group else 0))
 
     def studentised(self) -> np.ndarray:
-        """Residuals over their standard uncertainties in plain least squares: leverage does not hide an error."""
+        """Studentised residuals of plain least squares, independent of leverage."""
         return np.where(self.may, self.of("residual") / self.unit, 0.0)
 
     def w(self) -> np.ndarray:
-        """w of each observation, its own inflation undone: the estimated error does not depend on its own weight.
+        """w of each observation with its own inflation removed.
 
-        With inflation k the variance of the estimated error is (k^2 - 1) sigma^2 too large, exactly.
+        The estimated error does not depend on its own weight. With inflation k the variance of the estimated error is
+        (k^2 - 1) sigma^2 too large, exactly.
         """
         active = np.isfinite(self.inflation)
         extra = np.where(active, np.square(np.where(active, self.inflation, 1.0)) - 1.0, 0.0) * self.sigma**2
@@ -146,14 +161,14 @@ class _Rows:
 
 @dataclass(frozen=True)
 class RobustOptions:
-    """How `estimate_robustly` weighs and searches.
+    """Settings of `estimate_robustly`.
 
     method       a key of WEIGHTS; the convex huber and l1 need no start
     start        of a redescending method: "annealed" (Geman-McClure from the largest residual down), "l1", or "none"
     scale        "known" sigmas, or "mad": all sigmas off by one factor, from the median absolute residual
-    limit        |w| beyond which an observation counts as rejected
-    iterations   cap of each reweighting
-    trials       of the search of places; a quarter of them takes part in each
+    limit        |w| beyond which an observation is rejected
+    iterations   limit of each reweighting
+    trials       of the search of places; each includes a quarter of them
     hold         number of local unknowns of a place
     seed         of the search
     """
@@ -179,45 +194,45 @@ def estimate_robustly(
     places: Sequence[np.ndarray] | None = None,
     options: RobustOptions = BIWEIGHT,
 ) -> RobustEstimate:
-    """M-estimate by iterated reweighting of studentised residuals, with a start that survives many wrong observations.
+    """M-estimate by iterated reweighting of studentised residuals, with a robust start.
 
     solve        the engine, see the top of this file
     sizes        number of observations of each group
-    removable    one (m,) bool array a group: False for observations that are never down-weighted
+    removable    one (m,) bool array per group: False for observations that are never down-weighted
     places       one (m,) int array a group: rows with the same number (not negative) share local unknowns, such as the
-                 target of a range. Given, each place with several rejections is searched for a better choice: a few
-                 rows drawn at random hold it, those that agree with them join. Reweighting alone often chooses wrong
-                 where a third of a place's ranges are wrong
-    options      method, start, scale and caps
+                 target of a range. If given, each place with several rejections is searched for a better choice: random
+                 minimal sets of rows determine it, rows that agree are added. Reweighting alone often fails if a third
+                 of a place's ranges are wrong
+    options      method, start, scale and limits
 
     Weights are those of Schweppe's form: of the residual over its own standard uncertainty in plain least squares.
-    Raises EstimationError for an unknown name, or where the engine has no answer.
+    Raises EstimationError for an unknown name, or if the engine has no solution.
 
     Source: [HUBER09] (iterated reweighting, leverage); [BLACK96] (annealing); [TORR00] (the cost of a choice).
     """
     method, start, scale, iterations = options.method, options.start, options.scale, options.iterations
     if method not in WEIGHTS or start not in STARTS or scale not in ("known", "mad"):
         raise EstimationError(
-            f"robust estimation {method!r} from {start!r} with {scale!r} scale is unknown; known: "
+            f"unknown robust estimation: method {method!r}, start {start!r}, scale {scale!r}; expected one of "
             f"{', '.join(WEIGHTS)}; {', '.join(STARTS)}; known, mad"
         )
     rows = _Rows(solve, sizes, removable)
-    anew = scale == "mad"
+    rescale = scale == "mad"
     if method in REDESCENDING and start == "annealed":
-        width = float(np.abs(rows.studentised()).max(initial=1.0) / _scale(rows, anew))
+        width = float(np.abs(rows.studentised()).max(initial=1.0) / _scale(rows, rescale))
         for halving in range(int(np.ceil(np.log2(max(width, 1.0)))), -1, -1):
-            _reweight(rows, geman_mcclure, 2.0**halving, anew, 3)
+            _reweight(rows, geman_mcclure, 2.0**halving, rescale, 3)
     elif method in REDESCENDING and start == "l1":
-        _reweight(rows, l1, 1.0, anew, iterations)
-    s = _scale(rows, anew)
+        _reweight(rows, l1, 1.0, rescale, iterations)
+    s = _scale(rows, rescale)
     undecided = np.zeros(len(rows.inflation), dtype=bool)
     if places is not None:
         if method in REDESCENDING:
             _reweight(rows, geman_mcclure, s, False, iterations)
         undecided = _search(rows, np.concatenate(list(places)), s, options)
-    anew = anew and method not in REDESCENDING  # a redescending method keeps the scale of its start
-    change = _reweight(rows, WEIGHTS[method], 1.0 if anew else s, anew, iterations)
-    s = _scale(rows, anew) if anew else s
+    rescale = rescale and method not in REDESCENDING  # a redescending method keeps the scale of its start
+    change = _reweight(rows, WEIGHTS[method], 1.0 if rescale else s, rescale, iterations)
+    s = _scale(rows, rescale) if rescale else s
     w = rows.w() / s
     status = CONVERGED if change < SETTLED else NOT_CONVERGED.format(change=change, iterations=iterations)
     return RobustEstimate(
@@ -232,26 +247,31 @@ def estimate_robustly(
     )
 
 
-def _scale(rows: _Rows, anew: bool) -> float:
-    """1, or the scale of the studentised residuals; a median is not moved by a minority of wrong ones."""
-    if not anew or not rows.may.any():
+def _scale(rows: _Rows, rescale: bool) -> float:
+    """1, or the robust scale (MAD) of the studentised residuals."""
+    if not rescale or not rows.may.any():
         return 1.0
     scale = float(MAD_TO_SIGMA * np.median(np.abs(rows.studentised()[rows.may])))
     if not scale > 0.0:
         raise EstimationError(
             f"scale of the residuals is {scale:g}: more than half of the {np.count_nonzero(rows.may)} checked "
-            "observations fit exactly or are no numbers; use scale 'known'"
+            "observations fit exactly or are not numbers; use scale 'known'"
         )
     return scale
 
 
 def _reweight(
-    rows: _Rows, weight: Callable[[np.ndarray], np.ndarray], scale: float, anew: bool, iterations: int
+    rows: _Rows, weight: Callable[[np.ndarray], np.ndarray], scale: float, rescale: bool, iterations: int
 ) -> float:
-    """Reweights until the roots of the weights settle; `anew` multiplies `scale` by that of the residuals each time."""
+    """Reweight until the roots of the weights settle.
+
+    Returns the last change.
+
+    With `rescale`, `scale` is multiplied by that of the residuals at each iteration.
+    """
     change = np.inf
     for _ in range(iterations):
-        factor = scale * _scale(rows, anew)
+        factor = scale * _scale(rows, rescale)
         root = np.sqrt(weight(rows.studentised() / factor))
         inflation = np.where(rows.may, 1.0 / np.maximum(root, 1.0 / MOST_INFLATION), 1.0)
         change = float(np.abs(1.0 / inflation - 1.0 / rows.inflation).max(initial=0.0) * inflation.min(initial=np.inf))
@@ -262,11 +282,13 @@ def _reweight(
 
 
 def _search(rows: _Rows, places: np.ndarray, scale: float, options: RobustOptions) -> np.ndarray:
-    """Searches places with several rejections for the cheapest choice of wrong observations; True where undecided.
+    """Search places with several rejections for the cheapest set of wrong observations.
 
-    That is where a rival is nearly as cheap, or where hardly more rows agree than hold the place.
-    A choice costs the sum of min(t^2, limit^2) over its place. A quarter of the places is tried at a time, each held by
-    no more rows than it needs: a wrong choice then says nothing about what it shares with the others.
+    Returns a mask, True where undecided.
+
+    A place is undecided if a rival is nearly as cheap, or if hardly more rows agree than determine the place.
+    A choice costs the sum of min(t^2, limit^2) over its place. A quarter of the places is tried at a time, each with a
+    minimal set of rows, so that a wrong choice does not affect parameters shared with the others.
     """
     rng, hold, limit = np.random.default_rng(options.seed), options.hold, options.limit
     count = int(places.max(initial=-1)) + 1
@@ -276,7 +298,7 @@ def _search(rows: _Rows, places: np.ndarray, scale: float, options: RobustOption
         t = rows.of("residual") / (rows.sigma * scale)
         return np.bincount(at, np.minimum(t * t, limit**2), count + 1)
 
-    def kept(choice: np.ndarray) -> np.ndarray:
+    def cost_of(choice: np.ndarray) -> np.ndarray:
         rows.solve(np.where(choice, 1.0, MOST_INFLATION))
         return costs()
 
@@ -286,11 +308,11 @@ def _search(rows: _Rows, places: np.ndarray, scale: float, options: RobustOption
     def touched(flags: np.ndarray) -> np.ndarray:
         return np.bincount(at, flags, count + 1) > 0
 
-    def grave() -> np.ndarray:
+    def gross_errors() -> np.ndarray:
         return np.abs(rows.of("residual")) > 1.5 * limit * scale * rows.sigma
 
     best = agrees()
-    cost, wrong, rival = kept(best), grave(), np.full(count + 1, np.inf)
+    cost, wrong, rival = cost_of(best), gross_errors(), np.full(count + 1, np.inf)
     for _ in range(options.trials):
         tried = (np.bincount(at, ~best & inside, count + 1) > 1) & (rng.random(count + 1) < 0.25)
         if not tried.any():
@@ -299,31 +321,31 @@ def _search(rows: _Rows, places: np.ndarray, scale: float, options: RobustOption
         rank = np.empty(len(at), dtype=int)
         rank[order] = np.arange(len(at)) - np.searchsorted(at[order], at[order])
         holding = np.where(tried[at] & rows.may, rank < hold, best)
-        kept(holding)
+        cost_of(holding)
         choice = np.where(tried[at], agrees() | holding, best)
-        new = kept(choice)
+        new = cost_of(choice)
         better = tried & (new < cost - 1.0)
-        # the loser is a rival if it trusts what the winner finds gravely wrong; slight errors hardly matter
-        differs = tried & touched(np.where(better[at], best & ~choice & grave(), choice & ~best & wrong))
+        # the loser is a rival if it keeps rows with gross errors under the winner; small errors do not count
+        differs = tried & touched(np.where(better[at], best & ~choice & gross_errors(), choice & ~best & wrong))
         rival = np.where(differs, np.fmin(rival, np.where(better, cost, new)), rival)
         if better.any():
             best = np.where(better[at], choice, best)
-            cost, wrong = kept(best), grave()
-    kept(best)
-    lost = np.bincount(at, ~best, count + 1)
-    chance = (lost > 1) & (np.bincount(at, best, count + 1) - hold < LEAST_AGREEMENT)
+            cost, wrong = cost_of(best), gross_errors()
+    cost_of(best)
+    rejected_rows = np.bincount(at, ~best, count + 1)
+    chance = (rejected_rows > 1) & (np.bincount(at, best, count + 1) - hold < LEAST_AGREEMENT)
     return inside & (chance | (rival - cost < DECISIVE))[at]
 
 
 @dataclass(frozen=True)
 class Rejection:
-    """One observation that data snooping left out.
+    """Observation left out by data snooping.
 
-    group, row        which
+    group, row        indices
     statistic         w of its prediction by the others
     estimated_error   observed minus predicted by the others
-    margin            by how much less [pvv] falls if its best rival goes in its place; nan without a rival
-    rival             group and row of the one that explains its contradiction best in its place; None without one
+    margin            smaller decrease of [pvv] if its best rival is left out instead; nan without a rival
+    rival             group and row of the observation that explains the contradiction best in its place, or None
     """
 
     group: int
@@ -335,15 +357,15 @@ class Rejection:
 
 
 @dataclass(frozen=True, eq=False)
-class Snooped:
-    """The end of data snooping; tuples hold one (m,) array a group.
+class SnoopingResult:
+    """Result of data snooping; tuples hold one (m,) array per group.
 
     rejected     left out in the last solution
-    undecided    of two that explain a contradiction alike, both, and those given as doubtful: they weigh so little
-                 that they only hold what nothing else holds
-    rejections   one each, largest |w| first
-    critical     |w| beyond which an observation went
-    solutions    computed
+    undecided    both of two that explain a contradiction equally well, and the `doubtful` input: their weight is so
+                 small that they only determine otherwise undetermined parameters
+    rejections   one per rejected observation, largest |w| first
+    critical     |w| beyond which an observation is rejected
+    solutions    number computed
     status       "converged", or one line
     fits         of the last solution
     """
@@ -359,11 +381,11 @@ class Snooped:
 
 @dataclass(frozen=True)
 class SnoopingOptions:
-    """What `snoop` tests by.
+    """Settings of `snoop`.
 
-    level        chance of leaving any good observation out, over all
-    correction   for their number, as `reliability.single_level`
-    rounds       cap of the solutions before weighing
+    level        family-wise probability of rejecting a good observation
+    correction   for multiple testing, as `reliability.single_level`
+    rounds       limit of solutions before the comparison of rivals
     """
 
     level: float = 0.05
@@ -383,18 +405,18 @@ def snoop(
     start: Sequence[np.ndarray] | None = None,
     doubtful: Sequence[np.ndarray] | None = None,
     weigh: bool = True,
-) -> Snooped:
-    """Data snooping: out with the worst, one by one; back in with those that pass; rivals weighed at the end.
+) -> SnoopingResult:
+    """Data snooping: reject the worst one by one, readmit those that pass, compare rivals at the end.
 
     solve       the engine, see the top of this file; sigmas are known
     sizes       number of observations of each group
-    options     level of the tests and cap of rounds
-    removable   one (m,) bool array a group: False for observations that are never left out
-    start       one (m,) bool array a group, left out at first, such as `RobustEstimate.rejected`
-    doubtful    one (m,) bool array a group, such as `RobustEstimate.undecided`: neither trusted nor tested
-    weigh       one more solution for each rejection: would another observation explain as much?
+    options     level of the tests and limit of rounds
+    removable   one (m,) bool array per group: False for observations that are never left out
+    start       one (m,) bool array per group, left out initially, such as `RobustEstimate.rejected`
+    doubtful    one (m,) bool array per group, such as `RobustEstimate.undecided`: neither trusted nor tested
+    weigh       True: compare each rejection with its rivals, one more solution each
 
-    Raises EstimationError where the engine has no answer with `start` left out.
+    Raises EstimationError if the engine has no solution with `start` left out.
 
     Source: [BAARDA68] (data snooping), [SIDAK67]; the margin is the difference of the tests' squares, our rule.
     """
@@ -404,49 +426,52 @@ def snoop(
     critical = w_critical(single_level(options.level, max(int(np.count_nonzero(rows.may)), 1), options.correction))
     out = np.zeros(len(rows.may), dtype=bool) if start is None else np.concatenate(list(start)) & rows.may
     returns = np.zeros(len(out), dtype=int)
-    worst, ended = np.inf, False
+    worst, finished = np.inf, False
     for _ in range(options.rounds):
         w = _tests(rows, out)
-        inside = np.where(out, -1.0, w)
-        worst = float(inside.max(initial=0.0))
-        back = np.where(out & (returns < MOST_RETURNS), w, np.inf)
+        active_w = np.where(out, -1.0, w)
+        worst = float(active_w.max(initial=0.0))
+        readmissible = np.where(out & (returns < MOST_RETURNS), w, np.inf)
         if worst > critical:
-            out[np.argmax(inside)] = True
-        elif back.min(initial=np.inf) < critical:
-            returns[np.argmin(back)] += 1
-            out[np.argmin(back)] = False
+            out[np.argmax(active_w)] = True
+        elif readmissible.min(initial=np.inf) < critical:
+            returns[np.argmin(readmissible)] += 1
+            out[np.argmin(readmissible)] = False
         else:
-            ended = True
+            finished = True
             break
-    status = CONVERGED if ended else NOT_ENDED.format(rounds=options.rounds, worst=worst, limit=critical)
+    status = CONVERGED if finished else UNFINISHED.format(rounds=options.rounds, worst=worst, limit=critical)
     rejections, undecided = _rejections(rows, out, critical, weigh)
     undecided |= rows.doubtful
     status = _loosen(rows, out, undecided, status)
-    return Snooped(
+    return SnoopingResult(
         rows.split(out & ~undecided), rows.split(undecided), rejections, critical, rows.solved, status, rows.fits
     )
 
 
 def _tests(rows: _Rows, out: np.ndarray) -> np.ndarray:
-    """|w| of each row with some left out; 0 of those never left out or now unchecked."""
+    """|w| of each row with some left out.
+
+    0 for fixed or unchecked rows.
+    """
     rows.solve(np.where(out, np.inf, np.where(rows.doubtful, MOST_INFLATION, 1.0)))
     u = rows.of("detectable_error") / NONCENTRALITY
     with np.errstate(invalid="ignore"):
-        seen = rows.may & (rows.sigma**2 > UNCHECKED * u**2)
+        testable = rows.may & (rows.sigma**2 > UNCHECKED * u**2)
     w = np.abs(rows.of("standardised"))
-    if not np.isfinite(w[seen]).all() or not np.isfinite(rows.of("residual")).all():
+    if not np.isfinite(w[testable]).all() or not np.isfinite(rows.of("residual")).all():
         raise EstimationError(
-            f"no answer with {np.count_nonzero(out)} observations left out: something is no longer held; "
+            f"no solution with {np.count_nonzero(out)} observations left out: a parameter is no longer determined; "
             "leave out fewer at the start"
         )
-    return np.where(seen | out, w, 0.0)
+    return np.where(testable | out, w, 0.0)
 
 
 def _rejections(rows: _Rows, out: np.ndarray, critical: float, weigh: bool) -> tuple[tuple[Rejection, ...], np.ndarray]:
-    """What was left out, and which rows explain a contradiction as well as the one left out does.
+    """Rejections, and mask of rows that explain a contradiction as well as the rejected one.
 
     [pvv] falls by the same whichever of two goes first: w_i^2 + w_(j without i)^2 = w_j^2 + w_(i without j)^2. So with
-    i back in, j is a rival if it takes nearly as much away, and i would then pass.
+    i readmitted, j is a rival if it reduces [pvv] nearly as much, and i would then pass.
     """
     without = np.square(np.where(out, 0.0, _tests(rows, out)))
     w, errors = rows.of("standardised"), rows.of("estimated_error")
@@ -472,7 +497,10 @@ def _rejections(rows: _Rows, out: np.ndarray, critical: float, weigh: bool) -> t
 
 
 def _loosen(rows: _Rows, out: np.ndarray, undecided: np.ndarray, status: str) -> str:
-    """The last solution: what was left out is out, the undecided hold loosely what nothing else holds."""
+    """Last solution: rejected rows out, undecided rows with large sigmas.
+
+    Returns the status.
+    """
     _tests(rows, out)
     error = np.abs(rows.of("estimated_error") / rows.sigma)
     size = float(error[(undecided & out) | rows.doubtful].max(initial=MOST_INFLATION))
@@ -481,5 +509,5 @@ def _loosen(rows: _Rows, out: np.ndarray, undecided: np.ndarray, status: str) ->
     if not holding.any():
         return status
     named = [f"{g}:{k}" for g, k in map(rows.place, np.flatnonzero(holding)[:6])]
-    rest = " ..." if np.count_nonzero(holding) > 6 else ""
-    return UNDECIDED.format(rows=", ".join(named) + rest, size=size)
+    ellipsis = " ..." if np.count_nonzero(holding) > 6 else ""
+    return UNDECIDED.format(rows=", ".join(named) + ellipsis, size=size)

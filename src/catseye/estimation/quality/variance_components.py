@@ -1,4 +1,4 @@
-"""Variance components: how uncertain the observations really are, by group, or as a constant and a part that grows.
+"""Variance components: by group, or as a constant and a distance-dependent part.
 
 Restricted maximum likelihood, its estimating equations exact: for each component k with C = sum of theta_k Q_k,
 v' C^-1 Q_k C^-1 v = tr(P_v Q_k). For one factor a group this is [pvv]_k = r_k, Foerstner's fixed point (and Helmert's
@@ -32,11 +32,11 @@ WORST_CONDITION = 1e-5  # of the information scaled to a unit diagonal; the deri
 
 
 class VarianceModel(Protocol):
-    """What the components mean.
+    """Protocol of a variance model with K components.
 
-    names                  of the K components
+    names                  of the components
     start                  (K,) values, all positive or zero
-    scales(theta)          what `solve` takes
+    scales(theta)          argument of `solve`
     equations(fits, theta) observed (K,) v' C^-1 Q_k C^-1 v, expected (K,) tr(P_v Q_k), and bound (K, K), not less
                            than twice the information: sum over the rows of r q_k q_l / sigma^4
     """
@@ -51,11 +51,11 @@ class VarianceModel(Protocol):
 
 @dataclass(frozen=True)
 class GroupFactors:
-    """One factor on the claimed covariance of each set of groups; correlated groups are welcome.
+    """One factor on the claimed covariance of each set of groups, correlated or not.
 
-    groups    names of all groups, in the order of the engine's
-    sizes     number of observations of each
-    members   (groups,) which factor each belongs to, -1 for those taken as claimed; by default each its own
+    groups    names of all groups, in the engine's order
+    sizes     number of observations per group
+    members   (groups,) index of the factor, -1 for groups taken as claimed; by default one factor per group
     """
 
     groups: tuple[str, ...]
@@ -81,7 +81,7 @@ class GroupFactors:
     def scales(self, theta: np.ndarray) -> list[np.ndarray]:
         if not np.all(theta > 0.0):
             raise EstimationError(
-                f"{self.names[int(np.argmin(theta))]} is zero: the residuals are all zero; were they adjusted before?"
+                f"{self.names[int(np.argmin(theta))]} is zero: all residuals are zero (already adjusted?)"
             )
         factor = np.append(theta, 1.0)[self._member]
         return [np.full(m, np.sqrt(f)) for m, f in zip(self.sizes, factor, strict=True)]
@@ -97,12 +97,12 @@ class GroupFactors:
 
 @dataclass(frozen=True, eq=False)
 class RowModel:
-    """Variances of independent observations, fixed + cofactors @ theta, row by row.
+    """Variances of independent observations per row: fixed + cofactors @ theta.
 
     names       of the K components
     sigmas      one (m,) array a group: the claimed standard uncertainties that the engine scales
     cofactors   one (m, w) array a group, not negative
-    columns     one (w,) array a group: which components its cofactors belong to; empty for a group taken as claimed
+    columns     one (w,) array per group: component indices of its cofactors; empty for a group taken as claimed
     start       (K,) first values, in the unit that makes cofactors @ theta a variance
     fixed       one (m,) array a group: part of the variance that is known; default zero
     """
@@ -115,7 +115,7 @@ class RowModel:
     fixed: tuple[np.ndarray, ...] | None = None
 
     def variances(self, theta: np.ndarray) -> list[np.ndarray]:
-        """(m,) variances of each group; raises EstimationError where one is zero."""
+        """Variances (m,) of each group; raises EstimationError if one is zero."""
         fixed = [np.zeros(len(s)) for s in self.sigmas] if self.fixed is None else self.fixed
         variances = [f + q @ theta[c] for f, q, c in zip(fixed, self.cofactors, self.columns, strict=True)]
         for i, variance in enumerate(variances):
@@ -150,12 +150,12 @@ class RowModel:
 def constant_and_scale(
     names: Sequence[str], distances: Sequence[np.ndarray], sigmas: Sequence[np.ndarray], *, start: tuple[float, float]
 ) -> RowModel:
-    """The model sigma^2 = a^2 + (b D)^2 of each ranger; the components are a^2 in m^2 and b^2, a ratio squared.
+    """Model sigma^2 = a^2 + (b D)^2 of each ranger, with components a^2 in m^2 and b^2.
 
-    names       of the rangers, one a group
-    distances   one (m,) array a group, m
-    sigmas      one (m,) array a group, m: what the engine claims and scales
-    start       first (a, b), m and ratio (1e-6 is 1 ppm), positive
+    names       of the rangers, one per group
+    distances   one (m,) array per group, m
+    sigmas      one (m,) array per group, m: claimed by the engine and scaled
+    start       initial (a, b), m and ratio (1e-6 is 1 ppm), positive
 
     >>> model = constant_and_scale(["ZY101"], [np.array([60.0, 120.0])], [np.full(2, 1e-4)], start=(5e-5, 1e-6))
     >>> model.names
@@ -177,8 +177,8 @@ class Components:
 
     names        of the K components
     values       (K,) not negative
-    covariance   (K, K) the inverse of the expected information; nan where components are not separable
-    at_zero      (K,) True: held at zero, because a negative value would fit better
+    covariance   (K, K) the inverse of the expected information; nan if components are not separable
+    at_zero      (K,) True: constrained to zero, because a negative value would fit better
     status       "converged", or one line
     iterations   steps taken
     fits         with the sigmas of these components
@@ -194,17 +194,20 @@ class Components:
 
     @property
     def u(self) -> np.ndarray:
-        """(K,) standard uncertainties of the values."""
+        """Standard uncertainties (K,) of the values."""
         return np.sqrt(np.diag(self.covariance))
 
     def roots(self) -> tuple[np.ndarray, np.ndarray]:
-        """(K,) roots of the components, such as a and b, and their standard uncertainties; infinite at zero."""
+        """Roots (K,) of the components, such as a and b, and their standard uncertainties.
+
+        The uncertainties are infinite at zero.
+        """
         roots = np.sqrt(self.values)
         with np.errstate(divide="ignore"):
             return roots, self.u / (2.0 * roots)
 
     def require_converged(self) -> "Components":
-        """These components, or EstimationError with their status."""
+        """Return these components, or raise EstimationError with their status."""
         if self.status != CONVERGED:
             raise EstimationError(self.status)
         return self
@@ -213,60 +216,60 @@ class Components:
 def variance_components(
     solve: Scaled, model: VarianceModel, *, iterations: int = 100, tolerance: float = 1e-4
 ) -> Components:
-    """Restricted maximum likelihood estimate of variance components, not negative.
+    """Non-negative restricted maximum likelihood estimate of variance components.
 
     solve        the engine, see the top of this file
     model        `GroupFactors`, `constant_and_scale`, or any `RowModel`
-    iterations   cap
+    iterations   limit
     tolerance    step, in standard uncertainties of each component, that ends the iteration
 
     Each step is a regression of squared residuals on the cofactors with weights r / sigma^4, which for one factor a
-    group is Foerstner's. It takes an upper bound of the information for the information, so its steps are short, and
-    ends where the exact equations hold. The information itself is the derivative of the expected squares,
+    group is Foerstner's. It uses an upper bound of the information, so its steps are short, and ends
+    where the exact equations hold. The information itself is the derivative of the expected squares,
     tr(P_v Q_k), by each component, taken numerically: two solutions a component at the end.
-    Raises EstimationError for a component that shows in no residual.
+    Raises EstimationError for a component that affects no residual.
 
     Source: [FOERSTNER79]; [PATTERSON71] (restricted likelihood and its information).
     """
     theta, step = np.array(model.start, dtype=float), np.full(len(model.start), np.inf)
-    taken, share, before = 0, 1.0, np.zeros(len(theta))
-    while taken < iterations:
+    steps, share, before = 0, 1.0, np.zeros(len(theta))
+    while steps < iterations:
         fits = tuple(solve(model.scales(theta)))
         observed, expected, bound = model.equations(fits, theta)
-        _shown(model.names, expected, bound)
-        if taken and step.max() < tolerance:
+        _require_redundancy(model.names, expected, bound)
+        if steps and step.max() < tolerance:
             break
-        taken += 1
+        steps += 1
         new = _least_squares_not_negative(bound, bound @ theta + observed - expected)
         step = np.abs(new - theta) * np.sqrt(0.5 * np.diag(bound))
-        # the data may hold more information than is expected: a step to and fro is halved
+        # the data may contain more information than expected: an oscillating step is halved
         share = max(0.5 * share, 0.25) if before @ bound @ (new - theta) < 0.0 else min(1.5 * share, 1.0)
         before = new - theta
         theta = np.where(new > 0.0, theta + share * before, 0.0)
-    covariance, together = _inverse_information(solve, model, theta, STEP * expected / np.diag(bound))
+    covariance, inseparable = _inverse_information(solve, model, theta, STEP * expected / np.diag(bound))
     status = CONVERGED
     if step.max() >= tolerance:
         worst = int(np.argmax(step))
-        status = NOT_CONVERGED.format(name=model.names[worst], step=step[worst], iterations=taken)
+        status = NOT_CONVERGED.format(name=model.names[worst], step=step[worst], iterations=steps)
         fits = tuple(solve(model.scales(theta)))
-    if together:
-        status = INSEPARABLE.format(names=", ".join(model.names[k] for k in together))
-    return Components(model.names, theta, covariance, theta == 0.0, status, taken, fits)
+    if inseparable:
+        status = INSEPARABLE.format(names=", ".join(model.names[k] for k in inseparable))
+    return Components(model.names, theta, covariance, theta == 0.0, status, steps, fits)
 
 
-def _shown(names: Sequence[str], expected: np.ndarray, bound: np.ndarray) -> None:
-    """Raises EstimationError for a component whose observations have no redundancy; by Cauchy at most their sum."""
+def _require_redundancy(names: Sequence[str], expected: np.ndarray, bound: np.ndarray) -> None:
+    """Raise EstimationError for a component whose observations have no redundancy."""
     share = np.divide(expected**2, np.diag(bound), out=np.zeros(len(names)), where=np.diag(bound) > 0.0)
     if np.any(share < LEAST_REDUNDANCY):
         k = int(np.argmin(share))
         raise EstimationError(
-            f"{names[k]} shows in no residual: its observations have redundancy {share[k]:.2g} together; "
+            f"{names[k]} affects no residual: its observations have redundancy {share[k]:.2g} together; "
             "hold it, or join it with another group"
         )
 
 
 def _least_squares_not_negative(normal: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """The minimum of x' N x / 2 - right' x with no x negative; components in one block are solved together."""
+    """Minimum of x' N x / 2 - right' x with non-negative x."""
     from scipy.optimize import nnls
 
     scale = 1.0 / np.sqrt(np.diag(normal))
@@ -282,7 +285,9 @@ def _least_squares_not_negative(normal: np.ndarray, right: np.ndarray) -> np.nda
 def _inverse_information(
     solve: Scaled, model: VarianceModel, theta: np.ndarray, size: np.ndarray
 ) -> tuple[np.ndarray, list[int]]:
-    """Covariance of the components, and which are not separable, if any; `size` (K,) is the step of each.
+    """Covariance of the components, and indices of inseparable ones.
+
+    `size` (K,) is the step of each.
 
     d tr(P_v Q_k) / d theta_l = -tr(P_v Q_k P_v Q_l), twice the information with the sign turned.
     """

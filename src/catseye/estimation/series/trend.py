@@ -1,9 +1,9 @@
-"""A noisy record as a level and a rate that wander: states between its readings, their covariance, their strengths.
+"""Trend of a noisy record: smoothed level and rate, their covariance, and noise strengths.
 
     level' = rate + level wander,   rate' = rate wander,   reading = level + noise
 
-The states of n times are one Gaussian whose precision is a band of seven, so that the likelihood of the strengths, the
-states and any column of their covariance cost a time proportional to n.
+Level and rate are random walks. The states at n times are one Gaussian with a banded precision (bandwidth seven), so
+that the likelihood of the strengths, the states and any column of their covariance take time proportional to n.
 """
 
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
-LEAST_SHARE = 0.7  # of the usual noise: few readings far apart tell noise and wander apart badly
-FEWEST = 6  # readings that show strengths of their own
-STEPS = (2, 3)  # refinements of the likelihood's grid: each divides its step
+LEAST_SHARE = 0.7  # of the usual noise: few sparse readings separate noise and wander badly
+FEWEST = 6  # readings needed to estimate the strengths
+STEPS = (2, 3)  # refinements of the likelihood's grid: divisors of its step
 GRID = 5  # values of each time scale tried at first
 
 
@@ -35,7 +35,7 @@ class TrendStrength:
 
 @dataclass(frozen=True, eq=False)
 class Trend:
-    """The level that a record's readings show, at times of a grid.
+    """Smoothed level and rate of a record, at the times of a grid.
 
     seconds       (g,) s, ascending
     level, rate   (g,) unit, unit/s: expectation given all readings
@@ -52,18 +52,27 @@ class Trend:
     last: float
 
     def at(self, seconds: np.ndarray) -> np.ndarray:
-        """Level at times (...); before the first reading and after the last that of the end."""
+        """Level at times (...).
+
+        Constant before the first and after the last reading.
+        """
         return np.interp(np.clip(seconds, self.first, self.last), self.seconds, self.level)
 
     def rate_at(self, seconds: np.ndarray) -> np.ndarray:
-        """Rate at times (...), unit/s, over the grid's steps on either side; zero beyond the readings."""
+        """Rate at times (...), unit/s, from adjacent grid steps.
+
+        Zero outside the readings.
+        """
         if len(self.seconds) < 2:
             return np.zeros(np.shape(seconds))
         inside = (seconds >= self.first) & (seconds <= self.last)
         return np.where(inside, np.interp(seconds, self.seconds, np.gradient(self.level, self.seconds)), 0.0)
 
     def covariance(self, seconds: np.ndarray) -> np.ndarray:
-        """(k, k) unit^2 of the errors of `at` at k times, those beyond the readings growing with the distance."""
+        """Covariance (k, k) unit^2 of the errors of `at` at k times.
+
+        Outside the readings it grows with the distance.
+        """
         clipped = np.clip(seconds, self.first, self.last)
         right = np.zeros((2 * len(self.seconds), len(seconds)))
         after = np.clip(np.searchsorted(self.seconds, clipped), 1, max(len(self.seconds) - 1, 1))
@@ -75,20 +84,20 @@ class Trend:
             right[2 * (after - 1), np.arange(len(seconds))] = 1.0 - share
             right[2 * after, np.arange(len(seconds))] += share
         inside = right.T @ cho_solve_banded((self.factor, True), right, check_finite=False)
-        return 0.5 * (inside + inside.T) + self._beyond(np.asarray(seconds) - clipped)
+        return 0.5 * (inside + inside.T) + self._extrapolation_covariance(np.asarray(seconds) - clipped)
 
-    def _beyond(self, distance: np.ndarray) -> np.ndarray:
-        """Covariance of a level kept constant at distances (k,) s beyond an end; below zero before the first."""
+    def _extrapolation_covariance(self, distance: np.ndarray) -> np.ndarray:
+        """Covariance of a constant level at distances (k,) s outside the readings, negative before the first."""
         d, s = np.abs(distance), self.strength
-        same = np.sign(distance)[:, None] * np.sign(distance) > 0.0
-        less = np.minimum(d[:, None], d)
+        same_side = np.sign(distance)[:, None] * np.sign(distance) > 0.0
+        shorter = np.minimum(d[:, None], d)
         usual = float(np.sqrt(np.mean(self.rate**2))) if len(self.rate) else 0.0
-        return np.where(same, s.level**2 * less + s.rate**2 * less**3 / 3.0 + usual**2 * np.outer(d, d), 0.0)
+        return np.where(same_side, s.level**2 * shorter + s.rate**2 * shorter**3 / 3.0 + usual**2 * np.outer(d, d), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class _Record:
-    """Readings of distinct times: `weight` of each is how many it is the mean of."""
+    """Readings at distinct times; `weight` is the number averaged in each."""
 
     seconds: np.ndarray
     values: np.ndarray
@@ -105,7 +114,7 @@ class _Record:
         return float(np.median(np.diff(self.seconds)))
 
     def likelihood(self, level: float, rate: float) -> tuple[float, float]:
-        """Minus twice the logarithm of the restricted likelihood, and the noise's variance at its best.
+        """Minus twice the log restricted likelihood, and the best noise variance.
 
         level, rate   wander over the noise, squared: 1/s and 1/s^3
         """
@@ -126,12 +135,12 @@ class _Record:
 
 
 def trend_strength(seconds: ArrayLike, values: ArrayLike, *, usual: TrendStrength, least_noise: float) -> TrendStrength:
-    """Noise of a record and wander of what it reads, by its own readings.
+    """Noise of a record and wander of its level and rate, estimated from its readings.
 
     seconds       (n,) s, any order
     values        (n,)
-    usual         what is taken of fewer than six readings
-    least_noise   of a reading: by rounding; nor is it taken as less than seven tenths of the usual
+    usual         assumed for fewer than six readings
+    least_noise   lower limit of a reading's noise, by rounding; it is also at least seven tenths of the usual
 
     Restricted maximum likelihood over two time scales, on a grid that is refined; the noise follows in closed form.
 
@@ -141,7 +150,7 @@ def trend_strength(seconds: ArrayLike, values: ArrayLike, *, usual: TrendStrengt
     if len(record.seconds) < FEWEST:
         return usual
     step, span = record.step, float(np.ptp(record.seconds))
-    # A time scale is the time over which a filter in balance averages: sqrt(r step/q), and (r step/q)^(1/4) of a rate.
+    # A time scale is the averaging time of the steady-state filter: sqrt(r step/q), and (r step/q)^(1/4) of a rate.
     axes = [np.linspace(np.log(0.3 * step), np.log(span), GRID) for _ in range(2)]
     tried: dict[tuple[float, float], tuple[float, float]] = {}
 
@@ -162,7 +171,7 @@ def trend_strength(seconds: ArrayLike, values: ArrayLike, *, usual: TrendStrengt
 
 
 def trend_of(seconds: ArrayLike, values: ArrayLike, strength: TrendStrength, *, grid: ArrayLike = ()) -> Trend:
-    """Level and rate of a record of n readings (at least one), at their times and at those of a grid.
+    """Level and rate of a record of n >= 1 readings, at their times and those of a grid.
 
     Source: fixed-interval smoother of a local linear trend, as one banded system; flat priors on both states.
     """
@@ -178,7 +187,7 @@ def trend_of(seconds: ArrayLike, values: ArrayLike, strength: TrendStrength, *, 
     weight = record.weight / strength.noise**2
     band[0, at] += weight
     if len(record.seconds) < 2:
-        band[0, 1::2] += 1.0 / (strength.level**2 + 1e-30)  # of one reading no rate is known
+        band[0, 1::2] += 1.0 / (strength.level**2 + 1e-30)  # one reading gives no rate
     mean = float(np.mean(record.values))
     right = np.zeros(band.shape[1])
     right[at] = weight * (record.values - mean)
@@ -188,7 +197,7 @@ def trend_of(seconds: ArrayLike, values: ArrayLike, strength: TrendStrength, *, 
 
 
 def _precision(steps: np.ndarray, level: float, rate: float) -> tuple[np.ndarray, float]:
-    """Lower band (4, 2g) of the precision that the wander alone gives, and the logarithm of the steps' covariances.
+    """Lower band (4, 2g) of the precision by the wander alone, and log determinant of the steps' covariances.
 
     steps         (g - 1,) s, above 0
     level, rate   variances a second of the two wanders

@@ -1,4 +1,4 @@
-"""Motions of a figure of points as a whole, by which nothing between them changes."""
+"""Rigid motions and scale of a set of points."""
 
 import numpy as np
 
@@ -6,12 +6,12 @@ MOTIONS = ("shift along x", "shift along y", "shift along z", "turn about x", "t
 
 
 def motions(xyz: np.ndarray, centre: np.ndarray | None = None, size: float | None = None) -> np.ndarray:
-    """The seven motions of points (n, 3): (3 n, 7), none moving the points by more than metres.
+    """Seven motions of points (n, 3) as columns (3 n, 7), in the order of MOTIONS.
 
-    centre   (3,) m, about which points are turned and scaled; their mean if None
-    size     m, by which turns and scale are divided; their root mean square distance from the mean if None
+    centre   (3,) m, of rotation and scale; mean of the points if None
+    size     m, divisor of rotations and scale; RMS distance from the mean if None
 
-    Order as MOTIONS.
+    No motion moves the points by more than metres.
 
     >>> motions(np.array([[0.0, 0, 0], [2.0, 0, 0]]))[:, 6].tolist()
     [-1.0, 0.0, 0.0, 1.0, 0.0, 0.0]
@@ -22,7 +22,7 @@ def motions(xyz: np.ndarray, centre: np.ndarray | None = None, size: float | Non
     result = np.zeros((n, 3, 7))
     result[:, [0, 1, 2], [0, 1, 2]] = 1.0
     x, y, z = arm.T
-    result[:, 1, 3], result[:, 2, 3] = 0.0 - z, y  # turn about an axis: its unit vector cross the arm
+    result[:, 1, 3], result[:, 2, 3] = 0.0 - z, y  # rotation about an axis: its unit vector cross the arm
     result[:, 0, 4], result[:, 2, 4] = z, 0.0 - x
     result[:, 0, 5], result[:, 1, 5] = 0.0 - y, x
     result[:, :, 6] = arm

@@ -1,4 +1,4 @@
-"""The paraboloid that fits points best: where it stands, its focal length, how far each point lies off it."""
+"""Best-fit paraboloid of points: pose, focal length and deviation of every point."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,31 +14,31 @@ Free = Literal["vertex", "axis", "focal-length"]
 Measure = Literal["normal", "half-path"]
 AlongNormals = Callable[[np.ndarray], np.ndarray]
 PARAMETERS: dict[str, int] = {"vertex": 3, "axis": 2, "focal-length": 1}
-POSE: tuple[Free, ...] = ("vertex", "axis")  # a turn about its own axis leaves a paraboloid unchanged
+POSE: tuple[Free, ...] = ("vertex", "axis")  # a rotation about its axis leaves a paraboloid unchanged
 CONVERGED_STEP = 1e-10  # m and rad: a tenth of a nanometre at a metre's arm
 ITERATIONS = 30
-SQUARE = 500  # points to which matrices of their number are multiplied; beyond it the product costs seconds
-DEPENDENT = 1e-10  # of a column's length: what is left of a parameter beside those before it
+SQUARE = 500  # limit of points for full matrix products, which take seconds beyond it
+DEPENDENT = 1e-10  # of a column's length: minimum left after orthogonalisation
 
 
 @dataclass(frozen=True, eq=False)
 class ParaboloidFit:
-    """A paraboloid's place relative to a nominal frame, and the points' deviations from it.
+    """Fitted paraboloid's pose relative to a nominal frame, and the points' deviations from it.
 
     translation          (3,) m, of the vertex, in the outer frame
-    rotation             (3,) rad, rotation vector about the nominal vertex, in the outer frame; none about the axis
+    rotation             (3,) rad, rotation vector about the nominal vertex, in the outer frame; zero about the axis
     covariance           (6, 6), translation then rotation, from the points' covariance; singular about the axis
     frame                outer frame from the fitted paraboloid's frame
     local                (k, 3) m, the points in the fitted paraboloid's frame
     deviation            (k,) m, normal to the surface, positive towards the focus
     deviation_covariance (k, k) m^2, from the points' covariance, the fit's own uncertainty included
-    focal_length         m, fitted or held
-    u_focal_length       m, 0 where held
-    free                 what was fitted
+    focal_length         m, fitted or fixed
+    u_focal_length       m, 0 if fixed
+    free                 fitted parts
     parameter_covariance (p, p) m and rad: vertex x, y, z along the outer frame's axes, tilts about the nominal
-                         paraboloid's x and y, focal length; of these what was fitted
+                         paraboloid's x and y, focal length; of these the fitted ones
     normal               (k, 3) unit normals, outer frame
-    design               (k, p) by how much a parameter lowers a deviation
+    design               (k, p) decrease of the deviations per unit of the parameters
     gain                 (p, k) parameters from deviations
     along                (k, k) m^2, covariance of the points along their normals, without the fit
     """
@@ -61,17 +61,20 @@ class ParaboloidFit:
 
     @property
     def cos_incidence(self) -> np.ndarray:
-        """(k,) of light along the axis: the normals' component along it."""
+        """Cosine (k,) of the incidence of light along the axis: normal's component along it."""
         return cosine(self.local, self.focal_length)
 
     @property
     def half_path(self) -> np.ndarray:
-        """(k,) m, deviation times the cosine of the incidence: half of what it shortens the path to the focus by."""
+        """Half-path error (k,) m: deviation times the cosine of the incidence.
+
+        It is half of the shortening of the path to the focus.
+        """
         return self.deviation * self.cos_incidence
 
     @property
     def half_path_covariance(self) -> np.ndarray:
-        """Covariance of the half-path errors, (k, k) m^2."""
+        """Covariance (k, k) m^2 of the half-path errors."""
         c = self.cos_incidence
         return self.deviation_covariance * c[:, None] * c
 
@@ -86,30 +89,30 @@ def fit_paraboloid(
     weights: np.ndarray | None = None,
     measure: Measure = "normal",
 ) -> ParaboloidFit:
-    """Least squares of deviations over what is free of vertex, axis and focal length.
+    """Least-squares paraboloid over the free parts of vertex, axis and focal length.
 
     points         (k, 3) m, in the frame `nominal.to`, at least as many as parameters
     covariance     (3k, 3k) or, points independent of each other, (k, 3, 3) m^2, or a function from unit vectors (k, 3)
-                   to the covariance (k, k) along them; does not weigh, is carried through
+                   to the covariance (k, k) along them; not used as weight, only propagated
     nominal        outer frame from the nominal paraboloid's: vertex at its origin, axis along its z
-    focal_length   m, held, or where the search begins
-    free           of "vertex" (its three coordinates), "axis" (two tilts), "focal-length"; the rest is held as nominal
-    weights        (k,) 0 or more, of squares; 1 without
-    measure        what is squared: the "normal" deviation or the "half-path" error
+    focal_length   m, fixed, or the start value
+    free           of "vertex" (its three coordinates), "axis" (two tilts), "focal-length"; the others are nominal
+    weights        (k,) 0 or more, of squares; default 1
+    measure        quantity that is squared: the "normal" deviation or the "half-path" error
 
-    Unweighted by the covariance, because the surface's own errors, some tenths of a millimetre, are larger than the
-    points' uncertainty. The deviation is (z - r^2/4f) / sqrt(1 + r^2/4f^2), which differs from the distance to the
-    nearest point of the surface by deviation^2 / 8f at most: 2 nm for a millimetre on f = 60 m. The half-path error is
+    Not weighted by the covariance, because the surface errors, some tenths of a millimetre, exceed the points'
+    uncertainty. The deviation is (z - r^2/4f) / sqrt(1 + r^2/4f^2), which differs from the distance to the
+    surface by at most deviation^2 / 8f: 2 nm for a millimetre on f = 60 m. The half-path error is
     that times cos i = 1 / sqrt(1 + r^2/4f^2). Raises EstimationError for too few points and for points that do not
-    hold the parameters.
+    determine the parameters.
     """
     points = np.asarray(points, dtype=float)
     free = ordered(free)
     k, count = len(points), sum(PARAMETERS[name] for name in free)
     weights = np.ones(k) if weights is None else np.asarray(weights, dtype=float)
-    if (given := int(np.count_nonzero(weights))) < count:
+    if (available := int(np.count_nonzero(weights))) < count:
         what = "a paraboloid of known focal length" if free == POSE else f"a paraboloid of free {', '.join(free)}"
-        raise EstimationError(f"{what} needs {count} points, {given} given")
+        raise EstimationError(f"{what} needs {count} points, {available} given")
     tilts = nominal.rotation[:, :2]  # its x and y axes in the outer frame
     root = np.sqrt(weights)[:, None]
     translation, turn, focal = np.zeros(3), np.zeros(2), focal_length
@@ -130,13 +133,13 @@ def fit_paraboloid(
         raise EstimationError(f"the paraboloid did not settle in {ITERATIONS} iterations; last step {step} m, rad")
     local, normal, deviation, _ = _deviation(points, nominal, translation, tilts @ turn, focal)
     along = covariance_along(covariance, normal)
-    carried = _expansion(free, tilts) @ gain
+    expansion = _expansion(free, tilts) @ gain
     parameters = gain @ along @ gain.T
     rotation = from_vector(tilts @ turn) @ nominal.rotation
     return ParaboloidFit(
         translation=translation,
         rotation=tilts @ turn,
-        covariance=carried @ along @ carried.T,
+        covariance=expansion @ along @ expansion.T,
         frame=Transform(nominal.to, nominal.from_, rotation, nominal.translation + translation),
         local=local,
         deviation=deviation,
@@ -153,13 +156,16 @@ def fit_paraboloid(
 
 
 def _parts(step: np.ndarray, free: tuple[str, ...]) -> dict[str, np.ndarray]:
-    """A step of the parameters by what is free."""
+    """Step of the parameters, split by free part."""
     ends = np.cumsum([PARAMETERS[name] for name in free])
     return {name: step[end - PARAMETERS[name] : end] for name, end in zip(free, ends.tolist(), strict=True)}
 
 
 def ordered(free: Sequence[str]) -> tuple[str, ...]:
-    """What is free, in the order of the parameters; EstimationError for a name that is none of them."""
+    """Free parts in the order of the parameters.
+
+    EstimationError for an unknown name.
+    """
     for name in free:
         if name not in PARAMETERS:
             raise EstimationError(f"{name!r} is not a part of a paraboloid (expected {', '.join(PARAMETERS)})")
@@ -167,12 +173,12 @@ def ordered(free: Sequence[str]) -> tuple[str, ...]:
 
 
 def cosine(local: np.ndarray, focal_length: float) -> np.ndarray:
-    """(k,) cosine of the incidence at points (k, 3) m of a paraboloid's frame: of tan i = r/2f."""
+    """Cosine (k,) of the incidence at points (k, 3) m of a paraboloid's frame: of tan i = r/2f."""
     return 1.0 / np.sqrt(1.0 + np.sum(local[:, :2] ** 2, axis=1) / (2.0 * focal_length) ** 2)
 
 
 def covariance_along(covariance: np.ndarray | AlongNormals, normal: np.ndarray) -> np.ndarray:
-    """(k, k) m^2 of the points' components along unit vectors.
+    """Covariance (k, k) m^2 of the points' components along unit vectors.
 
     covariance   (3k, 3k) or (k, 3, 3) m^2, or a function that gives it
     normal       (k, 3)
@@ -187,25 +193,25 @@ def covariance_along(covariance: np.ndarray | AlongNormals, normal: np.ndarray) 
 
 
 def without(covariance: np.ndarray, design: np.ndarray, gain: np.ndarray) -> np.ndarray:
-    """(1 - design gain) covariance (1 - design gain)^T, (k, k) m^2.
+    """Residual covariance (1 - design gain) covariance (1 - design gain)^T, (k, k) m^2.
 
     covariance   (k, k) m^2
     design       (k, p)
     gain         (p, k)
     """
-    if len(design) <= SQUARE:  # as a square: never below zero, also where nothing is left
-        rest = np.eye(len(design)) - design @ gain
-        return rest @ covariance @ rest.T
+    if len(design) <= SQUARE:  # as a square: never negative, also if nothing is left
+        projection = np.eye(len(design)) - design @ gain
+        return projection @ covariance @ projection.T
     crossed = design @ (gain @ covariance)
     return covariance - crossed - crossed.T + design @ (gain @ covariance @ gain.T) @ design.T
 
 
 def design_rows(fit: ParaboloidFit, places: np.ndarray, nominal: Transform) -> np.ndarray:
-    """(m, p) of `ParaboloidFit.design` at other places of the fitted surface.
+    """Rows (m, p) of `ParaboloidFit.design` at other places of the fitted surface.
 
     fit       a fit
     places    (m, 2) m, x and y in the fitted paraboloid's frame
-    nominal   outer frame from the nominal paraboloid's, as the fit took it
+    nominal   outer frame from the nominal paraboloid's, as in the fit
     """
     height = np.sum(places**2, axis=1) / (4.0 * fit.focal_length)
     points = fit.frame.points(np.column_stack([places, height]))
@@ -215,7 +221,7 @@ def design_rows(fit: ParaboloidFit, places: np.ndarray, nominal: Transform) -> n
 
 
 def _gain(design: np.ndarray, scaled: np.ndarray, k: int) -> np.ndarray:
-    """(p, k): the least squares of scaled * (deviation - design parameters), from the deviations."""
+    """Gain (p, k) of the least squares of scaled * (deviation - design parameters)."""
     if not design.shape[1]:
         return np.zeros((0, k))
     rows = scaled * design
@@ -229,7 +235,9 @@ def _gain(design: np.ndarray, scaled: np.ndarray, k: int) -> np.ndarray:
 def _design(
     arm: np.ndarray, normal: np.ndarray, tilts: np.ndarray, cos: np.ndarray, free: tuple[str, ...]
 ) -> np.ndarray:
-    """(k, p): a shift lowers the deviation by its part along the normal, a turn w by that of w x arm.
+    """Design (k, p) of the deviations by the parameters.
+
+    A shift lowers the deviation by its component along the normal, a rotation w by that of w x arm.
 
     A longer focal length f lowers the surface z = r^2/4f by r^2/4f^2 = tan^2 i, so it raises the deviation by
     tan^2 i cos i.
@@ -245,7 +253,7 @@ def _design(
 
 
 def _expansion(free: tuple[str, ...], tilts: np.ndarray) -> np.ndarray:
-    """(6, p): translation and rotation vector in the outer frame from the parameters."""
+    """Translation and rotation vector in the outer frame by the parameters, (6, p)."""
     expansion = np.zeros((6, sum(PARAMETERS[name] for name in free)))
     at = 0
     for name in free:
@@ -260,7 +268,7 @@ def _expansion(free: tuple[str, ...], tilts: np.ndarray) -> np.ndarray:
 def _deviation(
     points: np.ndarray, nominal: Transform, translation: np.ndarray, rotation: np.ndarray, focal_length: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Points in the paraboloid's frame, unit normals in the outer frame, deviations along them, cosines."""
+    """Points in the paraboloid's frame, unit normals in the outer frame, deviations, cosines."""
     axes = from_vector(rotation) @ nominal.rotation
     local = (points - nominal.translation - translation) @ axes
     slope = local[:, :2] / (2.0 * focal_length)

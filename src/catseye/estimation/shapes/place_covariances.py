@@ -1,4 +1,4 @@
-"""Covariances of two sets of places and of their difference, second less turned first, for thousands of points too."""
+"""Covariances of two sets of points and of their difference, second less rotated first."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -8,28 +8,28 @@ import numpy as np
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.covariance import JointPoints
 
-ROWS = 300  # of a large matrix that are turned or looked at together: a few MB
-SYMMETRIC = 1e-9  # of the largest entry: what a covariance may differ by from its transpose
+ROWS = 300  # of a large matrix per batch: a few MB
+SYMMETRIC = 1e-9  # of the largest entry: tolerance of a covariance's asymmetry
 
 
 @dataclass(frozen=True, eq=False)
 class TurnedPoints:
-    """The covariance (3n, 3n) of some points in other axes, which needs no matrix of its own.
+    """Covariance (3n, 3n) of some points in rotated axes, without a matrix of its own.
 
     points   n of them
-    turn     (3, 3) to the other axes
+    turn     (3, 3) rotation to the other axes
     """
 
     points: JointPoints
     turn: np.ndarray
 
     def rows(self, low: int, high: int) -> np.ndarray:
-        """(3k, 3n) of some points with all, a new matrix."""
-        every = np.arange(len(self.points.columns))
-        return turned_rows(self.points.between(every[low:high], every), self.turn)
+        """Rows (3k, 3n) of some points with all, a new matrix."""
+        indices = np.arange(len(self.points.columns))
+        return turned_rows(self.points.between(indices[low:high], indices), self.turn)
 
     def times(self, a: np.ndarray) -> np.ndarray:
-        """The covariance times a (3n, k)."""
+        """Product of the covariance with a (3n, k)."""
         inside = turned_covariance(a, self.turn.T, columns=False)
         return turned_covariance(self.points.times(inside), self.turn, columns=False)
 
@@ -39,7 +39,7 @@ Known = np.ndarray | TurnedPoints
 
 @dataclass(frozen=True, eq=False)
 class PlaceCovariances:
-    """Covariances of the n places of a group in two epochs.
+    """Covariances of the n points of a group in two epochs.
 
     first    (3n, 3n) m^2, may be singular, or (n, 3, 3) of points that are independent; None: exact, as a design
     second   likewise; one of the two at least
@@ -51,38 +51,38 @@ class PlaceCovariances:
     cross: np.ndarray | None = None
 
     def checked(self, count: int) -> "PlaceCovariances":
-        """The same as numbers; EstimationError for another size, what is no number or not symmetric."""
-        given = {"of the first set": self.first, "of the second set": self.second, "between the sets": self.cross}
+        """Validated float arrays; EstimationError for wrong size, non-finite or asymmetric ones."""
+        inputs = {"of the first set": self.first, "of the second set": self.second, "between the sets": self.cross}
         size = (3 * count, 3 * count)
-        known: list[Any] = []
-        for name, each in given.items():
-            if isinstance(each, TurnedPoints):
-                each.points.check_size()
-                known.append(replace(each, points=each.points.held()))
+        validated: list[Any] = []
+        for name, item in inputs.items():
+            if isinstance(item, TurnedPoints):
+                item.points.check_size()
+                validated.append(replace(item, points=item.points.held()))
                 continue
-            q = None if each is None else np.asarray(each, dtype=float)
-            known.append(q)
+            q = None if item is None else np.asarray(item, dtype=float)
+            validated.append(q)
             if q is None or (q.shape == (count, 3, 3) and name != "between the sets" and np.isfinite(q).all()):
                 continue
             if q.shape != size or not np.isfinite(q).all():
                 raise EstimationError(f"the covariance {name} has shape {q.shape}, expected {size}, all finite")
             if name != "between the sets" and not _symmetric(q):
                 raise EstimationError(f"the covariance {name} is not symmetric")
-        return PlaceCovariances(*known)
+        return PlaceCovariances(*validated)
 
-    def of(self, keep: np.ndarray) -> "PlaceCovariances":
-        """Those of some points (n,) bool."""
-        if keep.all():
+    def of(self, mask: np.ndarray) -> "PlaceCovariances":
+        """Covariances of selected points (n,) bool."""
+        if mask.all():
             return self
-        parts: list[Any] = [_of(q, keep) for q in (self.first, self.second, self.cross)]
+        parts: list[Any] = [_of(q, mask) for q in (self.first, self.second, self.cross)]
         return PlaceCovariances(*parts)
 
     def difference(self, count: int, matrix: np.ndarray, extra: np.ndarray | None = None) -> np.ndarray:
-        """Covariance (3n, 3n) of second less turned first, a new matrix.
+        """Covariance (3n, 3n) of second less rotated first, a new matrix.
 
         count    n
-        matrix   (3, 3) by which the first is turned
-        extra    (3n,) m^2, more variance of the second
+        matrix   (3, 3) that rotates the first
+        extra    (3n,) m^2, additional variance of the second
         """
         size = 3 * count
         total = np.zeros((size, size))
@@ -103,13 +103,13 @@ class PlaceCovariances:
         return total
 
     def blocks(self, count: int, matrix: np.ndarray) -> np.ndarray:
-        """(n, 3, 3) of `difference`, each point's own."""
+        """Diagonal blocks (n, 3, 3) of `difference`."""
         first, second, cross = (_blocks(q, count) for q in (self.first, self.second, self.cross))
         shared = matrix @ cross
         return np.asarray(second + matrix @ first @ matrix.T - shared - shared.transpose(0, 2, 1))
 
     def difference_times(self, matrix: np.ndarray, a: np.ndarray, extra: np.ndarray | None = None) -> np.ndarray:
-        """`difference` times a (3n, k), without a matrix of its size."""
+        """Product of `difference` with a (3n, k), without a matrix of its size."""
         total = np.zeros(a.shape) if extra is None else extra[:, None] * a
         turned = turned_covariance(a, matrix.T, columns=False)
         if self.first is not None:
@@ -121,7 +121,7 @@ class PlaceCovariances:
         return total
 
     def pull(self, matrix: np.ndarray, a: np.ndarray) -> np.ndarray:
-        """By how much weighted residuals a (3n,) move the first places, (3n,) m: (Q_x L' - C) a."""
+        """Shift (3n,) m of the first places by weighted residuals a (3n,): (Q_x L' - C) a."""
         total = np.zeros(len(a))
         if self.first is not None:
             total += _times(self.first, turned_covariance(a[:, None], matrix.T, columns=False))[:, 0]
@@ -131,19 +131,19 @@ class PlaceCovariances:
 
 
 def turned_covariance(q: np.ndarray, matrix: np.ndarray, *, columns: bool) -> np.ndarray:
-    """q L' (columns) or L q (rows) for a covariance q (3n, 3m), L the matrix (3, 3) repeated along the diagonal."""
+    """q L' (columns) or L q (rows) of a covariance q (3n, 3m), L block-diagonal of the matrix (3, 3)."""
     if columns:
         return (q.reshape(len(q), -1, 3) @ matrix.T).reshape(q.shape)
     return (matrix @ q.reshape(-1, 3, q.shape[1])).reshape(q.shape)
 
 
 def turned_rows(q: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """L q L' of some rows (3k, 3n) of a covariance."""
+    """Rows L q L' (3k, 3n) of a rotated covariance."""
     return turned_covariance(turned_covariance(q, matrix, columns=True), matrix, columns=False)
 
 
 def turn_in_place(q: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """L q L', written over q (3n, 3n) and without another matrix of its size."""
+    """Rotated covariance L q L', overwriting q (3n, 3n) without a temporary of its size."""
     for k in range(0, len(q), ROWS):
         q[k : k + ROWS] = turned_rows(q[k : k + ROWS], matrix)
     return q
@@ -158,14 +158,14 @@ def _blocks(q: Known | None, count: int) -> np.ndarray:
     return q if q.ndim == 3 else q.reshape(count, 3, count, 3)[at, :, at]
 
 
-def _of(q: Known | None, keep: np.ndarray) -> Known | None:
+def _of(q: Known | None, mask: np.ndarray) -> Known | None:
     if q is None:
         return None
     if isinstance(q, TurnedPoints):
-        return replace(q, points=q.points.of_points(np.flatnonzero(keep)))
+        return replace(q, points=q.points.of_points(np.flatnonzero(mask)))
     if q.ndim == 3:
-        return q[keep]
-    rows = np.flatnonzero(np.repeat(keep, 3))
+        return q[mask]
+    rows = np.flatnonzero(np.repeat(mask, 3))
     return q[np.ix_(rows, rows)]
 
 
@@ -179,4 +179,4 @@ def _symmetric(q: np.ndarray) -> bool:
     firsts = range(0, len(q), ROWS)
     largest = max((float(np.abs(q[k : k + ROWS]).max()) for k in firsts), default=0.0)
     apart = (np.abs(q[k : k + ROWS, k:] - q[k:, k : k + ROWS].T).max() for k in firsts)
-    return all(float(each) <= SYMMETRIC * largest for each in apart)
+    return all(float(difference) <= SYMMETRIC * largest for difference in apart)

@@ -1,10 +1,10 @@
-"""The rigid, similarity or affine transformation between two sets of points, weighted with the covariance of both.
+"""Rigid, similarity or affine transformation between two sets of points, weighted with both covariances.
 
-Both covariances may be singular, as those of free networks are. What is estimated takes their null space in: only the
-part of the misclosures that no motion explains is weighted, by the inverse of its own covariance. So the sum of squares
-and its degrees of freedom do not depend on the datum of either set; the parameters do, and their covariance says so.
+Both covariances may be singular, as those of free networks are. The parameters absorb their null space: only the part
+of the misclosures that no motion explains is weighted, by the inverse of its own covariance. So the sum of squares and
+its degrees of freedom do not depend on the datum of either set; the parameters do, as their covariance shows.
 
-The covariance is factorised at the start and again only where the search has turned so far that steps shrink slowly.
+The covariance is factorised at the start and again only if the solution has rotated so far that convergence is slow.
 """
 
 from collections.abc import Sequence
@@ -19,23 +19,23 @@ from catseye.estimation.shapes.place_covariances import PlaceCovariances
 
 CONVERGED = "converged"
 NOT_CONVERGED = "not converged: the last step moved a point by {step:.2g} m after {iterations} iterations"
-WEAK = "weak: the turn about ({axis}) is uncertain by {u:.2g} rad; add a point away from that line"
+WEAK = "weak: the rotation about ({axis}) is uncertain by {u:.2g} rad; add a point away from that line"
 MIRRORED = "mirrored: a mirror image fits better; check the handedness of the axes"
 PARAMETERS = {"rigid": 6, "similarity": 7, "affine": 12}
 POINTS = {"rigid": 3, "similarity": 3, "affine": 4}
 ITERATIONS = 50
-STEP = 1e-12  # of the size of the set: below it rounding rules
-FLAT = 1e-9  # of the size of the set: points no further off a line or plane do not hold a turn about it
-NEAR = 1e-2  # of the step before: a factor that leaves more of it is of another place; so near are weights known
-HELD = 1e-4  # of a column's length: what must be left of it beside those before it, for a start to take the step
-WEAK_TURN = 0.1  # rad: beyond it a turn is no longer small, and its covariance only an indication
+STEP = 1e-12  # of the size of the set: rounding limit
+FLAT = 1e-9  # of the size of the set: points closer to a line or plane do not determine a rotation about it
+NEAR = 1e-2  # of the previous step: above it the factor is recomputed; also the accuracy of the weights
+INDEPENDENT = 1e-4  # of a column's length: minimum left after orthogonalisation, for the starting step
+WEAK_TURN = 0.1  # rad: above it a rotation is not small, and its covariance only indicative
 
 
 def motion_columns(points: np.ndarray, pivot: np.ndarray) -> np.ndarray:
-    """Derivatives of coordinates with respect to small translation, rotation and change of scale, (3n, 7).
+    """Derivatives (3n, 7) of coordinates by small translation, rotation and scale.
 
     points   (n, 3) m
-    pivot    (3,) m, what the rotation and the scale leave in place
+    pivot    (3,) m, fixed by rotation and scale
 
     Columns: translation x, y, z (1), rotation x, y, z (m/rad, right-hand rule), scale (m). Source: [BAARDA73].
 
@@ -47,19 +47,21 @@ def motion_columns(points: np.ndarray, pivot: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Transformation:
-    """second = pivot + translation + matrix (first - pivot), with residuals: second minus that.
+    """second = pivot + translation + matrix (first - pivot), with residuals.
+
+    The residuals are second minus its prediction.
 
     kind                "rigid", "similarity" or "affine"
-    pivot               (3,) m, in the axes of the first set; the translation is that of this point
+    pivot               (3,) m, in the axes of the first set; point of reference of the translation
     translation         (3,) m
     matrix              (3, 3): rotation, scale times rotation, or any
-    covariance          (6, 6), (7, 7) or (12, 12): translation; then rotation (a further small turn about the axes of
-                        the second set, rad); then scale; or, affine, translation and the matrix row by row
+    covariance          (6, 6), (7, 7) or (12, 12): translation; then rotation (a further small rotation about the axes
+                        of the second set, rad); then scale; or, affine, translation and the matrix row by row
     residual            (n, 3) m
     pvv                 weighted sum of squares
     degrees_of_freedom  3 n less parameters
     iterations          steps taken
-    status              "converged", or one line that says what is wrong and what to do
+    status              "converged", or one line with the problem and the remedy
     """
 
     kind: str
@@ -75,33 +77,38 @@ class Transformation:
 
     @property
     def scale(self) -> float:
-        """Cube root of the change of volume: 1 for a rigid motion."""
+        """Cube root of the volume ratio: 1 for a rigid motion."""
         return float(np.cbrt(np.linalg.det(self.matrix)))
 
     @property
     def rotation(self) -> np.ndarray:
-        """(3,) rad, rotation vector of the rotation nearest to the matrix."""
+        """Rotation vector (3,) rad of the rotation nearest to the matrix."""
         from scipy.spatial.transform import Rotation
 
         return Rotation.from_matrix(_polar(self.matrix)[0]).as_rotvec()
 
     @property
     def variance_factor(self) -> float:
-        """[pvv] / degrees of freedom, expectation 1; nan without redundancy."""
+        """Variance factor [pvv] / degrees of freedom, expectation 1.
+
+        It is nan without redundancy.
+        """
         return self.pvv / self.degrees_of_freedom if self.degrees_of_freedom else float("nan")
 
     def require_converged(self) -> "Transformation":
-        """This transformation, or EstimationError with its status."""
+        """Return this transformation, or raise EstimationError with its status."""
         if self.status != CONVERGED:
             raise EstimationError(self.status)
         return self
 
     def apply(self, points: np.ndarray) -> np.ndarray:
-        """Points (..., 3) m of the first set's axes in those of the second."""
+        """Points (..., 3) m transformed from the first set's axes to the second's."""
         return self.pivot + self.translation + (np.asarray(points, dtype=float) - self.pivot) @ self.matrix.T
 
     def about(self, pivot: np.ndarray) -> "Transformation":
-        """The same transformation with another pivot (3,) m: translation and covariance follow, nothing else changes.
+        """The same transformation with another pivot (3,) m.
+
+        Translation and covariance follow.
 
         translation' = translation + (matrix - 1) (pivot' - pivot). Exact.
         """
@@ -116,10 +123,11 @@ class Transformation:
         )
 
     def strain(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rotation (3,) rad and strain (6,) xx yy zz yz xz xy, stretch less one, with their covariance (9, 9).
+        """Rotation (3,) rad and strain (6,) xx yy zz yz xz xy, with covariance (9, 9).
 
-        The matrix is rotation times stretch (polar decomposition), so the strain is seen in the axes of the first set
-        and a rotation of any size leaves it at zero. The rotation's covariance is as in `covariance`.
+        Strain is stretch less one. The matrix is rotation times stretch (polar decomposition), so the strain refers to
+        the axes of the first set and is zero for a rotation of any size. The rotation's covariance is as in
+        `covariance`.
         """
         turn, stretch = _polar(self.matrix)
         slope = np.zeros((9, 9))
@@ -134,7 +142,7 @@ class Transformation:
         return np.concatenate([self.rotation, _six(stretch - np.eye(3))]), q
 
     def _of_matrix(self) -> np.ndarray:
-        """Covariance (9, 9) of the matrix, row by row."""
+        """Covariance (9, 9) of the matrix elements, row by row."""
         if self.kind == "affine":
             return self.covariance[3:, 3:]
         # row 3 i + j of the matrix depends on the parameters as component i of the image of unit vector j
@@ -148,13 +156,13 @@ def _six(tensor: np.ndarray) -> np.ndarray:
 
 
 def _polar(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation and symmetric stretch whose product is the matrix."""
+    """Rotation and symmetric stretch of a matrix (polar decomposition)."""
     u, s, vt = np.linalg.svd(matrix)
     return u @ vt, (vt.T * s) @ vt
 
 
 def _columns(kind: str, arm: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Derivatives (3n, p) of pivot + translation + matrix @ arm with respect to the parameters."""
+    """Derivatives (3n, p) of pivot + translation + matrix @ arm by the parameters."""
     n = len(arm)
     if kind == "affine":
         blocks = np.zeros((n, 3, 12))
@@ -170,12 +178,12 @@ def _columns(kind: str, arm: np.ndarray, matrix: np.ndarray) -> np.ndarray:
 
 
 def closed_form(first: np.ndarray, second: np.ndarray, *, with_scale: bool = False) -> tuple[np.ndarray, bool]:
-    """The matrix (rotation, or scale times rotation) that fits two sets of points best unweighted, and if mirrored.
+    """Best unweighted matrix (rotation, or scale times rotation) between two sets, and mirror flag.
 
     first, second   (n, 3) m
     with_scale      True fits a change of scale too
 
-    Always a proper rotation, also of points in one plane; the second value is True where an improper one fits better.
+    Always a proper rotation, also of coplanar points; the flag is True if an improper one fits better.
     The translation is that of the centroid. Source: [KABSCH76]; [UMEYAMA91] (sign that keeps it proper, scale). Exact.
 
     >>> turned = np.eye(3) @ [[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]]
@@ -202,29 +210,29 @@ def fit_transformation(
     pivot: np.ndarray | None = None,
     names: Sequence[str] | None = None,
 ) -> Transformation:
-    """The transformation from one set of points to another that fits both best, with full covariance.
+    """Best transformation between two sets of points, with full covariance.
 
     first               (n, 3) m, n at least 3 (affine 4)
     second              (n, 3) m, the same points in the same order
     kind                "rigid" (6 parameters), "similarity" (7) or "affine" (12)
     covariance_first    (3n, 3n) m^2, may be singular; None: the first set is exact
-    covariance_second   likewise; both None: equal weights of 1 m, so multiply the answer's covariance by its
+    covariance_second   likewise; both None: equal weights of 1 m, so multiply the resulting covariance by its
                         variance factor
     cross               (3n, 3n) m^2, covariance of the first (rows) with the second (columns), if any
     pivot               (3,) m, in the first set's axes; default the centroid
     names               n, for errors
 
     Starts from the closed form, then Gauss-Newton on the Gauss-Helmert model: the derivatives are taken at adjusted
-    points, so that the answer is the maximum of the likelihood however noisy the first set is. Singular covariances:
-    see the top of this file. A rigid motion also of networks whose scale is free is refused: fit a similarity. Raises
-    EstimationError for sets that do not fit together or do not hold the parameters, naming what floats.
+    points, so that the result is the maximum likelihood solution for any noise of the first set. Singular covariances:
+    see the top of this file. A rigid motion of networks with free scale is refused: fit a similarity. Raises
+    EstimationError for inconsistent sets or undetermined parameters, which are named.
 
     Source: [KABSCH76], [UMEYAMA91] (start); [POPE72] (derivatives at adjusted observations); [RAO73] section 4i.
     """
-    known = PlaceCovariances(covariance_first, covariance_second, cross)
+    covariance = PlaceCovariances(covariance_first, covariance_second, cross)
     if covariance_first is None and covariance_second is None:
-        known = PlaceCovariances(second=np.tile(np.eye(3), (len(first), 1, 1)))
-    return adjusted_motion(first, second, known, kind=kind, pivot=pivot, names=names)[0]
+        covariance = PlaceCovariances(second=np.tile(np.eye(3), (len(first), 1, 1)))
+    return adjusted_motion(first, second, covariance, kind=kind, pivot=pivot, names=names)[0]
 
 
 def adjusted_motion(
@@ -237,16 +245,16 @@ def adjusted_motion(
     names: Sequence[str] | None = None,
     extra: np.ndarray | None = None,
 ) -> tuple[Transformation, LinearEstimate]:
-    """`fit_transformation`, with the linear estimate at its end: gain, weighted residuals, weights.
+    """Transformation as `fit_transformation`, and the final linear estimate.
 
-    extra   (3n,) m^2, more variance of the second set
+    extra   (3n,) m^2, additional variance of the second set
 
-    Each step solves the linear model for what is left of the conditions at its place, misclosure = spread times
-    weighted residuals and columns' weighted residuals = 0, so that a factor of a place nearby leads to the same end.
-    The weights P of the estimate are of the last factor, by NEAR of themselves; everything else is of the end.
+    Each step solves the linear model for the remaining conditions, misclosure = covariance times weighted residuals and
+    columns' weighted residuals = 0, so that a factor from a nearby state gives the same solution. The weights P of the
+    estimate are of the last factor, accurate to NEAR; everything else is of the final state.
     """
-    x, y, called = _checked(first, second, kind, names)
-    known = covariance.checked(len(x))
+    x, y, coordinate_names = _checked(first, second, kind, names)
+    covariances = covariance.checked(len(x))
     pivot = x.mean(axis=0) if pivot is None else np.asarray(pivot, dtype=float)
     smallest = STEP * max(float(np.abs(x - pivot).max()), float(np.abs(y - pivot).max()))
     if kind == "affine":
@@ -255,31 +263,35 @@ def adjusted_motion(
     else:
         matrix, mirrored = closed_form(x, y, with_scale=kind == "similarity")
     translation = np.mean(y - pivot - (x - pivot) @ matrix.T, axis=0)
-    matrix, translation = _by_own_blocks(kind, x - pivot, y - pivot, known, matrix, translation)
-    adjusted, weighted, taken, used = x, np.zeros(x.size), 0, 0
+    matrix, translation = _with_point_blocks(kind, x - pivot, y - pivot, covariances, matrix, translation)
+    adjusted, weighted, iterations, used = x, np.zeros(x.size), 0, 0
     before = step = np.inf
     model = None
-    while step >= smallest and taken < ITERATIONS:
-        taken += 1
+    while step >= smallest and iterations < ITERATIONS:
+        iterations += 1
         misclosure = (y - pivot - translation - (x - pivot) @ matrix.T).ravel()
         columns = _columns(kind, adjusted - pivot, matrix)
         if model is None or (used > 1 and step > NEAR * before):
-            model, used = None, 0  # its memory goes first
+            model, used = None, 0  # frees its memory first
             model = FactoredModel.of(
-                columns, known.difference(len(x), matrix, extra), parameters=_names(kind), rows=called, overwrite=True
+                columns,
+                covariances.difference(len(x), matrix, extra),
+                parameters=_names(kind),
+                rows=coordinate_names,
+                overwrite=True,
             )
         used += 1
-        left = misclosure - known.difference_times(matrix, weighted[:, None], extra)[:, 0]
-        more, change = model.solve(left, -columns.T @ weighted)
+        remaining = misclosure - covariances.difference_times(matrix, weighted[:, None], extra)[:, 0]
+        more, change = model.solve(remaining, -columns.T @ weighted)
         weighted = weighted + more
         before, step = step, float(np.abs(columns @ change).max())
         at = matrix
-        adjusted = x + known.pull(at, weighted).reshape(-1, 3)
+        adjusted = x + covariances.pull(at, weighted).reshape(-1, 3)
         translation = translation + change[:3]
         matrix = _stepped(kind, at, change[3:])
     assert model is not None
-    gain, spread_of = model.refined(columns, lambda a: known.difference_times(at, a, extra))
-    status = NOT_CONVERGED.format(step=step, iterations=taken)
+    gain, spread_of = model.refined(columns, lambda a: covariances.difference_times(at, a, extra))
+    status = NOT_CONVERGED.format(step=step, iterations=iterations)
     if step < smallest:
         status = _status(kind, spread_of, mirrored or np.linalg.det(matrix) < 0.0)
     free = x.size - columns.shape[1]
@@ -293,32 +305,32 @@ def adjusted_motion(
         residual=misclosure.reshape(-1, 3),
         pvv=linear.pvv,
         degrees_of_freedom=free,
-        iterations=taken,
+        iterations=iterations,
         status=status,
     )
     return motion, linear
 
 
-def _by_own_blocks(
-    kind: str, x: np.ndarray, y: np.ndarray, known: PlaceCovariances, matrix: np.ndarray, translation: np.ndarray
+def _with_point_blocks(
+    kind: str, x: np.ndarray, y: np.ndarray, covariances: PlaceCovariances, matrix: np.ndarray, translation: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A start nearer to the end: one step in which each point counts by its own covariance, as if independent.
+    """Better start: one step with each point weighted by its own covariance block.
 
     x, y   (n, 3) m, from the pivot
 
-    Matrix and translation come back as they were where a point's own covariance is singular or the step is not held.
+    Matrix and translation are returned unchanged if a block is singular or the step is undetermined.
     """
     try:
-        half = np.linalg.inv(np.linalg.cholesky(known.blocks(len(x), matrix)))
+        half = np.linalg.inv(np.linalg.cholesky(covariances.blocks(len(x), matrix)))
     except np.linalg.LinAlgError:
         return matrix, translation
     rows = (half @ _columns(kind, x, matrix).reshape(len(x), 3, -1)).reshape(x.size, -1)
-    left = (half @ (y - translation - x @ matrix.T)[:, :, None]).ravel()
+    misclosure = (half @ (y - translation - x @ matrix.T)[:, :, None]).ravel()
     size = np.linalg.norm(rows, axis=0)
     base, triangle = np.linalg.qr(rows / size)
-    if np.abs(np.diag(triangle)).min() < HELD:
+    if np.abs(np.diag(triangle)).min() < INDEPENDENT:
         return matrix, translation
-    step = np.linalg.solve(triangle, base.T @ left) / size
+    step = np.linalg.solve(triangle, base.T @ misclosure) / size
     return _stepped(kind, matrix, step[3:]), translation + step[:3]
 
 
@@ -352,16 +364,16 @@ def _status(kind: str, covariance: np.ndarray, mirrored: bool) -> str:
 def _checked(
     first: np.ndarray, second: np.ndarray, kind: str, names: Sequence[str] | None
 ) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Both sets as floats and the names of their coordinates; refused where they cannot hold the parameters."""
+    """Validated float arrays of both sets, and coordinate names."""
     if kind not in PARAMETERS:
-        raise EstimationError(f"kind {kind!r} is none of {', '.join(PARAMETERS)}")
+        raise EstimationError(f"unknown kind {kind!r} (expected one of {', '.join(PARAMETERS)})")
     x, y = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
     if x.ndim != 2 or x.shape[1] != 3 or x.shape != y.shape or not (np.isfinite(x).all() and np.isfinite(y).all()):
         raise EstimationError(f"points have shapes {x.shape} and {y.shape}, expected (n, 3) twice, all finite")
-    called = list(names) if names is not None else [f"point {i}" for i in range(len(x))]
-    if len(called) != len(x):
-        raise EstimationError(f"{len(called)} names for {len(x)} points")
-    some = ", ".join(called[:4]) + (" ..." if len(called) > 4 else "")
+    labels = list(names) if names is not None else [f"point {i}" for i in range(len(x))]
+    if len(labels) != len(x):
+        raise EstimationError(f"{len(labels)} names for {len(x)} points")
+    some = ", ".join(labels[:4]) + (" ..." if len(labels) > 4 else "")
     if len(x) < POINTS[kind]:
         floats = {0: "everything", 1: "every rotation", 2: "the turn about the line through them"}
         floating = floats.get(len(x), "the strain across their plane")
@@ -377,4 +389,4 @@ def _checked(
         if rank == 2 and kind == "affine":
             axis = ", ".join(f"{v:.3f}" for v in vt[2])
             raise EstimationError(f"affine: {some} lie in one plane: strain along its normal ({axis}) floats")
-    return x, y, [f"{name} {axis}" for name in called for axis in "xyz"]
+    return x, y, [f"{name} {axis}" for name in labels for axis in "xyz"]

@@ -1,10 +1,10 @@
-"""A field known at some points, foretold at others with its uncertainty: trend and Gaussian process (kriging).
+"""Prediction of a field from measured points, with uncertainty: trend and Gaussian process (kriging).
 
     field(x) = trend(x) coefficients + smooth(x) + own(x)        measured = field + noise
 
 The trend's coefficients are free. `smooth` has the covariance of Matern, s^2 (1 + r) exp(-r) with r = sqrt(3) distance
-/ length; `own` is what each point has for itself (a panel's corner), p^2, independent; the noise's covariance is given.
-s, length and p are found by restricted likelihood, in which the trend takes no part.
+/ length; `own` is the independent part of each point (a panel's corner), variance p^2; the noise's covariance is known.
+s, length and p are estimated by restricted likelihood, which is independent of the trend.
 """
 
 from dataclasses import dataclass
@@ -13,20 +13,20 @@ import numpy as np
 
 from catseye.errors import EstimationError
 
-MOST = 300  # points for the search of the three numbers; of more an even choice
-SPARE = 6  # points beyond the trend's coefficients, at least
-LEAST = 1e-8  # m: below it a standard deviation is nothing
-LONGEST = 4.0  # length over the size of the set
+MOST = 300  # points for the estimation of the three parameters; above it an even selection
+SPARE = 6  # minimum of points beyond the trend's coefficients
+LEAST = 1e-8  # m: lower limit of a standard deviation
+LONGEST = 4.0  # maximum length over the size of the set
 EVALUATIONS = 120
 
 
 @dataclass(frozen=True, eq=False)
 class Roughness:
-    """What a field does beside its trend.
+    """Covariance parameters of a field beside its trend.
 
     smooth   m, standard deviation of the smooth part
-    length   m, over which it changes
-    own      m, standard deviation of what each point has for itself
+    length   m, correlation length
+    own      m, standard deviation of the independent part of each point
     """
 
     smooth: float
@@ -34,7 +34,7 @@ class Roughness:
     own: float
 
     def covariance(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """(n, m) m^2 of the smooth part between places (n, 2) and (m, 2) m.
+        """Covariance (n, m) m^2 of the smooth part between places (n, 2) and (m, 2) m.
 
         Source: [STEIN99], Matern's family at 3/2.
         """
@@ -45,12 +45,12 @@ class Roughness:
 
 @dataclass(frozen=True, eq=False)
 class Foretold:
-    """The field at m places, from k measured ones.
+    """Predicted field at m places, from k measured ones.
 
     value        (m,) m
-    covariance   (m, m) m^2 of foretold less true
-    weights      (m, k) by which the measured values enter
-    roughness    that was used
+    covariance   (m, m) m^2 of predicted less true
+    weights      (m, k) of the measured values
+    roughness    used
     """
 
     value: np.ndarray
@@ -67,7 +67,7 @@ def find_roughness(places: np.ndarray, values: np.ndarray, noise: np.ndarray, *,
     noise    (k, k) m^2, covariance of the measurement
     trend    (k, q), of full rank
 
-    Of more than 300 points an even choice of them counts. Their own uncertainty is not carried on.
+    Of more than 300 points an even selection is used. The uncertainty of the estimates is not propagated.
     Source: [PATTERSON71]. Raises EstimationError for fewer points than coefficients and six.
     """
     from scipy.linalg import solve_triangular
@@ -75,13 +75,13 @@ def find_roughness(places: np.ndarray, values: np.ndarray, noise: np.ndarray, *,
 
     k, q = trend.shape
     if k < q + SPARE:
-        raise EstimationError(f"{k} points beside {q} coefficients of a trend (expected {q + SPARE} points at least)")
+        raise EstimationError(f"{k} points for {q} coefficients of a trend (expected at least {q + SPARE} points)")
     if k > MOST:
         chosen = np.unique(np.linspace(0, k - 1, MOST).round().astype(int))
         places, values, trend = places[chosen], values[chosen], trend[chosen]
         noise = noise[np.ix_(chosen, chosen)]
     size = float(np.ptp(places, axis=0).max())
-    # error contrasts: what the trend cannot touch
+    # error contrasts: independent of the trend
     contrast = np.linalg.qr(trend, mode="complete")[0][:, q:]
     contrasts, contrast_noise = contrast.T @ values, contrast.T @ noise @ contrast
     spread = max(float(np.std(contrasts)), LEAST)
@@ -118,12 +118,12 @@ def _roughness(parameters: np.ndarray, spread: float, size: float) -> Roughness:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredField:
-    """A field as it was measured at k points.
+    """Field measured at k points.
 
     places   (k, 2) m
-    values   (k,) m: what is left when a design and its gain have taken their part
-    noise    (k, k) m^2, covariance of the measurement, before that
-    trend    (k, q), whose columns span those of the design too
+    values   (k,) m: residuals after a fit with a design and its gain
+    noise    (k, k) m^2, covariance of the measurement, before the fit
+    trend    (k, q), whose columns include the span of the design
     """
 
     places: np.ndarray
@@ -143,20 +143,20 @@ def foretell(
     gain: np.ndarray | None = None,
     wanted_design: np.ndarray | None = None,
 ) -> Foretold:
-    """Best linear unbiased prediction (universal kriging), with the covariance of what it misses.
+    """Best linear unbiased prediction (universal kriging), with the prediction error's covariance.
 
-    measured       what is known, at k points
+    measured       field at k points
     wanted         (m, 2) m
     wanted_trend   (m, q)
     roughness      of the field
-    same           (m,) the measured point that a wanted one is, which shares its own part; -1 for none
-    design, gain   (k, p), (p, k): values = (1 - design gain) raw; the field is wanted less what the gain would find in
-                   the true field, wanted_design gain field
+    same           (m,) index of the measured point identical with a wanted one, which shares its own part; -1 for none
+    design, gain   (k, p), (p, k): values = (1 - design gain) raw; the field is wanted less its fit by the gain,
+                   wanted_design gain field
     wanted_design  (m, p)
 
     Source: [STEIN99]; value = trend* b + c^T V^-1 (values - trend b), V = smooth + own + noise. With the weights K the
-    prediction misses by (K field - field*) + (K - wanted_design gain) noise, which gives its covariance whatever the
-    roughness is. Raises EstimationError where the points do not hold the trend.
+    prediction error is (K field - field*) + (K - wanted_design gain) noise, which gives its covariance for any
+    roughness. Raises EstimationError if the points do not determine the trend.
     """
     places, values, noise, trend = measured.places, measured.values, measured.noise, measured.trend
     smooth = roughness.covariance(places, places)
@@ -164,25 +164,25 @@ def foretell(
     between = roughness.covariance(wanted, places)
     shared = np.flatnonzero(same >= 0)
     between[shared, same[shared]] += roughness.own**2
-    beyond = roughness.covariance(wanted, wanted)
-    beyond[np.diag_indices_from(beyond)] += roughness.own**2
-    whole = smooth + noise
-    whole[np.diag_indices_from(whole)] += LEAST**2  # a rounding's worth, where neither noise nor own part is
+    prior_covariance = roughness.covariance(wanted, wanted)
+    prior_covariance[np.diag_indices_from(prior_covariance)] += roughness.own**2
+    total = smooth + noise
+    total[np.diag_indices_from(total)] += LEAST**2  # regularisation where there is neither noise nor own part
     try:
-        factor = np.linalg.cholesky(whole)
+        factor = np.linalg.cholesky(total)
     except np.linalg.LinAlgError as problem:
         raise EstimationError(
-            f"the covariance of {len(places)} measured points is not positive definite; is a point there twice?"
+            f"the covariance of {len(places)} measured points is not positive definite; is a point duplicated?"
         ) from problem
     from scipy.linalg import cho_solve
 
     solved = cho_solve((factor, True), trend)
     square = trend.T @ solved
     if not np.linalg.cond(square / np.sqrt(np.outer(np.diag(square), np.diag(square)))) < 1e14:
-        raise EstimationError(f"{len(places)} points do not hold the {trend.shape[1]} coefficients of the trend")
+        raise EstimationError(f"{len(places)} points do not determine the {trend.shape[1]} coefficients of the trend")
     simple = cho_solve((factor, True), between.T).T  # (m, k)
     weights = simple + (wanted_trend - simple @ trend) @ np.linalg.solve(square, solved.T)
     crossed = weights @ between.T
-    missed = weights @ smooth @ weights.T - crossed - crossed.T + beyond
-    heard = weights if design is None or gain is None or wanted_design is None else weights - wanted_design @ gain
-    return Foretold(weights @ values, missed + heard @ noise @ heard.T, weights, roughness)
+    missed = weights @ smooth @ weights.T - crossed - crossed.T + prior_covariance
+    noise_gain = weights if design is None or gain is None or wanted_design is None else weights - wanted_design @ gain
+    return Foretold(weights @ values, missed + noise_gain @ noise @ noise_gain.T, weights, roughness)

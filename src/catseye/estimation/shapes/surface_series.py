@@ -1,4 +1,4 @@
-"""Paraboloids through the same points at many epochs, at once: place, focal length, deviations, covariance of each."""
+"""Paraboloids through the same points at many epochs: pose, focal length, deviations, covariance."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,20 +16,22 @@ STATUS = {
     UNHELD: "the points do not hold the paraboloid",
     UNSETTLED: "not settled",
 }
-LARGE = 20_000  # points times epochs from which the compiled form pays for its import
+LARGE = 20_000  # points times epochs from which the compiled form is faster, import included
 
 
 @dataclass(frozen=True, eq=False)
 class SurfaceSeries:
-    """What T epochs of k points say; an epoch without an answer holds nan and its status says why.
+    """Fits of T epochs of k points.
 
-    free         what was fitted
-    parameters   (T, p) m and rad: vertex in the nominal paraboloid's own axes, tilts about its x and y, focal length
-                 less the nominal one; of these what is free
+    A failed epoch has nan and a status with the reason.
+
+    free         fitted parts
+    parameters   (T, p) m and rad: vertex in the nominal paraboloid's axes, tilts about its x and y, focal length
+                 less the nominal one; of these the free ones
     covariance   (T, p, p)
-    deviation    (T, k) m, normal, above zero towards the focus; nan where a point was not seen
-    points       (T,) points seen
-    status       (T,) 0 where converged, else a key of STATUS
+    deviation    (T, k) m, normal, above zero towards the focus; nan for missing points
+    points       (T,) number of points measured
+    status       (T,) 0 if converged, else a key of STATUS
     """
 
     free: tuple[str, ...]
@@ -40,12 +42,12 @@ class SurfaceSeries:
     status: np.ndarray
 
     def require_converged(self) -> "SurfaceSeries":
-        """This series, or EstimationError that names the first epoch without an answer."""
+        """Return this series, or raise EstimationError naming the first failed epoch."""
         bad = np.flatnonzero(self.status != CONVERGED)
         if len(bad):
             raise EstimationError(
                 f"epoch {bad[0] + 1} of {len(self.status)}: {STATUS[int(self.status[bad[0]])]}, "
-                f"{self.points[bad[0]]} points seen; {len(bad)} epochs without an answer"
+                f"{self.points[bad[0]]} points measured; {len(bad)} epochs failed"
             )
         return self
 
@@ -61,18 +63,18 @@ def fit_series(
     measure: Measure = "normal",
     compiled: bool | None = None,
 ) -> SurfaceSeries:
-    """As `fit_paraboloid`, each epoch for itself.
+    """Fit each epoch as `fit_paraboloid`.
 
-    points         (T, k, 3) m, in the frame `nominal.to`; nan in a point that was not seen
+    points         (T, k, 3) m, in the frame `nominal.to`; nan for missing points
     variance       (k,) or (T, k) m^2, of the points along their normals; points independent
     nominal        outer frame from the nominal paraboloid's
-    focal_length   m, held, or where the search begins
+    focal_length   m, fixed, or the start value
     free           of "vertex", "axis", "focal-length"
-    weights        (k,) of squares; 1 without
+    weights        (k,) of squares; default 1
     measure        "normal" or "half-path"
-    compiled       by the kernel (2209 points of 1000 epochs in seconds), or plainly; None: by size
+    compiled       True: by the kernel (2209 points of 1000 epochs in seconds); False: plain Python; None: by size
 
-    Raises EstimationError for names that are not parts of a paraboloid and for shapes that do not fit.
+    Raises EstimationError for unknown parts of a paraboloid and for inconsistent shapes.
     """
     points, free = np.asarray(points, dtype=float), ordered(free)
     if points.ndim != 3 or points.shape[2] != 3:
@@ -102,8 +104,8 @@ def _plainly(
     weights: np.ndarray,
     measure: Measure,
 ) -> SurfaceSeries:
-    """A call of `fit_paraboloid` an epoch, in the nominal paraboloid's own frame."""
-    own = Transform(nominal.from_, nominal.from_, np.eye(3), np.zeros(3))
+    """Fit every epoch with `fit_paraboloid`, in the nominal paraboloid's frame."""
+    nominal_frame = Transform(nominal.from_, nominal.from_, np.eye(3), np.zeros(3))
     epochs, k, _ = points.shape
     p = sum(PARAMETERS[name] for name in free)
     local = (points - nominal.translation) @ nominal.rotation
@@ -116,16 +118,16 @@ def _plainly(
         np.zeros(epochs, dtype=np.int64),
     )
     for epoch in range(epochs):
-        seen = np.isfinite(local[epoch]).all(axis=1)
-        blocks = variance[epoch, seen, None, None] * np.eye(3)
+        finite = np.isfinite(local[epoch]).all(axis=1)
+        blocks = variance[epoch, finite, None, None] * np.eye(3)
         try:
             fit = fit_paraboloid(
-                local[epoch, seen],
+                local[epoch, finite],
                 blocks,
-                own,
+                nominal_frame,
                 focal_length=focal_length,
                 free=free,
-                weights=weights[seen],
+                weights=weights[finite],
                 measure=measure,
             )
         except EstimationError as problem:
@@ -139,5 +141,5 @@ def _plainly(
         }
         series.parameters[epoch] = np.concatenate([parts[name] for name in free]) if free else []
         series.covariance[epoch] = fit.parameter_covariance
-        series.deviation[epoch, seen] = fit.deviation
+        series.deviation[epoch, finite] = fit.deviation
     return series

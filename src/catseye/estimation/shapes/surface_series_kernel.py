@@ -1,6 +1,6 @@
-"""The compiled form of `surface_series`: Gauss and Newton of each epoch, one pass over its points a step.
+"""Compiled form of `surface_series`: Gauss-Newton per epoch, one pass over its points per step.
 
-Its plain form, `fit_paraboloid` called an epoch, is its test.
+Tested against its plain form, `fit_paraboloid` per epoch.
 """
 
 import numpy as np
@@ -30,7 +30,10 @@ def _turned(a, b):
 
 @njit(cache=True, error_model="numpy")
 def _factor(matrix, p):
-    """Cholesky's lower factor in place of the matrix; whether every pivot is above the least."""
+    """Cholesky factor in place of the matrix.
+
+    False if a pivot is too small.
+    """
     for i in range(p):
         for j in range(i + 1):
             total = matrix[i, j]
@@ -47,7 +50,7 @@ def _factor(matrix, p):
 
 @njit(cache=True, error_model="numpy")
 def _solve(factor, right, p):
-    """The solution in place of the right-hand side."""
+    """Replace the right-hand side by the solution."""
     for i in range(p):
         for q in range(i):
             right[i] -= factor[i, q] * right[q]
@@ -60,10 +63,12 @@ def _solve(factor, right, p):
 
 @njit(cache=True, error_model="numpy")
 def _pass(local, weights, variance, six, settings, what, deviation, sums):
-    """Deviations and the right side of a step; `what` 1: the normal matrix, too; 2: and that of the noise.
+    """Deviations and right-hand side of a step.
+
+    `what` 1: and the normal matrix, 2: and the noise's.
 
     `settings` are columns, focal and squared of `series`; `sums` the normal matrix, that of the noise and the right
-    side. Returns the number of points that were seen.
+    side. Returns the number of points used.
     """
     columns, focal, squared = settings
     normal, spread, right = sums
@@ -119,16 +124,16 @@ def _pass(local, weights, variance, six, settings, what, deviation, sums):
 
 @njit(cache=True, error_model="numpy")
 def series(local, variance, weights, columns, focal, squared):
-    """Every epoch.
+    """Fit every epoch.
 
-    local      (T, k, 3) m, nominal paraboloid's frame; nan where not seen
+    local      (T, k, 3) m, nominal paraboloid's frame; nan if missing
     variance   (T, k) m^2 along the normals
     weights    (k,)
-    columns    (p,) of 0..5: which parameters are free
+    columns    (p,) of 0..5: indices of the free parameters
     focal      m
-    squared    whether half paths are squared, else normal deviations
+    squared    True: half-path errors are squared; False: normal deviations
 
-    Parameters (T, p), covariance (T, p, p), deviations (T, k), points seen and status (T,).
+    Returns parameters (T, p), covariance (T, p, p), deviations (T, k), number of points and status (T,).
     """
     epochs, k, p = local.shape[0], local.shape[1], len(columns)
     parameters, covariance = np.full((epochs, p), np.nan), np.full((epochs, p, p), np.nan)
@@ -139,10 +144,10 @@ def series(local, variance, weights, columns, focal, squared):
     settings, sums = (columns, focal, squared), (normal, spread, right)
     for t in range(epochs):
         six = np.zeros(6)
-        here, noise, off = local[t], variance[t], deviation[t]
+        epoch_points, noise, off = local[t], variance[t], deviation[t]
         for turn in range(ITERATIONS):
-            # the normal matrix of the first step serves the others: their right sides decide where they end
-            points[t] = _pass(here, weights, noise, six, settings, 1 if turn == 0 else 0, off, sums)
+            # the normal matrix of the first step is reused: the right-hand sides determine the solution
+            points[t] = _pass(epoch_points, weights, noise, six, settings, 1 if turn == 0 else 0, off, sums)
             if points[t] < p:
                 status[t] = TOO_FEW
                 break
@@ -165,7 +170,7 @@ def series(local, variance, weights, columns, focal, squared):
             continue
         for a in range(p):
             parameters[t, a] = six[columns[a]]
-        _pass(here, weights, noise, six, settings, 2, off, sums)
+        _pass(epoch_points, weights, noise, six, settings, 2, off, sums)
         if not _scaled(normal, size, p):
             status[t] = UNHELD
             continue
@@ -175,7 +180,10 @@ def series(local, variance, weights, columns, focal, squared):
 
 @njit(cache=True, error_model="numpy")
 def _scaled(normal, size, p):
-    """The normal matrix brought to unit diagonal and factored in place, the roots of its diagonal in `size`."""
+    """Scale the normal matrix to unit diagonal and factor it in place.
+
+    Diagonal roots in `size`.
+    """
     for a in range(p):
         size[a] = np.sqrt(normal[a, a])
     for a in range(p):
@@ -186,7 +194,7 @@ def _scaled(normal, size, p):
 
 @njit(cache=True, error_model="numpy")
 def _noise(factor, spread, size, covariance, column, p):
-    """Normal matrix's inverse times the noise's spread times that inverse, in the parameters' units."""
+    """Inverse normal matrix times the noise's spread times that inverse, in the parameters' units."""
     for a in range(p):
         for b in range(a):
             spread[b, a] = spread[a, b]

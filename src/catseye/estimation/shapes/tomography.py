@@ -1,6 +1,6 @@
-"""A field from its means along straight lines: Gauss-Markov estimation with a correlation length, no grid.
+"""Field tomography from line means: Gauss-Markov estimation with correlation lengths, no grid.
 
-A scalar field and, if wanted, a vector field are Gaussian processes about unknown means; an observation is the mean of
+A scalar field and, optionally, a vector field are Gaussian processes about unknown means; an observation is the mean of
 the scalar along a line, plus a multiple of the mean of the vector's component along it, plus systematic parameters with
 priors, plus noise. The best linear estimate of any mean along any other line follows from covariances of line means
 alone, which are integrals of the correlation along both lines: exact in one (error function), Gauss-Legendre in the
@@ -17,9 +17,9 @@ import numpy as np
 
 from catseye.errors import EstimationError, ValidityError
 
-NODES, NODES_PER_LENGTH = 8, 5  # Gauss-Legendre nodes: to begin with, and more for each correlation length
-LONGEST = 500.0  # correlation lengths: a longer line would need more nodes than are worth while
-SHORT = 1e-4  # correlation lengths: a shorter line counts as its mid-point, good to 1e-9
+NODES, NODES_PER_LENGTH = 8, 5  # Gauss-Legendre nodes: constant, and per correlation length
+LONGEST = 500.0  # correlation lengths: limit of a line's length (number of nodes)
+SHORT = 1e-4  # correlation lengths: a shorter line is replaced by its mid-point, accurate to 1e-9
 SUSPECT = 3.29  # of a standard normal variable: 1 in 1000
 WORST_CONDITION = 1e13
 
@@ -46,11 +46,11 @@ class Scale:
 
 @dataclass(frozen=True)
 class FieldPrior:
-    """What is known of a field beforehand.
+    """Prior of a field: mean and scales.
 
     mean     expected mean, in the field's unit
-    u_mean   its standard uncertainty: what all of space shares
-    scales   how the field departs from its mean
+    u_mean   its standard uncertainty, common to all of space
+    scales   of the field's variation about its mean
     """
 
     mean: float
@@ -70,7 +70,7 @@ class Lines:
 
     @property
     def directions(self) -> np.ndarray:
-        """(m, 3) unit vectors from start to end; zero for points."""
+        """Unit vectors (m, 3) from start to end; zero for points."""
         d = self.end - self.start
         length = np.linalg.norm(d, axis=1, keepdims=True)
         return d / np.where(length > 0.0, length, 1.0)
@@ -78,14 +78,16 @@ class Lines:
 
 @dataclass(frozen=True, eq=False)
 class LineMeans:
-    """Observations: mean of the scalar along each line + along x mean of the vector's component + design x parameters.
+    """Observed line means of the scalar field, with vector and systematic contributions.
+
+    observed = mean of the scalar along each line + along x mean of the vector's component + design x parameters.
 
     lines        of the m observations
     observed     (m,) in the scalar's unit
     covariance   (m, m) of the noise
-    along        (m,) what one unit of the vector along the line's direction adds; zeros where no vector enters
+    along        (m,) contribution of one unit of the vector along the line's direction; zero without a vector field
     design       (m, q) derivatives by systematic parameters, expected zero
-    sigmas       (q,) their standard uncertainties beforehand
+    sigmas       (q,) their prior standard uncertainties
     """
 
     lines: Lines
@@ -104,8 +106,8 @@ class Means:
     covariance   (t, t)
     parameters   (q,) estimates of the systematic parameters
     cross        (t, q) covariance of the means with them
-    resolution   (t,) 1 - variance over what it was beforehand: 0 where the lines tell nothing, 1 where they tell all
-    weights      (t, m) what a unit of each observation adds
+    resolution   (t,) 1 - posterior over prior variance: 0 without information, 1 for complete information
+    weights      (t, m) of the observations
     """
 
     value: np.ndarray
@@ -117,18 +119,18 @@ class Means:
 
     @property
     def u(self) -> np.ndarray:
-        """(t,) standard uncertainties."""
+        """Standard uncertainties (t,) of the means."""
         return np.sqrt(np.diag(self.covariance))
 
 
 def line_covariance(a: Lines, b: Lines, scales: tuple[Scale, ...]) -> np.ndarray:
-    """Covariance of a field's means along m lines with its means along n others, (m, n).
+    """Covariance (m, n) of a field's means along m lines with those along n others.
 
     a, b     lines
     scales   of the field, its mean not counted
 
-    Source: the double integral of the correlation along both lines over their lengths; derived in this file. Good to
-    1e-9 of the variance.
+    Source: the double integral of the correlation along both lines over their lengths; derived in this file. Accurate
+    to 1e-9 of the variance.
 
     >>> one = Lines(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0]]))
     >>> round(float(line_covariance(one, one, (Scale(1.0, (1.0, 1.0, 1.0)),))[0, 0]), 6)
@@ -142,14 +144,14 @@ def line_covariance(a: Lines, b: Lines, scales: tuple[Scale, ...]) -> np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Tomogram:
-    """The fields that the observations tell; ask it for means along lines.
+    """Estimated fields, to be evaluated along lines.
 
     chi_square           of the observations about their prediction from the priors: expectation m, variance 2 m
     degrees_of_freedom   m
-    predicted            (m,) each observation from all the others
-    standardised         (m,) observed less predicted over its standard deviation: standard normal when all holds
-    suspects             indices of observations that the rest does not bear out, the worst first: beyond 3.29 when it
-                         and those before it are left out; named only, all observations are in the estimate
+    predicted            (m,) each observation from all others
+    standardised         (m,) observed less predicted over its standard deviation: standard normal if the model holds
+    suspects             indices of observations that contradict the others, worst first: beyond 3.29 when it and
+                         those before it are left out; reported only, all observations are in the estimate
     """
 
     observations: LineMeans
@@ -171,9 +173,9 @@ class Tomogram:
         return self._means(np.full(len(prior), self.scalar.mean), prior, cross)
 
     def vector_along(self, lines: Lines, directions: np.ndarray) -> Means:
-        """Means along lines of the vector field's component in a direction of each, (t, 3) unit vectors.
+        """Means along lines of the vector field's component in given directions, (t, 3) unit vectors.
 
-        Raises EstimationError where no vector field was estimated.
+        Raises EstimationError if no vector field was estimated.
         """
         if self.vector is None:
             raise EstimationError("no vector field was estimated; give its prior")
@@ -198,21 +200,21 @@ class Tomogram:
         )
 
     def parameter_covariance(self) -> np.ndarray:
-        """(q, q) covariance of the systematic parameters."""
+        """Covariance (q, q) of the systematic parameters."""
         variance = self.observations.sigmas**2
         with_parameters = variance[:, None] * self.observations.design.T
         return np.diag(variance) - with_parameters @ self.inverse @ with_parameters.T
 
 
 def tomogram(observations: LineMeans, scalar: FieldPrior, vector: FieldPrior | None = None) -> Tomogram:
-    """The fields that best explain means along lines, given what was known beforehand.
+    """Best estimate of the fields from line means, given their priors.
 
     observations   means along lines, in the scalar's unit
     scalar         prior of the scalar field
     vector         prior of each component of the vector field, expected mean 0; None: no such field
 
     Source: [TARANTOLA05] section 3.2 in the space of observations; [RASMUSSEN06] eq. 5.12 (each observation from
-    the others). Raises EstimationError where observations contradict each other exactly, ValidityError for bad shapes.
+    the others). Raises EstimationError for exactly contradictory observations, ValidityError for inconsistent shapes.
     """
     _check(observations, vector)
     lines = observations.lines
@@ -227,20 +229,20 @@ def tomogram(observations: LineMeans, scalar: FieldPrior, vector: FieldPrior | N
     values, vectors = np.linalg.eigh(scaled)
     if not values[0] > values[-1] / WORST_CONDITION:
         raise EstimationError(
-            "the observations cannot be told apart: two of one line without noise; give their noise, or leave one out"
+            "singular covariance: two observations of one line without noise; give their noise, or leave one out"
         )
     inverse = (vectors / values) @ vectors.T / np.outer(root, root)
     innovation = observations.observed - scalar.mean
-    left = inverse @ innovation
+    weighted = inverse @ innovation
     variance = 1.0 / np.diag(inverse)  # of an observation about its prediction from the others
-    standardised = left * np.sqrt(variance)
+    standardised = weighted * np.sqrt(variance)
     return Tomogram(
         observations=observations,
         scalar=scalar,
         vector=vector,
-        chi_square=float(innovation @ left),
+        chi_square=float(innovation @ weighted),
         degrees_of_freedom=len(innovation),
-        predicted=observations.observed - left * variance,
+        predicted=observations.observed - weighted * variance,
         standardised=standardised,
         suspects=_suspects(inverse, innovation),
         inverse=inverse,
@@ -249,23 +251,23 @@ def tomogram(observations: LineMeans, scalar: FieldPrior, vector: FieldPrior | N
 
 
 def _suspects(inverse: np.ndarray, innovation: np.ndarray) -> np.ndarray:
-    """One after the other, since a gross error makes its neighbours look bad; at most half of all."""
+    """Suspect observations, removed one by one (a gross error affects its neighbours), at most half of all."""
     inverse, rejected = inverse.copy(), []
-    kept = np.ones(len(innovation), dtype=bool)
+    mask = np.ones(len(innovation), dtype=bool)
     for _ in range(len(innovation) // 2):
-        diagonal = np.where(kept, np.diag(inverse), 1.0)
-        score = np.where(kept, np.abs(inverse @ np.where(kept, innovation, 0.0)) / np.sqrt(diagonal), 0.0)
+        diagonal = np.where(mask, np.diag(inverse), 1.0)
+        score = np.where(mask, np.abs(inverse @ np.where(mask, innovation, 0.0)) / np.sqrt(diagonal), 0.0)
         worst = int(np.argmax(score))
         if score[worst] <= SUSPECT:
             break
         rejected.append(worst)
-        kept[worst] = False
+        mask[worst] = False
         inverse -= np.outer(inverse[:, worst], inverse[worst]) / inverse[worst, worst]  # of the matrix without its row
     return np.array(rejected, dtype=int)
 
 
 def _correlation(a: Lines, b: Lines, lengths: np.ndarray) -> np.ndarray:
-    """Mean of exp(-d²/2) over both lines: along b in closed form, along a by quadrature; (m, n)."""
+    """Mean (m, n) of exp(-d²/2) over both lines: closed form along b, quadrature along a."""
     from scipy.special import erf
 
     p, u = a.start / lengths, (a.end - a.start) / lengths
@@ -274,7 +276,7 @@ def _correlation(a: Lines, b: Lines, lengths: np.ndarray) -> np.ndarray:
     if not longest <= LONGEST:
         raise ValidityError(
             f"a line of {longest:g} correlation lengths is longer than {LONGEST:g}: shorten the line, or give the "
-            "field a longer scale (what is so small averages out)"
+            "field a longer scale (so small a scale averages out)"
         )
     size = np.linalg.norm(v, axis=1)
     point = size < SHORT
@@ -300,9 +302,9 @@ def _check(observations: LineMeans, vector: FieldPrior | None) -> None:
         "along": (observations.along.shape, (m,)),
         "design": (observations.design.shape, (m, q)),
     }
-    for name, (got, wanted) in shapes.items():
-        if got != wanted:
-            raise ValidityError(f"{name} of {m} line means has the shape {got}, expected {wanted}")
+    for name, (got, expected) in shapes.items():
+        if got != expected:
+            raise ValidityError(f"{name} of {m} line means has the shape {got}, expected {expected}")
     if m == 0:
         raise EstimationError("no observation of a mean along a line")
     if not np.all(np.isfinite(observations.observed)):

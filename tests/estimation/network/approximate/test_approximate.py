@@ -110,7 +110,7 @@ class Survey:
         return self
 
     def station(self, origin, *targets):
-        """What a total station measures."""
+        """Add the observations of a total station."""
         return self.directions(origin, *targets).ranges(origin, *targets).zeniths(origin, *targets)
 
     def network(self, *unknown, given=None):
@@ -275,7 +275,7 @@ def test_a_ranging_network_with_nothing_known_keeps_its_shape(s, t, seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_ranging_network_is_laid_on_four_known_points_right_side_out(seed):
+def test_ranging_network_is_fitted_to_four_known_points_with_correct_handedness(seed):
     stations, targets = field(8, 30, seed)
     survey = Survey(stations | targets, seed=seed)
     for name in stations:
@@ -321,7 +321,7 @@ def test_known_points_metres_off_still_give_starts_metres_off():
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_random_visibility_leaves_nothing_unfound_where_each_point_is_seen_three_times(seed):
+def test_random_visibility_places_all_points_with_three_sights(seed):
     rng = np.random.default_rng(seed)
     stations, targets = field(9, 60, seed, height=40)
     survey = Survey(stations | targets, seed=seed)
@@ -347,7 +347,7 @@ class TestWhatCannotBeFound:
         assert why == {"P": "seen by 3 ranges only and two positions fit"}
 
     def test_nothing(self):
-        assert Survey(POINT).ranges("A", "B").missing("P") == {"P": "no observation holds it"}
+        assert Survey(POINT).ranges("A", "B").missing("P") == {"P": "no observation of it"}
 
     def test_sights_from_points_that_are_lost_too(self):
         places = POINT | {"Q": (10, 20, 30)}
@@ -364,7 +364,7 @@ class TestWhatCannotBeFound:
         survey.groups.append(
             DistanceDifferences("d", np.ones(1), np.ones(1), *(survey.at(n) for n in ("A", "P", "B", "P")))
         )
-        assert survey.missing("P") == {"P": "no observation holds it"}
+        assert survey.missing("P") == {"P": "no observation of it"}
 
     def test_resection_on_the_circle_through_its_three_points(self):
         circle = {n: (50 * np.cos(a), 50 * np.sin(a), 0) for n, a in zip("ABCP", (0.3, 1.2, 2.5, 4.0), strict=True)}
@@ -385,7 +385,7 @@ def test_an_observed_coordinate_places_a_point_and_a_known_height_chooses_betwee
     np.testing.assert_allclose(answer.xyz[4], survey.true[4], atol=0.02)
 
 
-def test_inclinations_level_planes_and_joint_groups_serve_as_what_they_contain():
+def test_inclinations_level_planes_and_joint_groups_are_used_by_their_contents():
     survey = Survey(POINT | {"Q": (10, 30, 99.5)})
     level = survey.parameter(101.2, unit="m")
     heights = survey.true[[0, 1, 5], 2]
@@ -519,7 +519,7 @@ def test_a_level_plane_of_known_height_gives_a_height():
     survey.found("P")
 
 
-def test_an_unknown_zero_of_the_rangers_of_thirty_sigma_bends_the_figure_less_than_it_would_take_to_refuse_it():
+def test_unknown_ranger_zero_of_thirty_sigma_does_not_refuse_the_figure():
     stations, targets = field(10, 30, 1)
     survey = Survey(stations | targets, seed=1)
     zero = survey.parameter(0.03, unit="m", start=0.0)
@@ -531,7 +531,7 @@ def test_an_unknown_zero_of_the_rangers_of_thirty_sigma_bends_the_figure_less_th
     np.testing.assert_allclose(distances(answer.xyz), distances(survey.true), atol=1.0)
 
 
-def test_a_figure_of_ranges_that_too_few_placed_points_hold_says_how_many():
+def test_figure_with_too_few_placed_points_gives_their_number():
     stations, targets = field(8, 12, 1)
     survey = Survey(stations | targets | {"Z": (500, 500, 0)}, seed=1)
     for name in stations:

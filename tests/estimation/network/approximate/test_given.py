@@ -94,13 +94,13 @@ POOR = [(3.0, ()), (10.0, ()), (0.0, ((12, 30),)), (3.0, ((12, 30), (10, 20)))]
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("off", "exchanged"), POOR)
-def test_none_of_fifty_poor_starts_leads_elsewhere(off, exchanged):
+def test_fifty_poor_starts_lead_to_the_same_solution(off, exchanged):
     for seed in range(50):
         agrees(seed, off, exchanged)
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_exchanged_points_alone_are_placed_anew_and_named(seed):
+def test_only_exchanged_points_are_replaced_and_named(seed):
     true, rng = scene(seed)
     given = true.copy()
     given[[3, S + 4, S + 9]] = true[[S + 9, 3, S + 4]]
@@ -122,7 +122,7 @@ def test_exchanged_points_of_the_datum_are_kept_for_the_adjustment_to_name():
     np.testing.assert_array_equal(answer.xyz, given)
 
 
-def test_good_coordinates_are_all_kept_and_nothing_is_named():
+def test_good_coordinates_are_kept_without_a_note():
     true, rng = scene(1)
     answer = approximate(ranging(true + 0.01 * rng.normal(size=true.shape), rng))
     assert answer.replaced == answer.assumed == ()
@@ -192,7 +192,7 @@ def survey(true, turns=(2.0, -2.0, 1.1)):
     )
 
 
-def test_exchanged_points_of_a_level_network_are_placed_anew():
+def test_exchanged_points_of_a_level_network_are_replaced():
     true = scene(4)[0][: S + 6]
     given = true.copy()
     given[[6, 11]] = true[[11, 6]]

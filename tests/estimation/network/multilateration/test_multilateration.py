@@ -341,7 +341,7 @@ def nearest_covariance(name):
 @named
 @pytest.mark.parametrize("engine", ENGINES)
 def test_covariances_are_those_of_the_nearest_network_derived_by_a_bordered_inverse(name, engine):
-    """Where plain numpy's answer is, which is the compiled form's to a picometre (below)."""
+    """Tested on plain numpy, which agrees with the compiled form to a picometre (below)."""
     network, expected = VARIANTS[name], nearest_covariance(name)
     solution = adjust_ranges(network, engine=engine).require_converged()
     stations, targets, _ = columns_of(network)
@@ -436,7 +436,7 @@ def test_moving_and_turning_everything_moves_and_turns_the_answer(seed, far):
 @settings(max_examples=15)
 @given(unit=st.sampled_from([1e-3, 1.0, 1e3, 1e6]), claim=st.sampled_from([1e-3, 1.0, 1e3]), few=st.booleans())
 def test_units_and_sigmas_do_not_change_what_is_decided(unit, claim, few):
-    """From nanometres to kilometres, from 20 nm to 20 mm at 40 m: the same status, iterations apart."""
+    """Nanometres to kilometres, 20 nm to 20 mm at 40 m: same status, except for iterations."""
     network = room(5, seen=0.8, offset=1e-7 if claim < 1 else 1e-4, noise=claim)
     if few:
         kept = (network.target != 3) | (network.station < 2)
@@ -453,7 +453,7 @@ def test_units_and_sigmas_do_not_change_what_is_decided(unit, claim, few):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_another_range_never_grows_a_covariance(seed):
+def test_further_range_never_increases_a_covariance(seed):
     network = room(seed, seen=0.5, noise=0.0)
     left_out = np.ones(len(network.distance))
     left_out[7 * seed] = np.inf
@@ -660,7 +660,7 @@ def test_a_network_without_datum_floats_by_six_motions_or_seven():
     assert adjust_ranges(replace(self_scaled, datum_stations=np.ones((7, 3), dtype=bool))).status == CONVERGED
 
 
-def test_a_datum_that_leaves_a_turn_free_is_told_which():
+def test_datum_with_a_free_rotation_names_it():
     base = room(offset=0.0, noise=0.0)
     stations = base.stations.copy()
     stations[0], stations[3] = (-25, 0, 2), (25, 0, 2)
@@ -690,7 +690,7 @@ def test_a_station_without_ranges_is_named():
     assert "[S03]" in status(without(network, network.station == 2))
 
 
-def test_a_zero_and_scale_that_no_range_tells_apart_are_named():
+def test_inseparable_zero_and_scale_are_named():
     """All targets of one station lie at one distance: its zero and scale do the same."""
     network = room(5, t=25, noise=0.0, offset=0.0, station_names=NAMES["station_names"])
     targets = network.targets.copy()
@@ -710,7 +710,7 @@ def test_a_range_between_coinciding_points_is_named():
     targets = network.targets.copy()
     targets[2] = network.stations[4]
     assert status(replace(network, targets=targets)).startswith(
-        "undefined at the present values: the range S05 to T03 "
+        "undefined at the current values: the range S05 to T03 "
     )
 
 
@@ -750,8 +750,8 @@ def test_an_error_of_a_millimetre_shows_in_its_test_alone():
         ({"sigma": (3, 0.0)}, "range 3, S01 to T04: distance .* sigma 0.0 m; both must be finite and sigma positive"),
         ({"sigma": (3, np.inf)}, "range 3, S01 to T04"),
         ({"distance": (5, np.nan)}, "range 5, S01 to T06: distance nan m"),
-        ({"station": (2, 7)}, "range 2 names station 7, there are 7"),
-        ({"target": (2, -1)}, "range 2 names target -1, there are 14"),
+        ({"station": (2, 7)}, "range 2 names station 7, but there are 7"),
+        ({"target": (2, -1)}, "range 2 names target -1, but there are 14"),
         ({"stations": ((1, 2), np.nan)}, "S02 starts at .*nan.*; every point needs approximate coordinates"),
     ],
 )
@@ -770,7 +770,7 @@ def test_bad_extras_are_refused():
         adjust_ranges(
             replace(network, station_priors=PointPriors(np.array([0]), np.zeros((1, 3)), np.zeros((1, 3, 3))))
         )
-    with pytest.raises(InputError, match="priors name point 2, there are 7"):
+    with pytest.raises(InputError, match=r"priors name point 2 \(expected below 7"):
         adjust_ranges(replace(network, station_priors=prior(network.stations, [2, 2])))
     with pytest.raises(InputError, match="zero of S03: start"):
         adjust_ranges(replace(network, zero_sigma=np.where(np.arange(7) == 2, -1.0, 0.0)))

@@ -70,7 +70,7 @@ def test_weighted_positions_with_missing_ranges_are_scipys(compiled):
 
 @pytest.mark.parametrize("compiled", [False, True])
 def test_targets_of_an_adjusted_network_are_found_again_from_its_stations(compiled):
-    """At the optimum of the whole network the targets are optimal for its stations: an independent solver's answer."""
+    """Targets of an optimal network are optimal for its stations (independent solver)."""
 
     def table(name):
         with open(NETWORK / name, encoding="utf-8") as file:
@@ -130,7 +130,7 @@ def test_every_kind_of_trouble_ends_in_its_status_at_any_scale(compiled, scale):
     np.testing.assert_allclose(got.x[[0, 11]] / scale, targets[[0, 11]], atol=1e-10)
 
 
-def test_the_status_in_words_says_what_and_how_much():
+def test_status_text_gives_cause_and_size():
     stations, _, d, u, _ = awkward()
     got = positions(stations, d, u)
     assert "seen by 2 ranges only" in got.text(1)
@@ -191,7 +191,7 @@ def test_nearly_coplanar_stations_tell_the_side_when_they_can_and_say_so_when_th
 
 @pytest.mark.parametrize("compiled", [False, True])
 def test_the_closed_form_starts_at_the_answer(compiled):
-    """Without noise one step sees that nothing is left to do: flat, tilted and deep figures of stations."""
+    """Noise-free ranges need one step only: flat, tilted and deep figures of stations."""
     for flat in (0.05, 0.3, 1.0):
         stations, targets, d = hall(17, 64, flat=flat, sigma=0.0)
         turn = rotation(np.random.default_rng(17))
@@ -236,7 +236,7 @@ def test_compiled_and_plain_forms_give_the_same():
 
 
 def counted(monkeypatch):
-    """How many targets the compiled form has left to the plain one, as a list that grows."""
+    """Number of targets that the compiled form left to the plain one, as a growing list."""
     left, plain = [], module._plain
     monkeypatch.setattr(module, "_plain", lambda s, chunk, **kept: (left.append(len(chunk.d)), plain(s, chunk, **kept)))
     return left
@@ -262,7 +262,7 @@ def test_the_compiled_form_itself_finds_targets_from_any_subset(missing, monkeyp
             assert same[plain.status == PositionStatus.FOUND].all()
 
 
-def test_the_compiled_form_takes_the_near_image_of_the_stations_that_each_target_is_seen_from(monkeypatch):
+def test_compiled_form_takes_the_near_image_per_visible_stations(monkeypatch):
     """Three ranges each: every subset has a plane of its own, and which side of it is near is its own matter."""
     stations, targets, d = hall(21, 400, s=6, flat=0.4, sigma=0.0)
     rng = np.random.default_rng(22)
@@ -312,7 +312,7 @@ def test_a_step_across_the_stations_plane_does_not_end_at_the_worse_image(compil
 
 
 @draws(60)
-def test_compiled_and_plain_forms_agree_where_almost_nothing_goes_smoothly(runs):
+def test_compiled_and_plain_forms_agree_in_difficult_cases(runs):
     """Sigmas over six decades, noise beyond them, figures flat and thin, ranges missing: the same status and place."""
     rng = np.random.default_rng(23)
     for k in range(runs):
@@ -329,7 +329,7 @@ def test_compiled_and_plain_forms_agree_where_almost_nothing_goes_smoothly(runs)
         assert (apart(fast.x[answered], plain.x[answered]) <= 1e-3 * sigma).all()
 
 
-def test_undamped_steps_pass_a_narrow_valley_where_damped_ones_creep():
+def test_undamped_steps_pass_a_narrow_valley_faster_than_damped_ones():
     """Three good ranges, three a million times worse that spoil the start by metres: still scipy's minimum."""
     rng = np.random.default_rng(24)
     stations, targets, _ = hall(24, 200, s=6, flat=0.3)
@@ -343,7 +343,7 @@ def test_undamped_steps_pass_a_narrow_valley_where_damped_ones_creep():
         assert got.pvv[t] == pytest.approx(pvv, rel=1e-4, abs=1e-4)
 
 
-def test_a_damped_descent_that_settles_has_ended_however_it_came_there():
+def test_settled_damped_descent_has_status_settled():
     stations, targets, d = hall(25, 300, s=5, flat=0.3, sigma=0.0)
     u = np.array([[1e-4, 1e-4, 0.1, 0.1, 0.1]])
     r = Ranges(stations, d, u, np.full(300, 5))
@@ -351,7 +351,7 @@ def test_a_damped_descent_that_settles_has_ended_however_it_came_there():
     got = descend(r, start)
     there = apart(got.x, targets) < 1e-6
     assert there.mean() > 0.8
-    assert got.ended[there].all()
+    assert got.settled[there].all()
     assert (got.iterations[there] > 10).any()  # some were damped on the way
 
 
@@ -440,7 +440,7 @@ def test_near_the_stations_plane_an_ellipsoid_is_given_only_where_it_holds():
     assert share == sorted(share)
 
 
-def test_a_blunder_far_from_convergence_is_no_silent_answer():
+def test_blunder_far_from_convergence_is_reported():
     """Ranges exchanged between stations, 200 targets: each is found contradicting or refused an answer."""
     stations, _, d = hall(13, 200, s=6, flat=0.3)
     wrong = d[:, [1, 0, 2, 3, 4, 5]]
@@ -450,7 +450,7 @@ def test_a_blunder_far_from_convergence_is_no_silent_answer():
         assert (got.iterations <= CAP).all()
 
 
-def test_what_cannot_be_positions_is_refused_in_one_line():
+def test_invalid_positions_input_is_refused_in_one_line():
     stations, _, d = hall(14, 3)
     u = np.full(18, 5e-5)
     with pytest.raises(InputError, match=r"stations \(18, 3\) and distances \(3, 17\)"):

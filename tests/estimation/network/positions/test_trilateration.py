@@ -206,7 +206,7 @@ def test_convergence_is_of_second_order():
         assert after == pytest.approx(before**2 / (2 * (50 + before)), rel=1e-6)
 
 
-def test_the_iteration_at_its_cap_and_from_the_plane_says_so():
+def test_iteration_limit_and_start_in_plane_are_reported():
     s = np.array([[0.0, 0, 0], [60, 0, 0], [0, 80, 0]])
     start = np.array([[20.0, 20, 50], [20, 20, 0]])
     got = trilaterate_by_averaging(s, np.array([[40.0, 40, 40], [60, 60, 60]]), start)

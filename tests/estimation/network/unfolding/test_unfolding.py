@@ -119,7 +119,7 @@ def test_stations_nearly_in_a_plane_decide_the_sides_as_soon_as_the_ranges_can()
 
 @pytest.mark.parametrize(("s", "t", "within"), [(6, 8, 0.02), (4, 4, 0.05), (18, 60, 0.01)])
 @pytest.mark.parametrize("seed", range(2))
-def test_everything_in_one_plane_comes_out_in_the_plane(s, t, within, seed):
+def test_coplanar_points_give_a_planar_figure(s, t, within, seed):
     found = check(*scene(s, t, seed, height=0.0, target_height=0.0), seed, within=within)
     assert not np.any(found.targets[:, 2])
     assert not np.any(found.stations[:, 2])
@@ -273,6 +273,6 @@ def test_many_points_are_located_block_by_block_as_one_by_one():
     np.testing.assert_allclose(xyz[:, 0], targets, rtol=0.0, atol=0.02)
 
 
-def test_five_stations_in_a_plane_with_five_targets_off_it_are_told_the_number_needed():
+def test_five_coplanar_stations_are_refused_with_the_number_needed():
     found = unfold(measured(*scene(5, 5, 3, height=0.0), 3), SIGMA)
     assert "5 stations or 5 targets lie in one plane, where at least 6 are needed" in found.status

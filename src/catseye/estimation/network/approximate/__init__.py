@@ -1,1 +1,1 @@
-"""Where an adjustment begins: approximate coordinates and orientations, found for what a network does not give."""
+"""Approximate coordinates and orientations of a network, as start of its adjustment."""

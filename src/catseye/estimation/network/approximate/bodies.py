@@ -1,4 +1,4 @@
-"""Rigid bodies and frames of a network: what poses them, from placed points."""
+"""Poses of rigid bodies and frames of a network, from placed points."""
 
 from collections.abc import Iterator
 
@@ -15,16 +15,16 @@ from catseye.geometry.frames.rotation import to_vector
 def bodies_of(
     network: ObservationNetwork, values: np.ndarray
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-    """Points (k,), their coordinates in the body (k, 3), pose columns (6,) and R0 of each body or frame."""
-    whole = np.concatenate([np.zeros(3 * len(network.points.names)), values])
+    """Points (k,), body coordinates (k, 3), pose columns (6,) and R0 of each body or frame."""
+    state = np.concatenate([np.zeros(3 * len(network.points.names)), values])
     for group, _ in parts_of(network):
         if not isinstance(group, RigidBodies | FramePoints):
             continue
         k = len(group.point)
         local = np.asarray(group.observed).reshape(k, 3)
         if isinstance(group, FramePoints):
-            own = np.where(group.frame_point[:, None] < 0, -1, group.frame_point[:, None] + np.arange(3))
-            local = local + value(whole, own)
+            frame_columns = np.where(group.frame_point[:, None] < 0, -1, group.frame_point[:, None] + np.arange(3))
+            local = local + value(state, frame_columns)
         pose, start = np.broadcast_to(group.pose, (k, 6)), np.broadcast_to(group.start, (k, 3, 3))
         for columns in np.unique(pose, axis=0):
             at = np.flatnonzero((pose == columns).all(axis=1))
@@ -32,7 +32,7 @@ def bodies_of(
 
 
 def poses(network: ObservationNetwork, xyz: np.ndarray, values: np.ndarray) -> Iterator[tuple[int, float]]:
-    """Column and start of each pose whose six parameters are unknown, from at least three placed points off a line."""
+    """Column and start of each unknown pose, from at least three placed points, not collinear."""
     for point, local, columns, start in bodies_of(network, values):
         motion = rigid_motion(local, xyz[point])
         if motion is not None and np.all(columns >= 0):
@@ -41,9 +41,12 @@ def poses(network: ObservationNetwork, xyz: np.ndarray, values: np.ndarray) -> I
 
 
 def rigid_motion(local: np.ndarray, ground: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """R and T with ground = T + R local, from the rows known in both; None if fewer than three or in line."""
-    known = np.isfinite(ground).all(axis=1) & np.isfinite(local).all(axis=1)
-    if known.sum() < 3 or np.linalg.matrix_rank(local[known] - local[known].mean(axis=0), tol=1e-3) < 2:
+    """R and T with ground = T + R local, from rows known in both.
+
+    None if fewer than three or collinear.
+    """
+    common = np.isfinite(ground).all(axis=1) & np.isfinite(local).all(axis=1)
+    if common.sum() < 3 or np.linalg.matrix_rank(local[common] - local[common].mean(axis=0), tol=1e-3) < 2:
         return None
-    turn = closed_form(local[known], ground[known])[0]
-    return turn, ground[known].mean(axis=0) - turn @ local[known].mean(axis=0)
+    turn = closed_form(local[common], ground[common])[0]
+    return turn, ground[common].mean(axis=0) - turn @ local[common].mean(axis=0)

@@ -1,4 +1,4 @@
-"""Local figures where no point can be placed by itself: level networks about a station, figures from ranges alone."""
+"""Local figures for points that cannot be placed singly: level networks, and figures from ranges."""
 
 from collections import Counter, defaultdict
 
@@ -14,7 +14,7 @@ from catseye.estimation.shapes.rigid_body import closed_form
 
 
 def place_all(search: PlacingSearch) -> None:
-    """Places what can be placed: from placed points, by local figures, and last where one of two fits better."""
+    """Place all points possible: from placed points, by local figures, last the better of two positions."""
     search.spread()
     while len(search.unplaced) and (_attach_level(search) or _attach_ranges(search)):
         search.spread()
@@ -23,10 +23,12 @@ def place_all(search: PlacingSearch) -> None:
 
 
 def _attach_level(search: PlacingSearch) -> bool:
-    """Places points by local networks about a station, level and turned anyhow; whether any was placed.
+    """Place points by level local networks about a station.
 
-    The directions of the station's set with all else give local coordinates; two placed points among them (or one, and
-    an azimuth) say where it belongs. If the network gives no two points, the largest is laid down as it is.
+    True if any was placed.
+
+    The directions of the station's set with all other observations give local coordinates; two placed points among them
+    (or one, and an azimuth) attach them. Without two given points, the largest is placed as it is.
     """
     r = search.rows
     local_rows = np.ones(len(r), dtype=bool)
@@ -52,38 +54,47 @@ def _attach_level(search: PlacingSearch) -> bool:
 
 
 def _helmert(search: PlacingSearch, frame: PlacingSearch) -> bool:
-    """Lays a level local network on the placed points, turned about the vertical; whether it placed any coordinate."""
+    """Fit a level local network to the placed points about the vertical.
+
+    True if any was placed.
+    """
     level = np.isfinite(frame.xyz[:, :2]).all(axis=1)
     placed = np.isfinite(search.xyz[:, :2]).all(axis=1)
-    both = np.flatnonzero(level & placed)
-    ours, theirs = (xyz[both, 0] + 1j * xyz[both, 1] for xyz in (search.xyz, frame.xyz))
-    turn = level_turn(theirs, ours) if len(both) >= 2 else None
+    common = np.flatnonzero(level & placed)
+    placed_plan, frame_plan = (xyz[common, 0] + 1j * xyz[common, 1] for xyz in (search.xyz, frame.xyz))
+    turn = level_turn(frame_plan, placed_plan) if len(common) >= 2 else None
     turn = _turn_of_azimuths(search, frame, level) if turn is None else turn
-    if turn is None and (placed.sum() > len(both) or len(both) > 1):
+    if turn is None and (placed.sum() > len(common) or len(common) > 1):
         return False
-    if not len(both) and placed.any():
+    if not len(common) and placed.any():
         return False
     spot = (frame.xyz[:, 0] + 1j * frame.xyz[:, 1]) * np.exp(1j * (turn or 0.0))
-    spot = spot + (ours.mean() - spot[both].mean() if len(both) else 0.0)
+    spot = spot + (placed_plan.mean() - spot[common].mean() if len(common) else 0.0)
     rise = search.xyz[:, 2] - frame.xyz[:, 2]
     tied, free = np.isfinite(rise), not np.isfinite(search.xyz[:, 2]).any()
     up = frame.xyz[:, 2] + (np.median(rise[tied]) if tied.any() else 0.0 if free else np.nan)
     waiting = set(search.unplaced.tolist())
     filled = search.fill(np.stack([spot.real, spot.imag, up], axis=1))
-    if filled and (turn is None or not len(both) or free):
+    if filled and (turn is None or not len(common) or free):
         search.conventional |= waiting
     return filled
 
 
-def level_turn(theirs: np.ndarray, ours: np.ndarray) -> float | None:
-    """Angle, counter-clockwise, that turns points x + i y (k,) best onto others; None where they all coincide."""
-    if not np.ptp(np.abs(theirs - theirs[0])) > 0.0:
+def level_turn(source: np.ndarray, target: np.ndarray) -> float | None:
+    """Angle, counter-clockwise, that best rotates points x + i y (k,) onto others.
+
+    None if all coincide.
+    """
+    if not np.ptp(np.abs(source - source[0])) > 0.0:
         return None
-    return float(np.angle(np.sum((ours - ours.mean()) * np.conj(theirs - theirs.mean()))))
+    return float(np.angle(np.sum((target - target.mean()) * np.conj(source - source.mean()))))
 
 
 def _turn_of_azimuths(search: PlacingSearch, frame: PlacingSearch, level: np.ndarray) -> float | None:
-    """The same from oriented directions between points of a frame (n,) bool; None without any."""
+    """Rotation from oriented directions between points of a frame (n,) bool.
+
+    None without any.
+    """
     r = search.rows
     r = r.only((r.code == BEARING) & np.isin(r.which, list(search.given)) & level[r.origin] & level[r.target])
     if not len(r):
@@ -94,12 +105,13 @@ def _turn_of_azimuths(search: PlacingSearch, frame: PlacingSearch, level: np.nda
 
 
 def _attach_ranges(search: PlacingSearch) -> bool:
-    """Places points by figures unfolded from ranges alone; whether any was placed.
+    """Place points by figures unfolded from ranges alone.
 
-    Points that range each other all give a figure by classical scaling, stations and targets by unfolding; what the
-    other ranges tie to it follows. Three placed points off a line say where it belongs, and of its mirror images the
-    one that fits a fourth off their plane, or zenith angles and height differences. If the network gives fewer points,
-    the figure is laid down as it is, on those that it gives.
+    True if any was placed.
+
+    Points with all mutual ranges give a figure by classical scaling, stations and targets by unfolding; points tied to
+    it by other ranges follow. Three placed points, not collinear, attach it; a fourth off their plane, or zenith angles
+    and height differences, select the mirror image. With fewer given points, the figure is placed as it is on those.
     """
     r = search.rows
     rows = r.only((r.code == RANGE) & ~r.shift.any(axis=1))
@@ -119,7 +131,7 @@ def _attach_ranges(search: PlacingSearch) -> bool:
 
 
 def _parts_tied(rows: Sightings, n: int) -> np.ndarray:
-    """For each of n points the number of the part of the network, tied together by ranges, that it belongs to."""
+    """Index (n,) of the connected part (by ranges) of each point."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -128,10 +140,13 @@ def _parts_tied(rows: Sightings, n: int) -> np.ndarray:
 
 
 def _figure(frame: PlacingSearch, group: np.ndarray) -> str:
-    """Fills a frame from the ranges between a group of points alone; why not, or nothing."""
+    """Fill a frame from the ranges between a group of points.
+
+    Returns the reason of failure, or "".
+    """
     rows = frame.rows.only(np.isin(frame.rows.origin, group))
     if not len(rows):
-        return "no range holds it"
+        return "no range to it"
     distance = dict(zip(zip(rows.origin.tolist(), rows.target.tolist(), strict=True), rows.observed, strict=True))
     distance |= {(b, a): d for (a, b), d in distance.items()}
     clique = _clique(distance)
@@ -155,7 +170,7 @@ def _figure(frame: PlacingSearch, group: np.ndarray) -> str:
 
 
 def _unfolded(ranges: np.ndarray, sigma: float) -> Unfolding:
-    """The figure; ranger zeros and scales still unknown may make ranges up to 100 times worse than their sigma."""
+    """Unfolded figure; unknown zeros and scales may make ranges up to 100 times worse than sigma."""
     unfolding = unfold(ranges, sigma)
     for factor in (10.0, 100.0):
         if not unfolding.status.startswith(NO_FIT.split("{")[0]):
@@ -165,7 +180,7 @@ def _unfolded(ranges: np.ndarray, sigma: float) -> Unfolding:
 
 
 def _clique(distance: dict[tuple[int, int], float]) -> list[int]:
-    """Points that have distances to each other all, grown from the one with the most."""
+    """Points with all mutual distances, grown from the one with the most."""
     ties = defaultdict(set)
     for a, b in distance:
         ties[a].add(b)
@@ -181,17 +196,20 @@ def _clique(distance: dict[tuple[int, int], float]) -> list[int]:
 
 
 def _laid_down(search: PlacingSearch, frame: PlacingSearch) -> str:
-    """Lays a figure that may be turned and mirrored on the placed points; why not, or nothing."""
-    placed, here = (np.isfinite(xyz).all(axis=1) for xyz in (search.xyz, frame.xyz))
-    both = placed & here
+    """Fit a figure, rotated and mirrored, to the placed points.
+
+    Returns the reason of failure, or "".
+    """
+    placed, in_frame = (np.isfinite(xyz).all(axis=1) for xyz in (search.xyz, frame.xyz))
+    common = placed & in_frame
     tries = []
     for mirror in (1.0, -1.0):
         local = frame.xyz * (1.0, 1.0, mirror)
-        motion = rigid_motion(local[both], search.xyz[both])
+        motion = rigid_motion(local[common], search.xyz[common])
         if motion is None:
             return _by_convention(search, frame)
         xyz = motion[1] + local @ motion[0].T
-        apart = float(np.sqrt(np.mean((xyz - search.xyz)[both] ** 2)))
+        apart = float(np.sqrt(np.mean((xyz - search.xyz)[common] ** 2)))
         tries.append((apart, _misfit_of_heights(search.rows, xyz), xyz))
     for by in (0, 1):
         first, second = sorted(tries, key=lambda t: t[by])
@@ -201,14 +219,14 @@ def _laid_down(search: PlacingSearch, frame: PlacingSearch) -> str:
 
 
 def _by_convention(search: PlacingSearch, frame: PlacingSearch) -> str:
-    """Lays a figure down as it is, on the one or two placed points or those in line, where they are all."""
-    placed, here = (np.isfinite(xyz).all(axis=1) for xyz in (search.xyz, frame.xyz))
-    both, r = placed & here, search.rows
-    turned = (r.code != RANGE) & here[r.origin] & here[r.target]
-    if placed.sum() > both.sum() or turned.any():
-        return f"of {int(here.sum())} points that ranges tie together {int(both.sum())} are placed, 3 are needed"
-    turn = closed_form(frame.xyz[both], search.xyz[both])[0] if both.sum() > 1 else np.eye(3)
-    shift = search.xyz[both].mean(axis=0) - turn @ frame.xyz[both].mean(axis=0) if both.any() else np.zeros(3)
+    """Place a figure as it is, on one or two placed or collinear points, if they are all."""
+    placed, in_frame = (np.isfinite(xyz).all(axis=1) for xyz in (search.xyz, frame.xyz))
+    common, r = placed & in_frame, search.rows
+    turned = (r.code != RANGE) & in_frame[r.origin] & in_frame[r.target]
+    if placed.sum() > common.sum() or turned.any():
+        return f"of {int(in_frame.sum())} points that ranges tie together {int(common.sum())} are placed, 3 are needed"
+    turn = closed_form(frame.xyz[common], search.xyz[common])[0] if common.sum() > 1 else np.eye(3)
+    shift = search.xyz[common].mean(axis=0) - turn @ frame.xyz[common].mean(axis=0) if common.any() else np.zeros(3)
     waiting = set(search.unplaced.tolist())
     why = _taken(search, frame, frame.xyz @ turn.T + shift)
     search.conventional |= set() if why else waiting
@@ -216,13 +234,19 @@ def _by_convention(search: PlacingSearch, frame: PlacingSearch) -> str:
 
 
 def _taken(search: PlacingSearch, frame: PlacingSearch, xyz: np.ndarray) -> str:
-    """Takes a figure that is laid down at xyz; why not, or nothing."""
+    """Accept a figure placed at xyz.
+
+    Returns the reason of failure, or "".
+    """
     search.sides |= frame.sides & set(search.unplaced.tolist())
     return "" if search.fill(xyz) else "nothing new"
 
 
 def _misfit_of_heights(r: Sightings, xyz: np.ndarray) -> float:
-    """Median misfit, m, of what tells up from down: zenith angles and height differences; 0 without any."""
+    """Median misfit, m, of zenith angles and height differences.
+
+    0 without any.
+    """
     up = (r.code == ZENITH) | ((r.code == DIFFERENCE) & (r.which == 2))
     r = r.only(up & np.isfinite(xyz[r.origin]).all(axis=1) & np.isfinite(xyz[r.target]).all(axis=1))
     if not len(r):

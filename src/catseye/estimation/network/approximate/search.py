@@ -1,4 +1,4 @@
-"""Points placed one by one, or many at once, from those placed before, and sets oriented on the way."""
+"""Placement of points one by one, or in blocks, from placed points, and orientation of sets."""
 
 from collections import Counter
 
@@ -17,21 +17,21 @@ from catseye.estimation.network.approximate.sightings import (
 from catseye.estimation.network.approximate.ties import FLOOR, Ties, wrapped
 from catseye.estimation.network.unfolding.location import locate
 
-STRICT, LENIENT = 1e-3, 1e-7  # least over largest eigenvalue of a point's normal matrix: good geometry; any at all
+STRICT, LENIENT = 1e-3, 1e-7  # smallest over largest eigenvalue of a point's normal matrix: good geometry; any
 DECIDED = 4.0  # a second position must fit this many times worse, in squares ...
 BY_NOISE = 25.0  # ... and by more than five standard uncertainties
 TWO_FIT = " and two positions fit"
-MIRRORED = ", mirror images in the plane of those that see it: give it a rough place, or measure a zenith angle"
-BLOCK = 20_000  # ranges at a time, so that memory stays bounded
+MIRRORED = ", mirror images in the plane of the stations: give rough coordinates, or measure a zenith angle"
+BLOCK = 20_000  # ranges per batch, to bound memory
 
 
 class PlacingSearch:
-    """Points placed so far, orientations found so far, and how to go on.
+    """Points and orientations found so far, and the search for more.
 
-    sides        points put on an assumed side of the plane of those that see them
-    conventional points of a figure, and what hangs on it, of which nothing given says where it belongs
-    why          of a point that is not placed
-    unfolding    why no figure of ranges helped a point
+    sides        points on an assumed side of the plane of their stations
+    conventional points of a figure, and dependent ones, without a relation to given coordinates
+    why          reason for an unplaced point
+    unfolding    reason why no figure of ranges placed a point
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class PlacingSearch:
         return self._order[self._first[p] : self._first[p + 1]] % len(self.rows)
 
     def fill(self, xyz: np.ndarray) -> bool:
-        """Takes coordinates (n, 3) where there are none; whether there were any."""
+        """Fill missing coordinates from (n, 3); True if any were filled."""
         new = ~np.isfinite(self.xyz) & np.isfinite(xyz)
         self.xyz[new] = xyz[new]
         return bool(new.any())
@@ -67,12 +67,12 @@ class PlacingSearch:
         return np.flatnonzero(~np.isfinite(self.xyz).all(axis=1))
 
     def spread(self) -> None:
-        """Places points from placed ones, those with good geometry first."""
+        """Place points from placed ones, good geometry first."""
         while self.sweep(STRICT, DECIDED) or self.sweep(LENIENT, DECIDED):
             pass
 
     def sweep(self, strictness: float, decided: float) -> bool:
-        """Tries every point once; whether a coordinate was found."""
+        """Try every point once; True if a coordinate was found."""
         before = int(np.isfinite(self.xyz).sum())
         self.orient_sets()
         self._place_by_ranges()
@@ -86,27 +86,30 @@ class PlacingSearch:
         return int(np.isfinite(self.xyz).sum()) > before
 
     def _place_by_bodies(self) -> None:
-        """Places the rest of each body of which three points off a line are placed."""
+        """Place the remaining points of bodies with three placed points, not collinear."""
         for point, local in self.bodies:
             motion = rigid_motion(local, self.xyz[point])
             if motion is not None:
-                lost = ~np.isfinite(self.xyz[point]).all(axis=1) & np.isfinite(local).all(axis=1)
-                self.xyz[point[lost]] = motion[1] + local[lost] @ motion[0].T
+                unplaced = ~np.isfinite(self.xyz[point]).all(axis=1) & np.isfinite(local).all(axis=1)
+                self.xyz[point[unplaced]] = motion[1] + local[unplaced] @ motion[0].T
 
     def _usable(self, p: int) -> np.ndarray:
-        """Rows at a point whose other end, and whose orientation, are known; or whose set is the point's own."""
+        """Rows at a point with known other end and orientation, or of the point's own set."""
         touching = self.touching(p)
         r = self.rows.only(touching)
-        other = np.where(r.origin == p, r.target, r.origin)
-        known = np.isfinite(self.xyz[other])
+        opposite = np.where(r.origin == p, r.target, r.origin)
+        placed = np.isfinite(self.xyz[opposite])
         oriented = np.array([w in self.orientations for w in r.which.tolist()], dtype=bool)
-        one = known[np.arange(len(r)), np.where(r.code == DIFFERENCE, r.which, 0)]
-        level = known[:, :2].all(axis=1)
-        fit = [known.all(axis=1), level, level & (oriented | (r.origin == p)), known.all(axis=1), one, True]
+        component = placed[np.arange(len(r)), np.where(r.code == DIFFERENCE, r.which, 0)]
+        level = placed[:, :2].all(axis=1)
+        fit = [placed.all(axis=1), level, level & (oriented | (r.origin == p)), placed.all(axis=1), component, True]
         return touching[np.choose(r.code, np.broadcast_arrays(*fit))]
 
     def _place(self, p: int, rows: Sightings, *, strictness: float, decided: float) -> None:
-        """Places a point if one position fits clearly better than others; else its plan, and its height, alone."""
+        """Place a point if one position fits clearly best.
+
+        Otherwise place its plan position or height alone.
+        """
         ties = Ties.of(p, rows, self.xyz, self.orientations)
         if self._take(p, ties, slice(3), strictness=strictness, decided=decided):
             return
@@ -117,11 +120,14 @@ class PlacingSearch:
             self.xyz[p, 2] = np.average(ties.observed[up], weights=ties.weight[up] ** 2)
 
     def _take(self, p: int, ties: "Ties", part: slice, *, strictness: float, decided: float) -> bool:
-        """Takes x, y, z or x, y of the one position that fits; whether they are known then."""
+        """Accept x, y, z or x, y of the only position that fits.
+
+        True if they are then known.
+        """
         if np.isfinite(self.xyz[p, part]).all():
             return True
-        x, cost, held = ties.solved(strictness)
-        if not held[part].all():
+        x, cost, determined = ties.solved(strictness)
+        if not determined[part].all():
             return False
         apart = np.linalg.norm((x - x[0])[:, part], axis=1) > 0.01 * ties.size
         if np.any(apart & (cost < decided * cost[0] + BY_NOISE)):
@@ -131,22 +137,22 @@ class PlacingSearch:
         return True
 
     def _place_by_ranges(self) -> None:
-        """Places, many at once, the points that four or more ranges decide; others wait for other sightings."""
+        """Place in blocks the points that four or more ranges determine."""
         r = self.rows
         plain = (r.code == RANGE) & ~r.shift.any(axis=1)
-        known = np.isfinite(self.xyz).all(axis=1)
+        placed = np.isfinite(self.xyz).all(axis=1)
         for origin, target in ((r.origin, r.target), (r.target, r.origin)):
-            chosen = np.flatnonzero(plain & known[origin] & ~known[target])
+            chosen = np.flatnonzero(plain & placed[origin] & ~placed[target])
             if not len(chosen):
                 continue
             order = chosen[np.argsort(target[chosen], kind="stable")]
             cuts = np.arange(BLOCK, len(order), BLOCK)
-            cuts = np.unique(np.searchsorted(target[order], target[order][cuts]))  # a point's ranges stay together
+            cuts = np.unique(np.searchsorted(target[order], target[order][cuts]))  # a point's ranges stay in one block
             for part in np.split(order, cuts):
                 self._place_block(r.only(part), origin[part], target[part])
 
     def _place_block(self, r: Sightings, origin: np.ndarray, target: np.ndarray) -> None:
-        """Places the targets of some ranges from placed origins where four or more decide."""
+        """Place the targets of some ranges from placed origins, if four or more determine them."""
         points, at = np.unique(target, return_inverse=True)
         anchors, by = np.unique(origin, return_inverse=True)
         ranges = np.full((len(points), len(anchors)), np.nan)
@@ -162,10 +168,10 @@ class PlacingSearch:
         self.xyz[points[clear]] = xyz[clear, 0]
 
     def orient_sets(self) -> None:
-        """The orientation of every set with a placed station and target: the median over its longer sights."""
+        """Orient every set with placed station and target: median over its longer sights."""
         r = self.rows
-        known = np.isfinite(self.xyz[:, :2]).all(axis=1)
-        bearings = np.flatnonzero((r.code == BEARING) & known[r.origin] & known[r.target])
+        placed = np.isfinite(self.xyz[:, :2]).all(axis=1)
+        bearings = np.flatnonzero((r.code == BEARING) & placed[r.origin] & placed[r.target])
         along = self.xyz[r.target[bearings]] - self.xyz[r.origin[bearings]] + r.shift[bearings]
         turn = np.arctan2(along[:, 0], along[:, 1]) - r.observed[bearings]
         if not len(bearings):
@@ -180,19 +186,19 @@ class PlacingSearch:
                 self.orientations[which] = float(wrapped(zero + np.median(wrapped(turn[part] - zero))))
 
     def reason(self, p: int) -> str:
-        """Why a point has no coordinates."""
+        """Reason why a point has no coordinates."""
         touching, usable = self.touching(p), self._usable(p)
         if not len(touching):
-            return "no observation holds it"
+            return "no observation of it"
         text = f"seen by {_counted(self.rows.code[touching])}"
         if len(usable) < len(touching):
             text += f", of which {_counted(self.rows.code[usable])} from placed points"
         else:
             text += " only"
-        held = [name for name, known in zip("xyz", np.isfinite(self.xyz[p]), strict=True) if known]
-        text += f" ({', '.join(held)} found)" if held else ""
+        determined = [name for name, finite in zip("xyz", np.isfinite(self.xyz[p]), strict=True) if finite]
+        text += f" ({', '.join(determined)} found)" if determined else ""
         if p in self.unfolding and self.why.get(p) == TWO_FIT and np.all(self.rows.code[usable] == RANGE):
-            return text + TWO_FIT + MIRRORED  # and that is why no figure of all points helped
+            return text + TWO_FIT + MIRRORED  # which also prevents a figure of all points
         return text + self.unfolding.get(p, self.why.get(p, ""))
 
 

@@ -1,4 +1,4 @@
-"""What ties points to each other in a network, whatever kinds of observation say it, in one table."""
+"""Table of all observations that connect points of a network, of any kind."""
 
 from collections import defaultdict
 from collections.abc import Iterator
@@ -30,12 +30,12 @@ from catseye.estimation.observations.reading import reading_columns
 
 RANGE, LEVEL, BEARING, ZENITH, DIFFERENCE, COORDINATE = range(6)
 WORDS = ("range", "horizontal distance", "direction", "zenith angle", "coordinate difference", "coordinate")
-GROUND = -1  # the "set" of a direction whose orientation is known: an azimuth
+GROUND = -1  # the "set" of a direction with known orientation: an azimuth
 
 
 @dataclass(frozen=True, eq=False)
 class Sightings:
-    """Every observation between two points (or of one) that can place a point, in one table of m rows.
+    """Observations between two points (or of one) that can place a point, a table of m rows.
 
     code       RANGE ... COORDINATE
     origin     (m,) index of the point measured from; of a coordinate, the point
@@ -55,7 +55,7 @@ class Sightings:
     which: np.ndarray
 
     def only(self, chosen: np.ndarray) -> "Sightings":
-        """The rows where `chosen` (m,) is True, or at these indices."""
+        """Selected rows, by mask (m,) or indices."""
         return Sightings(*(getattr(self, name)[chosen] for name in self.__dataclass_fields__))
 
     def __len__(self) -> int:
@@ -76,10 +76,10 @@ def parts_of(network: ObservationNetwork) -> Iterator[tuple[ObservationGroup, np
 
 
 def sightings(network: ObservationNetwork) -> Sightings:
-    """The table of a network's observations."""
+    """Table of a network's observations."""
     start = np.concatenate([np.zeros(3 * len(network.points.names)), [p.start for p in network.parameters]])
     tables: list[Sightings] = []
-    sets = len(start)  # angles make sets of their own, after those whose orientation is a parameter
+    sets = len(start)  # angles form additional sets, after those with an orientation parameter
     for group, variance in parts_of(network):
         if isinstance(group, HorizontalAngles):
             tables += _of_angles(group, variance, sets)
@@ -111,7 +111,10 @@ def _table(
 
 
 def _of_group(group: ObservationGroup, variance: np.ndarray, start: np.ndarray) -> Sightings | None:
-    """Rows of all kinds but angles and level planes; None for a kind that cannot place a point by itself."""
+    """Rows of all kinds except angles and level planes.
+
+    None for kinds that cannot place a point.
+    """
     common: dict[str, Any] = {"observed": group.observed, "variance": variance, "shift": getattr(group, "shift", None)}
     match group:
         case Distances():
@@ -141,26 +144,26 @@ def _of_group(group: ObservationGroup, variance: np.ndarray, start: np.ndarray) 
 
 
 def _of_angles(group: HorizontalAngles, variance: np.ndarray, sets: int) -> Iterator[Sightings]:
-    """Each sight of an angle as a direction of a set, numbered from `sets`."""
+    """Sights of angles as directions of sets, numbered from `sets`."""
     for at, target, reading, row, circle in _circles(group):
         shift = group.foresight_shift if target == group.foresight[row] else group.backsight_shift
-        one = None if shift is None else np.broadcast_to(shift, (len(variance), 3))[[row]]
+        row_shift = None if shift is None else np.broadcast_to(shift, (len(variance), 3))[[row]]
         yield _table(
             BEARING,
             (at, target),
             observed=np.array([reading]),
             variance=variance[[row]],
-            shift=one,
+            shift=row_shift,
             which=sets + circle,
         )
 
 
 def _of_levels(group: LevelPlanes, variance: np.ndarray) -> Iterator[Sightings]:
-    """Heights, or height differences to the first point of each level plane whose height is a parameter."""
+    """Heights, or height differences to the first point of each level plane of unknown height."""
     height = group.observed - group.height
     for level in np.unique(group.columns[:, 1]):
-        same = np.flatnonzero(group.columns[:, 1] == level)
-        point, up, v = group.point[same], height[same], variance[same]
+        members = np.flatnonzero(group.columns[:, 1] == level)
+        point, up, v = group.point[members], height[members], variance[members]
         if level < 0:
             yield _table(COORDINATE, (point, -1), observed=up, variance=v, which=2)
         else:
@@ -169,7 +172,7 @@ def _of_levels(group: LevelPlanes, variance: np.ndarray) -> Iterator[Sightings]:
 
 
 def _length(group: Distances | HorizontalDistances, start: np.ndarray) -> np.ndarray:
-    """Observed lengths (m,) freed of offset and scale, as far as the start values know them."""
+    """Observed lengths (m,) corrected for offset and scale, from the start values."""
     nuisance, scaling = reading_columns(group)
     offset = group.offset + np.sum(np.where(nuisance < 0, 0.0, group.coefficient) * value(start, nuisance), axis=1)
     factor = np.sum(np.where(scaling < 0, 0.0, group.scaling_coefficient) * value(start, scaling), axis=1)
@@ -177,17 +180,17 @@ def _length(group: Distances | HorizontalDistances, start: np.ndarray) -> np.nda
 
 
 def _circles(group: HorizontalAngles) -> Iterator[tuple[int, int, float, int, int]]:
-    """Angles as readings of circles, one for those that share sights: (at, target, reading, row, circle)."""
+    """Angles as circle readings, one circle per connected sights: (at, target, reading, row, circle)."""
     ties: dict[tuple[int, int], list[tuple[int, float, int]]] = defaultdict(list)
     for row, (at, back, fore) in enumerate(zip(group.at, group.backsight, group.foresight, strict=True)):
         ties[at, back].append((fore, group.observed[row], row))
         ties[at, fore].append((back, -group.observed[row], row))
-    done: set[tuple[int, int]] = set()
+    visited: set[tuple[int, int]] = set()
     for circle, first in enumerate(ties):
         waiting = [(first[1], 0.0, ties[first][0][2])]
         while waiting:
             target, reading, row = waiting.pop()
-            if (first[0], target) not in done:
-                done.add((first[0], target))
+            if (first[0], target) not in visited:
+                visited.add((first[0], target))
                 yield first[0], target, reading, row, circle
-                waiting += [(other, reading + angle, k) for other, angle, k in ties[first[0], target]]
+                waiting += [(neighbour, reading + angle, k) for neighbour, angle, k in ties[first[0], target]]

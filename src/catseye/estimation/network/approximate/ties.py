@@ -1,4 +1,4 @@
-"""One point placed by least squares of all that ties it to placed points: its starts, its descent, what is held."""
+"""Placement of one point by least squares of its observations to placed points."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -17,21 +17,23 @@ from catseye.estimation.network.approximate.sightings import (
 )
 from catseye.estimation.network.unfolding.location import locate
 
-FLOOR = 1e-3  # m: no sigma counts as smaller, for the points that are given may be poor
-RADII = (0.25, 1.0, 3.0)  # of the starts about the known points, in half their extent
+FLOOR = 1e-3  # m: lower limit of sigma, as given points may be poor
+RADII = (0.25, 1.0, 3.0)  # of the starts around the known points, in half their extent
 
 
 @dataclass(frozen=True, eq=False)
 class Ties:
-    """What ties one point to placed ones; m rows, residuals in metres over their standard uncertainties.
+    """Observations of one point to placed ones.
+
+    There are m rows, residuals in units of sigma.
 
     code       (m,) RANGE ... COORDINATE; differences have become coordinates
-    anchor     (m, 3) m, where the sight begins or ends, heights of instrument and target applied
-    sense      (m,) 1 where the point is the target, -1 where it is the origin
-    observed   (m,) m or rad; oriented where the orientation is known
-    arm        (m,) m, what turns radians into metres: the measured distance, else the size
+    anchor     (m, 3) m, other end of the sight, heights of instrument and target applied
+    sense      (m,) 1 if the point is the target, -1 if it is the origin
+    observed   (m,) m or rad; oriented if the orientation is known
+    arm        (m,) m, factor from radians to metres: the measured distance, else the size
     weight     (m,) 1/m
-    own        (m,) the point's own unoriented set, numbered from 0; -1 for others
+    circle     (m,) index of the point's own unoriented sets, from 0; -1 for others
     axis       (m,) of a coordinate
     size       m, of the surroundings
     """
@@ -42,37 +44,37 @@ class Ties:
     observed: np.ndarray
     arm: np.ndarray
     weight: np.ndarray
-    own: np.ndarray
+    circle: np.ndarray
     axis: np.ndarray
     size: float
 
     @classmethod
     def of(cls, p: int, r: Sightings, xyz: np.ndarray, orientations: dict[int, float]) -> "Ties":
-        """Ties of point p by usable rows; coordinates of p that are known tie it too."""
+        """Ties of point p by usable rows, and by its known coordinates."""
         sense = np.where(r.origin == p, -1.0, 1.0)
-        other = np.where(r.origin == p, r.target, r.origin)
-        anchor = xyz[other] - sense[:, None] * r.shift
+        opposite = np.where(r.origin == p, r.target, r.origin)
+        anchor = xyz[opposite] - sense[:, None] * r.shift
         oriented = np.array([w in orientations for w in r.which.tolist()], dtype=bool)
         observed = r.observed + np.where(r.code == BEARING, [orientations.get(w, 0.0) for w in r.which.tolist()], 0.0)
         step = r.code == DIFFERENCE
         observed[step] = anchor[step, r.which[step]] + sense[step] * r.observed[step]
         code = np.where(step, COORDINATE, r.code)
-        own = np.full(len(r), -1)
+        circle = np.full(len(r), -1)
         free = (code == BEARING) & ~oriented
-        own[free] = np.unique(r.which[free], return_inverse=True)[1]
+        circle[free] = np.unique(r.which[free], return_inverse=True)[1]
         lengths = (code == RANGE) | (code == LEVEL)
         about = anchor[code != COORDINATE, :2]
         size = float(max([*np.ptp(about, axis=0)] if len(about) else [0.0])) or 0.0
         size = max([size, *observed[lengths]]) or 1.0
-        measured = dict(zip(other[lengths].tolist(), observed[lengths].tolist(), strict=True))
-        arm = np.array([measured.get(k, size) for k in other.tolist()])
+        measured = dict(zip(opposite[lengths].tolist(), observed[lengths].tolist(), strict=True))
+        arm = np.array([measured.get(k, size) for k in opposite.tolist()])
         angular = (code == BEARING) | (code == ZENITH)
         weight = 1.0 / np.hypot(np.where(angular, arm, 1.0) * r.sigma, FLOOR)
-        ties = cls(code, anchor, sense, observed, arm, weight, own, r.which, size)
-        return ties._with_known(xyz[p])
+        ties = cls(code, anchor, sense, observed, arm, weight, circle, r.which, size)
+        return ties._with_coordinates(xyz[p])
 
-    def _with_known(self, at: np.ndarray) -> "Ties":
-        """With a coordinate for each of the point's own that is known."""
+    def _with_coordinates(self, at: np.ndarray) -> "Ties":
+        """Ties with one more for each known coordinate of the point."""
         axis = np.flatnonzero(np.isfinite(at))
         if not len(axis):
             return self
@@ -83,13 +85,13 @@ class Ties:
         return replace(self, **cast(Any, joined))
 
     def in_plan(self, level: np.ndarray) -> "Ties":
-        """Those of the ties (m,) that do not depend on height, in the plane z = 0."""
+        """Ties (m,) independent of height, in the plane z = 0."""
         names = list(self.__dataclass_fields__)[:-1]
         flat = replace(self, **cast(Any, {n: getattr(self, n)[level] for n in names}))
-        return flat._with_known(np.array([np.nan, np.nan, 0.0]))
+        return flat._with_coordinates(np.array([np.nan, np.nan, 0.0]))
 
     def residuals(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Weighted residuals (b, m) and their derivatives (b, m, 3), of the predicted value, at b positions."""
+        """Weighted residuals (b, m) and derivatives (b, m, 3) of the predicted values, at b positions."""
         along = np.nan_to_num(x[:, None] - self.anchor)
         tiny = 1e-9 * self.size
         far = np.maximum(np.hypot(along[..., 0], along[..., 1]), tiny)
@@ -103,8 +105,8 @@ class Ties:
         azimuth = np.arctan2(self.sense * along[..., 0], self.sense * along[..., 1])
         turn = np.stack([along[..., 1], -along[..., 0], 0 * far], axis=-1) / (far**2)[..., None]
         v[:, k], slope[:, k] = wrapped(self.observed - azimuth)[:, k], turn[:, k]
-        for own in range(self.own.max(initial=-1) + 1):  # the orientation of the point's own set is eliminated
-            k = self.own == own
+        for index in range(self.circle.max(initial=-1) + 1):  # eliminates the orientation of the point's own set
+            k = self.circle == index
             mean = np.angle(np.mean(np.exp(1j * v[:, k]), axis=1, keepdims=True))
             v[:, k] = wrapped(v[:, k] - mean)
             slope[:, k] -= slope[:, k].mean(axis=1, keepdims=True)
@@ -121,7 +123,7 @@ class Ties:
         return v * scale, slope * scale[:, None]
 
     def solved(self, strictness: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Positions (b, 3) by rising cost (b,), and which of the best one's coordinates (3,) the ties hold."""
+        """Positions (b, 3) by increasing cost (b,), and mask (3,) of determined coordinates of the best."""
         x = self.starts()
         v, slope = self.residuals(x)
         cost, damping, step = np.sum(v**2, axis=1), np.full(len(x), 1e-2), np.full(x.shape, np.inf)
@@ -145,35 +147,35 @@ class Ties:
         plain = slope[order[0]] / self.weight[:, None]
         values, axes = np.linalg.eigh(plain.T @ plain)
         loose = axes[:, values < strictness * values[2]]
-        held = np.sum(loose**2, axis=1) < 1e-4
-        return x[order], cost[order], held
+        determined = np.sum(loose**2, axis=1) < 1e-4
+        return x[order], cost[order], determined
 
     def starts(self) -> np.ndarray:
-        """Positions (b, 3) to begin from: polar ones, those of three ranges, else all around the known points."""
-        known = np.full(3, np.nan)
+        """Start positions (b, 3): polar ones, from three ranges, else all around the known points."""
+        fixed = np.full(3, np.nan)
         k = self.code == COORDINATE
-        known[self.axis[k]] = self.observed[k]
+        fixed[self.axis[k]] = self.observed[k]
         origins = list(self._polar())
         k = self.code == RANGE
         if k.sum() >= 3 and not origins:
-            both = locate(self.anchor[k], self.observed[None, k])[0][0]
-            origins = [x for x in both if np.isfinite(x).all()]
+            solutions = locate(self.anchor[k], self.observed[None, k])[0][0]
+            origins = [x for x in solutions if np.isfinite(x).all()]
         if origins:
-            return np.where(np.isfinite(known), known, np.array(origins))
+            return np.where(np.isfinite(fixed), fixed, np.array(origins))
         about = self.anchor[self.code != COORDINATE]
         middle = np.nan_to_num(about).sum(axis=0) / np.maximum(np.isfinite(about).sum(axis=0), 1)
         angle = np.arange(12) * np.pi / 6 + 0.1
-        rise = (0.0,) if np.any(self.code == ZENITH) or np.isfinite(known[2]) else (0.0, 1.0, -1.0)
+        rise = (0.0,) if np.any(self.code == ZENITH) or np.isfinite(fixed[2]) else (0.0, 1.0, -1.0)
         ring = [(r * np.sin(a), r * np.cos(a), h * r) for r in RADII for a in angle for h in rise]
         x = middle + 0.5 * self.size * np.array(ring)
-        return np.where(np.isfinite(known), known, x)
+        return np.where(np.isfinite(fixed), fixed, x)
 
     def _polar(self) -> Iterator[np.ndarray]:
-        """Positions from one oriented direction, distance and zenith angle (level where there is none) at one point."""
-        for b in np.flatnonzero((self.code == BEARING) & (self.own < 0)):
-            same = np.all(self.anchor[:, :2] == self.anchor[b, :2], axis=1)
-            distance = np.flatnonzero(same & ((self.code == RANGE) | (self.code == LEVEL)))
-            zenith = np.flatnonzero(same & (self.code == ZENITH))
+        """Positions from an oriented direction, distance and zenith angle (or level) at one point."""
+        for b in np.flatnonzero((self.code == BEARING) & (self.circle < 0)):
+            at_station = np.all(self.anchor[:, :2] == self.anchor[b, :2], axis=1)
+            distance = np.flatnonzero(at_station & ((self.code == RANGE) | (self.code == LEVEL)))
+            zenith = np.flatnonzero(at_station & (self.code == ZENITH))
             if len(distance) and (len(zenith) or self.code[distance[0]] == LEVEL):
                 d = distance[0]
                 tilt = self.observed[zenith[0]] if len(zenith) else np.pi / 2
@@ -184,5 +186,5 @@ class Ties:
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:
-    """The angles brought into [-pi, pi)."""
+    """Angles reduced to [-pi, pi)."""
     return (angle + np.pi) % (2 * np.pi) - np.pi

@@ -1,9 +1,10 @@
-"""Elimination of targets from a ranging network in plain numpy: for small problems, and the compiled form's test.
+"""Elimination of targets from a ranging network in plain numpy (Schur complement).
 
-Each target's 3 x 3 block V of the normal matrix is eliminated into a dense system of the stations' parameters, x y z
-and, where any is free, zero and scale. With a = root (1 + scale) u the whitened derivative of a range by its target,
-g = (-a, root, root D) by the station's parameters and W = g a', the reduced matrix is the sum of g g' - W V^-1 W'.
-Source: [FOERSTNER16] chapter 15, elimination of points from the normal equations of a bundle.
+For small problems, and as the test of the compiled form. Each target's 3 x 3 block V of the normal matrix is eliminated
+into a dense system of the stations' parameters, x y z and, where any is free, zero and scale. With a = root (1 + scale)
+u the whitened derivative of a range by its target, g = (-a, root, root D) by the station's parameters and W = g a', the
+reduced matrix is the sum of g g' - W V^-1 W'. Source: [FOERSTNER16] chapter 15, elimination of points from the normal
+equations of a bundle.
 """
 
 from collections.abc import Iterator
@@ -20,15 +21,15 @@ CHUNK = 4_000_000  # numbers in the largest array of one chunk of targets
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What the elimination needs to know of a network, checked and complete.
+    """Validated ranging network for the elimination.
 
     station, target   (m,) index of each range's ends
     distance, sigma   (m,) observed value and claimed standard uncertainty, m
-    inflation         (m,) factor on each sigma, infinite where left out; None: 1
-    width             parameters a station: 3, or 5 with zero and scale
+    inflation         (m,) factor on each sigma, infinite if left out; None: 1
+    width             parameters per station: 3, or 5 with zero and scale
     free_stations     (S, width) bool
     free_targets      (T, 3) bool
-    target_weight     (T, 3, 3) inverse covariance of the targets' priors, zero without one; None: no priors
+    target_weight     (T, 3, 3) inverse covariance of the targets' priors, zero if none; None: no priors
     target_value      (T, 3) m, their values
     """
 
@@ -45,18 +46,18 @@ class Problem:
 
     @cached_property
     def root(self) -> np.ndarray:
-        """(m,) square root of the weight in the solution, 1/m; 0 where left out."""
+        """Square root (m,) of the weights, 1/m; 0 if left out."""
         return 1.0 / (self.sigma if self.inflation is None else self.sigma * self.inflation)
 
     @property
     def used(self) -> int:
-        """Number of ranges that take part."""
+        """Number of ranges in the solution."""
         return len(self.sigma) if self.inflation is None else int(np.sum(np.isfinite(self.inflation)))
 
 
 @dataclass(frozen=True, eq=False)
 class IterationState:
-    """Where the iteration stands: stations (S, 3), targets (T, 3), zero (S,) in metres, scale (S,)."""
+    """State of the iteration: stations (S, 3), targets (T, 3), zero (S,) in metres, scale (S,)."""
 
     stations: np.ndarray
     targets: np.ndarray
@@ -68,22 +69,22 @@ class IterationState:
 class Reduced:
     """Normal equations of the stations' parameters after the targets' elimination.
 
-    normal      (n, n), n = S width, held parameters included
-    before      (n,) its diagonal before the elimination
-    right       (n,)
-    inverse     (T, 3, 3) V^-1 over free coordinates, zero elsewhere
-    own         (T, 3) V^-1 b, the targets' step if the stations stay
-    condition   (T,) 1 / (trace V trace V^-1), nearly the ratio of V's smallest eigenvalue to their sum; nan without V
-    cost        sum of squares of the whitened misclosures of the ranges; nan where a range joins coinciding points
-    gain        sum of b' V^-1 b
-    moment      sum of (root D)^2: how many times the unit roundoff shows in the cost
+    normal        (n, n), n = S width, held parameters included
+    before        (n,) its diagonal before the elimination
+    right         (n,)
+    inverse       (T, 3, 3) V^-1 over free coordinates, zero elsewhere
+    target_step   (T, 3) V^-1 b, the targets' step with fixed stations
+    condition     (T,) 1 / (trace V trace V^-1), nearly the ratio of V's smallest eigenvalue to their sum; nan without V
+    cost          sum of squares of the whitened misclosures of the ranges; nan if the ends of a range coincide
+    gain          sum of b' V^-1 b
+    moment        sum of (root D)^2: amplification of roundoff in the cost
     """
 
     normal: np.ndarray
     before: np.ndarray
     right: np.ndarray
     inverse: np.ndarray
-    own: np.ndarray
+    target_step: np.ndarray
     condition: np.ndarray
     cost: float
     gain: float
@@ -92,7 +93,7 @@ class Reduced:
 
 @dataclass(frozen=True, eq=False)
 class Statistics:
-    """covariance (T, 3, 3) of the targets, m^2; and (m,) of the ranges, as in `least_squares.adjustment.GroupFit`."""
+    """Covariance (T, 3, 3) of the targets, m^2, and tests (m,) of the ranges as in `GroupFit`."""
 
     covariance: np.ndarray
     residual: np.ndarray
@@ -102,14 +103,17 @@ class Statistics:
 
     @classmethod
     def unknown(cls, t: int, m: int) -> "Statistics":
-        """Those of t targets and m ranges without an answer: nan; the four arrays of ranges are one."""
-        nothing = np.full(m, np.nan)
-        return cls(np.full((t, 3, 3), np.nan), nothing, nothing, nothing, nothing)
+        """Statistics without a solution: nan.
+
+        The four arrays of ranges are one.
+        """
+        undefined = np.full(m, np.nan)
+        return cls(np.full((t, 3, 3), np.nan), undefined, undefined, undefined, undefined)
 
 
 @dataclass(frozen=True, eq=False)
 class RangeRows:
-    """Some ranges, linearised and whitened with `root`: rows, their ends, a (k, 3), g (k, width), misclosure (k,)."""
+    """Ranges linearised and whitened: rows, ends, a (k, 3), g (k, width), misclosure (k,)."""
 
     rows: np.ndarray
     station: np.ndarray
@@ -121,7 +125,7 @@ class RangeRows:
 
 
 def linearise(problem: Problem, state: IterationState, rows: np.ndarray, *, root: np.ndarray) -> RangeRows:
-    """The ranges `rows` at a state, whitened with root (k,)."""
+    """Ranges `rows` linearised at a state, whitened with root (k,)."""
     station, target = problem.station[rows], problem.target[rows]
     along = state.targets[target] - state.stations[station]
     length = np.sqrt(np.einsum("ij,ij->i", along, along))
@@ -133,9 +137,10 @@ def linearise(problem: Problem, state: IterationState, rows: np.ndarray, *, root
 
 
 def invert_targets(v: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Inverses of V (T, 3, 3) over free coordinates (T, 3), zero elsewhere, and 1 / (trace V trace V^-1).
+    """Inverses of V (T, 3, 3) over free coordinates (T, 3), and 1 / (trace V trace V^-1).
 
-    By the factors L D L', which cares for no scale; a singular V gives a condition of nan, infinity or below roundoff.
+    Zero elsewhere. By the factors L D L', independent of scale; a singular V gives a condition of nan, infinity or
+    below roundoff.
     """
     fx, fy, fz = free.T.astype(float)
     out = np.empty_like(v)
@@ -160,7 +165,7 @@ def invert_targets(v: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 class NumpyBlocks:
-    """Elimination, back substitution and statistics of one problem; `KernelBlocks` is the compiled form."""
+    """Elimination, back-substitution and statistics of one problem; compiled form `KernelBlocks`."""
 
     def __init__(self, problem: Problem):
         self.problem = problem
@@ -173,77 +178,77 @@ class NumpyBlocks:
         self._repeated = len(np.unique(pairs)) < len(pairs)
 
     def _chunks(self) -> Iterator[tuple[slice, np.ndarray]]:
-        """Targets in slices, with the rows of their ranges, so that no array grows past CHUNK numbers."""
+        """Slices of targets with the rows of their ranges, to bound memory to CHUNK numbers."""
         step = max(1, CHUNK // max(1, 3 * self._size))
         for low in range(0, len(self._first) - 1, step):
             high = min(low + step, len(self._first) - 1)
             yield slice(low, high), self._sorted[self._first[low] : self._first[high]]
 
     def _coupling(self, linear: RangeRows, part: slice) -> np.ndarray:
-        """W of some targets: (t, n, 3)."""
+        """Coupling W (t, n, 3) of some targets with the stations."""
         w = np.zeros((part.stop - part.start, self._stations, self.problem.width, 3))
         share = linear.g[:, :, None] * linear.a[:, None, :]
         at = (linear.target - part.start, linear.station)
         if self._repeated:
             np.add.at(w, at, share)
         else:
-            used = self.problem.root[linear.rows] > 0.0  # a range left out may repeat a used one
+            used = self.problem.root[linear.rows] > 0.0  # a left-out range may repeat a used one
             w[at[0][used], at[1][used]] = share[used]
         return w.reshape(len(w), self._size, 3)
 
     def reduce(self, state: IterationState) -> Reduced:
-        """Normal equations at a state, targets eliminated."""
+        """Reduced normal equations at a state, targets eliminated."""
         problem, t = self.problem, len(self.problem.free_targets)
         normal, before, right = np.zeros((self._size, self._size)), np.zeros(self._size), np.zeros(self._size)
-        inverse, own, condition = np.empty((t, 3, 3)), np.empty((t, 3)), np.empty(t)
+        inverse, local_step, condition = np.empty((t, 3, 3)), np.empty((t, 3)), np.empty(t)
         cost = gain = moment = 0.0
         for part, rows in self._chunks():
             linear = linearise(problem, state, rows, root=problem.root[rows])
             v, b = self._targets(linear, part, state)
             inverse[part], condition[part] = invert_targets(v, problem.free_targets[part])
-            own[part] = np.einsum("tij,tj->ti", inverse[part], b)
+            local_step[part] = np.einsum("tij,tj->ti", inverse[part], b)
             w = self._coupling(linear, part)
-            with np.errstate(invalid="ignore"):  # a singular V is judged by its condition
+            with np.errstate(invalid="ignore"):  # a singular V is detected by its condition
                 flat = np.ascontiguousarray(w.transpose(1, 0, 2)).reshape(self._size, -1)
                 normal -= flat @ (w @ inverse[part]).transpose(0, 2, 1).reshape(-1, self._size)
-                right -= flat @ own[part].ravel()
-                gain += float(np.sum(own[part] * b))
+                right -= flat @ local_step[part].ravel()
+                gain += float(np.sum(local_step[part] * b))
             self._stations_alone(linear, normal, before, right)
             cost += float(linear.misclosure @ linear.misclosure)
             moment += float(np.sum((problem.root[rows] * linear.length) ** 2))
             if np.any((linear.length == 0.0) & (problem.root[rows] > 0.0)):
                 cost = np.nan
-        return Reduced((normal + normal.T) / 2, before, right, inverse, own, condition, cost, gain, moment)
+        return Reduced((normal + normal.T) / 2, before, right, inverse, local_step, condition, cost, gain, moment)
 
     def follow(self, state: IterationState, old: Reduced) -> Reduced:
-        """The right side and cost at a state close to that of `old`, whose matrices are kept."""
-        right, own, cost, gain, moment = np.zeros(self._size), np.empty_like(old.own), 0.0, 0.0, 0.0
+        """Right-hand side and cost at a state near `old`, whose matrices are reused."""
+        right, local_step, cost, gain, moment = np.zeros(self._size), np.empty_like(old.target_step), 0.0, 0.0, 0.0
         for part, rows in self._chunks():
             linear = linearise(self.problem, state, rows, root=self.problem.root[rows])
             b = self._targets(linear, part, state)[1]
-            own[part] = np.einsum("tij,tj->ti", old.inverse[part], b)
-            short = linear.misclosure - np.einsum("ki,ki->k", linear.a, own[linear.target])
+            local_step[part] = np.einsum("tij,tj->ti", old.inverse[part], b)
+            short = linear.misclosure - np.einsum("ki,ki->k", linear.a, local_step[linear.target])
             for i in range(self.problem.width):
                 right[i :: self.problem.width] += np.bincount(linear.station, linear.g[:, i] * short, self._stations)
-            gain += float(np.sum(own[part] * b))
+            gain += float(np.sum(local_step[part] * b))
             cost += float(linear.misclosure @ linear.misclosure)
             moment += float(np.sum((self.problem.root[rows] * linear.length) ** 2))
-        return replace(old, right=right, own=own, cost=cost, gain=gain, moment=moment)
+        return replace(old, right=right, target_step=local_step, cost=cost, gain=gain, moment=moment)
 
-    def felt(self, at: IterationState, own: np.ndarray) -> np.ndarray:
-        """Steps of the targets alone, own (T, 3, f), as the stations feel them: minus the sum of g a' own, (n, f)."""
-        f = own.shape[2]
+    def felt(self, at: IterationState, target_steps: np.ndarray) -> np.ndarray:
+        """Effect (n, f) on the stations of target steps, own (T, 3, f): minus the sum of g a' own."""
+        f = target_steps.shape[2]
         out = np.zeros((self._stations, self.problem.width, f))
         for _, rows in self._chunks():
             linear = linearise(self.problem, at, rows, root=self.problem.root[rows])
-            along = np.einsum("ki,kif->kf", linear.a, own[linear.target])
+            along = np.einsum("ki,kif->kf", linear.a, target_steps[linear.target])
             for i in range(self.problem.width):
                 for j in range(f):
                     out[:, i, j] -= np.bincount(linear.station, linear.g[:, i] * along[:, j], self._stations)
         return out.reshape(self._size, f)
 
     def _targets(self, linear: RangeRows, part: slice, state: IterationState) -> tuple[np.ndarray, np.ndarray]:
-        """V and the right side of some targets, priors included."""
+        """V and right-hand side of some targets, priors included."""
         n, at = part.stop - part.start, linear.target - part.start
         v, b = np.empty((n, 3, 3)), np.empty((n, 3))
         for i in range(3):
@@ -267,21 +272,21 @@ class NumpyBlocks:
             before[first + i] += np.bincount(linear.station, linear.g[:, i] ** 2, s)
 
     def back(self, state: IterationState, reduced: Reduced, step: np.ndarray) -> np.ndarray:
-        """The targets' step (T, 3) that belongs to a step (n,) of the stations' parameters."""
-        moved = np.empty_like(reduced.own)
+        """Targets' step (T, 3) for a step (n,) of the stations' parameters (back-substitution)."""
+        moved = np.empty_like(reduced.target_step)
         by_station = step.reshape(self._stations, -1)
         for part, rows in self._chunks():
             linear = linearise(self.problem, state, rows, root=self.problem.root[rows])
             along = np.einsum("ij,ij->i", linear.g, by_station[linear.station])
             at, n = linear.target - part.start, part.stop - part.start
             total = np.stack([np.bincount(at, linear.a[:, i] * along, n) for i in range(3)], axis=1)
-            moved[part] = reduced.own[part] - np.einsum("tij,tj->ti", reduced.inverse[part], total)
+            moved[part] = reduced.target_step[part] - np.einsum("tij,tj->ti", reduced.inverse[part], total)
         return moved
 
     def statistics(self, at: IterationState, answer: IterationState, inverse: np.ndarray, q: np.ndarray) -> Statistics:
-        """Covariances and tests, from V^-1 of each target and the covariance q (n, n) of the stations' parameters.
+        """Covariances and tests, from V^-1 of the targets and covariance q (n, n) of the stations.
 
-        Directions are those at `at`, where both were found; residuals are those of the answer, one step further.
+        Directions are those at `at`, where both were computed; residuals are those of the answer, one step further.
         """
         problem, m = self.problem, len(self.problem.distance)
         covariance, h, misclosure = np.empty_like(inverse), np.empty(m), np.empty(m)

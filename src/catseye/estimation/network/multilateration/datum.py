@@ -1,11 +1,11 @@
-"""Motions that ranges cannot see, and the inner constraints that hold them.
+"""Motions not observed by ranges, and the inner constraints that fix them.
 
-Seven generators move all points: three shifts, three turns about the axes, one dilation. A motion is free if it leaves
-every held coordinate and every point with a prior in place; the dilation also needs every ranger's scale free. The
-datum is: of all networks that free motions carry into each other, the one whose datum coordinates lie nearest to their
-given values (least sum of squares). Its conditions are h = F' sum n (x - x0) = 0 over datum coordinates, n the
+Seven generators move all points: three shifts, three rotations about the axes, one dilation. A motion is free if it
+leaves every held coordinate and every point with a prior in place; the dilation also needs every ranger's scale free.
+The datum selects, of all networks related by free motions, the one whose datum coordinates are nearest to their given
+values (least sum of squares). Its conditions are h = F' sum n (x - x0) = 0 over datum coordinates, n the
 generators at the answer x, F the free motions. The covariance uses the exact derivative of h, not that at x0.
-Where held coordinates leave free motions whose combination F changes with x, that change is neglected: second order.
+If held coordinates leave free motions whose combination F changes with x, that change is neglected: second order.
 Source: [FOERSTNER16] chapter 4, gauge constraints and S-transformations.
 """
 
@@ -17,16 +17,16 @@ import numpy as np
 from catseye.estimation.network.multilateration.blocks import IterationState
 
 GENERATORS = 7
-STILL = 1e-10  # of the network's size: a held coordinate moved by less is not moved
-ENOUGH = 64  # held points that are looked at first: they nearly always hold everything already
-TURNS = np.array(  # (3, 3, 3): turn k displaces x by TURNS[k] @ x, the cross product e_k x x
+STILL = 1e-10  # of the network's size: tolerance for a fixed coordinate
+ENOUGH = 64  # held points that are tried first: they usually fix all motions
+TURNS = np.array(  # (3, 3, 3): rotation k displaces x by TURNS[k] @ x, the cross product e_k x x
     [[[0, 0, 0], [0, 0, -1], [0, 1, 0]], [[0, 0, 1], [0, 0, 0], [-1, 0, 0]], [[0, -1, 0], [1, 0, 0], [0, 0, 0]]],
     dtype=float,
 )
 
 
 def generators(x: np.ndarray) -> np.ndarray:
-    """Displacements (k, 3, 7) of points x (k, 3) by the generators: shifts, turns, dilation, about the origin.
+    """Displacements (k, 3, 7) of points x (k, 3) by shifts, rotations and dilation about the origin.
 
     >>> generators(np.array([[1.0, 2.0, 3.0]]))[0, :, 5]  # turn about z
     array([-2., 1., 0.])
@@ -45,17 +45,17 @@ def displacements(x: np.ndarray, motion: np.ndarray) -> np.ndarray:
     return x @ (np.einsum("a,aij->ij", motion[3:6], TURNS) + motion[6] * np.eye(3)).T + motion[:3]
 
 
-def free_motions(held: np.ndarray, coordinates: np.ndarray, *, dilation: bool, size: float) -> np.ndarray:
-    """Basis (7, f) of the motions that leave some coordinates in place; a unit of each moves points by about 1 m.
+def free_motions(points: np.ndarray, coordinates: np.ndarray, *, dilation: bool, size: float) -> np.ndarray:
+    """Basis (7, f) of the motions that leave some coordinates in place.
 
-    held          (k, 3) points, relative to an origin amid the network
-    coordinates   (k, 3) bool: which of their coordinates must stay
-    dilation      whether the size of the network is free
-    size          of the network, m
+    points        (k, 3) points, relative to an origin inside the network
+    coordinates   (k, 3) bool: their fixed coordinates
+    dilation      True if the size of the network is free
+    size          of the network, m; a unit of each motion moves points by about 1 m
     """
     unit = np.array([1.0, 1.0, 1.0] + [1.0 / size] * 4)
     generator = np.eye(GENERATORS)[:, : 7 if dilation else 6]
-    rows = (generators(held)[coordinates] * unit) @ generator
+    rows = (generators(points)[coordinates] * unit) @ generator
     if not len(rows):
         return unit[:, None] * generator
     if len(rows) > GENERATORS:
@@ -67,11 +67,11 @@ def free_motions(held: np.ndarray, coordinates: np.ndarray, *, dilation: bool, s
 
 @dataclass(frozen=True, eq=False)
 class InnerConstraints:
-    """Inner constraints at a state, linearised.
+    """Linearised inner constraints at a state.
 
     value        (f,) h
     at_stations  (S, 3, f) derivative by the stations' coordinates
-    points       (k,) targets that take part
+    points       (k,) targets in the constraints
     at_targets   (k, 3, f) derivative by their coordinates
     response     (f, f) derivative by the free motions themselves
     """
@@ -83,7 +83,7 @@ class InnerConstraints:
     response: np.ndarray
 
     def restore(self, stations: np.ndarray, targets: np.ndarray) -> np.ndarray:
-        """The amounts (f,) of the free motions that, after a step of stations and targets, satisfy the conditions."""
+        """Amounts (f,) of the free motions that satisfy the conditions after a step."""
         count = len(self.value)
         ahead = self.value + stations.ravel() @ self.at_stations.reshape(-1, count)
         if len(self.points):
@@ -93,7 +93,7 @@ class InnerConstraints:
 
 @dataclass(frozen=True, eq=False)
 class Datum:
-    """Which coordinates take part in the inner constraints, and their given values: stations (S, 3), targets (T, 3)."""
+    """Coordinates in the inner constraints, and reference values: stations (S, 3), targets (T, 3)."""
 
     stations: np.ndarray
     targets: np.ndarray
@@ -103,7 +103,10 @@ class Datum:
     def conditions(
         self, state: IterationState, motions: np.ndarray, free: tuple[np.ndarray, np.ndarray]
     ) -> InnerConstraints:
-        """The inner constraints at a state, for free motions (7, f); free: coordinates of stations and of targets."""
+        """Inner constraints at a state, for free motions (7, f).
+
+        `free` holds the masks of stations and targets.
+        """
         points = self.points
         first = _share(state.stations, self.stations, self.marked_stations, motions, free[0])
         if not len(points):
@@ -115,20 +118,20 @@ class Datum:
 
     @cached_property
     def points(self) -> np.ndarray:
-        """Indices of the targets that take part."""
+        """Indices of the targets in the constraints."""
         return np.flatnonzero(self.marked_targets.any(axis=1))
 
     @cached_property
     def empty(self) -> bool:
-        """Whether nothing takes part."""
+        """True if no coordinate is in the constraints."""
         return not (self.marked_stations.any() or len(self.points))
 
 
 def _share(
-    x: np.ndarray, given: np.ndarray, marked: np.ndarray, motions: np.ndarray, free: np.ndarray
+    x: np.ndarray, reference: np.ndarray, marked: np.ndarray, motions: np.ndarray, free: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Value (f,), derivative (k, 3, f) and response (f, f) of the conditions from some points."""
-    off = np.where(marked, x - given, 0.0)
+    off = np.where(marked, x - reference, 0.0)
     n = generators(x).reshape(-1, GENERATORS)
     value = off.ravel() @ n
     slope = n * marked.reshape(-1, 1)

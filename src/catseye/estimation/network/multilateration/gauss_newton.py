@@ -1,11 +1,12 @@
-"""Ranging networks: stations that measure distances to targets, all coordinates unknown, solved by block elimination.
+"""Gauss-Newton adjustment of ranging networks by block elimination of the targets.
 
-observed = (1 + scale) |target - station| + zero + error, zero and scale of the station held, free or with a prior.
-Every target is eliminated into a dense system of the stations' parameters, so thousands of targets cost milliseconds:
-in plain numpy for small networks, compiled for large ones. Gauss-Newton, its step halved while the cost rises, with the
-normal matrix of a large network kept once a step is a thousandth of the one before (covariances to 1e-6 of their own).
-It is scale-free: rank is judged by directions and by the share of a diagonal that survives the elimination, so metres,
-nanometre sigmas and kilometres decide alike. Free motions are held by inner constraints: see `datum`.
+Stations measure distances to targets, all coordinates unknown: observed = (1 + scale) |target - station| + zero +
+error, zero and scale of the station held, free or with a prior. Every target is eliminated into a dense system of the
+stations' parameters, so thousands of targets cost milliseconds: in plain numpy for small networks, compiled for large
+ones. The Gauss-Newton step is halved while the cost rises, and the normal matrix of a large network is kept once a step
+is a thousandth of the previous one (covariances accurate to 1e-6). The method is scale-free: rank is determined from
+directions and from the share of a diagonal that remains after the elimination, independent of units. Free motions are
+fixed by inner constraints: see `datum`.
 """
 
 from dataclasses import dataclass
@@ -22,21 +23,21 @@ from catseye.estimation.network.multilateration.datum import InnerConstraints, d
 from catseye.estimation.network.multilateration.network import RangingNetwork, Setup, set_up
 from catseye.estimation.network.multilateration.solution import Gauge, RangingSolution
 
-COMPILED_FROM = 200_000  # ranges: below, importing the compiled kernels costs more than they save
-WORST_TARGET = 1e-12  # of 1 / (trace V trace V^-1): directions within 1 microradian of a plane show nothing off it
-WORST_NETWORK = 1e-13  # of the reduced matrix, scaled by its diagonal before elimination: below it is roundoff
-KEEP_BELOW = 1e-3  # of the step before: the normal matrix changes less than that by far, and may be kept
-KEEP_FROM = 20_000  # ranges: below, building it anew costs too little to give up its last digits
+COMPILED_FROM = 200_000  # ranges: below it importing the compiled kernels costs more than they save
+WORST_TARGET = 1e-12  # of 1 / (trace V trace V^-1): coplanar directions within 1 microradian are singular
+WORST_NETWORK = 1e-13  # of the reduced matrix, scaled by its diagonal before elimination: roundoff limit
+KEEP_BELOW = 1e-3  # of the previous step: below it the normal matrix is kept
+KEEP_FROM = 20_000  # ranges: below it rebuilding is cheap, and the matrix is not kept
 EPS = float(np.finfo(float).eps)
 
 
 class Blocks(Protocol):
-    """Either engine: `NumpyBlocks`, `KernelBlocks`."""
+    """Protocol of both engines: `NumpyBlocks`, `KernelBlocks`."""
 
     def reduce(self, state: IterationState) -> Reduced: ...
     def follow(self, state: IterationState, old: Reduced) -> Reduced: ...
     def back(self, state: IterationState, reduced: Reduced, step: np.ndarray) -> np.ndarray: ...
-    def felt(self, at: IterationState, own: np.ndarray) -> np.ndarray: ...
+    def felt(self, at: IterationState, target_steps: np.ndarray) -> np.ndarray: ...
     def statistics(
         self, at: IterationState, answer: IterationState, inverse: np.ndarray, q: np.ndarray
     ) -> Statistics: ...
@@ -50,15 +51,15 @@ def adjust_ranges(
     inflation: np.ndarray | None = None,
     engine: str | None = None,
 ) -> RangingSolution:
-    """The coordinates, zeros and scales that fit a ranging network best, with covariances and tests of every range.
+    """Best-fit coordinates, zeros and scales of a ranging network, with covariances and tests.
 
-    network      see there
-    tests        False leaves covariances and tests at nan
-    iterations   cap of Gauss-Newton steps; a step that raises the cost is halved, ten times at most
+    network      see `RangingNetwork`
+    tests        False: covariances and tests are nan
+    iterations   limit of Gauss-Newton steps; a step that raises the cost is halved, at most ten times
     inflation    (m,) factor on each range's sigma, infinite leaves it out but still tests it against its prediction
     engine       "numpy", "numba", or None: compiled from 200 000 ranges on
 
-    Returns a RangingSolution whose status says what happened; raises InputError for a network that is none.
+    The status of the solution describes any failure; raises InputError for an invalid network.
 
     Source: [FOERSTNER16] chapters 4 and 15 (Gauss-Markov model, elimination, gauge), [BAARDA68] (tests).
 
@@ -78,7 +79,7 @@ def adjust_ranges(
 
 def _engine(setup: Setup, engine: str | None) -> Blocks:
     if engine not in (None, "numpy", "numba"):
-        raise InputError(f'engine is "numpy", "numba" or None, not {engine!r}')
+        raise InputError(f'unknown engine {engine!r} (expected "numpy", "numba" or None)')
     if engine == "numpy" or (engine is None and len(setup.problem.distance) < COMPILED_FROM):
         return NumpyBlocks(setup.problem)
     from catseye.estimation.network.multilateration.kernel import KernelBlocks
@@ -88,10 +89,10 @@ def _engine(setup: Setup, engine: str | None) -> Blocks:
 
 @dataclass(frozen=True, eq=False)
 class _Factor:
-    """Cholesky factor of the reduced matrix over the free parameters, made regular along the free motions.
+    """Cholesky factor of the reduced matrix over the free parameters, regularised along free motions.
 
     index   (k,) the free parameters
-    scale   (k,) what they were multiplied with
+    scale   (k,) their scale factors
     lower   (k, k)
     basis   (k, f) orthonormal, scaled: the free motions
     """
@@ -102,14 +103,14 @@ class _Factor:
     basis: np.ndarray
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        """The shortest (scaled) solution (n,) for a right side (n,)."""
+        """Shortest (scaled) solution (n,) for a right-hand side (n,)."""
         step = np.zeros(len(right))
         if len(self.index):
             step[self.index] = self.scale * lapack.dpotrs(self.lower, self.scale * right[self.index], lower=1)[0]
         return step
 
     def inverse(self, n: int) -> np.ndarray:
-        """The pseudoinverse (n, n) in scaled parameters, zero where held."""
+        """Pseudoinverse (n, n) in scaled parameters, zero if held."""
         out = np.zeros((n, n))
         if len(self.index):
             half = np.tril(lapack.dpotri(self.lower, lower=1)[0])
@@ -120,11 +121,11 @@ class _Factor:
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """A Gauss-Newton step: of the stations' parameters (n,) and targets (T, 3), and how it was found.
+    """Gauss-Newton step of the stations' parameters (n,) and targets (T, 3).
 
     size     in standard deviations of all parameters together, the motion to the datum included
-    gain     by how much it lowers the cost, to first order
-    noise    what roundoff makes of `size`
+    gain     reduction of the cost, to first order
+    noise    roundoff of `size`
     """
 
     stations: np.ndarray
@@ -137,22 +138,22 @@ class _Step:
 
 
 class _Iteration:
-    """Gauss-Newton on one network."""
+    """Gauss-Newton iteration on one network."""
 
     def __init__(self, setup: Setup, blocks: Blocks):
         self.setup, self.blocks, self.problem = setup, blocks, setup.problem
         self.state = self.at = setup.start
         self.factor: _Factor | None = None
-        self.thrifty = len(self.problem.distance) >= KEEP_FROM
+        self.reuses_matrix = len(self.problem.distance) >= KEEP_FROM
         self.free = np.flatnonzero(self.problem.free_stations.ravel())
-        self.taken, self.cost, self.moment = 0, np.nan, 0.0
+        self.steps, self.cost, self.moment = 0, np.nan, 0.0
 
     def run(self, network: RangingNetwork, iterations: int, tests: bool) -> RangingSolution:
-        """Iterate to an answer, then its statistics."""
+        """Iterate to convergence, then compute the statistics."""
         status, answer = NOT_CONVERGED.format(step=np.inf, iterations=0), None
         reduced, before = self._reduce(self.state), 0.0
-        while self.taken < iterations:
-            self.taken += 1
+        while self.steps < iterations:
+            self.steps += 1
             step = self._solve(reduced)
             if isinstance(step, str):
                 status = step
@@ -160,22 +161,25 @@ class _Iteration:
             if step.size < STEP_IN_SIGMAS + step.noise:
                 status, answer = CONVERGED, step
                 break
-            status = NOT_CONVERGED.format(step=step.size, iterations=self.taken)
-            descent = self._descend(step, reduced, keep=self.thrifty and step.size < KEEP_BELOW * before)
+            status = NOT_CONVERGED.format(step=step.size, iterations=self.steps)
+            descent = self._descend(step, reduced, keep=self.reuses_matrix and step.size < KEEP_BELOW * before)
             if descent is None:
                 break
             reduced, before = descent, step.size
         return self._solution(network, status, reduced, answer, tests)
 
     def _reduce(self, state: IterationState) -> Reduced:
-        """Normal equations at a state, whose factor is then to be found."""
+        """Normal equations at a state; the factor is reset."""
         reduced = self.blocks.reduce(state)
         cost, moment = self.setup.terms.add(state, reduced.normal, reduced.before, reduced.right, self.problem.width)
         self.cost, self.moment, self.at, self.factor = reduced.cost + cost, reduced.moment + moment, state, None
         return reduced
 
     def _follow(self, state: IterationState, old: Reduced) -> Reduced:
-        """The right side at a state close to where the normal matrix was built, which is kept with its factor."""
+        """Right-hand side at a nearby state.
+
+        Normal matrix and factor are reused.
+        """
         reduced = self.blocks.follow(state, old)
         aside = np.zeros_like(old.normal), np.zeros_like(old.before)
         cost, moment = self.setup.terms.add(state, *aside, reduced.right, self.problem.width)
@@ -193,7 +197,12 @@ class _Iteration:
         return IterationState(old.stations + by_station[:, :3], old.targets + fraction * step.targets, zero, scale)
 
     def _descend(self, step: _Step, old: Reduced, *, keep: bool) -> Reduced | None:
-        """Take the step, halved while the cost rises, or None; keep: the normal matrix, if the whole step descends."""
+        """Take the step, halved while the cost rises.
+
+        None if it never falls.
+
+        keep   reuse the normal matrix, if the full step descends
+        """
         before = self.cost
         noise = 8.0 * EPS * (before * self.moment) ** 0.5 + EPS**2 * self.moment  # of the cost, from roundoff of D
         for halving in range(11):
@@ -206,7 +215,7 @@ class _Iteration:
         return None
 
     def _solve(self, reduced: Reduced) -> _Step | str:
-        """The next step; or why there is none."""
+        """Next step, or the reason why there is none."""
         if not np.isfinite(self.cost):
             return self._undefined()
         refusal = self._floating(reduced)
@@ -236,25 +245,27 @@ class _Iteration:
     def _undefined(self) -> str:
         problem, names = self.problem, self.setup.names
         along = self.state.targets[problem.target] - self.state.stations[problem.station]
-        same = np.flatnonzero(~np.any(along != 0.0, axis=1) & (problem.root > 0.0))
-        called = [f"the range {names.station(problem.station[i])} to {names.target(problem.target[i])}" for i in same]
+        coinciding = np.flatnonzero(~np.any(along != 0.0, axis=1) & (problem.root > 0.0))
+        called = [
+            f"the range {names.station(problem.station[i])} to {names.target(problem.target[i])}" for i in coinciding
+        ]
         return UNDEFINED.format(names=status_of.listed(called) if called else "a range between stations")
 
     def _floating(self, reduced: Reduced) -> str | None:
-        """Why some target has no place relative to its stations, or None."""
+        """Reason why a target is not determined relative to its stations, or None."""
         fine = reduced.condition >= WORST_TARGET
         if fine.all():
             return None
         needed = np.any(self.problem.free_targets, axis=1)
         if self.setup.terms.targets is not None:
-            needed[self.setup.terms.targets.index] = False  # positive definite already
+            needed[self.setup.terms.targets.index] = False  # positive definite by its prior
         bad = np.flatnonzero(~fine & needed)
         if not len(bad):
             return None
         return status_of.floating_targets(self.problem, self.state, self.setup.names, floating=bad)
 
     def _null(self, motions: np.ndarray, state: IterationState) -> np.ndarray:
-        """What the free motions do to the stations' parameters: (n, f)."""
+        """Free motions in terms of the stations' parameters, (n, f)."""
         null = np.zeros((*self.problem.free_stations.shape, motions.shape[1]))
         null[:, :3] = generators(state.stations) @ motions
         if self.problem.width > 3:
@@ -294,7 +305,7 @@ class _Iteration:
         return status_of.floating_network(self.problem, self.setup.names, joined, part=full)
 
     def _conditions(self, motions: np.ndarray, state: IterationState) -> InnerConstraints | str:
-        """Inner constraints at a state, or why they do not hold the free motions."""
+        """Inner constraints at a state, or the reason why they do not fix the free motions."""
         datum = self.setup.datum
         count = motions.shape[1]
         if datum.empty:
@@ -314,7 +325,7 @@ class _Iteration:
         problem, at, n = self.problem, self.at, self.problem.free_stations.size
         state, pvv = self.state, self.cost
         covariance, gauge, statistics = np.full((n, n), np.nan), None, None
-        if answer is not None:  # the last step; the statistics hold where the normal matrix was built, all consistently
+        if answer is not None:  # last step; the statistics refer to the state of the normal matrix
             state, pvv = self._moved(answer, 1.0), max(self.cost - answer.gain, 0.0)
         conditions = answer.motions.shape[1] if answer is not None else 0
         if answer is not None and tests:
@@ -325,13 +336,13 @@ class _Iteration:
                 moved = (generators(x) @ gauge.motions) * problem.free_targets[gauge.points][:, :, None]
                 joined = moved @ gauge.drift.transpose(0, 2, 1)
                 statistics.covariance[gauge.points] -= joined + joined.transpose(0, 2, 1)
-        known = statistics
+        computed = statistics
         statistics = statistics or Statistics.unknown(len(state.targets), len(problem.distance))
         free = int(np.sum(problem.free_stations)) + int(np.sum(problem.free_targets))
         count = problem.used + self.setup.terms.count()
         degrees = count - free + conditions
         if status == CONVERGED and degrees > 0 and pvv > status_of.BELIEVABLE**2 * degrees:
-            status = status_of.contradiction(problem, state, self.setup.names, statistics=known) or status
+            status = status_of.contradiction(problem, state, self.setup.names, statistics=computed) or status
         return RangingSolution(
             network,
             state.stations + self.setup.origin,
@@ -339,7 +350,7 @@ class _Iteration:
             state.zero,
             state.scale,
             status,
-            self.taken,
+            self.steps,
             pvv,
             degrees,
             problem.width,
@@ -356,7 +367,7 @@ class _Iteration:
         )
 
     def _covariance(self, answer: _Step, reduced: Reduced) -> tuple[np.ndarray, Gauge]:
-        """Covariance (n, n) of the stations' parameters in the datum, by an S-transformation; and the datum's part.
+        """Covariance (n, n) of the stations' parameters in the datum (S-transformation), and the gauge.
 
         With h the conditions' derivative by the stations, the targets following them, and R the inverse of their
         response: T = 1 - N R h', Q = T Q0 T' + N R (sum over datum targets of H' V^-1 H) R' N'.
@@ -368,18 +379,18 @@ class _Iteration:
         if not f:
             return q, gauge
         conditions = self._conditions(motions, self.at)
-        if isinstance(conditions, str):  # it held them one step before
+        if isinstance(conditions, str):  # they were fixed one step before
             raise EstimationError(conditions)
         by_station = np.zeros((*self.problem.free_stations.shape, f))
         by_station[:, :3] = conditions.at_stations
         h, back, spread = by_station.reshape(n, f), np.linalg.inv(conditions.response), np.zeros((f, f))
         if len(conditions.points):
-            own = reduced.inverse[conditions.points] @ conditions.at_targets
-            spread = np.einsum("kif,kig->fg", conditions.at_targets, own)
+            followed = reduced.inverse[conditions.points] @ conditions.at_targets
+            spread = np.einsum("kif,kig->fg", conditions.at_targets, followed)
             everywhere = np.zeros((len(self.at.targets), 3, f))
-            everywhere[conditions.points] = own
+            everywhere[conditions.points] = followed
             h = h + self.blocks.felt(self.at, everywhere)
-            gauge = Gauge(motions, null, conditions.points, own @ back.T)
-        carried, taken = null @ back, h.T @ q
-        moved = carried @ taken
-        return q - moved - moved.T + carried @ (taken @ h + spread) @ carried.T, gauge
+            gauge = Gauge(motions, null, conditions.points, followed @ back.T)
+        null_response, projected = null @ back, h.T @ q
+        moved = null_response @ projected
+        return q - moved - moved.T + null_response @ (projected @ h + spread) @ null_response.T, gauge

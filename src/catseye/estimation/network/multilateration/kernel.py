@@ -1,18 +1,20 @@
-"""Elimination of targets from a ranging network, compiled; `blocks` does the same in plain numpy.
+"""Compiled elimination of targets from a ranging network.
 
-Targets stand in blocks of LANES, one lane each; a slot is one station (or its repetition) over the lanes of a block, so
-that every inner loop runs over lanes and fills the vector unit. A lane without a range has root weight zero.
-Per slot and lane: a = root (1 + scale) u, u from station to target; the whitened derivative by the target is a, that
-by the station's parameters g = (-a, root, root D). With V = sum a a' and c_rs = a_r' V^-1 a_s the reduced normal
-matrix is the sum of (delta_rs - c_rs) g_r g_s': 15 multiply-adds a pair of stations and target.
+Plain form in `blocks`.
+
+Targets are stored in blocks of LANES, one lane each; a slot is one station (or its repetition) over the lanes of a
+block, so that every inner loop runs over lanes and fills the vector unit. A lane without a range has root weight zero.
+Per slot and lane: a = root (1 + scale) u, u from station to target; the whitened derivative by the target is a, that by
+the station's parameters g = (-a, root, root D). With V = sum a a' and c_rs = a_r' V^-1 a_s the reduced normal matrix is
+the sum of (delta_rs - c_rs) g_r g_s': 15 multiply-adds per pair of stations and target.
 
 For the statistics a and g are whitened with the claimed sigma, and phi is the root weight in the solution over that of
 the claim. With E_rs = g_r' Q_rs g_s, F_r = sum_s E_rs phi_s^2 a_s, M = sum_r phi_r^2 a_r F_r' and p = V^-1 a the
 target's covariance is V^-1 + V^-1 M V^-1, and the variance of a predicted range, in units of its claimed variance,
-E_rr - 2 F_r.p_r + a_r.p_r + p_r' M p_r: of a range that was left out (phi = 0) as well.
+E_rr - 2 F_r.p_r + a_r.p_r + p_r' M p_r: also of a left-out range (phi = 0).
 
-All of it stands in one file because the cache of compiled code looks at no other: what changes elsewhere would go
-unnoticed. Views are taken by row and fixed offset: an index that might be negative costs the vector unit.
+All code is in one file because the cache of compiled code does not notice changes in other files. Views are taken by
+row and fixed offset: an index that might be negative prevents vectorisation.
 Source: [FOERSTNER16] chapter 15, elimination of points from the normal equations of a bundle.
 """
 
@@ -33,12 +35,12 @@ from catseye.estimation.network.multilateration.layout_kernel import by_target, 
 
 LANES = 128
 ROWS = 7  # of a slot's scratch: a (3), derivatives by zero and scale (2), misclosure, phi^2
-ASSOCIATIVE = {"reassoc", "contract", "nsz"}  # sums over lanes may be reordered; nan and infinity stay what they are
-SMALLEST = 1e-300  # keeps the direction between coinciding points finite; they are told apart by their distance
+ASSOCIATIVE = {"reassoc", "contract", "nsz"}  # sums over lanes may be reordered; nan and infinity are preserved
+SMALLEST = 1e-300  # keeps the direction between coinciding points finite; they are detected by their distance
 
 
 class KernelBlocks:
-    """The compiled form of `NumpyBlocks`: same constructor, methods and answers."""
+    """Compiled form of `NumpyBlocks`: same constructor, methods and results."""
 
     def __init__(self, problem: Problem):
         self.problem = problem
@@ -60,11 +62,11 @@ class KernelBlocks:
         self._packed = slots, ends, order, observed, root
 
     def reduce(self, state: IterationState) -> Reduced:
-        """See `NumpyBlocks.reduce`."""
+        """Elimination, as `NumpyBlocks.reduce`."""
         p, n = self.problem.width, len(self.problem.free_stations) * self.problem.width
         t = len(self._free)
         normal, before, right = np.zeros((n, n)), np.zeros(n), np.zeros(n)
-        inverse, own, condition = np.empty((t, 3, 3)), np.empty((t, 3)), np.empty(t)
+        inverse, target_step, condition = np.empty((t, 3, 3)), np.empty((t, 3)), np.empty(t)
         cost, gain, moment = _reduce(
             self._packed,
             (state.stations, state.targets, state.zero, state.scale),
@@ -72,33 +74,35 @@ class KernelBlocks:
             *self._priors,
             p,
             (normal, before, right),
-            (inverse, own, condition),
+            (inverse, target_step, condition),
         )
-        return Reduced(normal, before, right, inverse, own, condition, cost, gain, moment)
+        return Reduced(normal, before, right, inverse, target_step, condition, cost, gain, moment)
 
     def follow(self, state: IterationState, old: Reduced) -> Reduced:
-        """See `NumpyBlocks.follow`."""
-        right, own = np.zeros_like(old.right), np.empty_like(old.own)
+        """Right-hand side, as `NumpyBlocks.follow`."""
+        right, target_step = np.zeros_like(old.right), np.empty_like(old.target_step)
         points = (state.stations, state.targets, state.zero, state.scale)
-        cost, gain, moment = _follow(self._packed, points, *self._priors, old.inverse, self.problem.width, right, own)
-        return replace(old, right=right, own=own, cost=cost, gain=gain, moment=moment)
+        cost, gain, moment = _follow(
+            self._packed, points, *self._priors, old.inverse, self.problem.width, right, target_step
+        )
+        return replace(old, right=right, target_step=target_step, cost=cost, gain=gain, moment=moment)
 
     def back(self, state: IterationState, reduced: Reduced, step: np.ndarray) -> np.ndarray:
         """Back-substitution, as `NumpyBlocks.back`."""
         moved = np.empty((len(self._free), 3))
         points = (state.stations, state.targets, state.zero, state.scale)
-        _back(self._packed, points, reduced.inverse, reduced.own, step, self.problem.width, moved)
+        _back(self._packed, points, reduced.inverse, reduced.target_step, step, self.problem.width, moved)
         return moved
 
-    def felt(self, at: IterationState, own: np.ndarray) -> np.ndarray:
-        """Redundancy numbers, as `NumpyBlocks.felt`."""
-        out = np.zeros((own.shape[2], self.problem.free_stations.size))
+    def felt(self, at: IterationState, target_steps: np.ndarray) -> np.ndarray:
+        """Effect on the stations, as `NumpyBlocks.felt`."""
+        out = np.zeros((target_steps.shape[2], self.problem.free_stations.size))
         points = (at.stations, at.targets, at.zero, at.scale)
-        _felt(self._packed, points, np.ascontiguousarray(own.transpose(2, 0, 1)), self.problem.width, out)
+        _felt(self._packed, points, np.ascontiguousarray(target_steps.transpose(2, 0, 1)), self.problem.width, out)
         return out.T
 
     def statistics(self, at: IterationState, answer: IterationState, inverse: np.ndarray, q: np.ndarray) -> Statistics:
-        """See `NumpyBlocks.statistics`."""
+        """Covariances and tests, as `NumpyBlocks.statistics`."""
         m = len(self.problem.distance)
         covariance, out = np.empty((len(self._free), 3, 3)), (np.empty(m), np.empty(m), np.empty(m), np.empty(m))
         points = (at.stations, at.targets, at.zero, at.scale)
@@ -113,7 +117,10 @@ class KernelBlocks:
 
 @njit(cache=True, error_model="numpy")
 def _place(order, b, xyz, x):
-    """Coordinates of the targets of block b into x, by lane; lanes past the end repeat the last target."""
+    """Coordinates of the targets of block b into x, by lane.
+
+    Lanes past the end repeat the last target.
+    """
     for lane in range(LANES):
         t = order[min(b * LANES + lane, len(order) - 1)]
         for i in range(3):
@@ -122,7 +129,10 @@ def _place(order, b, xyz, x):
 
 @njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
 def _directions(x, at, zero, scale, distance, root, row):
-    """Fill a slot's row: a, root, root D and misclosure; returns its cost, sum of (root D)^2, and coincident weight."""
+    """Fill a slot's row: a, root, root D and misclosure.
+
+    Returns its cost, sum of (root D)^2, and coincident weight.
+    """
     sx, sy, sz = at[0], at[1], at[2]
     cost = moment = coincident = 0.0
     for lane in range(LANES):
@@ -150,7 +160,7 @@ def _misclose(x, at, zero, scale, distance, root, row):
 
 @njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
 def _gather_target(row, v):
-    """Add one slot to V (rows 0 to 5: xx xy xz yy yz zz) and to its right side (rows 6 to 8)."""
+    """Add one slot to V (rows 0 to 5: xx xy xz yy yz zz) and its right-hand side (rows 6 to 8)."""
     for lane in range(LANES):
         x, y, z, e = row[lane], row[LANES + lane], row[2 * LANES + lane], row[5 * LANES + lane]
         v[lane] += x * x
@@ -178,7 +188,10 @@ def _add_priors(order, b, xyz, weight, value, v):
 
 @njit(cache=True, error_model="numpy")
 def _invert(v, free, out):
-    """Inverse of one V over its free coordinates, zero elsewhere, as xx xy xz yy yz zz; returns 1 / (tr V tr V^-1)."""
+    """Inverse of one V over its free coordinates, as xx xy xz yy yz zz.
+
+    Zero elsewhere. Returns 1 / (tr V tr V^-1).
+    """
     fx, fy, fz = free[0], free[1], free[2]
     a, b, c = v[0] * fx + (1.0 - fx), v[1] * fx * fy, v[2] * fx * fz
     d, e, f = v[3] * fy + (1.0 - fy), v[4] * fy * fz, v[5] * fz + (1.0 - fz)
@@ -198,8 +211,13 @@ def _invert(v, free, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _solve_targets(order, b, v, free, inverse, own, condition, local):
-    """V^-1 into `inverse` and rows 0 to 5 of `local`, V^-1 b into `own` and rows 6 to 8; returns b' V^-1 b."""
+def _solve_targets(order, b, v, free, inverse, target_step, condition, local):
+    """Invert V and solve for the targets' steps of a block.
+
+    Returns b' V^-1 b.
+
+    V^-1 goes into `inverse` and rows 0 to 5 of `local`, V^-1 b into `target_step` and rows 6 to 8.
+    """
     one, q, gain = np.empty(6), np.empty(6), 0.0
     local[:] = 0.0
     for lane in range(min(LANES, len(order) - b * LANES)):
@@ -217,7 +235,7 @@ def _solve_targets(order, b, v, free, inverse, own, condition, local):
             y = 0.0
             for j in range(3):
                 y += full[i, j] * v[(6 + j) * LANES + lane]
-            own[t, i] = y
+            target_step[t, i] = y
             local[(6 + i) * LANES + lane] = y
             gain += y * v[(6 + i) * LANES + lane]
     return gain
@@ -225,7 +243,7 @@ def _solve_targets(order, b, v, free, inverse, own, condition, local):
 
 @njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
 def _times(local, row, out):
-    """The product V^-1 a of one slot's block."""
+    """Product V^-1 a of one slot's block."""
     for lane in range(LANES):
         x, y, z = row[lane], row[LANES + lane], row[2 * LANES + lane]
         xx, xy, xz = local[lane], local[LANES + lane], local[2 * LANES + lane]
@@ -236,18 +254,18 @@ def _times(local, row, out):
 
 
 @njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
-def _own_weights(row, p, local, rest, shortfall):
-    """1 - c_rr, and e - a' V^-1 b, of one slot."""
+def _reduced_weights(row, p, local, remaining_weight, shortfall):
+    """Reduced weights 1 - c_rr, and shortfalls e - a' V^-1 b, of one slot."""
     for lane in range(LANES):
         x, y, z = row[lane], row[LANES + lane], row[2 * LANES + lane]
-        rest[lane] = 1.0 - (x * p[lane] + y * p[LANES + lane] + z * p[2 * LANES + lane])
-        known = x * local[6 * LANES + lane] + y * local[7 * LANES + lane] + z * local[8 * LANES + lane]
-        shortfall[lane] = row[5 * LANES + lane] - known
+        remaining_weight[lane] = 1.0 - (x * p[lane] + y * p[LANES + lane] + z * p[2 * LANES + lane])
+        predicted = x * local[6 * LANES + lane] + y * local[7 * LANES + lane] + z * local[8 * LANES + lane]
+        shortfall[lane] = row[5 * LANES + lane] - predicted
 
 
 @njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
-def _station(row, rest, shortfall, at, sums):
-    """One slot's share of its station's diagonal block, of the diagonal before elimination and of the right side."""
+def _station(row, remaining_weight, shortfall, at, sums):
+    """Add one slot to its station's diagonal block, its diagonal before elimination and right-hand side."""
     normal, before, right = sums
     xx = yx = yy = zx = zy = zz = bx = by = bz = rx = ry = rz = 0.0
     for lane in range(LANES):
@@ -258,7 +276,7 @@ def _station(row, rest, shortfall, at, sums):
         rx += x * w
         ry += y * w
         rz += z * w
-        u, v, w = rest[lane] * x, rest[lane] * y, rest[lane] * z
+        u, v, w = remaining_weight[lane] * x, remaining_weight[lane] * y, remaining_weight[lane] * z
         xx += u * x
         yx += v * x
         yy += v * y
@@ -277,8 +295,8 @@ def _station(row, rest, shortfall, at, sums):
 
 
 @njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
-def _station_extra(row, rest, shortfall, at, sums):
-    """The same for its zero and scale."""
+def _station_extra(row, remaining_weight, shortfall, at, sums):
+    """Add one slot's zero and scale, as `_station`."""
     normal, before, right = sums
     for i in range(3, 5):
         g, total, gain = row[i * LANES : (i + 1) * LANES], 0.0, 0.0
@@ -290,7 +308,7 @@ def _station_extra(row, rest, shortfall, at, sums):
         for j in range(i + 1):
             h, total = row[j * LANES : (j + 1) * LANES], 0.0
             for lane in range(LANES):
-                total += rest[lane] * g[lane] * h[lane]
+                total += remaining_weight[lane] * g[lane] * h[lane]
             normal[at + i, at + j] += -total if j < 3 else total
 
 
@@ -325,7 +343,7 @@ def _pair(p, r, s, block):
 
 @njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
 def _pair_extra(p, r, s, block):
-    """The same for the parameters zero and scale: rows and columns 3 and 4 of block (5, 5)."""
+    """Subtract the terms of zero and scale: rows and columns 3 and 4 of block (5, 5)."""
     t33 = t34 = t43 = t44 = 0.0
     ax = ay = az = bx = by = bz = cx = cy = cz = dx = dy = dz = 0.0
     for lane in range(LANES):
@@ -363,16 +381,16 @@ def _pair_extra(p, r, s, block):
 
 @njit(cache=True, error_model="numpy")
 def _pairs(slots, low, count, rows, local, width, sums):
-    """All slots of a block into the reduced normal equations, lower triangle."""
+    """Add all slots of a block to the reduced normal equations, lower triangle."""
     normal = sums[0]
-    p, rest, shortfall, square = np.empty(3 * LANES), np.empty(LANES), np.empty(LANES), np.empty((5, 5))
+    p, remaining_weight, shortfall, square = np.empty(3 * LANES), np.empty(LANES), np.empty(LANES), np.empty((5, 5))
     for r in range(count):
         at = width * slots[low + r]
         _times(local, rows[r], p)
-        _own_weights(rows[r], p, local, rest, shortfall)
-        _station(rows[r], rest, shortfall, at, sums)
+        _reduced_weights(rows[r], p, local, remaining_weight, shortfall)
+        _station(rows[r], remaining_weight, shortfall, at, sums)
         if width > 3:
-            _station_extra(rows[r], rest, shortfall, at, sums)
+            _station_extra(rows[r], remaining_weight, shortfall, at, sums)
         for s in range(r):
             to = width * slots[low + s]
             if width == 3 and at != to:
@@ -391,10 +409,13 @@ def _pairs(slots, low, count, rows, local, width, sums):
 
 @njit(cache=True, error_model="numpy")
 def _reduce(packed, points, free, prior_weight, prior_value, width, sums, solved):
-    """Fill the sums (normal, before, right) and what is solved a target; returns cost, b' V^-1 b, sum of (root D)^2."""
+    """Fill the sums (normal, before, right) and the targets' solution.
+
+    Returns cost, b' V^-1 b, and sum of (root D)^2.
+    """
     slots, ends, order, distance, root = packed
     stations, targets, zero, scale = points
-    inverse, own, condition = solved
+    inverse, target_step, condition = solved
     rows = np.empty((np.max(ends[1:] - ends[:-1]), ROWS * LANES))
     x, v, local = np.empty(3 * LANES), np.empty(9 * LANES), np.empty(9 * LANES)
     cost = gain = moment = coincident = 0.0
@@ -409,7 +430,7 @@ def _reduce(packed, points, free, prior_weight, prior_value, width, sums, solved
             _gather_target(rows[k], v)
         if len(prior_weight):
             _add_priors(order, b, targets, prior_weight, prior_value, v)
-        gain += _solve_targets(order, b, v, free, inverse, own, condition, local)
+        gain += _solve_targets(order, b, v, free, inverse, target_step, condition, local)
         _pairs(slots, low, count, rows, local, width, sums)
     for i in range(len(sums[1])):
         for j in range(i):
@@ -418,8 +439,13 @@ def _reduce(packed, points, free, prior_weight, prior_value, width, sums, solved
 
 
 @njit(cache=True, error_model="numpy")
-def _own_steps(order, b, v, inverse, own, y):
-    """V^-1 b of a block into `own` and by lane into y, from the right sides in rows 6 to 8 of v; returns b' V^-1 b."""
+def _target_steps(order, b, v, inverse, target_step, y):
+    """Targets' steps V^-1 b of a block, from rows 6 to 8 of v.
+
+    Returns b' V^-1 b.
+
+    They go into `target_step`, and by lane into y.
+    """
     gain = 0.0
     y[:] = 0.0
     for lane in range(min(LANES, len(order) - b * LANES)):
@@ -428,7 +454,7 @@ def _own_steps(order, b, v, inverse, own, y):
             step = 0.0
             for j in range(3):
                 step += inverse[t, i, j] * v[(6 + j) * LANES + lane]
-            own[t, i] = y[i * LANES + lane] = step
+            target_step[t, i] = y[i * LANES + lane] = step
             gain += step * v[(6 + i) * LANES + lane]
     return gain
 
@@ -454,8 +480,11 @@ def _short(row, y, at, width, right):
 
 
 @njit(cache=True, error_model="numpy")
-def _follow(packed, points, prior_weight, prior_value, inverse, width, right, own):
-    """Fill right (n,) and own (t, 3) with V^-1 as it was; returns cost, b' V^-1 b, sum of (root D)^2."""
+def _follow(packed, points, prior_weight, prior_value, inverse, width, right, target_step):
+    """Fill right (n,) and target_step (t, 3) with V^-1 as it was.
+
+    Returns cost, b' V^-1 b, and sum of (root D)^2.
+    """
     slots, ends, order, distance, root = packed
     stations, targets, zero, scale = points
     rows = np.empty((np.max(ends[1:] - ends[:-1]), ROWS * LANES))
@@ -472,15 +501,15 @@ def _follow(packed, points, prior_weight, prior_value, inverse, width, right, ow
             _gather_target(rows[k], v)
         if len(prior_weight):
             _add_priors(order, b, targets, prior_weight, prior_value, v)
-        gain += _own_steps(order, b, v, inverse, own, y)
+        gain += _target_steps(order, b, v, inverse, target_step, y)
         for k in range(count):
             _short(rows[k], y, width * slots[low + k], width, right)
     return cost, gain, moment
 
 
 @njit(cache=True, error_model="numpy")
-def _felt(packed, points, own, width, out):
-    """Fill out (f, n) with minus the sums of g a' own, own (f, t, 3)."""
+def _felt(packed, points, target_steps, width, out):
+    """Fill out (f, n) with minus the sums of g a' target_steps, target_steps (f, t, 3)."""
     slots, ends, order, distance, root = packed
     stations, targets, zero, scale = points
     rows = np.empty((np.max(ends[1:] - ends[:-1]), ROWS * LANES))
@@ -491,9 +520,9 @@ def _felt(packed, points, own, width, out):
         for k in range(count):
             s = slots[low + k]
             _directions(x, stations[s], zero[s], scale[s], distance[low + k], root[low + k], rows[k])
-            rows[k, 5 * LANES : 6 * LANES] = 0.0  # no misclosure: what is left of it is a' own alone
-        for f in range(len(own)):
-            _place(order, b, own[f], y)
+            rows[k, 5 * LANES : 6 * LANES] = 0.0  # no misclosure: only a' target_steps remains
+        for f in range(len(target_steps)):
+            _place(order, b, target_steps[f], y)
             for k in range(count):
                 _short(rows[k], y, width * slots[low + k], width, out[f])
 
@@ -512,8 +541,8 @@ def _add_along(row, step, width, total):
 
 
 @njit(cache=True, error_model="numpy")
-def _back(packed, points, inverse, own, step, width, moved):
-    """The targets' step V^-1 (b - W' step): `moved` (t, 3)."""
+def _back(packed, points, inverse, target_step, step, width, moved):
+    """Targets' step V^-1 (b - W' step): `moved` (t, 3)."""
     slots, ends, order, distance, root = packed
     stations, targets, zero, scale = points
     row, x, total = np.empty(ROWS * LANES), np.empty(3 * LANES), np.empty(3 * LANES)
@@ -530,12 +559,12 @@ def _back(packed, points, inverse, own, step, width, moved):
                 y = 0.0
                 for j in range(3):
                     y += inverse[t, i, j] * total[j * LANES + lane]
-                moved[t, i] = own[t, i] - y
+                moved[t, i] = target_step[t, i] - y
 
 
 @njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
 def _share(root, claimed, row):
-    """The weighted square phi^2 of one slot."""
+    """Weighted square phi^2 of one slot."""
     for lane in range(LANES):
         phi = root[lane] / claimed[lane] if claimed[lane] > 0.0 else 0.0
         row[6 * LANES + lane] = phi * phi
@@ -543,7 +572,10 @@ def _share(root, claimed, row):
 
 @njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
 def _coupled(q, r, s, fr, fs):
-    """E_rs by lane for coordinates alone, q (3, 3); F_r gains E phi_s^2 a_s, F_s gains E phi_r^2 a_r."""
+    """E_rs by lane for coordinates alone, q (3, 3).
+
+    F_r gains E phi_s^2 a_s, F_s gains E phi_r^2 a_r.
+    """
     xx, xy, xz = q[0, 0], q[0, 1], q[0, 2]
     yx, yy, yz = q[1, 0], q[1, 1], q[1, 2]
     zx, zy, zz = q[2, 0], q[2, 1], q[2, 2]
@@ -563,7 +595,7 @@ def _coupled(q, r, s, fr, fs):
 
 @njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
 def _coupled_extra(q, r, s, fr, fs):
-    """The same with zero and scale, q (5, 5), g = (-a, root, root D)."""
+    """E_rs by lane with zero and scale, q (5, 5), g = (-a, root, root D), as `_coupled`."""
     for lane in range(LANES):
         x, y, z, b, d = s[lane], s[LANES + lane], s[2 * LANES + lane], s[3 * LANES + lane], s[4 * LANES + lane]
         u, v, w = r[lane], r[LANES + lane], r[2 * LANES + lane]
@@ -583,33 +615,33 @@ def _coupled_extra(q, r, s, fr, fs):
 
 
 @njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
-def _single(q, row, f, own, width):
-    """E_rr by lane into `own`; F_r gains E_rr phi_r^2 a_r."""
+def _single(q, row, f, diagonal, width):
+    """E_rr by lane into `diagonal`; F_r gains E_rr phi_r^2 a_r."""
     xx, yy, zz, xy, xz, yz = q[0, 0], q[1, 1], q[2, 2], 2.0 * q[0, 1], 2.0 * q[0, 2], 2.0 * q[1, 2]
     for lane in range(LANES):
         x, y, z = row[lane], row[LANES + lane], row[2 * LANES + lane]
-        own[lane] = x * (xx * x + xy * y + xz * z) + y * (yy * y + yz * z) + zz * z * z
+        diagonal[lane] = x * (xx * x + xy * y + xz * z) + y * (yy * y + yz * z) + zz * z * z
     for i in range(3, width):
         g = row[i * LANES : (i + 1) * LANES]
         x0, y0, z0, b0, d0 = 2.0 * q[i, 0], 2.0 * q[i, 1], 2.0 * q[i, 2], q[i, 3], q[i, 4]
         for lane in range(LANES):
             e = b0 * row[3 * LANES + lane] + d0 * row[4 * LANES + lane]
             e -= x0 * row[lane] + y0 * row[LANES + lane] + z0 * row[2 * LANES + lane]
-            own[lane] += g[lane] * e
+            diagonal[lane] += g[lane] * e
     for lane in range(LANES):
-        e = own[lane] * row[6 * LANES + lane]
+        e = diagonal[lane] * row[6 * LANES + lane]
         f[lane] += e * row[lane]
         f[LANES + lane] += e * row[LANES + lane]
         f[2 * LANES + lane] += e * row[2 * LANES + lane]
 
 
 @njit(cache=True, error_model="numpy")
-def _couple(slots, low, count, q, width, rows, f, own):
+def _couple(slots, low, count, q, width, rows, f, diagonal):
     """E and F of all slots of a block."""
     f[:] = 0.0
     for r in range(count):
         at = width * slots[low + r]
-        _single(q[at : at + width, at : at + width], rows[r], f[r], own[r], width)
+        _single(q[at : at + width, at : at + width], rows[r], f[r], diagonal[r], width)
         for s in range(r):
             to = width * slots[low + s]
             if width == 3:
@@ -656,18 +688,21 @@ def _finish_targets(order, b, inverse, m, local, covariance):
 
 
 @njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
-def _predicted(row, f, p, mp, own):
-    """Variance of the predicted ranges of one slot, in units of the claimed one, over E_rr in `own`."""
+def _predicted(row, f, p, mp, diagonal):
+    """Variance of the predicted ranges of one slot, over the claimed one, added to E_rr in `diagonal`."""
     for lane in range(LANES):
         h = p[lane] * (mp[lane] + row[lane] - 2.0 * f[lane])
         h += p[LANES + lane] * (mp[LANES + lane] + row[LANES + lane] - 2.0 * f[LANES + lane])
         h += p[2 * LANES + lane] * (mp[2 * LANES + lane] + row[2 * LANES + lane] - 2.0 * f[2 * LANES + lane])
-        own[lane] += h
+        diagonal[lane] += h
 
 
 @njit(cache=True, error_model="numpy", fastmath=ASSOCIATIVE)
 def _judge(row, h, claimed, tests, values):
-    """Residual, redundancy, standardised residual and detectable error of one slot by lane; see `judged`."""
+    """Residual, redundancy, standardised residual and detectable error of one slot by lane.
+
+    See `judged`.
+    """
     noncentrality, unchecked = tests
     for lane in range(LANES):
         square, e, sigma = row[6 * LANES + lane], row[5 * LANES + lane], 1.0 / max(claimed[lane], SMALLEST)
@@ -682,7 +717,7 @@ def _judge(row, h, claimed, tests, values):
 
 @njit(cache=True, error_model="numpy")
 def _scatter(index, values, out):
-    """The rows of values to their ranges."""
+    """Copy the rows of values to their ranges."""
     residual, redundancy, standardised, detectable = out
     for lane in range(LANES):
         i = index[lane]
@@ -701,7 +736,7 @@ def _statistics(packed, claims, states, inverse, q, tests, covariance, out):
     claimed, index, width = claims
     (stations, targets, zero, scale), answer = states
     most = np.max(ends[1:] - ends[:-1])
-    rows, f, own = np.empty((most, ROWS * LANES)), np.empty((most, 3 * LANES)), np.empty((most, LANES))
+    rows, f, diagonal = np.empty((most, ROWS * LANES)), np.empty((most, 3 * LANES)), np.empty((most, LANES))
     x, y, m, local = np.empty(3 * LANES), np.empty(3 * LANES), np.empty(6 * LANES), np.empty(6 * LANES)
     p, mp, values = np.empty(3 * LANES), np.empty(3 * LANES), np.empty((4, LANES))
     for b in range(len(ends) - 1):
@@ -713,7 +748,7 @@ def _statistics(packed, claims, states, inverse, q, tests, covariance, out):
             _directions(x, stations[s], zero[s], scale[s], distance[low + k], claimed[low + k], rows[k])
             _misclose(y, answer[0][s], answer[2][s], answer[3][s], distance[low + k], claimed[low + k], rows[k])
             _share(root[low + k], claimed[low + k], rows[k])
-        _couple(slots, low, count, q, width, rows, f, own)
+        _couple(slots, low, count, q, width, rows, f, diagonal)
         m[:] = 0.0
         for k in range(count):
             _spread(rows[k], f[k], m)
@@ -721,6 +756,6 @@ def _statistics(packed, claims, states, inverse, q, tests, covariance, out):
         for k in range(count):
             _times(local, rows[k], p)
             _times(m, p, mp)
-            _predicted(rows[k], f[k], p, mp, own[k])
-            _judge(rows[k], own[k], claimed[low + k], tests, values)
+            _predicted(rows[k], f[k], p, mp, diagonal[k])
+            _judge(rows[k], diagonal[k], claimed[low + k], tests, values)
             _scatter(index[low + k], values, out)

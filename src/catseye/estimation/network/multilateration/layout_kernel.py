@@ -1,7 +1,7 @@
-"""Ranges of a network laid out by station and target for `kernel`, compiled.
+"""Compiled layout of a network's ranges by station and target, for `kernel`.
 
-Targets stand in blocks of `lanes`; a slot is one station, or its repetition, over the lanes of a block. The number of
-lanes is an argument because the cache of compiled code does not see a constant of another file change.
+Targets are stored in blocks of `lanes`; a slot is one station, or its repetition, over the lanes of a block. The number
+of lanes is an argument because the cache of compiled code does not notice changes of constants in other files.
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ from numba import njit
 
 @njit(cache=True, error_model="numpy")
 def by_target(station, target, targets):
-    """Rows sorted by target, then station: `first` (t + 1,), `rows` (m,), and a hash of the stations a target sees."""
+    """Rows sorted by target, then station: `first` (t + 1,), `rows` (m,), and a hash of stations per target."""
     first, pattern = np.zeros(targets + 1, np.int64), np.zeros(targets, np.uint64)
     rows, ordered = np.empty(len(target), np.int32), True
     for i in range(len(target)):
@@ -38,7 +38,7 @@ def by_target(station, target, targets):
 
 @njit(cache=True, error_model="numpy")
 def _repeats(station, rows, low, high, most):
-    """Raise most[s] to the number of times that the target of rows[low:high] sees station s."""
+    """Raise most[s] to the number of ranges from station s to the target of rows[low:high]."""
     count = 0
     for j in range(low, high):
         s = station[rows[j]]
@@ -48,7 +48,7 @@ def _repeats(station, rows, low, high, most):
 
 @njit(cache=True, error_model="numpy")
 def slots_of(station, first, rows, order, stations, lanes):
-    """The station of every slot, and where the slots of each block end."""
+    """Station of every slot, and end of the slots of each block."""
     blocks = (len(order) + lanes - 1) // lanes
     ends = np.zeros(blocks + 1, np.int64)
     slots = np.empty(len(rows) + 1, np.int32)  # never more slots than ranges
@@ -67,7 +67,9 @@ def slots_of(station, first, rows, order, stations, lanes):
 
 @njit(cache=True, error_model="numpy")
 def fill(ranges, first, rows, order, ends, slots, lanes):
-    """Distance, root weight and row of the range in every slot and lane: (slots, lanes); 0, 0 and -1 without one.
+    """Distance, root weight and row of every slot and lane: (slots, lanes).
+
+    0, 0 and -1 if empty.
 
     `ranges` are station, distance, sigma and inflation, (m,) each.
     """
@@ -90,7 +92,7 @@ def fill(ranges, first, rows, order, ends, slots, lanes):
 
 @njit(cache=True, error_model="numpy")
 def gather(values, index):
-    """values[index], zero where the index is -1."""
+    """values[index], zero if the index is -1."""
     out = np.zeros(index.shape)
     for k in range(index.shape[0]):
         for lane in range(index.shape[1]):

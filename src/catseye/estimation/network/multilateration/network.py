@@ -1,4 +1,4 @@
-"""A ranging network as it is given: stations, targets, ranges, what is held and what is known beforehand; checked."""
+"""Input of a ranging network: stations, targets, ranges, fixed coordinates and priors; validation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,9 +15,11 @@ from catseye.estimation.network.multilateration.terms import Gauges, PointPriors
 
 @dataclass(frozen=True, eq=False)
 class RangingNetwork:
-    """A ranging network before its adjustment; S stations, T targets, m ranges. None: none of it, or none held.
+    """Ranging network before its adjustment; S stations, T targets, m ranges.
 
-    stations        (S, 3) m, where the iteration starts, and what held and datum coordinates refer to
+    None: not present, or none held.
+
+    stations        (S, 3) m, start values, and reference of held and datum coordinates
     targets         (T, 3) m, the same
     station         (m,) index of the station of each range; any pair may be missing or repeated
     target          (m,) index of its target
@@ -25,16 +27,16 @@ class RangingNetwork:
     sigma           (m,) m, its standard uncertainty
     held_stations   (S, 3) bool, coordinates held at their given values
     held_targets    (T, 3) bool
-    datum_stations  (S, 3) bool, coordinates that take part in the inner constraints, where a motion is free
+    datum_stations  (S, 3) bool, coordinates in the inner constraints, if a motion is free
     datum_targets   (T, 3) bool
     zero_start      (S,) m, start and prior value of each station's zero (default 0)
-    zero_sigma      (S,) m, 0 holds it, infinity leaves it free, else its prior's standard uncertainty (default held)
+    zero_sigma      (S,) m, 0: held, infinite: free, else its prior's standard uncertainty (default held)
     scale_start     (S,) 1, the same for its scale
     scale_sigma     (S,) 1
-    station_priors  stations with coordinates known beforehand, with covariance
+    station_priors  stations with prior coordinates and covariance
     target_priors   targets likewise
     between         distances between stations
-    station_names   for the status; indices where none are given
+    station_names   for the status; default indices
     target_names    the same
     """
 
@@ -61,17 +63,17 @@ class RangingNetwork:
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """A checked network, about its own centre.
+    """Validated network, relative to its centre.
 
     problem      for the elimination
-    start        state where the iteration begins
+    start        initial state
     datum        inner constraints
     terms        observations beside the ranges
     names        for the status
     origin       (3,) m, what was subtracted from all coordinates: the mean of the stations
     size         m, of the network about its origin
-    dilation     whether a change of scale can be free
-    still        points (k, 3) bool: stations, then targets, whose coordinates no free motion may move
+    dilation     True if a change of scale can be free
+    still        points (k, 3) bool: stations, then targets, with coordinates fixed against free motions
     """
 
     problem: Problem
@@ -85,9 +87,9 @@ class Setup:
     still: np.ndarray
 
     def motions(self, state: IterationState) -> np.ndarray:
-        """The free motions (7, f) at a state, see `free_motions`."""
+        """Free motions (7, f) at a state, see `free_motions`."""
         at, s = self.points, len(state.stations)
-        for some in (at[:ENOUGH], at):  # a few held points nearly always hold everything
+        for some in (at[:ENOUGH], at):  # a few held points usually fix all motions
             stations, targets = some[some < s], some[some >= s] - s
             points = np.concatenate([state.stations[stations], state.targets[targets]])
             free = free_motions(points, self.still[some], dilation=self.dilation, size=self.size)
@@ -97,20 +99,20 @@ class Setup:
 
     @cached_property
     def points(self) -> np.ndarray:
-        """Indices, stations then targets, of points that no free motion may move."""
+        """Indices, stations then targets, of points fixed against free motions."""
         return np.flatnonzero(self.still.any(axis=1))
 
 
 def set_up(network: RangingNetwork, inflation: np.ndarray | None) -> Setup:
-    """Check a network; raises InputError with what is wrong, where."""
+    """Validate a network; raises InputError with problem and place."""
     names = Names(network.station_names, network.target_names)
     stations, targets = _points(network.stations, names.station), _points(network.targets, names.target)
     s, t = len(stations), len(targets)
     if not s or not t or not len(network.distance):
         raise InputError(f"a ranging network needs stations, targets and ranges: {s}, {t} and {len(network.distance)}")
-    for called, count, given in (("station", s, network.station_names), ("target", t, network.target_names)):
-        if len(given) not in (0, count):
-            raise InputError(f"{called}_names has {len(given)} names for {count} {called}s")
+    for called, count, labels in (("station", s, network.station_names), ("target", t, network.target_names)):
+        if len(labels) not in (0, count):
+            raise InputError(f"{called}_names has {len(labels)} names for {count} {called}s")
     held_stations, held_targets = _marks(network.held_stations, s, "held"), _marks(network.held_targets, t, "held")
     origin = stations.mean(axis=0)
     gauges = _gauges(network, s, names)
@@ -162,7 +164,7 @@ def _marks(marks, count: int, called: str) -> np.ndarray:
 
 
 def _gauges(network: RangingNetwork, s: int, names: Names) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
-    """Start and sigma of each station's zero, and of its scale."""
+    """Start values and sigmas of all zeros, and of all scales."""
     out = []
     for called, start, sigma in (
         ("zero", network.zero_start, network.zero_sigma),
@@ -177,15 +179,15 @@ def _gauges(network: RangingNetwork, s: int, names: Names) -> tuple[tuple[np.nda
             i = int(bad[0])
             raise InputError(
                 f"{called} of {names.station(i)}: start {start[i]}, sigma {sigma[i]}; "
-                "sigma is 0 to hold it, infinite to leave it free, else that of its prior"
+                "expected sigma 0 (held), infinite (free), or that of its prior"
             )
         out.append((start, sigma))
     return tuple(out)
 
 
 def _ranges(network: RangingNetwork, s: int, t: int, names: Names, inflation: np.ndarray | None) -> dict:
-    """The part of a Problem that says who measured what, and how well."""
-    # one layout, so that the kernels are compiled once
+    """Ranges part of a Problem, validated."""
+    # fixed memory layout, so that the kernels are compiled once
     station, target = (np.require(i, np.int64, ["C", "W"]) for i in (network.station, network.target))
     distance, sigma = (np.require(d, float, ["C", "W"]) for d in (network.distance, network.sigma))
     shapes = {a.shape for a in (station, target, distance, sigma)}
@@ -194,7 +196,7 @@ def _ranges(network: RangingNetwork, s: int, t: int, names: Names, inflation: np
     for called, index, count in (("station", station, s), ("target", target, t)):
         if index.min() < 0 or index.max() >= count:
             i = int(np.flatnonzero((index < 0) | (index >= count))[0])
-            raise InputError(f"range {i} names {called} {index[i]}, there are {count}")
+            raise InputError(f"range {i} names {called} {index[i]}, but there are {count}")
     if inflation is not None:
         inflation = np.asarray(inflation, dtype=float)
         if inflation.shape != sigma.shape or not np.all(inflation > 0.0):
@@ -229,12 +231,12 @@ def _terms(
         (counts[1], names.target, network.target_priors),
     ):
         priors.append(None if prior is None or not len(prior.index) else _prior(prior, count, called, origin))
-    known = []
+    gauge_priors = []
     for i, (start, sigma) in enumerate(gauges):
         index = np.flatnonzero((sigma > 0.0) & np.isfinite(sigma))
         if len(index):
-            known.append(Gauges(("zero priors", "scale priors")[i], 3 + i, index, start[index], sigma[index]))
-    return PriorTerms(priors[0], priors[1], _between(network.between, counts[0]), tuple(known))
+            gauge_priors.append(Gauges(("zero priors", "scale priors")[i], 3 + i, index, start[index], sigma[index]))
+    return PriorTerms(priors[0], priors[1], _between(network.between, counts[0]), tuple(gauge_priors))
 
 
 def _prior(prior: PointPriors, count: int, called, origin: np.ndarray) -> PointPriors:
@@ -242,10 +244,10 @@ def _prior(prior: PointPriors, count: int, called, origin: np.ndarray) -> PointP
     observed, covariance = np.asarray(prior.observed, dtype=float), np.asarray(prior.covariance, dtype=float)
     if observed.shape != (len(index), 3) or covariance.shape != (len(index), 3, 3):
         raise InputError(f"priors of {len(index)} points have values {observed.shape}, covariances {covariance.shape}")
-    known, times = np.unique(index, return_counts=True)
-    bad = known[(known < 0) | (known >= count) | (times > 1)]
+    distinct, times = np.unique(index, return_counts=True)
+    bad = distinct[(distinct < 0) | (distinct >= count) | (times > 1)]
     if len(bad):
-        raise InputError(f"priors name point {bad[0]}, there are {count}, each has one prior at most")
+        raise InputError(f"priors name point {bad[0]} (expected below {count}, one prior per point)")
     fine = np.isfinite(observed).all(axis=1) & np.isfinite(covariance).all(axis=(1, 2))
     matrices = np.where(fine[:, None, None], covariance, 0.0)
     skew = np.abs(matrices - matrices.transpose(0, 2, 1)).max(axis=(1, 2))

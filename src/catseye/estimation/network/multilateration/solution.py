@@ -1,4 +1,4 @@
-"""The answer of a ranging network: coordinates, their covariance in the datum, and the tests of every range."""
+"""Solution of a ranging network: coordinates, covariance in the datum, tests of every range."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ from catseye.estimation.network.multilateration.network import RangingNetwork, S
 
 @dataclass(frozen=True, eq=False)
 class Gauge:
-    """How the answer was brought to its datum: errors of datum targets alone move the stations too.
+    """Datum transformation of a solution: errors of datum targets also move the stations.
 
     motions   (7, f) free motions
-    null      (n, f) what they do to the stations' parameters
+    null      (n, f) their effect on the stations' parameters
     points    (k,) targets in the datum
-    drift     (k, 3, f) covariance of such a target's own step with minus the amounts of the motions
+    drift     (k, 3, f) covariance of such a target's step with minus the amounts of the motions
     """
 
     motions: np.ndarray
@@ -30,22 +30,25 @@ class Gauge:
 
 @dataclass(frozen=True, eq=False)
 class RangingSolution:
-    """An adjusted ranging network; S stations, T targets, m ranges, n = S width parameters of the stations.
+    """Adjusted ranging network.
 
-    network             what was adjusted
+    S stations, T targets, m ranges, n = S width station parameters.
+
+    network             the adjusted network
     stations            (S, 3) m
     targets             (T, 3) m
     zero                (S,) m
     scale               (S,) 1
-    status              "converged", or one line that says what is wrong, where, and what to do; "contradictory" ones
-                        converged too and have all statistics, but to residuals beyond belief
+    status              "converged", or one line with problem, place and remedy; "contradictory" solutions
+                        converged and have all statistics, but implausibly large residuals
     iterations          linearisations
     pvv                 sum of squares of all whitened residuals, priors included
     degrees_of_freedom  observations and conditions less free parameters
-    width               parameters a station: 3 (x y z), or 5 (x y z zero scale)
-    covariance          (n, n) of the stations' parameters, a priori; zero where held, nan without answer or tests
+    width               parameters per station: 3 (x y z), or 5 (x y z zero scale)
+    covariance          (n, n) of the stations' parameters, a priori; zero if held, nan without solution or tests
     covariance_targets  (T, 3, 3) m^2
-    redundancy          (m,) as in `least_squares.adjustment.GroupFit`, here of the ranges; nan without answer or tests
+    redundancy          (m,) as in `least_squares.adjustment.GroupFit`, here of the ranges; nan without solution or
+                        tests
     standardised        (m,)
     detectable          (m,) m
     """
@@ -73,41 +76,44 @@ class RangingSolution:
 
     @property
     def variance_factor(self) -> float:
-        """[pvv] / degrees of freedom, expectation 1; nan without redundancy."""
+        """Variance factor [pvv] / degrees of freedom, expectation 1.
+
+        It is nan without redundancy.
+        """
         return self.pvv / self.degrees_of_freedom if self.degrees_of_freedom > 0 else float("nan")
 
     @property
     def covariance_stations(self) -> np.ndarray:
-        """(S, 3, 3) m^2 of each station's coordinates."""
+        """Covariances (S, 3, 3) m^2 of the stations' coordinates."""
         s = np.arange(len(self.stations))
         return self.covariance.reshape(len(s), self.width, len(s), self.width)[s, :3, s, :3]
 
     @property
     def u_zero(self) -> np.ndarray:
-        """(S,) m standard uncertainty of each zero, 0 where held."""
+        """Standard uncertainties (S,) m of the zeros, 0 if held."""
         return np.sqrt(np.diag(self.covariance)[3 :: self.width]) if self.width > 3 else np.zeros(len(self.zero))
 
     @property
     def u_scale(self) -> np.ndarray:
-        """(S,) standard uncertainty of each scale, 0 where held."""
+        """Standard uncertainties (S,) of the scales, 0 if held."""
         return np.sqrt(np.diag(self.covariance)[4 :: self.width]) if self.width > 3 else np.zeros(len(self.scale))
 
     @cached_property
     def residual(self) -> np.ndarray:
-        """(m,) m, observed minus predicted, of ranges left out as well."""
+        """Residuals (m,) m, observed minus predicted, of left-out ranges too."""
         problem = self._setup.problem
         rows = np.arange(len(problem.distance))
         return linearise(problem, self._answer, rows, root=np.ones(len(rows))).misclosure
 
     @cached_property
     def estimated_error(self) -> np.ndarray:
-        """(m,) m, the error in a range that would explain its residual best."""
+        """Estimated gross errors (m,) m of single ranges."""
         active = self._setup.problem.root > 0.0
         return np.where(active, self.residual / np.maximum(self.redundancy, UNCHECKED), self.residual)
 
     @cached_property
     def fits(self) -> tuple[GroupFit, ...]:
-        """A fit of the ranges, then of what there is: between stations, station, target, zero and scale priors."""
+        """Fits of the ranges and of all other groups (between stations, priors)."""
         problem = self._setup.problem
         ranges = GroupFit(
             "ranges",
@@ -123,13 +129,13 @@ class RangingSolution:
         return ranges, *self._setup.terms.fits(self._answer, self.covariance, self.covariance_targets, self.width)
 
     def require_converged(self) -> "RangingSolution":
-        """This solution, or EstimationError with its status."""
+        """Return this solution, or raise EstimationError with its status."""
         if self.status != CONVERGED:
             raise EstimationError(self.status)
         return self
 
     def following(self, targets: np.ndarray) -> np.ndarray:
-        """(k, 3, n) how targets (k,) move with the stations' parameters: minus V^-1 times what joins them."""
+        """Derivatives (k, 3, n) of targets (k,) by the stations' parameters: minus V^-1 times the coupling."""
         problem = self._setup.problem
         place = np.full(len(self.targets), -1)
         place[targets] = np.arange(len(targets))
@@ -140,17 +146,17 @@ class RangingSolution:
         return self._inverse[targets] @ y.reshape(len(targets), len(self.covariance), 3).transpose(0, 2, 1)
 
     def joined(self, first: "Mapped", second: "Mapped") -> np.ndarray:
-        """Covariance (k, l) of some parameters with others; EstimationError without an answer or without tests.
+        """Covariance (k, l) of some parameters with others.
 
-        M Q M' of the stations' parameters that they follow, V^-1 of coordinates of the same target, and what the datum
-        takes from those of its own targets.
+        EstimationError without a solution or tests. M Q M' of the stations' parameters that they follow, plus V^-1 of
+        coordinates of the same target, minus the datum's part for datum targets.
         """
         gauge = self._gauge
         if gauge is None:
             raise EstimationError(f"no covariance: {self.status if self.status != CONVERGED else 'tests was False'}")
         out = first.maps @ self.covariance @ second.maps.T
-        same = (first.target[:, None] == second.target) & (first.target[:, None] >= 0)
-        i, j = np.nonzero(same)
+        same_target = (first.target[:, None] == second.target) & (first.target[:, None] >= 0)
+        i, j = np.nonzero(same_target)
         out[i, j] += self._inverse[first.target[i], first.axis[i], second.axis[j]]
         if len(gauge.points):
             one, two = (self._drift[m.target, m.axis] for m in (first, second))
@@ -158,7 +164,9 @@ class RangingSolution:
         return out
 
     def products(self, chosen: "Mapped", a: np.ndarray) -> np.ndarray:
-        """(m, w) covariance of w parameters with the sum of a (m, w) times them, row by row; see `joined`.
+        """Covariances (m, w) of w parameters with the sum of a (m, w) times them, row by row.
+
+        See `joined`.
 
         chosen   maps (m, w, n), target and axis (m, w)
         """
@@ -167,44 +175,47 @@ class RangingSolution:
             return np.full(a.shape, np.nan)
         moved = np.einsum("mwn,mw->mn", maps, a, optimize=True)
         out = (maps @ (moved @ self.covariance)[:, :, None])[:, :, 0]
-        same = (target[:, :, None] == target[:, None]) & (target[:, :, None] >= 0)
-        own = self._inverse[target[:, :, None], axis[:, :, None], axis[:, None]]
-        out += (np.where(same, own, 0.0) @ a[:, :, None])[:, :, 0]
+        same_target = (target[:, :, None] == target[:, None]) & (target[:, :, None] >= 0)
+        blocks = self._inverse[target[:, :, None], axis[:, :, None], axis[:, None]]
+        out += (np.where(same_target, blocks, 0.0) @ a[:, :, None])[:, :, 0]
         if len(gauge.points):
             drift = self._drift[target, axis]
-            taken = np.einsum("mwf,mw->mf", drift, a)
-            out -= ((maps @ gauge.null) @ taken[:, :, None] + drift @ (moved @ gauge.null)[:, :, None])[:, :, 0]
+            drift_sum = np.einsum("mwf,mw->mf", drift, a)
+            out -= ((maps @ gauge.null) @ drift_sum[:, :, None] + drift @ (moved @ gauge.null)[:, :, None])[:, :, 0]
         return out
 
     @cached_property
     def _drift(self) -> np.ndarray:
-        """(T + 1, 3, f) `Gauge.drift` of every target, zero outside the datum; the last for none, which is -1."""
+        """`Gauge.drift` (T + 1, 3, f) of every target, zero outside the datum.
+
+        The last row for index -1.
+        """
         assert self._gauge is not None
         drift = np.zeros((len(self.targets) + 1, 3, self._gauge.null.shape[1]))
         drift[self._gauge.points] = self._gauge.drift
         return drift
 
     def joint(self, stations: Sequence[int] = (), targets: Sequence[int] = ()) -> np.ndarray:
-        """Joint covariance (3k, 3k), m^2, of some stations, then some targets, each once, in the order given.
+        """Joint covariance (3k, 3k), m^2, of some stations, then some targets, in the given order.
 
-        Raises EstimationError without an answer or without tests.
+        Each point once. Raises EstimationError without a solution or tests.
         """
         s, t, xyz = np.asarray(stations, dtype=np.int64), np.asarray(targets, dtype=np.int64), np.arange(3)
-        own = np.eye(len(self.covariance))[(s[:, None] * self.width + xyz).ravel()]
+        station_maps = np.eye(len(self.covariance))[(s[:, None] * self.width + xyz).ravel()]
         chosen = Mapped(
-            np.concatenate([own, self.following(t).reshape(-1, len(self.covariance))]),
-            np.concatenate([np.full(len(own), -1), np.repeat(t, 3)]),
-            np.concatenate([np.zeros(len(own), dtype=np.int64), np.tile(xyz, len(t))]),
+            np.concatenate([station_maps, self.following(t).reshape(-1, len(self.covariance))]),
+            np.concatenate([np.full(len(station_maps), -1), np.repeat(t, 3)]),
+            np.concatenate([np.zeros(len(station_maps), dtype=np.int64), np.tile(xyz, len(t))]),
         )
         return self.joined(chosen, chosen)
 
 
 @dataclass(frozen=True, eq=False)
 class Mapped:
-    """Some parameters of a ranging network, by how they follow the stations' parameters.
+    """Parameters of a ranging network, as linear maps of the stations' parameters.
 
-    maps     (k, n) row of the identity for one of the stations' own, of `RangingSolution.following` for a target's
-    target   (k,) which target's coordinate it is; -1 for the stations' own
+    maps     (k, n) row of the identity for a station parameter, of `RangingSolution.following` for a target coordinate
+    target   (k,) index of the target; -1 for station parameters
     axis     (k,) 0, 1 or 2 of such a coordinate
     """
 

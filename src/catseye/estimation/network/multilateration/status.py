@@ -1,4 +1,4 @@
-"""What to tell when a ranging network has no answer, or one not to be believed: what floats, where, what to do."""
+"""Status texts of a ranging network that failed or is implausible: cause, place, remedy."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,39 +13,39 @@ __all__ = ["CONVERGED", "NOT_CONVERGED", "RANK_DEFICIENT", "UNDEFINED", "Names",
 TARGET = "rank deficient: {name} {why}{others}; add ranges from other directions, hold it or give it a prior"
 MOTIONS = "rank deficient: the whole network floats ({motions}); hold {count} more coordinates, or mark datum points"
 DATUM = "rank deficient: the datum does not hold {motions}; mark more coordinates as datum, or hold them"
-PIECES = "rank deficient: the network is in {count} pieces that nothing joins or holds: {pieces}; \
+PIECES = "rank deficient: the network is in {count} pieces that no observation connects: {pieces}; \
 add ranges between them, or hold each one"
 CONTRADICTORY = "contradictory: half of the residuals exceed {median:.0f} standard uncertainties, worst at {worst}; \
 a range may be grossly wrong, two points exchanged, or the starting coordinates too far off"
 
 LISTED = 4  # names in one line
-BELIEVABLE = 30.0  # median |residual| / sigma: beyond it no sigma is merely optimistic, the model is wrong
+BELIEVABLE = 30.0  # median |residual| / sigma: above it the model is wrong, not only the sigmas
 AXES = "xyz"
 
 
 @dataclass(frozen=True)
 class Names:
-    """What stations and targets are called."""
+    """Names of stations and targets."""
 
     stations: Sequence[str]
     targets: Sequence[str]
 
     def station(self, i: int) -> str:
-        """The name of station i, or its index."""
+        """Name of station i, or its index."""
         return self.stations[i] if len(self.stations) else f"station[{i}]"
 
     def target(self, i: int) -> str:
-        """The name of target i, or its index."""
+        """Name of target i, or its index."""
         return self.targets[i] if len(self.targets) else f"target[{i}]"
 
     def parameter(self, i: int, width: int) -> str:
-        """The name of parameter i of the stations."""
+        """Name of parameter i of the stations."""
         s, k = divmod(i, width)
         return f"{AXES[k]} of {self.station(s)}" if k < 3 else f"{('zero', 'scale')[k - 3]} of {self.station(s)}"
 
 
 def listed(names: Sequence[str]) -> str:
-    """Some names in one line.
+    """Names in one line, up to a limit.
 
     >>> listed(["S1", "S2", "S3", "S4", "S5", "S6"])
     'S1, S2, S3, S4 and 2 more'
@@ -55,7 +55,7 @@ def listed(names: Sequence[str]) -> str:
 
 
 def floating_targets(problem: Problem, state: IterationState, names: Names, *, floating: np.ndarray) -> str:
-    """Why the targets `floating` (indices, worst first) cannot be placed by their stations."""
+    """Status of targets `floating` (indices, worst first) not determined by their stations."""
     worst = int(floating[0])
     rows = np.flatnonzero((problem.target == worst) & (problem.root > 0.0))
     stations = len(np.unique(problem.station[rows]))
@@ -69,8 +69,10 @@ def floating_targets(problem: Problem, state: IterationState, names: Names, *, f
         values = np.linalg.svd(a, compute_uv=False)
         line = len(values) > 1 and values[1] < 1e-6 * values[0]
         why = f"lies on one {'line' if line else 'plane'} with all {stations} stations that see it"
-    others = [names.target(int(i)) for i in floating[1:]]
-    return TARGET.format(name=names.target(worst), why=why, others=f" (so do {listed(others)})" if others else "")
+    other_targets = [names.target(int(i)) for i in floating[1:]]
+    return TARGET.format(
+        name=names.target(worst), why=why, others=f" (so do {listed(other_targets)})" if other_targets else ""
+    )
 
 
 def described(motions: np.ndarray, size: float) -> str:
@@ -94,7 +96,7 @@ def described(motions: np.ndarray, size: float) -> str:
 
 
 def pieces(problem: Problem, names: Names, joined: tuple[np.ndarray, np.ndarray]) -> list[str]:
-    """The members of each part of the network that ranges (and `joined` pairs of stations) hold together."""
+    """Members of each connected part of the network (ranges and `joined` pairs of stations)."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -111,7 +113,10 @@ def pieces(problem: Problem, names: Names, joined: tuple[np.ndarray, np.ndarray]
 
 
 def floating_network(problem: Problem, names: Names, joined: tuple[np.ndarray, np.ndarray], *, part: np.ndarray) -> str:
-    """Why the reduced system is singular, `part` (n,) the share of each station parameter in what floats."""
+    """Status of a singular reduced system.
+
+    `part` (n,) is each parameter's share in the null space.
+    """
     parts = pieces(problem, names, joined)
     if len(parts) > 1:
         return PIECES.format(count=len(parts), pieces=" and ".join(parts[:3]))
@@ -123,7 +128,10 @@ def floating_network(problem: Problem, names: Names, joined: tuple[np.ndarray, n
 def contradiction(
     problem: Problem, state: IterationState, names: Names, *, statistics: Statistics | None
 ) -> str | None:
-    """The status of a network whose residuals are beyond belief as a whole, or None; without statistics less exact."""
+    """Status of implausibly large residuals overall, or None.
+
+    Less exact without statistics.
+    """
     rows = np.flatnonzero(problem.root > 0.0)
     misclosure = np.abs(linearise(problem, state, rows, root=problem.root[rows]).misclosure)
     median = float(np.median(misclosure))

@@ -1,6 +1,7 @@
-"""What a ranging network knows beside its ranges: priors of points, zeros and scales, and ranges between stations.
+"""Terms beside the ranges: priors of points, zeros and scales, and ranges between stations.
 
-These touch the stations' parameters alone (or one target's), so they join the normal equations after the elimination.
+They depend on the stations' parameters only (or one target's), so they are added to the normal equations after the
+elimination.
 """
 
 from collections.abc import Iterator
@@ -15,7 +16,7 @@ from catseye.estimation.network.multilateration.blocks import UNCHECKED, Iterati
 
 @dataclass(frozen=True, eq=False)
 class PointPriors:
-    """Points whose coordinates were measured before (stochastic points), independent of each other.
+    """Points with prior coordinates (stochastic points), independent of each other.
 
     index        (k,) of the station or target, each once
     observed     (k, 3) m
@@ -29,7 +30,10 @@ class PointPriors:
 
 @dataclass(frozen=True, eq=False)
 class StationRanges:
-    """Distances between two stations, free of zero and scale: first, second (k,) stations; distance, sigma (k,) m."""
+    """Distances between stations, free of zero and scale.
+
+    Fields: first, second (k,) stations; distance, sigma (k,) m.
+    """
 
     first: np.ndarray
     second: np.ndarray
@@ -39,7 +43,7 @@ class StationRanges:
 
 @dataclass(frozen=True, eq=False)
 class Gauges:
-    """Priors of one parameter a ranger, its zero or its scale.
+    """Priors of one parameter per ranger, its zero or its scale.
 
     name     of the group, for reports
     column   3 for zero, 4 for scale, among the parameters of a station
@@ -57,7 +61,7 @@ class Gauges:
 
 @dataclass(frozen=True, eq=False)
 class PriorTerms:
-    """All of them; None where there are none."""
+    """All prior terms; None if there are none."""
 
     stations: PointPriors | None
     targets: PointPriors | None
@@ -81,7 +85,12 @@ class PriorTerms:
     def add(
         self, state: IterationState, normal: np.ndarray, before: np.ndarray, right: np.ndarray, width: int
     ) -> tuple[float, float]:
-        """Add to the reduced normal equations, see `Reduced`; returns cost and moment, of target priors too."""
+        """Add to the reduced normal equations, see `Reduced`.
+
+        Returns cost and moment.
+
+        Both include target priors.
+        """
         cost = moment = 0.0
         if self.targets is not None:
             off = self.targets.observed - state.targets[self.targets.index]
@@ -117,19 +126,21 @@ class PriorTerms:
     def fits(
         self, state: IterationState, q: np.ndarray, target_covariance: np.ndarray, width: int
     ) -> tuple[GroupFit, ...]:
-        """A fit a group, from the covariances of the stations' parameters q (n, n) and of the targets (T, 3, 3)."""
+        """Fits of the groups, from covariances q (n, n) of the stations and (T, 3, 3) of the targets."""
         fits = []
         if self.between is not None:
             columns, jacobian, off = _between(self.between, state, width)
-            q_own = np.einsum("ki,kij,kj->k", jacobian, q[columns[:, :, None], columns[:, None, :]], jacobian)
+            q_adjusted = np.einsum("ki,kij,kj->k", jacobian, q[columns[:, :, None], columns[:, None, :]], jacobian)
             fits.append(
-                _fit("between stations", off[:, None], self.between.sigma[:, None, None] ** 2, q_own[:, None, None])
+                _fit(
+                    "between stations", off[:, None], self.between.sigma[:, None, None] ** 2, q_adjusted[:, None, None]
+                )
             )
         if self.stations is not None:
             columns = self.stations.index[:, None] * width + np.arange(3)
-            q_own = q[columns[:, :, None], columns[:, None, :]]
+            q_adjusted = q[columns[:, :, None], columns[:, None, :]]
             off = self.stations.observed - state.stations[self.stations.index]
-            fits.append(_fit("station priors", off, self.stations.covariance, q_own))
+            fits.append(_fit("station priors", off, self.stations.covariance, q_adjusted))
         if self.targets is not None:
             off = self.targets.observed - state.targets[self.targets.index]
             fits.append(_fit("target priors", off, self.targets.covariance, target_covariance[self.targets.index]))
@@ -141,7 +152,7 @@ class PriorTerms:
 
 
 def _whitening(priors: PointPriors | None) -> np.ndarray:
-    """(k, 3, 3) inverse Cholesky factors of the priors' covariances."""
+    """Inverse Cholesky factors (k, 3, 3) of the priors' covariances."""
     return np.zeros((0, 3, 3)) if priors is None else np.linalg.inv(np.linalg.cholesky(priors.covariance))
 
 
@@ -149,7 +160,7 @@ def _between(between: StationRanges, state: IterationState, width: int) -> tuple
     """Columns (k, 6), Jacobian (k, 6) and residual (k,) of ranges between stations."""
     along = state.stations[between.second] - state.stations[between.first]
     length = np.linalg.norm(along, axis=1)
-    with np.errstate(invalid="ignore"):  # stations that coincide have no direction: nan, which the solver reports
+    with np.errstate(invalid="ignore"):  # coinciding stations give nan, which the solver reports
         u = along / length[:, None]
     xyz = np.arange(3)
     columns = np.concatenate([between.first[:, None] * width + xyz, between.second[:, None] * width + xyz], axis=1)
@@ -157,15 +168,17 @@ def _between(between: StationRanges, state: IterationState, width: int) -> tuple
 
 
 def _fit(name: str, off: np.ndarray, covariance: np.ndarray, q: np.ndarray) -> GroupFit:
-    """Fit of k direct observations of r values each, correlated inside; q (k, r, r) covariance of the adjusted ones.
+    """Fit of k direct observations of r values each, with covariance q (k, r, r) of the adjusted values.
 
     With P = C^-1 and P_v = P - P Q P: w = (P v) / sqrt(diag P_v), redundancy diag(P_v C).
     """
     weight = np.linalg.inv(covariance)
-    own = np.einsum("kii->ki", weight)
+    weight_diagonal = np.einsum("kii->ki", weight)
     pv = np.einsum("kij,kj->ki", weight, off)
     leverage = weight @ q
-    visible = np.maximum(own - np.einsum("kij,kji->ki", leverage, weight), UNCHECKED * own).ravel()
+    visible = np.maximum(
+        weight_diagonal - np.einsum("kij,kji->ki", leverage, weight), UNCHECKED * weight_diagonal
+    ).ravel()
     redundancy = 1.0 - np.einsum("kii->ki", leverage)
     return GroupFit(
         name,

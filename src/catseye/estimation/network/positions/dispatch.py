@@ -1,6 +1,6 @@
 """Positions of many targets from ranges to known stations, by weighted least squares.
 
-The stations are known here; where they are not, the network is adjusted as one (`network.adjustment`,
+The stations are known here; otherwise the network is adjusted as a whole (`network.adjustment`,
 `network.multilateration`). Every threshold is a pure number: in standard uncertainties, or relative to the size of the
 stations' figure.
 """
@@ -17,7 +17,7 @@ from catseye.estimation.network.positions.start import SIGNIFICANT, Planes, patt
 from catseye.estimation.network.positions.status import TEXTS, PositionStatus
 from catseye.estimation.network.positions.trilateration import FLAT
 
-LANES = 2**15  # ranges a chunk of the plain form, so that its arrays stay in the cache
+LANES = 2**15  # ranges per chunk of the plain form, so that its arrays stay in the cache
 LANES_COMPILED = 2**18
 COMPILED_FROM = 2_000_000  # ranges: loading numba takes as long as the plain form for these
 
@@ -27,11 +27,11 @@ class Positions:
     """Positions of t targets.
 
     x            (t, 3) m; nan unless the status is FOUND or CONTRADICTING
-    covariance   (t, 3, 3) m^2, a priori (variance factor 1), of stations without uncertainty; nan likewise
-    status       (t,) int8 of `PositionStatus`; `text` says it in words
-    ranges       (t,) used for each
-    iterations   (t,) Gauss-Newton steps; 0 where none was tried
-    pvv          (t,) sum of squared residuals in sigmas; nan where none was tried
+    covariance   (t, 3, 3) m^2, a priori (variance factor 1), for exactly known stations; nan likewise
+    status       (t,) int8 of `PositionStatus`; in words by `text`
+    ranges       (t,) number used
+    iterations   (t,) Gauss-Newton steps; 0 if not tried
+    pvv          (t,) sum of squared residuals in sigmas; nan if not tried
     """
 
     x: np.ndarray
@@ -43,18 +43,18 @@ class Positions:
 
     @property
     def degrees_of_freedom(self) -> np.ndarray:
-        """(t,) ranges less three; negative where there are too few."""
+        """Degrees of freedom (t,): ranges less three; negative for too few."""
         return self.ranges - 3
 
     def text(self, target: int) -> str:
-        """The status of one target in words: what is wrong and what to do."""
+        """Status of one target in words, with the remedy."""
         status, ranges = PositionStatus(self.status[target]), int(self.ranges[target])
         freedom = ranges - 3 if status == PositionStatus.CONTRADICTING else ranges
         ratio = float(np.sqrt(self.pvv[target] / max(freedom, 1)))
         return TEXTS[status].format(ranges=ranges, ratio=ratio, iterations=int(self.iterations[target]))
 
     def require_found(self) -> "Positions":
-        """These positions, or EstimationError that names the first target without one, why, and how many there are."""
+        """Return these positions, or raise EstimationError for the first missing target."""
         bad = np.flatnonzero(self.status != PositionStatus.FOUND)
         if len(bad):
             raise EstimationError(f"target {bad[0]} ({len(bad)} of {len(self.status)} likewise): {self.text(bad[0])}")
@@ -63,14 +63,14 @@ class Positions:
 
 @dataclass(frozen=True, eq=False)
 class _Chunk:
-    """Some targets: d (k, s) m, u (1 or k, s) m, near (1 or k, 3) m from the stations' centre or None."""
+    """Batch of targets: d (k, s) m, u (1 or k, s) m, near (1 or k, 3) m from the centre, or None."""
 
     d: np.ndarray
     u: np.ndarray
     near: np.ndarray | None
 
     def of(self, lanes: np.ndarray | slice) -> "_Chunk":
-        """The inputs of some of the targets."""
+        """Inputs of selected targets."""
         u, near = (a if a is None or len(a) == 1 else a[lanes] for a in (self.u, self.near))
         assert u is not None
         return _Chunk(np.ascontiguousarray(self.d[lanes]), u, near)
@@ -85,24 +85,24 @@ def positions(
     compiled: bool | None = None,
     threads: int = 1,
 ) -> Positions:
-    """Least-squares positions of many targets, each from its ranges to known stations, with covariance and status.
+    """Least-squares positions of targets from ranges to known stations, with covariance and status.
 
-    stations    (s, 3) m, known: their uncertainty is not in the covariance, for that adjust the network
-    distances   (t, s) m, nan where missing; any subset serves
+    stations    (s, 3) m, taken as exact: to include their uncertainty adjust the network
+    distances   (t, s) m, nan if missing; any subset
     sigma       (s,) or (t, s) m, standard uncertainties of the ranges, independent
-    near        (3,) or (t, 3) m, nan where unknown: a point on the target's side of the stations' plane; used only
-                where the ranges do not tell the two mirror images apart by 5 sigma: the image on that side is taken,
-                without it none is
-    compiled    whether to use the compiled form (None: from two million ranges on); both give the same to rounding
-    threads     that share the work of the compiled form; one is best below a megabyte of ranges
+    near        (3,) or (t, 3) m, nan if unknown: a point on the target's side of the stations' plane; used only if the
+                ranges do not separate the two mirror images by 5 sigma: the image on that side is taken; without it
+                neither is
+    compiled    True: use the compiled form (None: from two million ranges on); both agree to rounding
+    threads     of the compiled form; one is best below a megabyte of ranges
 
-    The start is closed: differences of squared ranges give the place in the principal plane of the stations that see
-    the target, their mean the height, up to its sign. Gauss-Newton goes on from there, damped if it must be, until the
-    curvature of the ranges foresees a next step below 1e-4 sigma. The rank is judged by that curvature too: where one
-    sigma of the position bends the ranges by 0.25 sigma, its height over the plane of the stations is not held.
-    Working memory is bounded; it is a small part of the answer's. Raises InputError for shapes or stations.
+    The start is in closed form: differences of squared ranges give the position in the principal plane of the stations
+    that see the target, their mean the height, up to its sign. Gauss-Newton continues, damped if necessary, until the
+    curvature of the ranges predicts a next step below 1e-4 sigma. The rank is determined by that curvature too: if one
+    sigma of the position bends the ranges by 0.25 sigma, its height over the stations' plane is undetermined.
+    Working memory is bounded, a small part of the result's. Raises InputError for shapes or stations.
 
-    Source: [FOERSTNER16] chapter 4 (Gauss-Markov model); [PARKER04] section 3.1.2 wants it, without equations.
+    Source: [FOERSTNER16] chapter 4 (Gauss-Markov model); [PARKER04] section 3.1.2 requires it, without equations.
 
     >>> s = np.array([[0.0, 0, 0], [50, 0, 1], [0, 50, 2], [50, 50, 9]])
     >>> d = np.linalg.norm(np.array([20.0, 10, 30]) - s, axis=1)
@@ -120,8 +120,12 @@ def positions(
     s = s - origin
     if targets.near is not None:
         targets = _Chunk(targets.d, targets.u, targets.near - origin)
-    whole = planes_of(s, np.ones((1, m), dtype=bool))
-    fast = _compiled(s, whole, origin) if compiled and whole.count[0] >= 3 and not whole.collinear[0] else None
+    all_stations = planes_of(s, np.ones((1, m), dtype=bool))
+    fast = (
+        _compiled(s, all_stations, origin)
+        if compiled and all_stations.count[0] >= 3 and not all_stations.collinear[0]
+        else None
+    )
     size = max((LANES_COMPILED if compiled else LANES) // m, 1)
 
     def work(first: int) -> None:
@@ -130,10 +134,10 @@ def positions(
         chunk = targets.of(rows)
         lanes = np.arange(len(chunk.d)) if fast is None else np.flatnonzero(~fast(chunk, part))
         if len(lanes):
-            _plain(s, chunk if fast is None else chunk.of(lanes), whole=whole, part=part, lanes=lanes)
+            _plain(s, chunk if fast is None else chunk.of(lanes), all_stations=all_stations, part=part, lanes=lanes)
             part.x[lanes] += origin
 
-    with ThreadPoolExecutor(threads) as pool:  # the compiled form lets go of the interpreter
+    with ThreadPoolExecutor(threads) as pool:  # the compiled form releases the interpreter lock
         for _ in pool.map(work, range(0, t, size)) if threads > 1 else map(work, range(0, t, size)):
             pass
     return out
@@ -142,7 +146,7 @@ def positions(
 def _checked(
     stations: np.ndarray, distances: np.ndarray, sigma: np.ndarray, near: np.ndarray | None
 ) -> tuple[np.ndarray, _Chunk]:
-    """The arguments of `positions` as float arrays, or InputError."""
+    """Arguments of `positions` as validated float arrays, or InputError."""
     s, d, u = (np.asarray(a, dtype=float) for a in (stations, distances, sigma))
     if s.ndim != 2 or s.shape[1] != 3 or d.ndim != 2 or d.shape[1] != len(s) or not len(s):
         raise InputError(f"stations {s.shape} and distances {d.shape}: (s, 3) and (t, s) are expected, s at least 1")
@@ -159,12 +163,14 @@ def _checked(
     return s, _Chunk(d, np.ascontiguousarray(np.atleast_2d(u)), None if side is None else np.atleast_2d(side))
 
 
-def _compiled(s: np.ndarray, whole: Planes, origin: np.ndarray) -> Callable[[_Chunk, Positions], np.ndarray]:
-    """The compiled form for these stations: writes a chunk's answers, returns (k,) whether it vouches for them."""
+def _compiled(s: np.ndarray, all_stations: Planes, origin: np.ndarray) -> Callable[[_Chunk, Positions], np.ndarray]:
+    """Compiled solver for these stations: writes a chunk's results, returns mask (k,) of reliable ones."""
     from catseye.estimation.network.positions import kernel
 
-    frame = np.concatenate([whole.centre, whole.axes[0], whole.inverse])
-    site = kernel.StationPlane(s, whole.half_square[0], np.ascontiguousarray(whole.rows[0]), frame, origin)
+    frame = np.concatenate([all_stations.centre, all_stations.axes[0], all_stations.inverse])
+    site = kernel.StationPlane(
+        s, all_stations.half_square[0], np.ascontiguousarray(all_stations.rows[0]), frame, origin
+    )
     d = descent
     limits = kernel.PositionLimits(FLAT, SIGNIFICANT, d.ENOUGH, d.SINGULAR, d.BENT, d.CONTRADICTION, d.CAP_UNDAMPED)
 
@@ -179,9 +185,9 @@ def _compiled(s: np.ndarray, whole: Planes, origin: np.ndarray) -> Callable[[_Ch
     return fast
 
 
-def _plain(s: np.ndarray, chunk: _Chunk, *, whole: Planes, part: Positions, lanes: np.ndarray) -> None:
-    """Answers of a chunk, written into the lanes of `part`, relative to the stations' centre; for any trouble."""
-    ranges, planes, which, refused = _sorted_out(s, chunk, whole)
+def _plain(s: np.ndarray, chunk: _Chunk, *, all_stations: Planes, part: Positions, lanes: np.ndarray) -> None:
+    """Solve a chunk of any kind, written into the lanes of `part`, relative to the stations' centre."""
+    ranges, planes, which, refused = _sorted_out(s, chunk, all_stations)
     status = np.select(
         [refused, planes.count[which] < 3, planes.collinear[which]],
         [PositionStatus.REFUSED, PositionStatus.TOO_FEW, PositionStatus.COLLINEAR],
@@ -200,16 +206,18 @@ def _plain(s: np.ndarray, chunk: _Chunk, *, whole: Planes, part: Positions, lane
     part.x[lanes[answered]], part.covariance[lanes[answered]] = solution.x[answered], solution.covariance[answered]
 
 
-def _sorted_out(s: np.ndarray, chunk: _Chunk, whole: Planes) -> tuple[descent.Ranges, Planes, np.ndarray, np.ndarray]:
-    """Ranges with the missing ones made harmless, planes and patterns of what is seen, targets to refuse."""
+def _sorted_out(
+    s: np.ndarray, chunk: _Chunk, all_stations: Planes
+) -> tuple[descent.Ranges, Planes, np.ndarray, np.ndarray]:
+    """Ranges without missing ones, planes and patterns of visibility, targets to refuse."""
     d, u = chunk.d, chunk.u
     fit = (d >= 0.0) & (d < np.inf) & (u > 0.0) & (u < np.inf)
     if fit.all():
         which = np.zeros(len(d), dtype=int)
-        return descent.Ranges(s, d, u, np.full(len(d), len(s))), whole, which, which > 0
-    given = ~np.isnan(d)
-    refused = (given & ~fit).any(axis=1)
-    seen = given & ~refused[:, None]
-    patterns, which = patterns_of(seen)
-    ranges = descent.Ranges(s, np.where(seen, d, 0.0), np.where(seen, u, np.inf), given.sum(axis=1))
+        return descent.Ranges(s, d, u, np.full(len(d), len(s))), all_stations, which, which > 0
+    present = ~np.isnan(d)
+    refused = (present & ~fit).any(axis=1)
+    visible = present & ~refused[:, None]
+    patterns, which = patterns_of(visible)
+    ranges = descent.Ranges(s, np.where(visible, d, 0.0), np.where(visible, u, np.inf), present.sum(axis=1))
     return ranges, planes_of(s, patterns), which, refused

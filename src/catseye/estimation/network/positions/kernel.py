@@ -1,8 +1,8 @@
-"""The compiled fast lane of `positions`: whole blocks of targets at once, one array a quantity.
+"""Compiled fast path of `positions`: blocks of targets, one array per quantity.
 
-It takes undamped Gauss-Newton steps from the closed start and vouches only for what went smoothly; every other target
-is left to the plain form in `start` and `descent`, which is also its test. Import it only when a
-problem is large: loading numba takes longer than a hundred thousand positions.
+It takes undamped Gauss-Newton steps from the closed-form start and returns only results that converged smoothly; all
+other targets are left to the plain form in `start` and `descent`, which is also its test. Import it only for large
+problems: loading numba takes longer than a hundred thousand positions.
 """
 
 import math
@@ -11,16 +11,19 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-LANES = 32  # targets a block: what fits the registers' width several times and the first cache with all its ranges
-SWEEPS = 4  # of Jacobi's rotations; three nearly always leave nothing off the diagonal
-DIAGONAL = 1e-11  # of the trace: what may stay off the diagonal; its axes then start well within a nanometre
+LANES = 32  # targets per block: several register widths, and all ranges fit the first-level cache
+SWEEPS = 4  # of Jacobi rotations; three usually suffice
+DIAGONAL = 1e-11  # of the trace: limit of off-diagonal elements; the start is then accurate to a nanometre
 
 _compiled = njit(cache=True, error_model="numpy", fastmath={"contract"}, nogil=True)
-_inlined = njit(error_model="numpy", fastmath={"contract"})  # kept with their caller
+_inlined = njit(error_model="numpy", fastmath={"contract"})  # cached with their caller
 
 
 class MeasuredRanges(NamedTuple):
-    """What is known of k targets: ranges d (k, s) m, nan where missing; sigma (1 or k, s) m; near (1 or k, 3) m."""
+    """Input of k targets: ranges d (k, s) m, nan if missing.
+
+    sigma (1 or k, s) m; near (1 or k, 3) m.
+    """
 
     d: np.ndarray
     sigma: np.ndarray
@@ -28,8 +31,10 @@ class MeasuredRanges(NamedTuple):
 
 
 class StationPlane(NamedTuple):
-    """The stations (s, 3) m, and of their own plane: `half_square` (s,), `rows` (3, s), and `frame` (5, 3): its centre,
-    three axes and inverse extents, see `start.Planes`; all relative to `origin` (3,) m."""
+    """Stations (s, 3) m and their principal plane, relative to `origin` (3,) m.
+
+    `half_square` (s,), `rows` (3, s), and `frame` (5, 3): centre, three axes and inverse extents, see `start.Planes`.
+    """
 
     stations: np.ndarray
     half_square: np.ndarray
@@ -39,7 +44,7 @@ class StationPlane(NamedTuple):
 
 
 class PositionLimits(NamedTuple):
-    """The thresholds of the same names in `start` and `descent`."""
+    """Thresholds of the same names in `start` and `descent`."""
 
     flat: float
     significant: float
@@ -51,7 +56,7 @@ class PositionLimits(NamedTuple):
 
 
 class Answers(NamedTuple):
-    """What is written: as in `Positions`, and `good` (k,) bool, True where the answer is vouched for."""
+    """Output arrays as in `Positions`, and `good` (k,) bool, True for reliable results."""
 
     x: np.ndarray
     covariance: np.ndarray
@@ -63,7 +68,10 @@ class Answers(NamedTuple):
 
 @_inlined
 def _load(block, table, first, lanes):
-    """Rows of a table turned into one array a station; the last row fills what a short block leaves over."""
+    """Rows of a table as one array per station.
+
+    The last row fills a short block.
+    """
     for j in range(LANES):
         row = first + min(j, lanes - 1)
         for i in range(table.shape[1]):
@@ -72,42 +80,50 @@ def _load(block, table, first, lanes):
 
 @_inlined
 def _complete(ranges, count, clear):
-    """Whether every range of a block is given; then clear where none is negative or infinite."""
+    """True if a block has all ranges.
+
+    `clear` marks lanes without negative or infinite ones.
+    """
     total, low = np.zeros(LANES), np.zeros(LANES)
     for i in range(ranges.shape[0]):
         for j in range(LANES):
             total[j] += ranges[i, j]
             low[j] = min(low[j], ranges[i, j])
-    whole = True
+    complete = True
     for j in range(LANES):
         count[j] = ranges.shape[0]
         clear[j] = low[j] >= 0.0 and total[j] < np.inf
-        whole = whole and total[j] == total[j]
-    return whole
+        complete = complete and total[j] == total[j]
+    return complete
 
 
 @_inlined
 def _weigh(ranges, spread, root, count, clear):
-    """Reciprocal sigmas of a block; a range that is missing becomes 0 with weight 0. Clear where all given are fit."""
+    """Reciprocal sigmas of a block.
+
+    A missing range gets 0 and weight 0.
+
+    `clear` marks lanes whose ranges are all valid.
+    """
     unfit = np.zeros(LANES)
     count[:] = 0.0
     for i in range(ranges.shape[0]):
         for j in range(LANES):
             d, u = ranges[i, j], spread[i, j]
-            given = d == d
+            present = d == d
             fit = (d >= 0.0) & (d < np.inf) & (u > 0.0) & (u < np.inf)
-            unfit[j] += 1.0 if given & (not fit) else 0.0
-            count[j] += 1.0 if given else 0.0
-            root[i, j] = 1.0 / u if given & fit else 0.0
-            ranges[i, j] = d if given & fit else 0.0
-            spread[i, j] = u if given & fit else 0.0
+            unfit[j] += 1.0 if present & (not fit) else 0.0
+            count[j] += 1.0 if present else 0.0
+            root[i, j] = 1.0 / u if present & fit else 0.0
+            ranges[i, j] = d if present & fit else 0.0
+            spread[i, j] = u if present & fit else 0.0
     for j in range(LANES):
         clear[j] = unfit[j] == 0.0
 
 
 @_inlined
-def _whole_figure(ranges, spread, site, figure, z):
-    """Of targets that all stations see: their common frame, and coordinates along it, see `_height`."""
+def _common_figure(ranges, spread, site, figure, z):
+    """Common frame of targets seen by all stations, and coordinates along it, see `_height`."""
     z[:] = 0.0
     figure[:] = site.frame.reshape(5, 3, 1)
     for i in range(ranges.shape[0]):
@@ -124,7 +140,10 @@ def _whole_figure(ranges, spread, site, figure, z):
 
 @_inlined
 def _moments(ranges, root, stations, count, figure, m):
-    """Centre of what each target sees, into figure[0]; the sums m of q q (xx, yy, zz, yz, xz, xy), of q y and of y."""
+    """Centre of the visible stations, into figure[0].
+
+    m gets the sums of q q (xx, yy, zz, yz, xz, xy), q y and y.
+    """
     figure[0], m[:] = 0.0, 0.0
     for i in range(ranges.shape[0]):
         sx, sy, sz = stations[i, 0], stations[i, 1], stations[i, 2]
@@ -153,7 +172,7 @@ def _moments(ranges, root, stations, count, figure, m):
 
 @_inlined
 def _rotation(p, q, off):
-    """Tangent, cosine, sine of the smaller rotation that makes (p, off; off, q) diagonal."""
+    """Tangent, cosine, sine of the smaller rotation that diagonalises (p, off; off, q)."""
     gap = q - p
     t = math.copysign(2.0, gap) * off / (abs(gap) + math.sqrt(gap * gap + 4.0 * off * off) + 1e-300)
     c = 1.0 / math.sqrt(1.0 + t * t)
@@ -171,7 +190,10 @@ def _turned(c, s, p, q):
 
 @_inlined
 def _principal_axes(m, figure):
-    """Axes of each lane's moments by Jacobi's rotations, into figure[1:4]; m[0:3] become the extents along them."""
+    """Axes of each lane's moments by Jacobi rotations, into figure[1:4].
+
+    Extents into m[0:3].
+    """
     figure[1:4] = np.eye(3).reshape(3, 3, 1)
     for _ in range(SWEEPS):
         for j in range(LANES):
@@ -196,7 +218,7 @@ def _principal_axes(m, figure):
 
 @_inlined
 def _normal_last(m, figure):
-    """Exchanges axes so that the one of least extent is the third."""
+    """Exchange axes so that the one of smallest extent is the third."""
     for k in range(2):
         for j in range(LANES):
             swap = m[k, j] < m[2, j]
@@ -207,8 +229,10 @@ def _normal_last(m, figure):
 
 
 @_inlined
-def _own_figure(block, stations, count, flat, figure, m, z, clear):
-    """As `_whole_figure`, each target with the frame of what it sees; not clear where that is a line, or too few.
+def _visible_figure(block, stations, count, flat, figure, m, z, clear):
+    """Frame of the visible stations per target.
+
+    A lane is not clear if they are collinear or too few.
 
     `block` are ranges, their spread and the roots of their weights.
     """
@@ -237,8 +261,10 @@ def _own_figure(block, stations, count, flat, figure, m, z, clear):
 
 @_inlined
 def _closed_start(figure, z, count, near, significant, x, clear):
-    """The closed form of `start.starts`; z: coordinates along the axes, sum of y, variance of the third,
-    which the height then replaces."""
+    """Closed-form start as in `start.starts`.
+
+    z: coordinates along the axes, sum of y, variance of the third, which the height then replaces.
+    """
     for j in range(LANES):
         square = -2.0 * z[3, j] / count[j] - z[0, j] * z[0, j] - z[1, j] * z[1, j]
         significant_side = z[2, j] * z[2, j] > significant * significant * z[4, j]
@@ -246,8 +272,10 @@ def _closed_start(figure, z, count, near, significant, x, clear):
         side += (near[2, j] - figure[0, 2, j]) * figure[3, 2, j]
         sign = math.copysign(1.0, z[2, j] if significant_side else side)
         lateral = z[0, j] * z[0, j] * figure[4, 0, j] + z[1, j] * z[1, j] * figure[4, 1, j]
-        own = z[2, j] * z[2, j]
-        spread = significant_side and (square < 0.25 * own or own * figure[4, 2, j] < 1.0 / count[j] + lateral)
+        normal_square = z[2, j] * z[2, j]
+        spread = significant_side and (
+            square < 0.25 * normal_square or normal_square * figure[4, 2, j] < 1.0 / count[j] + lateral
+        )
         h = sign * (abs(z[2, j]) if spread else math.sqrt(max(square, 0.0)))
         clear[j] = clear[j] and h != 0.0 and (significant_side or abs(side) > 0.0)
         z[4, j] = h
@@ -257,7 +285,7 @@ def _closed_start(figure, z, count, near, significant, x, clear):
 
 @_inlined
 def _evaluate(ranges, root, stations, x, a):
-    """Normal matrix (a[0:6], upper rows), right side (6:9), cost (9) and squared curvature (10) of a block."""
+    """Normal matrix (a[0:6]), right-hand side (6:9), cost (9) and squared curvature (10) of a block."""
     a[:] = 0.0
     for i in range(ranges.shape[0]):
         sx, sy, sz = stations[i, 0], stations[i, 1], stations[i, 2]
@@ -284,7 +312,10 @@ def _evaluate(ranges, root, stations, x, a):
 
 @_inlined
 def _step(a, x, q, tally, singular, clear):
-    """One Gauss-Newton step of a block; tally: what foresees the next step, pvv after this one, bend; squares."""
+    """One Gauss-Newton step of a block.
+
+    tally: predicted next step, pvv after this one, bend; squares.
+    """
     for j in range(LANES):
         n0, n1, n2, n3, n4, n5 = a[0, j], a[1, j], a[2, j], a[3, j], a[4, j], a[5, j]
         q0, q1, q2 = n3 * n5 - n4 * n4, n2 * n4 - n1 * n5, n1 * n4 - n2 * n3
@@ -310,7 +341,7 @@ def _step(a, x, q, tally, singular, clear):
 
 @_inlined
 def _same_side(x, figure, height, j):
-    """Whether lane j still is on the side of the stations' plane where it started: not over to the other image."""
+    """True if lane j is still on the side of the stations' plane where it started."""
     over = 0.0
     for c in range(3):
         over += (x[c, j] - figure[0, c, j]) * figure[3, c, j]
@@ -319,7 +350,7 @@ def _same_side(x, figure, height, j):
 
 @_inlined
 def _leave(answers, t, j, at, q, origin):
-    """Lane j of a block is the answer of target t."""
+    """Store lane j of a block as the result of target t."""
     x, c = answers.x, answers.covariance
     x[t, 0], x[t, 1], x[t, 2] = at[0, j] + origin[0], at[1, j] + origin[1], at[2, j] + origin[2]
     c[t, 0, 0], c[t, 1, 1], c[t, 2, 2] = q[0, j], q[3, j], q[5, j]
@@ -330,7 +361,7 @@ def _leave(answers, t, j, at, q, origin):
 
 @_compiled
 def locate(measured, site, limits, answers):
-    """Positions of the targets of one chunk, from whatever ranges each has, written into the answers."""
+    """Positions of the targets of one chunk, written into the output arrays."""
     k, s = measured.d.shape
     ranges, spread, root = np.empty((s, LANES)), np.empty((s, LANES)), np.empty((s, LANES))
     figure, m, z, near = np.empty((5, 3, LANES)), np.empty((10, LANES)), np.empty((5, LANES)), np.empty((3, LANES))
@@ -340,23 +371,23 @@ def locate(measured, site, limits, answers):
     for first in range(0, k, LANES):
         lanes = min(LANES, k - first)
         _load(ranges, measured.d, first, lanes)
-        whole = _complete(ranges, count, clear)
-        if not (whole and ready):
+        complete = _complete(ranges, count, clear)
+        if not (complete and ready):
             _load(spread, measured.sigma, 0 if shared else first, 1 if shared else lanes)
             _weigh(ranges, spread, root, count, clear)
-            ready = whole and shared  # what all share need not be made again
+            ready = complete and shared  # shared sigmas need not be computed again
         if measured.near.shape[0] > 1 or first == 0:
             _load(near, measured.near, first, min(lanes, measured.near.shape[0]))
-        if whole:
-            _whole_figure(ranges, spread, site, figure, z)
+        if complete:
+            _common_figure(ranges, spread, site, figure, z)
         else:
-            _own_figure((ranges, spread, root), site.stations, count, limits.flat, figure, m, z, clear)
+            _visible_figure((ranges, spread, root), site.stations, count, limits.flat, figure, m, z, clear)
         _closed_start(figure, z, count, near, limits.significant, at, clear)
         for j in range(lanes):
             answers.good[first + j], answers.ranges[first + j] = False, int(count[j])
-        waiting, taken = True, 0
-        while waiting and taken < limits.cap:
-            taken += 1
+        waiting, steps = True, 0
+        while waiting and steps < limits.cap:
+            steps += 1
             _evaluate(ranges, root, site.stations, at, a)
             _step(a, at, q, tally, limits.singular, clear)
             waiting = False
@@ -367,8 +398,8 @@ def locate(measured, site, limits, answers):
                     waiting = True
                     continue
                 _leave(answers, first + j, j, at, q, site.origin)
-                answers.pvv[first + j], answers.iterations[first + j] = tally[1, j], taken
+                answers.pvv[first + j], answers.iterations[first + j] = tally[1, j], steps
                 most = limits.contradiction**2 * (count[j] - 3.0) if count[j] > 3.0 else 1.0
-                held = tally[2, j] < limits.bent * limits.bent and tally[1, j] <= most
-                answers.good[first + j] = held and _same_side(at, figure, z[4, j], j)
-                clear[j] = False  # it has its answer: what more its block needs does not move it
+                reliable = tally[2, j] < limits.bent * limits.bent and tally[1, j] <= most
+                answers.good[first + j] = reliable and _same_side(at, figure, z[4, j], j)
+                clear[j] = False  # finished: further steps of its block do not change it

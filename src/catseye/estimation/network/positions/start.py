@@ -1,4 +1,4 @@
-"""Where a position is sought first, in closed form: in the principal plane of the stations that see the target.
+"""Closed-form start of a position, in the principal plane of the stations that see the target.
 
 Differences of squared ranges give the foot in that plane, their mean the height over it, up to its sign.
 """
@@ -9,19 +9,19 @@ import numpy as np
 
 from catseye.estimation.network.positions.trilateration import FLAT
 
-SIGNIFICANT = 5.0  # sigmas by which ranges must tell one mirror image from the other
+SIGNIFICANT = 5.0  # sigmas by which ranges must separate the mirror images
 
 
 @dataclass(frozen=True, eq=False)
 class Planes:
-    """The principal plane of the stations of each of p patterns of visibility.
+    """Principal planes of the stations of p visibility patterns.
 
     centre, axes   (p, 3), (p, 3, 3) of their figure: centroid, and directions by falling extent; the last is the normal
     rows           (p, 3, s): their products with `half_square - d^2 / 2` are the target's coordinates along the axes
-    half_square    (p, s) half the squared distance of each station from the centre; 0 where it does not see
-    inverse        (p, 3) reciprocals of the sums of squares along the axes; infinite where the figure is flat
-    count          (p,) stations that see
-    collinear      (p,) they stand on one line
+    half_square    (p, s) half the squared distance of each station from the centre; 0 if not visible
+    inverse        (p, 3) reciprocals of the sums of squares along the axes; infinite if the figure is flat
+    count          (p,) visible stations
+    collinear      (p,) bool: they lie on one line
     """
 
     centre: np.ndarray
@@ -34,20 +34,23 @@ class Planes:
 
 
 def planes_of(s: np.ndarray, patterns: np.ndarray) -> Planes:
-    """With q_i = s_i - centre, z from the centre: q_i.z = (z^2 + q_i^2 - d_i^2) / 2, and sum q_i = 0 rids it of z^2."""
+    """Principal planes of visibility patterns (p, s) of stations (s, 3).
+
+    With q_i = s_i - centre, z from the centre: q_i.z = (z^2 + q_i^2 - d_i^2) / 2, and sum q_i = 0 eliminates z^2.
+    """
     count = patterns.sum(axis=1)
     centre = patterns @ s / np.maximum(count, 1)[:, None]
     q = (s - centre[:, None]) * patterns[..., None]
     extent, vectors = np.linalg.eigh(np.swapaxes(q, 1, 2) @ q)
     extent, axes = extent[:, ::-1], np.swapaxes(vectors, 1, 2)[:, ::-1]
-    held = extent > FLAT * extent[:, :1]
-    inverse = np.where(held, 1.0 / np.where(held, extent, 1.0), np.inf)
-    rows = axes @ np.swapaxes(q, 1, 2) * np.where(held, inverse, 0.0)[..., None]
-    return Planes(centre, axes, rows, np.sum(q * q, axis=2) / 2, inverse, count, ~held[:, 1])
+    extended = extent > FLAT * extent[:, :1]
+    inverse = np.where(extended, 1.0 / np.where(extended, extent, 1.0), np.inf)
+    rows = axes @ np.swapaxes(q, 1, 2) * np.where(extended, inverse, 0.0)[..., None]
+    return Planes(centre, axes, rows, np.sum(q * q, axis=2) / 2, inverse, count, ~extended[:, 1])
 
 
 def patterns_of(table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The distinct rows (p, s) of a table of bools, and which of them each row is."""
+    """Distinct rows (p, s) of a bool table, and the index of each row among them."""
     bits = np.packbits(table, axis=1)
     keys = np.zeros((len(bits), -(-bits.shape[1] // 8) * 8), dtype=np.uint8)
     keys[:, : bits.shape[1]] = bits
@@ -59,8 +62,10 @@ def patterns_of(table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True, eq=False)
 class Starts:
-    """Foot in the stations' plane (k, 3), height over it (k,) up to its sign, the normal (k, 3), and the sign (k,) that
-    the ranges tell, else that of the side where the target is known to be, else 0; and that side itself."""
+    """Start positions: foot in the stations' plane (k, 3), height over it (k,), normal (k, 3).
+
+    The sign (k,) of the height is from the ranges, else from the known side, else 0; side (k,) is that side.
+    """
 
     foot: np.ndarray
     height: np.ndarray
@@ -69,25 +74,25 @@ class Starts:
     side: np.ndarray
 
     def of(self, lanes: np.ndarray) -> "Starts":
-        """Those of some of the targets."""
+        """Starts of selected targets."""
         return Starts(self.foot[lanes], self.height[lanes], self.normal[lanes], self.sign[lanes], self.side[lanes])
 
 
 def starts(planes: Planes, which: np.ndarray, d: np.ndarray, *, u: np.ndarray, near: np.ndarray | None) -> Starts:
-    """The closed form for targets of patterns `which` (k,), d and u as in `descent.Ranges`, near (1 or k, 3).
+    """Closed-form starts for targets of patterns `which` (k,), near (1 or k, 3).
 
-    The height comes from the mean square of the ranges, or from the stations' own spread along the normal, which also
-    tells the sign: whichever is better known, with u^2 of 1 / n + z1^2 / E1 + z2^2 / E2 against z3^2 / E3, E the sums
-    of squares of the stations along their axes.
+    d and u as in `descent.Ranges`. The height is from the mean square of the ranges, or from the stations' extent along
+    the normal, which also gives the sign: whichever is more accurate, with u^2 of 1 / n + z1^2 / E1 + z2^2 / E2 against
+    z3^2 / E3, E the sums of squares of the stations along their axes.
     """
-    one = len(planes.count) == 1  # what all share is not copied for each
-    y = (planes.half_square[0] if one else planes.half_square[which]) - d * d / 2
-    z = y @ planes.rows[0].T if one else np.einsum("ks,kcs->kc", y, planes.rows[which])
-    lever = planes.rows[0, 2] if one else planes.rows[which, 2]
+    single = len(planes.count) == 1  # shared arrays are not copied
+    y = (planes.half_square[0] if single else planes.half_square[which]) - d * d / 2
+    z = y @ planes.rows[0].T if single else np.einsum("ks,kcs->kc", y, planes.rows[which])
+    lever = planes.rows[0, 2] if single else planes.rows[which, 2]
     variance = np.sum((lever * d * np.where(u < np.inf, u, 0.0)) ** 2, axis=1)
     square = -2.0 * y.sum(axis=1) / planes.count[which] - z[:, 0] ** 2 - z[:, 1] ** 2
     sided = z[:, 2] ** 2 > SIGNIFICANT**2 * variance
-    bound = np.minimum(planes.inverse[which], 1e200)  # finite, so that nothing times it is nothing
+    bound = np.minimum(planes.inverse[which], 1e200)  # finite, so that zero times it is zero
     level = 1.0 / planes.count[which] + np.sum(z[:, :2] ** 2 * bound[:, :2], axis=1)
     spread = sided & ((square < 0.25 * z[:, 2] ** 2) | (z[:, 2] ** 2 * bound[:, 2] < level))
     height = np.where(spread, np.abs(z[:, 2]), np.sqrt(np.maximum(square, 0.0)))

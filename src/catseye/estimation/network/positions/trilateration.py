@@ -1,4 +1,4 @@
-"""Positions from three ranges to known stations: the closed form, its covariance, and the notes' iteration.
+"""Positions from three ranges to known stations: closed form, covariance, and the notes' iteration.
 
 More ranges than three: `positions`. Thresholds are pure numbers, relative to the size of the stations' figure.
 """
@@ -10,18 +10,18 @@ import numpy as np
 from catseye.errors import InputError
 from catseye.estimation.network.positions.status import PositionStatus
 
-FLAT = 1e-13  # squared extent over largest squared extent: below it a figure of points is flat to double precision
+FLAT = 1e-13  # squared extent over largest squared extent: flatness limit in double precision
 
 
 @dataclass(frozen=True, eq=False)
 class Trilateration:
-    """Where three spheres meet.
+    """Intersections of three spheres.
 
     x            (..., 2, 3) m: first the point above the stations' plane, from where stations 1, 2, 3 run
-                 anticlockwise (the side of (s2 - s1) x (s3 - s1)), then its mirror image below; nan without answer
-    height       (...) m of the first above that plane; nan without answer
-    misclosure   (..., 3) m by which each range is too short to reach the foot, the point of the plane where the three
-                 miss by the same power; zero where they meet, nan where the stations stand on one line
+                 anticlockwise (the side of (s2 - s1) x (s3 - s1)), then its mirror image below; nan without solution
+    height       (...) m of the first above that plane; nan without solution
+    misclosure   (..., 3) m by which each range is too short to reach the foot, the radical centre in the plane; zero
+                 if they meet, nan for collinear stations
     status       (...) int8 of `PositionStatus`: FOUND, COLLINEAR, DISJOINT or REFUSED
     """
 
@@ -32,14 +32,14 @@ class Trilateration:
 
 
 def trilaterate(stations: np.ndarray, distances: np.ndarray) -> Trilateration:
-    """The two points at three distances from three stations, in closed form.
+    """Both points at three distances from three stations, in closed form.
 
-    stations    (..., 3, 3) m, a station a row
+    stations    (..., 3, 3) m, one station per row
     distances   (..., 3) m, not negative
 
     With origin at the station of the shortest range, a and b to the others and n = a x b, the foot in the plane obeys
-    f.a = (d0^2 - d1^2 + a^2) / 2 and likewise b; the height is the root of d0^2 - f^2. A square that is negative by
-    less than rounding counts as zero. Never raises for a value: see the status.
+    f.a = (d0^2 - d1^2 + a^2) / 2 and likewise b; the height is the root of d0^2 - f^2. A square that is negative
+    within rounding counts as zero. Never raises for a value: see the status.
 
     Source: [PARKER04] eq. 3.1, solved; its "unique set of coordinates" are two, mirror images in the stations' plane.
 
@@ -86,12 +86,12 @@ def trilateration_covariance(
     u_distances: np.ndarray,
     station_covariance: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Covariance (..., 3, 3) in m^2 of a point found from three ranges, to first order.
+    """Covariance (..., 3, 3) in m^2 of a point from three ranges, to first order.
 
     stations             (..., 3, 3) m
     x                    (..., 3) m, either of the two points
     u_distances          (..., 3) m, standard uncertainties of the ranges, independent
-    station_covariance   (..., 3, 3, 3) m^2, one block a station, or (..., 9, 9) of all three jointly; None if known
+    station_covariance   (..., 3, 3, 3) m^2, one block per station, or (..., 9, 9) of all three jointly; None if exact
 
     With unit vectors e_i from station to point, e_i.dx = dd_i + e_i.ds_i. It holds while the uncertainty of the height
     over the stations' plane is small beside the height; in the plane itself it is nan.
@@ -119,13 +119,13 @@ def trilateration_covariance(
 
 @dataclass(frozen=True, eq=False)
 class AveragedIteration:
-    """The answer of `trilaterate_by_averaging`.
+    """Result of `trilaterate_by_averaging`.
 
-    x            (..., 3) m, the last average; nan where singular
+    x            (..., 3) m, the last average; nan if singular
     difference   (...) m between the last old and new values
     iterations   (...) solutions of eq. 3.7 taken
-    status       (...) int8 of `PositionStatus`: FOUND, NOT_CONVERGED (at the cap; x is then no answer), or
-                 NOT_HELD (singular)
+    status       (...) int8 of `PositionStatus`: FOUND, NOT_CONVERGED (at the limit; x is then invalid), or NOT_HELD
+                 (singular)
     """
 
     x: np.ndarray
@@ -142,20 +142,20 @@ def trilaterate_by_averaging(
     epsilon: float = 1e-9,
     iterations: int = 50,
 ) -> AveragedIteration:
-    """The point at three distances from three stations, by the iteration of the notes.
+    """Point at three distances from three stations, by the iteration of the notes.
 
     stations     (..., 3, 3) m
     distances    (..., 3) m
-    start        (..., 3) m, off the stations' plane, on the side of the answer
-    epsilon      m, old and new values agree to this
-    iterations   cap; at the cap the status says NOT_CONVERGED, as it always ends where the ranges do not meet
+    start        (..., 3) m, off the stations' plane, on the side of the solution
+    epsilon      m, agreement of old and new values
+    iterations   limit; status NOT_CONVERGED there, as always if the ranges do not meet
 
     Eq. 3.3 is (r - r_i).(r~ - r_i) = R_i^2: eq. 3.1 at r~ = r. Its own solutions r~ = r, 3.7 unaveraged, flip the error
-    e = r - answer to -e + O(e^2) and never settle. Since r~ - r solves (r - r_i).(r~ - r) = R_i^2 - |r - r_i|^2, half
+    e = r - answer to -e + O(e^2) and never converge. Since r~ - r solves (r - r_i).(r~ - r) = R_i^2 - |r - r_i|^2, half
     of it is Newton's step for 3.1: the average *is* Newton's method, of second order. Precisely, the next error is
     |e|^2 / (2 h) along the normal of the stations' plane, h the present height over it: after one step the point is
     exact in the plane, and the height obeys Heron's h' = (h + H^2 / h) / 2. So it converges from anywhere off the
-    plane, to the image on the start's side; without a real H it wanders for ever.
+    plane, to the image on the start's side; without a real H it never converges.
 
     Source: [PARKER04] eqs. 3.3-3.7 and the text above them.
     """
@@ -167,7 +167,7 @@ def trilaterate_by_averaging(
     right = np.broadcast_to(d**2 - np.sum((s * s), axis=-1), (*shape, 3))
     r = start - origin
     status = np.full(shape, PositionStatus.NOT_CONVERGED, dtype=np.int8)
-    difference, taken = np.full(shape, np.nan), np.zeros(shape, dtype=int)
+    difference, steps = np.full(shape, np.nan), np.zeros(shape, dtype=int)
     for _ in range(iterations):
         open_ = status == PositionStatus.NOT_CONVERGED
         if not open_.any():
@@ -179,13 +179,13 @@ def trilaterate_by_averaging(
             step = np.linalg.norm(new - r, axis=-1)
         singular = open_ & ~np.isfinite(step)
         r = np.where(singular[..., None], np.nan, np.where(open_[..., None], (r + new) / 2, r))
-        difference, taken = np.where(open_, step, difference), taken + open_
+        difference, steps = np.where(open_, step, difference), steps + open_
         status[singular], status[open_ & (step <= epsilon)] = PositionStatus.NOT_HELD, PositionStatus.FOUND
-    return AveragedIteration(r + origin, difference, taken, status)
+    return AveragedIteration(r + origin, difference, steps, status)
 
 
 def _three(stations: np.ndarray, distances: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Stations and distances of equal batch, as floats."""
+    """Stations and distances of equal batch shape, as floats."""
     s, d = np.asarray(stations, dtype=float), np.asarray(distances, dtype=float)
     if s.shape[-2:] != (3, 3) or d.shape[-1:] != (3,):
         raise InputError(f"stations {s.shape} and distances {d.shape}: (..., 3, 3) and (..., 3) are expected")
@@ -194,7 +194,7 @@ def _three(stations: np.ndarray, distances: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def _cofactors(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Transposed cofactors (..., 3, 3) and determinant (..., 1, 1) of matrices given by rows: inverse = one / other."""
+    """Transposed cofactors (..., 3, 3) and determinant (..., 1, 1) of matrices given by rows."""
     p, q, r = rows[..., 0, :], rows[..., 1, :], rows[..., 2, :]
     columns = np.stack([np.cross(q, r), np.cross(r, p), np.cross(p, q)], axis=-1)
     return columns, np.sum(p * columns[..., 0], axis=-1)[..., None, None]

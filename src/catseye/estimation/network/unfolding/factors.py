@@ -1,8 +1,8 @@
-"""Figures from the factors of their squared ranges: algebra that needs no start, or a search over small matrices.
+"""Figures from the factors of their squared ranges: closed algebra, or a search over small matrices.
 
-With s_i about the stations' mean and t_j about the targets' mean, the squared ranges freed of their row and column
-means are -2 s_i . t_j: a matrix of rank 3 (2 where the stations or the targets lie in one plane). Its factors u, v are
-the figure up to an affine map A; the row and column means then fix the map, because they hold |s_i|^2 and |t_j|^2.
+With s_i about the stations' mean and t_j about the targets' mean, the squared ranges minus their row and column means
+are -2 s_i . t_j: a matrix of rank 3 (2 if the stations or the targets lie in one plane). Its factors u, v are
+the figure up to an affine map A; the row and column means then fix the map, because they contain |s_i|^2 and |t_j|^2.
 Sizes here are about 1.
 """
 
@@ -13,12 +13,12 @@ Means = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # u (s, d), v (t,
 
 
 def classical_scaling(distances: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points from all distances between them, up to a rigid motion and a mirror image, and the eigenvalues.
+    """Points from all mutual distances, up to a rigid motion and a mirror image, and eigenvalues.
 
     distances   (n, n) m, symmetric, complete, n >= 4
 
-    Returns xyz (n, 3) m about the mean, along principal axes by falling extent, and the (n,) eigenvalues (m^2) by
-    falling size: from the fourth on they are zero but for errors; a third that is as small tells of a plane.
+    Returns xyz (n, 3) m about the mean, along principal axes by decreasing extent, and the (n,) eigenvalues (m^2) in
+    decreasing order: from the fourth on they are zero except for errors; an equally small third means coplanar points.
 
     Source: [TORGERSON52], eigenvectors of the doubly centred squares.
 
@@ -34,17 +34,23 @@ def classical_scaling(distances: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _without_means(a: np.ndarray) -> np.ndarray:
-    """A matrix freed of the means of its rows and columns."""
+    """Matrix minus the means of its rows and columns."""
     return a - a.mean(axis=0) - a.mean(axis=1)[:, None] + a.mean()
 
 
 def in_space(points: np.ndarray) -> np.ndarray:
-    """(n, 2) as (n, 3) with z = 0; (n, 3) as it is."""
+    """Points (n, 2) as (n, 3) with z = 0.
+
+    (n, 3) unchanged.
+    """
     return np.hstack([points, np.zeros((len(points), 3 - points.shape[1]))])
 
 
 def factors(squares: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """u (s, k) and v (t, k) of the squared ranges (s, t) by falling singular values, and those (k,), k = min(s, t)."""
+    """Factors u (s, k), v (t, k) of the squared ranges (s, t), and singular values (k,).
+
+    In decreasing order, k = min(s, t).
+    """
     left, values, right = np.linalg.svd(-0.5 * _without_means(squares), full_matrices=False)
     root = np.sqrt(len(left))
     return left * root, right.T * values / root, values
@@ -53,7 +59,7 @@ def factors(squares: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def upgraded(
     squares: np.ndarray, u: np.ndarray, v: np.ndarray, *, search: int, rng: np.random.Generator
 ) -> list[Figure]:
-    """Figures A u_i and b + A^-T v_j whose row and column means are nearest to those of the squares, best first.
+    """Figures A u_i and b + A^-T v_j with means nearest to those of the squares, best first.
 
     The quadrics through ten stations or ten targets (six in a plane) give A; without them, `search` random maps do.
     """
@@ -70,16 +76,18 @@ def upgraded(
         maps.append(np.linalg.inv(_root(m)).T)
     if not maps:
         return []
-    a = np.linalg.qr(np.array(maps))[1]  # a turn of the whole figure is free
+    a = np.linalg.qr(np.array(maps))[1]  # the rotation of the figure is free
     a, b, cost = match_means(a, _offset(a, means), means)
     order = [k for k in np.argsort(cost) if np.isfinite(cost[k])][: 12 if search else 2]
     return [(u @ a[k].T, b[k] + v @ np.linalg.inv(a[k])) for k in order]
 
 
 def in_plane(squares: np.ndarray) -> list[Figure]:
-    """The figure with its stations in one plane and all targets on one side of it; empty where they are too few.
+    """Figure with coplanar stations and all targets on one side.
 
-    The stations' quadric alone gives the map; what is left of a target's squares is its height.
+    Empty if too few.
+
+    The stations' quadric alone gives the map; the remainder of a target's squares is its height.
     """
     u, v = (factor[:, :2] for factor in factors(squares)[:2])
     row = (squares + 2 * u @ v.T).mean(axis=1)
@@ -87,16 +95,19 @@ def in_plane(squares: np.ndarray) -> list[Figure]:
         return []
     a = _root(m)
     at = u @ a.T
-    left_over = row - np.sum(at**2, axis=1)
-    b = np.linalg.lstsq(-2 * at, left_over - left_over.mean(), rcond=None)[0]
+    residual_means = row - np.sum(at**2, axis=1)
+    b = np.linalg.lstsq(-2 * at, residual_means - residual_means.mean(), rcond=None)[0]
     to = b + v @ np.linalg.inv(a)
     height2 = np.mean(squares - np.sum((at[:, None] - to) ** 2, axis=2), axis=0)
-    height = np.sqrt(np.maximum(height2, 1e-4))  # of a size 1: off the plane, where the ranges can move it
+    height = np.sqrt(np.maximum(height2, 1e-4))  # for size 1: off the plane, so that the ranges can move it
     return [(in_space(at), np.hstack([to, height[:, None]]))]
 
 
 def _metric(points: np.ndarray, means: np.ndarray) -> np.ndarray | None:
-    """Symmetric M of the quadric u' M u + linear terms = means; None where the points do not determine it."""
+    """Symmetric M of the quadric u' M u + linear terms = means.
+
+    None if undetermined.
+    """
     d = points.shape[1]
     i, j = np.triu_indices(d)
     squares = points[:, i] * points[:, j] * np.where(i == j, 1.0, 2.0)
@@ -110,13 +121,13 @@ def _metric(points: np.ndarray, means: np.ndarray) -> np.ndarray | None:
 
 
 def _root(m: np.ndarray) -> np.ndarray:
-    """A with A' A = M; eigenvalues that errors made negative are raised."""
+    """A with A' A = M; negative eigenvalues are raised."""
     size, axes = np.linalg.eigh(m)
     return (axes * np.sqrt(np.clip(size, 1e-3 * abs(size).max(), None))).T
 
 
 def _offset(a: np.ndarray, means: Means) -> np.ndarray:
-    """b that fits the means best for given maps A (k, d, d)."""
+    """Best b for given maps A (k, d, d)."""
     u, v, row, column = means
     inverse = np.linalg.inv(a)
     at, to = u @ np.swapaxes(a, 1, 2), v @ inverse
@@ -128,7 +139,9 @@ def _offset(a: np.ndarray, means: Means) -> np.ndarray:
 
 
 def match_means(a: np.ndarray, b: np.ndarray, means: Means) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Levenberg's descent of maps A (k, d, d), upper triangular, and b (k, d) to given means; with the costs (k,).
+    """Levenberg descent of maps A (k, d, d), upper triangular, and b (k, d) to given means.
+
+    Returns the costs (k,) too.
 
     Row mean i less its part |A u_i - b|^2, column mean j less |b + A^-T v_j|^2 - |b|^2; each of these is compared
     after the other's mean is taken off.
@@ -145,7 +158,7 @@ def match_means(a: np.ndarray, b: np.ndarray, means: Means) -> tuple[np.ndarray,
         trial_a, trial_b = a.copy(), b + step[:, len(i) :]
         trial_a[:, i, j] += step[:, : len(i)]
         size = np.abs(np.einsum("kii->ki", trial_a))
-        alive = size.min(axis=1) > 1e-6 * size.max(axis=1)  # a map that folds the figure has no inverse
+        alive = size.min(axis=1) > 1e-6 * size.max(axis=1)  # a singular map has no inverse
         trial_a = np.where(alive[:, None, None], trial_a, a)
         trial_residual, trial_jacobian = _misfit_of_means(trial_a, trial_b, means)
         trial = np.sum(trial_residual**2, axis=1)
@@ -153,16 +166,19 @@ def match_means(a: np.ndarray, b: np.ndarray, means: Means) -> tuple[np.ndarray,
         a, b = np.where(better[:, None, None], trial_a, a), np.where(better[:, None], trial_b, b)
         residual = np.where(better[:, None], trial_residual, residual)
         jacobian = np.where(better[:, None, None], trial_jacobian, jacobian)
-        done = np.abs(trial - cost) <= 1e-9 * cost
+        settled = np.abs(trial - cost) <= 1e-9 * cost
         cost = np.where(better, trial, cost)
         damping = np.clip(damping * np.where(better, 0.2, 5.0), 1e-12, 1e8)
-        if np.all(done & better | (damping >= 1e6)):
+        if np.all(settled & better | (damping >= 1e6)):
             break
     return a, b, cost
 
 
 def _misfit_of_means(a: np.ndarray, b: np.ndarray, means: Means) -> tuple[np.ndarray, np.ndarray]:
-    """Residuals of the means (k, s + t), weighted by the number of squares in each, and derivatives by A and b."""
+    """Weighted residuals of the means (k, s + t), and derivatives by A and b.
+
+    The weight is the root of the number of squares in each.
+    """
     u, v, row, column = means
     i, j = np.triu_indices(b.shape[1])
     weight = np.concatenate([np.full(len(u), len(v) ** 0.5), np.full(len(v), len(u) ** 0.5)])

@@ -1,13 +1,13 @@
-"""Points from ranges to known points, many at once, with both places where the sum of squares is least.
+"""Points from ranges to known points, in blocks, with both minima of the sum of squares.
 
-`positions.trilateration` gives the one place, its covariance and a verdict; here the second place is wanted too,
-however well it fits, and no sigma is known yet.
+`positions.trilateration` gives one position, its covariance and status; here the second position is needed too,
+however well it fits, and sigma is not known yet.
 """
 
 import numpy as np
 
-BLOCK = 20_000  # ranges at a time, so that memory stays bounded
-FLAT = 1e-10  # least over largest eigenvalue of a scatter of points: their extent across is 1e-5 of that along
+BLOCK = 20_000  # ranges per batch, to bound memory
+FLAT = 1e-10  # smallest over largest eigenvalue of the scatter of points: extents differ by 1e-5
 
 
 def locate(anchors: np.ndarray, ranges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -16,10 +16,10 @@ def locate(anchors: np.ndarray, ranges: np.ndarray) -> tuple[np.ndarray, np.ndar
     anchors   (s, 3) m
     ranges    (t, s) m, nan where not measured
 
-    Returns xyz (t, 2, 3) m and the root mean squares (t, 2) m of their residuals; nan where fewer than three ranges
-    or all anchors in line. Anchors in one plane give mirror images of equal rms; where only one minimum exists
-    both are equal. The start is linear: along the principal axes of the anchors seen, about their mean, the equations
-    separate, and the height above their plane follows from the mean of the squares.
+    Returns xyz (t, 2, 3) m and the root mean squares (t, 2) m of their residuals; nan for fewer than three ranges or
+    collinear anchors. Coplanar anchors give mirror images of equal rms; if only one minimum exists both are equal. The
+    start is linear: along the principal axes of the anchors seen, about their mean, the equations separate, and the
+    height above their plane follows from the mean of the squares.
 
     >>> anchors = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]])
     >>> locate(anchors, np.linalg.norm(anchors - [1.0, 2.0, 2.0], axis=1)[None])[0][0, :, 2].round(6)
@@ -29,16 +29,16 @@ def locate(anchors: np.ndarray, ranges: np.ndarray) -> tuple[np.ndarray, np.ndar
         cuts = range(max(BLOCK // ranges.shape[1], 1), len(ranges), max(BLOCK // ranges.shape[1], 1))
         blocks = [locate(anchors, block) for block in np.split(ranges, cuts)]
         return np.concatenate([b[0] for b in blocks]), np.concatenate([b[1] for b in blocks])
-    seen = np.isfinite(ranges)
-    enough = np.flatnonzero(seen.sum(axis=1) >= 3)
+    measured = np.isfinite(ranges)
+    enough = np.flatnonzero(measured.sum(axis=1) >= 3)
     xyz, rms = np.full((len(ranges), 2, 3), np.nan), np.full((len(ranges), 2), np.nan)
     if not len(enough):
         return xyz, rms
-    square = np.where(seen, ranges, 0.0)[enough] ** 2
-    start, spread = _both_sides(anchors, square, seen[enough].astype(float))
-    twice, weight = (np.repeat(a, 2, axis=0) for a in (np.sqrt(square), seen[enough].astype(float)))
-    moved, left = _descend(start.reshape(-1, 3), anchors, twice, weight=weight)
-    places, size = moved.reshape(-1, 2, 3), left.reshape(-1, 2)
+    square = np.where(measured, ranges, 0.0)[enough] ** 2
+    start, spread = _both_sides(anchors, square, measured[enough].astype(float))
+    twice, weight = (np.repeat(a, 2, axis=0) for a in (np.sqrt(square), measured[enough].astype(float)))
+    moved, remaining_rms = _descend(start.reshape(-1, 3), anchors, twice, weight=weight)
+    places, size = moved.reshape(-1, 2, 3), remaining_rms.reshape(-1, 2)
     order = np.argsort(size, axis=1, kind="stable")
     places, size = np.take_along_axis(places, order[:, :, None], axis=1), np.take_along_axis(size, order, axis=1)
     xyz[enough], rms[enough] = np.where(spread[:, None, None], places, np.nan), np.where(spread[:, None], size, np.nan)
@@ -46,7 +46,7 @@ def locate(anchors: np.ndarray, ranges: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def _both_sides(anchors: np.ndarray, square: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Starts (t, 2, 3) above and below the plane of the anchors seen, and (t,) whether these are off a line.
+    """Starts (t, 2, 3) above and below the plane of the anchors, and mask (t,) of non-collinear anchors.
 
     square, weight   (t, s) squared ranges, m^2, and 1 where measured, else both 0
     """
@@ -60,16 +60,16 @@ def _both_sides(anchors: np.ndarray, square: np.ndarray, weight: np.ndarray) -> 
     spread = values[:, 1] > FLAT * values[:, 2]
     local = np.einsum("tji,tj->ti", axes, right) / np.where(spread[:, None], np.maximum(values, 1e-300), 1.0)
     height2 = (square - level).sum(axis=1) / number[:, 0] - local[:, 1] ** 2 - local[:, 2] ** 2
-    height = np.sqrt(np.maximum(height2, 1e-4 * square.max(axis=1)))  # in the plane itself Newton would not leave it
-    both = np.stack([local, local], axis=1)
-    both[:, 0, 0], both[:, 1, 0] = height, -height
-    return mean[:, None] + np.einsum("tij,tkj->tki", axes, both), spread
+    height = np.sqrt(np.maximum(height2, 1e-4 * square.max(axis=1)))  # not zero: Newton would stay in the plane
+    sides = np.stack([local, local], axis=1)
+    sides[:, 0, 0], sides[:, 1, 0] = height, -height
+    return mean[:, None] + np.einsum("tij,tkj->tki", axes, sides), spread
 
 
 def _descend(
     x: np.ndarray, anchors: np.ndarray, ranges: np.ndarray, *, weight: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Levenberg's descent of many points (n, 3) at once; the points and the rms of their residuals (n,).
+    """Levenberg descent of many points (n, 3), and rms (n,) of their residuals.
 
     ranges, weight   (n, s) m and 0 or 1
     """

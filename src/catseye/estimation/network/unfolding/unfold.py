@@ -1,7 +1,7 @@
-"""Figures from ranges alone: stations and targets both unknown, found up to a rigid motion and a mirror image.
+"""Figures from ranges alone: stations and targets up to a rigid motion and a mirror image.
 
-How the figure comes out of the factors of the squared ranges: `factors`. From a complete part it is extended
-to the rest (`sides`), fitted to all ranges and judged (`fit`).
+The figure follows from the factors of the squared ranges (`factors`). From a complete part it is extended to the other
+points (`sides`), fitted to all ranges and checked (`fit`).
 
 Least numbers: ranges S T >= 3 (S + T) - 6 with S, T >= 4 (4 x 6, 5 x 5), where several figures may fit and the status
 says so; linear, thus without a search, from 10 stations or 10 targets on. Stations in one plane: at least 6, and no
@@ -30,24 +30,24 @@ LOOSE = "not unfolded: the ranges between {s} stations and {t} targets let the f
 points in one plane may lie on one circle or other conic: add a station off it"
 AMBIGUOUS = "not unfolded: different figures fit {s} stations and {t} targets equally well; measure more pairs"
 
-NOISE = 3.0  # a singular value below this many times that of noise alone counts as none
-ENOUGH = 120  # stations or targets that begin the figure; the rest follows from them
+NOISE = 3.0  # a singular value below this multiple of the noise's is zero
+ENOUGH = 120  # stations or targets in the initial figure; the others follow
 
 
 @dataclass(frozen=True, eq=False)
 class Unfolding:
-    """A figure from ranges, in its own axes.
+    """Figure from ranges, in its own axes.
 
     Origin at the stations' mean; x along their largest extent, positive towards the first station found; z along their
     least, positive towards the mean of the targets; of the two mirror images that in which the first three stations
-    found, seen from the targets' side, run counter-clockwise.
+    found, seen from the targets' side, are counter-clockwise.
 
-    stations       (S, 3) m, nan where not found
-    targets        (T, 3) m, nan where not found
-    side_assumed   (S + T,) bool, stations first: points that fit as well on the other side of the plane of those that
-                   see them; they are put on the side of the others
+    stations       (S, 3) m, nan if not found
+    targets        (T, 3) m, nan if not found
+    side_assumed   (S + T,) bool, stations first: points that fit as well on the other side of the plane of their
+                   partners; they are put on the side of the others
     rms            m, of the residuals, over the degrees of freedom
-    status         "unfolded", or one line that says what is wrong and what to do
+    status         "unfolded", or one line with problem and remedy
     """
 
     stations: np.ndarray
@@ -58,9 +58,9 @@ class Unfolding:
 
 
 def unfold(ranges: np.ndarray, sigma: float, *, seed: int = 0) -> Unfolding:
-    """Stations and targets from the ranges between them, nothing else known.
+    """Stations and targets from the ranges between them only.
 
-    ranges   (S, T) m between station and target, nan where not measured
+    ranges   (S, T) m between station and target, nan if not measured
     sigma    m, standard uncertainty of a range
     seed     of the search that small networks need
 
@@ -79,14 +79,14 @@ def unfold(ranges: np.ndarray, sigma: float, *, seed: int = 0) -> Unfolding:
     (s, t), m = ranges.shape, int(np.isfinite(ranges).sum())
     rows, columns = _complete_part(np.isfinite(ranges))
     if not len(rows):
-        return _none(s, t, TOO_FEW.format(s=s, t=t, m=m))
+        return _failed(s, t, TOO_FEW.format(s=s, t=t, m=m))
     rows, columns = (k[np.linspace(0, len(k) - 1, min(len(k), ENOUGH)).astype(int)] for k in (rows, columns))
     part = ranges[np.ix_(rows, columns)]
     size = float(np.sqrt(np.mean(part**2)))
     figure, status = _part_figure(part / size, sigma / size, np.random.default_rng(seed))
     if figure is None:
-        whole = status == TOO_FEW
-        return _none(s, t, status.format(s=s if whole else len(rows), t=t if whole else len(columns), m=m))
+        too_few = status == TOO_FEW
+        return _failed(s, t, status.format(s=s if too_few else len(rows), t=t if too_few else len(columns), m=m))
     stations, targets = np.full((s, 3), np.nan), np.full((t, 3), np.nan)
     stations[rows], targets[columns] = figure[0] * size, figure[1] * size
     extend(stations, targets, ranges, sigma=sigma)
@@ -94,7 +94,10 @@ def unfold(ranges: np.ndarray, sigma: float, *, seed: int = 0) -> Unfolding:
 
 
 def _fitted(stations: np.ndarray, targets: np.ndarray, ranges: np.ndarray, *, sigma: float) -> Unfolding:
-    """The figure fitted to all ranges between its found points, sides settled, in its own axes; or why it is none."""
+    """Figure fitted to all ranges, sides settled, in its own axes.
+
+    Returns the reason if it fails.
+    """
     s, t = ranges.shape
     at, to = np.flatnonzero(np.isfinite(stations[:, 0])), np.flatnonzero(np.isfinite(targets[:, 0]))
     table, assumed = ranges[np.ix_(at, to)], np.zeros(s + t, dtype=bool)
@@ -105,22 +108,25 @@ def _fitted(stations: np.ndarray, targets: np.ndarray, ranges: np.ndarray, *, si
         assumed[at] = settle_sides(targets[to], stations, at, table=table, sigma=sigma)
         fit = least_squares(stations[at], targets[to], table)
     if fit.rms > FIT * sigma:
-        return _none(s, t, NO_FIT.format(rms=fit.rms, sigma=sigma))
+        return _failed(s, t, NO_FIT.format(rms=fit.rms, sigma=sigma))
     if loose(fit, table, sigma):
-        return _none(s, t, LOOSE.format(s=len(at), t=len(to)))
+        return _failed(s, t, LOOSE.format(s=len(at), t=len(to)))
     stations[at], targets[to] = in_space(fit.stations), in_space(fit.targets)
     stations, targets = _oriented(stations, targets)
     return Unfolding(stations, targets, assumed, fit.rms, UNFOLDED)
 
 
-def _none(s: int, t: int, status: str) -> Unfolding:
-    """An answer without a figure, and why."""
+def _failed(s: int, t: int, status: str) -> Unfolding:
+    """Result without a figure, with the reason."""
     nowhere = np.full((s, 3), np.nan), np.full((t, 3), np.nan)
     return Unfolding(*nowhere, np.zeros(s + t, dtype=bool), float("nan"), status)
 
 
 def _complete_part(measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows and columns of a complete part with the most ranges to spare; stations are dropped one at a time."""
+    """Rows and columns of a complete part with the most redundant ranges.
+
+    Drops stations one by one.
+    """
     best: tuple[int, np.ndarray, np.ndarray] = (-1, np.zeros(0, int), np.zeros(0, int))
     for turned in (False, True):
         table = measured.T if turned else measured
@@ -170,7 +176,7 @@ def _part_figure(ranges: np.ndarray, sigma: float, rng: np.random.Generator) -> 
 
 
 def _differ(a: FigureFit, b: FigureFit, sigma: float) -> bool:
-    """Whether two figures of size about 1 have different stations or targets, beyond what noise can do."""
+    """True if two figures of size about 1 differ beyond noise."""
     return any(
         np.max(np.abs(np.linalg.norm(p[:, None] - p, axis=2) - np.linalg.norm(q[:, None] - q, axis=2)))
         > 0.02 + 100 * sigma
@@ -179,7 +185,7 @@ def _differ(a: FigureFit, b: FigureFit, sigma: float) -> bool:
 
 
 def _oriented(stations: np.ndarray, targets: np.ndarray) -> Figure:
-    """The figure in its own axes, as `Unfolding` states them."""
+    """Figure in its own axes, as described in `Unfolding`."""
     placed = stations[np.isfinite(stations[:, 0])]
     mean = placed.mean(axis=0)
     axes = np.linalg.svd(placed - mean)[2]

@@ -1,4 +1,4 @@
-"""Points in a moving frame: a ground point is T + R p, with p known or to be found, the same in every posture."""
+"""Points in a moving frame: ground point = T + R p, with p constant, known or estimated."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,22 +7,23 @@ from typing import ClassVar
 import numpy as np
 
 from catseye.estimation.observations.bodies.pose import frame_columns, in_frame, require_rotation
-from catseye.estimation.observations.kind import ObservationKind, beside, value
+from catseye.estimation.observations.kind import ObservationKind, joined_columns, value
 from catseye.estimation.observations.sight import XYZ
 
 
 @dataclass(frozen=True, eq=False)
 class FramePoints(ObservationKind):
-    """observed = R' (X - T) - x[p] + error, in the frame's axes, R = exp([w]x) R0; see `pose`.
+    """observed = R' (X - T) - x[p] + error, in the frame's axes.
 
-    With p among the parameters the observed value is 0, or known nominal coordinates from which p departs.
+    R = exp([w]x) R0, see `pose`. With p among the parameters the observed value is 0, or nominal coordinates from which
+    p departs.
 
-    name          what the group is, for reports
+    name          of the group, for reports
     observed      (3n,) m, x, y, z point by point
     covariance    of the observed values: (n, 3, 3), or as `ObservationGroup` has it; its smallest sensible standard
                   uncertainty is that of `FixedDistances`, for the same reason
     point         (n,) column of the x of each point on the ground
-    pose          (6,) or (n, 6) columns of T, m, and w, rad; -1 for a parameter that is zero
+    pose          (6,) or (n, 6) columns of T, m, and w, rad; -1 for a parameter fixed at zero
     start         R0, (3, 3) or (n, 3, 3), ground from frame
     frame_point   (n,) column of the x of p, which y and z follow; -1 where p is zero
     """
@@ -44,13 +45,13 @@ class FramePoints(ObservationKind):
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """(3n, 10): x, y, z of the point, T, w, the coordinate of p."""
-        own = np.where(self.frame_point[:, None] < 0, -1, self.frame_point[:, None] + XYZ).reshape(-1, 1)
-        return beside(self.name, len(self.observed), frame_columns(self.point, self.pose), own)
+        """Columns (3n, 10): x, y, z of the point, T, w, the coordinate of p."""
+        frame_coordinate = np.where(self.frame_point[:, None] < 0, -1, self.frame_point[:, None] + XYZ).reshape(-1, 1)
+        return joined_columns(self.name, len(self.observed), frame_columns(self.point, self.pose), frame_coordinate)
 
     @property
     def ends(self) -> tuple[np.ndarray, ...]:
-        """The point on the ground, the point in the frame."""
+        """Columns of the point on the ground and of the point in the frame."""
         return np.repeat(self.point, 3), np.repeat(self.frame_point, 3)
 
     @property
@@ -65,7 +66,7 @@ class FramePoints(ObservationKind):
         >>> p.predict(np.array([5.0, 2.0, 0.0, 5.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0, 1.0]))[0]
         array([ 0.,  0., -1.])
         """
-        own = self.columns[:, 9]
+        frame_coordinate = self.columns[:, 9]
         local, slope = in_frame(x, self.point, self.pose, start=self.start)
-        jacobian = np.concatenate([slope.reshape(-1, 9), np.where(own < 0, 0.0, -1.0)[:, None]], axis=1)
-        return local.ravel() - value(x, own), jacobian
+        jacobian = np.concatenate([slope.reshape(-1, 9), np.where(frame_coordinate < 0, 0.0, -1.0)[:, None]], axis=1)
+        return local.ravel() - value(x, frame_coordinate), jacobian

@@ -1,4 +1,4 @@
-"""Level planes: points at one unknown height, or at known heights above it, as a level's line of sight gives them."""
+"""Level planes: points at known heights from one unknown level, as from a levelling instrument."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -6,18 +6,20 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import ObservationKind, beside, optional, value
+from catseye.estimation.observations.kind import ObservationKind, joined_columns, optional, value
 from catseye.estimation.observations.sight import triples
 
 
 @dataclass(frozen=True, eq=False)
 class LevelPlanes(ObservationKind):
-    """observed = z of point + height - x[level] + error; observed 0 says that the point plus its height is level.
+    """observed = z of point + height - x[level] + error.
 
-    A level that stands anywhere and reads a staff on each point: the reading is the `height`, and its line of sight the
+    The observed value is usually 0.
+
+    For a levelling instrument that reads a staff on every point, the reading is the `height` and its line of sight the
     unknown `level`.
 
-    name         what the group is, for reports
+    name         of the group, for reports
     observed     (m,) metres, usually zeros
     covariance   of the observed values, see `ObservationGroup`
     point        (m,) column of the point's x
@@ -37,9 +39,9 @@ class LevelPlanes(ObservationKind):
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """(m, 2): z of the point, height of the plane."""
+        """Columns (m, 2): z of the point, height of the plane."""
         m = len(self.observed)
-        return beside(self.name, m, triples(self.point)[:, 2:], optional(self.level, m))
+        return joined_columns(self.name, m, triples(self.point)[:, 2:], optional(self.level, m))
 
     @property
     def ends(self) -> tuple[np.ndarray, ...]:

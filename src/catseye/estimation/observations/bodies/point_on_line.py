@@ -1,4 +1,4 @@
-"""Points on a straight line, or at known places across it."""
+"""Points on a straight line, or at known offsets from it."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -6,26 +6,27 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import ObservationKind, beside, value
+from catseye.estimation.observations.kind import ObservationKind, joined_columns, value
 from catseye.estimation.observations.sight import triples
 from catseye.estimation.observations.unit_direction import direction, require_direction
 
 
 @dataclass(frozen=True, eq=False)
 class PointsOnLine(ObservationKind):
-    """observed_i = f_i . (P - centre) - x[shift_i] + error, i = 1, 2: the two components of the distance from a line.
+    """observed_i = f_i . (P - centre) - x[shift_i] + error, i = 1, 2.
 
-    f_1, f_2 are square to the line and to each other. One number, the distance itself, would have no derivative on the
-    line. Four parameters are minimal: two tilts of the direction from its start (see `observations.unit_direction`) and
-    the shifts along f_1, f_2. A line that is known has -1 in place of its parameters.
+    These are the two components of the distance from a line: f_1, f_2 are perpendicular to the line and to each other.
+    The distance itself would have no derivative on the line. Four parameters are minimal: two tilts of the direction
+    from its start (see `observations.unit_direction`) and the shifts along f_1, f_2. A known line has -1 in place of
+    its parameters.
 
-    name         what the group is, for reports
+    name         of the group, for reports
     observed     (2b,) metres, point by point
     covariance   of the observed values, see `ObservationGroup`
     point        (b,) column of the point's x
     centre       (3,) or (b, 3) m, near the points: the tilts turn the line about it
     along        (3,) or (b, 3), the direction's start
-    line         (4,) or (b, 4) columns of tilt 1, tilt 2, shift 1, shift 2, m; -1 for a parameter that is zero
+    line         (4,) or (b, 4) columns of tilt 1, tilt 2, shift 1, shift 2, m; -1 for a parameter fixed at zero
     """
 
     kind: ClassVar[str] = "point_on_line"
@@ -45,11 +46,11 @@ class PointsOnLine(ObservationKind):
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """(2b, 6): point, tilts, the component's own shift."""
+        """Columns (2b, 6): point, tilts, shift of the component."""
         b = len(self.point)
         line = np.broadcast_to(np.atleast_2d(self.line), (b, 4))
-        both = np.repeat(np.concatenate([triples(self.point), line[:, :2]], axis=1), 2, axis=0)
-        return beside(self.name, len(self.observed), both, line[:, 2:].reshape(-1, 1))
+        common = np.repeat(np.concatenate([triples(self.point), line[:, :2]], axis=1), 2, axis=0)
+        return joined_columns(self.name, len(self.observed), common, line[:, 2:].reshape(-1, 1))
 
     @property
     def ends(self) -> tuple[np.ndarray, ...]:
@@ -73,5 +74,5 @@ class PointsOnLine(ObservationKind):
         lever = x[triples(self.point)] - self.centre
         values = np.einsum("mik,mk->mi", line.f, lever).ravel() - value(x, shifts)
         slope = np.where(tilts[:, None] < 0, 0.0, np.einsum("mijk,mk->mij", line.df, lever))
-        own = np.where(shifts < 0, 0.0, -1.0)[:, None]
-        return values, np.concatenate([line.f.reshape(-1, 3), slope.reshape(-1, 2), own], axis=1)
+        by_shift = np.where(shifts < 0, 0.0, -1.0)[:, None]
+        return values, np.concatenate([line.f.reshape(-1, 3), slope.reshape(-1, 2), by_shift], axis=1)

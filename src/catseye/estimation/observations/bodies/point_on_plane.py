@@ -6,26 +6,26 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import ObservationKind, beside, value
+from catseye.estimation.observations.kind import ObservationKind, joined_columns, value
 from catseye.estimation.observations.sight import triples
 from catseye.estimation.observations.unit_direction import direction, require_direction
 
 
 @dataclass(frozen=True, eq=False)
 class PointsOnPlane(ObservationKind):
-    """observed = u . (P - centre) - x[offset] + error: the distance from the plane, positive where the normal points.
+    """observed = u . (P - centre) - x[offset] + error, positive on the normal's side.
 
-    Three parameters are minimal: two tilts of the normal u from its start (see `observations.unit_direction`) and the
-    offset along u. A plane that is known has -1 in place of its parameters. Observed 0 says on the plane; the radius of
-    a ball that touches it is another choice.
+    The value is the distance from the plane. Three parameters are minimal: two tilts of the normal u from its start
+    (see `observations.unit_direction`) and the offset along u. A known plane has -1 in place of its parameters.
+    Observed 0 means on the plane; the radius of a touching ball is another use.
 
-    name         what the group is, for reports
+    name         of the group, for reports
     observed     (m,) metres
     covariance   of the observed values, see `ObservationGroup`
     point        (m,) column of the point's x
     centre       (3,) or (m, 3) m, near the points: the tilts turn the plane about it
     normal       (3,) or (m, 3), the normal's start
-    surface      (3,) or (m, 3) columns of tilt 1, tilt 2 and offset, m; -1 for a parameter that is zero
+    surface      (3,) or (m, 3) columns of tilt 1, tilt 2 and offset, m; -1 for a parameter fixed at zero
     """
 
     kind: ClassVar[str] = "point_on_plane"
@@ -45,8 +45,8 @@ class PointsOnPlane(ObservationKind):
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """(m, 6): point, tilts, offset."""
-        return beside(self.name, len(self.observed), triples(self.point), np.atleast_2d(self.surface))
+        """Columns (m, 6): point, tilts, offset."""
+        return joined_columns(self.name, len(self.observed), triples(self.point), np.atleast_2d(self.surface))
 
     @property
     def ends(self) -> tuple[np.ndarray, ...]:

@@ -6,19 +6,19 @@ from typing import ClassVar
 
 import numpy as np
 
-from catseye.estimation.observations.kind import ObservationKind, beside, optional, value
-from catseye.estimation.observations.sight import both, length, sight, triples
+from catseye.estimation.observations.kind import ObservationKind, joined_columns, optional, value
+from catseye.estimation.observations.sight import by_ends, length, sight, triples
 
 
 @dataclass(frozen=True, eq=False)
 class PointsOnSphere(ObservationKind):
-    """observed = |P - C| - radius - x[radius_column] + error: the distance from the sphere, positive outside.
+    """observed = |P - C| - radius - x[radius_column] + error, positive outside.
 
-    name            what the group is, for reports
+    name            of the group, for reports
     observed        (m,) metres
     covariance      of the observed values, see `ObservationGroup`
     point           (m,) column of the point's x
-    centre          (m,) column of the x of the centre C, which is a point as any other
+    centre          (m,) column of the x of the centre C, an ordinary point
     radius          (m,) or one, the known part of the radius, m
     radius_column   (m,) column of the unknown part, m, -1 for none; or None
     """
@@ -36,9 +36,9 @@ class PointsOnSphere(ObservationKind):
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """(m, 7): centre, point, radius."""
+        """Columns (m, 7): centre, point, radius."""
         m = len(self.observed)
-        return beside(self.name, m, triples(self.centre), triples(self.point), optional(self.radius_column, m))
+        return joined_columns(self.name, m, triples(self.centre), triples(self.point), optional(self.radius_column, m))
 
     @property
     def ends(self) -> tuple[np.ndarray, ...]:
@@ -46,7 +46,9 @@ class PointsOnSphere(ObservationKind):
         return self.point, self.centre
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values (m,) and Jacobian (m, 7) at the parameters x; nan for a point at the centre.
+        """Values (m,) and Jacobian (m, 7).
+
+        Values are nan for a point at the centre.
 
         >>> p = PointsOnSphere("p", np.zeros(1), np.ones(1), np.array([0]), np.array([3]), 4.5)
         >>> p.predict(np.array([3.0, 4.0, 0.0, 0.0, 0.0, 0.0]))[0]
@@ -54,5 +56,5 @@ class PointsOnSphere(ObservationKind):
         """
         radius = self.columns[:, 6]
         size, unit = length(sight(x, self.centre, self.point, shift=None))
-        jacobian = np.concatenate([both(unit), np.where(radius < 0, 0.0, -1.0)[:, None]], axis=1)
+        jacobian = np.concatenate([by_ends(unit), np.where(radius < 0, 0.0, -1.0)[:, None]], axis=1)
         return size - self.radius - value(x, radius), jacobian

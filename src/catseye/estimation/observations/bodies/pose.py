@@ -1,7 +1,8 @@
-"""Where a moving frame is: ground = T + exp([w]x) R0 frame, with translation T, rotation vector w, a fixed start R0.
+"""Pose of a moving frame: ground = T + exp([w]x) R0 frame.
 
-The rotation vector is in ground axes and turns the frame about its own origin, the point T, after R0. The six
-parameters of a pose are T then w. A pose is smooth up to a whole turn from R0, so R0 need not be near.
+T is the translation, w the rotation vector, R0 a fixed start. The rotation vector is in ground axes and turns the frame
+about its own origin, the point T, after R0. The six parameters of a pose are T then w. A pose is smooth up to a whole
+turn from R0, so R0 need not be near.
 """
 
 import numpy as np
@@ -15,7 +16,7 @@ SERIES_BELOW = 0.3  # rad: there (t - sin t) / t^3 by its series and by its form
 
 
 def right_jacobian(w: np.ndarray) -> np.ndarray:
-    """J (..., 3, 3) with exp(w + dw) = exp(w) exp(J dw) to first order.
+    """Right Jacobian J (..., 3, 3): exp(w + dw) = exp(w) exp(J dw) to first order.
 
     J = 1 - (1 - cos t) / t^2 [w]x + (t - sin t) / t^3 [w]x^2, with t the length of w.
 
@@ -34,7 +35,7 @@ def right_jacobian(w: np.ndarray) -> np.ndarray:
 
 
 def require_rotation(name: str, start: np.ndarray) -> None:
-    """Refuse a start R0, (3, 3) or (n, 3, 3), that is no rotation; EstimationError."""
+    """Raise EstimationError if start R0, (3, 3) or (n, 3, 3), is not a rotation."""
     if start.shape[-2:] != (3, 3) or not np.allclose(start @ np.swapaxes(start, -1, -2), np.eye(3), rtol=0, atol=1e-9):
         raise EstimationError(f"{name}: the start R0 is not orthonormal within 1e-9; give a rotation matrix")
     if np.any(np.linalg.det(start) < 0.0):
@@ -42,9 +43,9 @@ def require_rotation(name: str, start: np.ndarray) -> None:
 
 
 def turned_back(vector: np.ndarray, w: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A ground vector in the frame's axes, R' v with R = exp([w]x) R0; its derivatives by v and by w.
+    """Ground vector in the frame's axes, R' v, and its derivatives by v and w.
 
-    With y = exp(-w) v, dy = [y]x J dw, J the right Jacobian of w.
+    R = exp([w]x) R0. With y = exp(-w) v, dy = [y]x J dw, J the right Jacobian of w.
 
     vector   (n, 3)
     w        (n, 3) or (1, 3) rad
@@ -59,11 +60,11 @@ def turned_back(vector: np.ndarray, w: np.ndarray, start: np.ndarray) -> tuple[n
 
 
 def in_frame(x: np.ndarray, point: np.ndarray, pose: np.ndarray, *, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Ground points in a frame's coordinates, R' (X - T), and their derivatives.
+    """Ground points in frame coordinates, R' (X - T), and their derivatives.
 
     x       parameters
     point   (n,) columns of the x of the points
-    pose    (6,) or (n, 6) columns of T and w, -1 for a parameter that is zero
+    pose    (6,) or (n, 6) columns of T and w, -1 for a parameter fixed at zero
     start   R0, (3, 3) or (n, 3, 3)
 
     Returns coordinates (n, 3), derivatives by X, T, w (n, 3, 9).
@@ -77,7 +78,7 @@ def in_frame(x: np.ndarray, point: np.ndarray, pose: np.ndarray, *, start: np.nd
 
 
 def frame_columns(point: np.ndarray, pose: np.ndarray) -> np.ndarray:
-    """Columns (3n, 9) of points and pose, three rows a point."""
+    """Columns (3n, 9) of points and pose, three rows per point."""
     n = len(point)
-    whole = np.concatenate([triples(point), np.broadcast_to(np.atleast_2d(pose), (n, 6))], axis=1)
-    return np.repeat(whole, 3, axis=0)
+    rows = np.concatenate([triples(point), np.broadcast_to(np.atleast_2d(pose), (n, 6))], axis=1)
+    return np.repeat(rows, 3, axis=0)

@@ -1,4 +1,4 @@
-"""Rigid bodies: points that move as one, such as the prisms of a triplet or of a panel."""
+"""Rigid bodies: points that move together, such as the prisms of a triplet or of a panel."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,17 +12,16 @@ from catseye.estimation.observations.kind import ObservationKind
 
 @dataclass(frozen=True, eq=False)
 class RigidBodies(ObservationKind):
-    """observed = R' (X - T) + error: the coordinates of ground points X in the body, R = exp([w]x) R0; see `pose`.
+    """observed = R' (X - T) + error: coordinates of ground points X in the body.
 
-    What was observed is the body, in its own axes, with the covariance of its calibration; six parameters say where it
-    is. Without the pose's parameters it would be the points' shape alone. Several bodies share a group where each
-    point has its own pose columns.
+    R = exp([w]x) R0, see `pose`. The observed values are calibrated body coordinates with their covariance; six
+    parameters give the pose. Several bodies can share a group, with pose columns per point.
 
-    name         what the group is, for reports
+    name         of the group, for reports
     observed     (3n,) m, body coordinates x, y, z point by point
     covariance   of the observed values, (3n, 3n) or another form of `ObservationGroup`
     point        (n,) column of the x of each point on the ground
-    pose         (6,) or (n, 6) columns of T, m, and w, rad; -1 for a parameter that is zero
+    pose         (6,) or (n, 6) columns of T, m, and w, rad; -1 for a parameter fixed at zero
     start        R0, (3, 3) or (n, 3, 3), ground from body
     """
 
@@ -42,7 +41,7 @@ class RigidBodies(ObservationKind):
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """(3n, 9): x, y, z of the point, T, w."""
+        """Columns (3n, 9): x, y, z of the point, T, w."""
         return frame_columns(self.point, self.pose)
 
     @property

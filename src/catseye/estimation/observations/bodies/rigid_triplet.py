@@ -1,4 +1,4 @@
-"""Rigid triplets: two prisms and a ball that stand to each other as their calibration says, wherever the unit is."""
+"""Rigid triplets: two prisms and a ball with calibrated geometry, in any pose."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,25 +17,26 @@ EYE = np.eye(3)
 
 @dataclass(frozen=True, eq=False)
 class RigidTriplets(ObservationKind):
-    """Five rows a unit, observed = (along, across, height, spacing, squareness) - x[offset] + error.
+    """Five rows per unit, observed = (along, across, height, spacing, squareness) - x[offset] + error.
 
-    With e the unit vector from the left to the right prism, u the plate's normal at its tilts, n the part of u that is
-    square to e at length 1, m = n x e, and b the ball's centre less the prisms' mid-point:
+    With e the unit vector from the left to the right prism, u the plate's normal at its tilts, n the unit vector along
+    the part of u perpendicular to e, m = n x e, and b the ball's centre less the prisms' mid-point:
 
         along = b . e, across = b . m, height = b . n (H_corr), spacing between the prisms, squareness = e . u.
 
-    The prisms alone leave the turn about their own line open: the plate's normal, two tilts of a start with a prior,
-    closes it. The squareness tells one of the tilts to a tenth of a milliradian, which the ranges' obliquity needs.
+    The prisms alone do not determine the rotation about their line; the plate's normal does: two tilts from a start,
+    with a prior. The squareness determines one of the tilts to a tenth of a milliradian, as the ranges' obliquity
+    needs.
 
-    name         what the group is, for reports
+    name         of the group, for reports
     observed     (5n,) four lengths in m and an angle in rad, unit by unit; 0, 0, H_corr, D_12, 0 of a data sheet
     covariance   of the observed values: (n, 5, 5), or another form of `ObservationGroup`
     left         (n,) column of the x of the left prism's reference point
-    right        (n,) the same of the right prism
-    ball         (n,) the same of the ball's centre
-    tilt         (n, 2) columns of the tilts of the normal from its start, rad; -1 for a tilt that is zero
+    right        (n,) column of the x of the right prism's reference point
+    ball         (n,) column of the x of the ball's centre
+    tilt         (n, 2) columns of the tilts of the normal from its start, rad; -1 for a tilt fixed at zero
     start        (n, 3) or (3,) plate's normal on the prism side, any length, less than a right angle off
-    offset       (n, 5) columns of what the calibration is off by, the same in every posture; -1 for none; or None
+    offset       (n, 5) columns of calibration errors, constant in all postures; -1 for none; or None
     """
 
     kind: ClassVar[str] = "rigid_triplet"
@@ -54,17 +55,17 @@ class RigidTriplets(ObservationKind):
     def __post_init__(self) -> None:
         n, m = len(self.left), len(self.observed)
         if m != ROWS * n:
-            raise EstimationError(f"{self.name}: {m} observed values for {n} triplets; give {ROWS} a unit")
+            raise EstimationError(f"{self.name}: {m} observed values for {n} triplets; give {ROWS} per unit")
         super().__post_init__()
         require_direction(self.name, "plate's normal", self.start)
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """(5n, 12): x, y, z of left prism, right prism and ball, two tilts, the row's own offset."""
+        """Columns (5n, 12): left prism, right prism, ball, two tilts, offset of the row."""
         n = len(self.left)
-        whole = [*(triples(p) for p in (self.left, self.right, self.ball)), self.tilt.reshape(n, 2)]
-        own = optional(self.offset, n, ROWS).reshape(-1, 1)
-        return np.concatenate([np.repeat(np.concatenate(whole, axis=1), ROWS, axis=0), own], axis=1)
+        common = [*(triples(p) for p in (self.left, self.right, self.ball)), self.tilt.reshape(n, 2)]
+        offset = optional(self.offset, n, ROWS).reshape(-1, 1)
+        return np.concatenate([np.repeat(np.concatenate(common, axis=1), ROWS, axis=0), offset], axis=1)
 
     @property
     def units(self) -> np.ndarray:
@@ -72,16 +73,19 @@ class RigidTriplets(ObservationKind):
 
     @property
     def ends(self) -> tuple[np.ndarray, ...]:
-        """The left prism, the right prism, the ball."""
+        """Columns of the left prism, the right prism and the ball."""
         return tuple(np.repeat(p, ROWS) for p in (self.left, self.right, self.ball))
 
     @property
     def component(self) -> np.ndarray:
-        """Along is the unit's x, across its y, height its z."""
+        """Components (5n,): x along, y across, z height of the unit.
+
+        It is "" for other rows.
+        """
         return np.tile(["x", "y", "z", "", ""], len(self.left))
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values (5n,) and Jacobian (5n, 12) at the parameters x; nan where two prisms coincide.
+        """Values (5n,) and Jacobian (5n, 12); nan where two prisms coincide.
 
         >>> t = RigidTriplets("t", np.zeros(5), np.ones(5), *(np.array([c]) for c in (0, 3, 6)),
         ...                   np.array([[-1, -1]]), np.array([0.0, 0.0, 1.0]))
@@ -95,21 +99,22 @@ class RigidTriplets(ObservationKind):
         body, slopes = _in_body(ball - 0.5 * (left + right), e, tilted.u)
         by_b, by_e, by_u = slopes
         by_s = by_e @ ((EYE - e[:, :, None] * e[:, None, :]) / spacing[:, None, None])
-        by_s[:, 3] += e  # the spacing's own row
+        by_s[:, 3] += e  # row of the spacing
         tilts = np.einsum("nrk,nak->nra", by_u, tilted.du)
         tilts = np.where(self.tilt.reshape(n, 1, 2) < 0, 0.0, tilts)
         parts = [-0.5 * by_b - by_s, -0.5 * by_b + by_s, by_b, tilts]
-        own = self.columns[:, -1]
+        offset = self.columns[:, -1]
         jacobian = np.concatenate(parts, axis=2).reshape(-1, 11)
         values = np.stack([body[:, 0], body[:, 1], body[:, 2], spacing, body[:, 3]], axis=1).ravel()
-        return values - value(x, own), np.concatenate([jacobian, np.where(own < 0, 0.0, -1.0)[:, None]], axis=1)
+        return values - value(x, offset), np.concatenate([jacobian, np.where(offset < 0, 0.0, -1.0)[:, None]], axis=1)
 
 
 def _in_body(b: np.ndarray, e: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
-    """(along, across, height, squareness) of n units, and the derivatives of five rows by b, e and u, (n, 5, 3) each.
+    """Coordinates (along, across, height, squareness) of n units, and derivatives by b, e and u.
 
-    With q = e . u, w = u - q e and c = |w|: dn = (1 - n n')/c dw, dw = du - e (e . du) - (e u' + q) de, and across is
-    the box product of b, n and e. The fourth row, the spacing, is none of theirs: 0.
+    The derivatives are (n, 5, 3) each, of five rows. With q = e . u, w = u - q e and c = |w|: dn = (1 - n n')/c dw, dw
+    = du - e (e . du) - (e u' + q) de, and across is the scalar triple product of b, n and e. The fourth row, the
+    spacing, is 0: it does not depend on them.
     """
     q = np.sum(e * u, axis=1)
     w = u - q[:, None] * e
@@ -119,14 +124,14 @@ def _in_body(b: np.ndarray, e: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, t
     turn = (EYE - n[:, :, None] * n[:, None, :]) / c[:, None, None]
     n_by_u = turn @ (EYE - e[:, :, None] * e[:, None, :])
     n_by_e = -turn @ (e[:, :, None] * u[:, None, :] + q[:, None, None] * EYE)
-    none = np.zeros_like(b)
+    zeros = np.zeros_like(b)
     box_n = np.cross(e, b)
 
     def by_n(row: np.ndarray, n_by: np.ndarray) -> np.ndarray:
         return np.einsum("nk,nkl->nl", row, n_by)
 
-    by_b = np.stack([e, m, n, none, none], axis=1)
-    by_e = np.stack([b, np.cross(b, n) + by_n(box_n, n_by_e), by_n(b, n_by_e), none, u], axis=1)
-    by_u = np.stack([none, by_n(box_n, n_by_u), by_n(b, n_by_u), none, e], axis=1)
+    by_b = np.stack([e, m, n, zeros, zeros], axis=1)
+    by_e = np.stack([b, np.cross(b, n) + by_n(box_n, n_by_e), by_n(b, n_by_e), zeros, u], axis=1)
+    by_u = np.stack([zeros, by_n(box_n, n_by_u), by_n(b, n_by_u), zeros, e], axis=1)
     body = np.stack([np.sum(b * e, axis=1), np.sum(b * m, axis=1), np.sum(b * n, axis=1), q], axis=1)
     return body, (by_b, by_e, by_u)
