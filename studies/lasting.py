@@ -214,12 +214,16 @@ async def _watched(running: LiveCoordinator, twin: int, minutes: float, path: Pa
 
 
 def slopes(rows: np.ndarray) -> list[tuple[str, float, float]]:
-    """MB a minute of each process with its u, after the first fifth of the run.
+    """MB a minute of each process with its u, after the first fifth of the run: of the least in each five minutes.
+
+    That is what a process holds between epochs; while one is solved it has tens of MB more for a second.
 
     Neighbours go together, since memory is taken and given back in steps: the u of independent rows is widened by their
     lag-one correlation r, sqrt((1 + r) / (1 - r)), of which a negative one is taken as zero.
     """
     late = rows[rows[:, 0] >= SETTLING * rows[-1, 0]]
+    block = (late[:, 0] // (60.0 * BLOCK)).astype(int)
+    late = np.array([[late[block == k, 0].mean(), *late[block == k, 1:4].min(axis=0)] for k in np.unique(block)])
     minutes = (late[:, 0] - late[:, 0].mean()) / 60.0
     found = []
     for name, held_mb in zip(NAMES, late[:, 1:4].T, strict=True):
@@ -247,6 +251,7 @@ def draw_memory(axes: Any, path: Path) -> None:
     axes.axvline(rows[first, 0] / 60.0, color=FAINT, lw=0.8)
     axes.set(xlabel="time of the site, min", ylabel="memory since the line, MB")
     axes.set_title("MB a minute behind the line", loc="left")
+    axes.set_ylim(top=1.4 * axes.get_ylim()[1])
     axes.legend(loc="upper left", fontsize="x-small")
 
 
@@ -284,7 +289,8 @@ def draw(memory: Path, late: Path, folder: Path) -> None:
             f"{len(ms)} shots: p99 {np.percentile(ms, 99):.1f} ms, {np.percentile(quiet, 99):.1f} little stolen",
             loc="left",
         )
-        right.legend(loc="upper right")
+        right.set_ylim(top=30.0 * limit)
+        right.legend(loc="upper right", ncols=2)
     (folder / "lasting.svg").write_text(svg(figure), encoding="utf-8")
 
 

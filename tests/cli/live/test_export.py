@@ -90,3 +90,12 @@ def test_what_is_left_of_a_cut_journal_is_exported_when_asked(catseye, tmp_path)
     assert "cut.db is damaged" in told["notes"][0]
     assert len(rows(tmp_path / "out", "shots")) == told["rows"]["shots"] > 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["cut.db", "out"]
+
+
+def test_an_empty_span_is_doubtful(catseye, tmp_path):
+    """It was written with status 0 and without a verdict."""
+    words = ["export", recorded(), "--from", "2090-01-01", "--to", "csv"]
+    status, said, _ = catseye(*words, "--out", tmp_path / "out")
+    assert (status, "Doubtful: no event of the run lies in the span" in " ".join(said.split())) == (0, True)
+    status, said, _ = catseye(*words, "--out", tmp_path / "out", "--json")
+    assert (status, json.loads(said)["verdict"]["word"]) == (0, "doubtful")

@@ -79,6 +79,7 @@ def export(
         say(json_line(summary))
     elif not quiet:
         rows = ", ".join(f"{count} {name}" for name, count in outcome.rows.items())
+        say(wrapped("Verdict", outcome.verdict.text))
         say(wrapped("Written to", f"{out}/: run {outcome.run}, {rows}."))
         for text in chain_words(outcome.chain) if outcome.chain.count or not outcome.chain.chained else ():
             say(wrapped("Chain", text))

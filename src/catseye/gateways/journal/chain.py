@@ -60,6 +60,8 @@ def export_verdict(chain: ChainReport | None, rows: int, doubts: Sequence[str] =
         altered = [f"nothing vouches for any of it: {chain.problems[0]}"]
     elif chain and chain.count:
         altered = [f"exported without {chain.count} altered events"]
+    if not rows:
+        return Verdict("doubtful", "no event of the run lies in the span: the tables are empty")
     return Verdict("good", f"{rows} rows written").hearing([*altered, *doubts])
 
 
