@@ -83,7 +83,7 @@ def test_a_thermometer_that_is_ten_degrees_off_is_none(value):
     found = refused(NOTHING, {thermometer("WX1"): value}, field(), KNOWN, 12)
     assert found.held == {thermometer("WX1")}
     (text,) = found.texts
-    assert f"WX1's thermometer read {value:+.1f} °C too high" in text
+    assert f"a bias of WX1's thermometer by {value:+.1f} °C" in text
     assert "its record is kept" in text
     assert not found.same(NOTHING)
 

@@ -71,7 +71,7 @@ def test_a_target_typed_three_decimetres_off_comes_out_where_it_was(few_01, redu
     assert compare(found, reduced_few_01.coordinates) < 1e-6
     notes = [n for n in found.notes if n.startswith("DP050")]
     assert len(notes) == 1
-    assert notes[0].startswith("DP050: position known to 300 mm only; whole cycles found jointly from 6 shots, next")
+    assert notes[0].startswith("DP050: position uncertain by 300 mm; whole cycles found jointly from 6 shots, next")
     assert not found.unresolved
     assert not found.ranges.thin.any()
     assert found.variance_factor == pytest.approx(reduced_few_01.coordinates.variance_factor, abs=1e-4)
@@ -91,7 +91,7 @@ def test_a_ranger_on_the_feed_arm_typed_three_decimetres_off_comes_out_where_it_
 ):
     found = few_adjusted(arm_off(few_01, "ZY113"))
     assert compare(found, reduced_few_01.coordinates) < 1e-6
-    assert any(n.startswith("ZY113: position known to 300 mm only; whole cycles found jointly") for n in found.notes)
+    assert any(n.startswith("ZY113: position uncertain by 300 mm; whole cycles found jointly") for n in found.notes)
 
 
 @pytest.mark.slow
@@ -113,7 +113,7 @@ def test_what_four_rangers_cannot_tell_is_rejected_with_the_reason_and_never_gue
     for k in mine:
         assert reduction.status[k] == "whole cycles unknown"
         reason = reduction.rejected[int(few_01.shots.shot[k])]
-        assert reason.startswith("whole cycles unknown: DP005 is typed to 300 mm only; of ")
+        assert reason.startswith("whole cycles unknown: typed position of DP005 is uncertain by 300 mm; of ")
         assert "range it from more stations" in reason
     assert "DP005" not in reduction.coordinates.points
     assert len(reduction.rejected) == len(reduced_few_01.rejected) + 4
@@ -193,7 +193,8 @@ def test_a_campaign_of_nothing_but_unknown_cycles_is_refused_with_the_reason(
 ):
     only = part(target_off(few_01, "DP005"), (few_targets == "DP005") | few_references)
     with pytest.raises(
-        InputError, match=r"^shots\.csv: whole cycles unknown: DP005 is typed to 300 mm only; .*; nothing to adjust$"
+        InputError,
+        match=r"^shots\.csv: whole cycles unknown: typed position of DP005 is uncertain .*; nothing to adjust$",
     ):
         reduce_epoch(only)
 

@@ -85,7 +85,7 @@ def test_a_measured_surface_is_interpolated_and_what_it_does_not_cover_is_not_ju
     expected = np.array([np.nan, 9.25, 7.5, 7.0 - 2.0 * 250 / 450, np.nan]) - dew
     np.testing.assert_allclose(found.condensation.margin_k, expected, atol=1e-5)  # an MJD resolves a microsecond
     assert found.condensation.deposit.tolist() == ["unknown", "none", "dew", "dew", "unknown"]
-    assert found.notes[-1].startswith("dew: the surface's temperature is unknown at 2 of 5 weather samples")
+    assert found.notes[-1].startswith("dew: surface temperature unknown at 2 of 5 weather samples")
 
 
 def test_between_readings_too_far_apart_nothing_is_judged(night_01):
