@@ -51,7 +51,7 @@ def test_where_height_and_standard_air_do_not_decide_none_is_accused(offset):
     ]
     assert found.difference == pytest.approx(-offset, abs=0.2)
     assert found.accused == ""
-    assert "do not say which" in found.text
+    assert "do not decide which" in found.text
 
 
 def test_order_does_not_matter():

@@ -4,7 +4,7 @@ import pytest
 from catseye.errors import ValidityError
 from catseye.geometry.sky.sun import altitude_azimuth, sun_direction
 from catseye.records.site.site import Location
-from catseye.reduction.site.earth_rotation import FramePlace, RotationStatus, _each, place_of, rotation_at, sun_at
+from catseye.reduction.site.earth_rotation import FramePlace, RotationStatus, _directly, place_of, rotation_at, sun_at
 from sun_scene import GREEN_BANK, MORNING, apart, astropy_sun
 
 ARCSECOND = np.pi / 648_000
@@ -65,7 +65,7 @@ def test_inside_the_tables_astropy_agrees_within_five_arc_seconds():
 
 def test_many_times_are_interpolated_within_two_milliseconds_of_arc():
     mjd = MORNING + np.random.default_rng(2).uniform(0, 1, 3000)
-    exact = _each(mjd, GREEN_BANK)
+    exact = _directly(mjd, GREEN_BANK)
     assert np.max(np.abs(sun_at(mjd, GREEN_BANK).direction - exact)) < 1e-8  # the cubic's remainder, 5e-9
     grid = mjd.reshape(30, 100)
     assert sun_at(grid, GREEN_BANK).direction.shape == (30, 100, 3)
@@ -73,7 +73,7 @@ def test_many_times_are_interpolated_within_two_milliseconds_of_arc():
 
 def test_scattered_times_are_not_interpolated():
     mjd = np.linspace(45_000, 60_000, 100)
-    assert np.array_equal(sun_at(mjd, GREEN_BANK).direction, _each(mjd, GREEN_BANK))
+    assert np.array_equal(sun_at(mjd, GREEN_BANK).direction, _directly(mjd, GREEN_BANK))
 
 
 def test_a_site_record_and_its_air():

@@ -127,7 +127,7 @@ def test_the_age_is_that_of_the_nearest_reading():
 
 def test_without_a_reading_it_says_so():
     for ask in (lambda t: t.at(mjd(0.0)), lambda t: t.angles(float(mjd(0.0)))):
-        with pytest.raises(InputError, match="told no posture"):
+        with pytest.raises(InputError, match="no telescope position received"):
             ask(PostureTrack())
     assert PostureTrack().latest is None
 
