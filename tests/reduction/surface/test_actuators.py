@@ -88,7 +88,7 @@ def test_a_target_beyond_the_limits_is_told_and_not_cut(tenth):
     assert found.within.sum() == len(NAMES) - sum(outward)
     row = rows_of(found)[7]
     assert row.target_mm == pytest.approx(25.4 + row.correction_mm)
-    with pytest.raises(InputError, match=r"actuator = 'X1' of the positions is none"):
+    with pytest.raises(InputError, match=r"actuator = 'X1' of the positions is unknown"):
         corrections(shape, NAMES, PLACES, positions={"X1": 0.0}, roughness=free.roughness)
 
 

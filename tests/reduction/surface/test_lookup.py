@@ -63,9 +63,9 @@ def test_what_the_epochs_cannot_tell_is_left_out_with_its_reason():
     rng = np.random.default_rng(5)
     up = lookup_of(epochs(rng, elevations=np.array(UP), temperatures=np.full(6, 10.0)))
     assert up.columns == ("constant", SIN, COS)
-    assert up.left_out[HYSTERESIS] == "elevation went one way only"
+    assert up.left_out[HYSTERESIS] == "elevation moved in one direction only"
     assert up.left_out[THERMAL] == "temperatures within 0.00 °C"
     two = lookup_of(epochs(rng, elevations=np.array([20.0, 60.0, 20.0])))
     assert SIN in two.left_out
-    with pytest.raises(EstimationError, match="2 epochs at least, 1 given"):
+    with pytest.raises(EstimationError, match="2 epochs at least, not 1"):
         lookup_of(epochs(rng, elevations=np.array([20.0, 30.0]))[:1])
