@@ -168,7 +168,7 @@ def test_boxes_are_named_and_never_become_free():
     target = np.array([147.0, -21.0, 4.0])  # in the control room
     own = guard(boxes=boxes()[:1])
     verdict = own.pointing(MORNING, counts(STATION, target))
-    assert "hits control-room; a box does not go away (people work behind the windows): choose" in verdict.reason
+    assert "hits control-room; a box is permanent (people work behind the windows): choose" in verdict.reason
     assert verdict.free_at_mjd is None
     over = counts(STATION, [135.0, -21.0, 9.3])  # 0.3 m above its near edge, and rising
     near = own.pointing(MORNING, over)

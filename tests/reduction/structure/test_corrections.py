@@ -266,7 +266,7 @@ def test_coefficients_that_nothing_holds_are_named(antenna):
         fit_model(antenna, epochs, free={"subreflector": ["shift_y"]})
     with pytest.raises(InputError, match="'prime_focus' has no motion"):
         fit_model(antenna, epochs, free={"prime_focus": ["shift_y"]})
-    with pytest.raises(InputError, match="'shift' is no component"):
+    with pytest.raises(InputError, match="'shift' is not a component"):
         fit_model(antenna, epochs, free={"feed_arm": ["shift"]})
     with pytest.raises(EstimationError, match="needs 3 points"):
         frame_motion(antenna, epochs[0], "subreflector")
