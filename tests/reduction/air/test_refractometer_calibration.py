@@ -153,7 +153,7 @@ def test_a_gap_is_bridged_by_the_weather_or_named_as_ambiguous(night):
     plan = PathPlan(path_length=20000.0, gaps=gap, thermometers=5, noise_c=0.02, eddies_c=0.02, patch_c=0.0)
     simulated, far = night(12, plan)
     assert [s.reason for s in far.followed.sections] == ["start", "ambiguous gap"]
-    assert any("whole cycles are not tied" in note for note in far.notes)
+    assert any("whole cycles are not connected" in note for note in far.notes)
     good = np.isfinite(far.refractivity)  # each section stands on its own weather
     assert set(far.followed.section[good]) == {0, 1}
     assert np.max(np.abs(far.refractivity - simulated.index)[good]) < 0.2e-6
