@@ -139,7 +139,7 @@ def test_a_tabulated_constant_errs_by_what_the_prisms_face_sees(change):
 
 
 def test_nonsense_is_refused():
-    with pytest.raises(ValidityError, match="no triangle is left"):
+    with pytest.raises(ValidityError, match="no triangle remains"):
         t.spacing_effect(0.635, 150.0, 18.0)
     with pytest.raises(ValidityError, match="more than the distance"):
         t.across_effect(1e-4, height=20.0, d_mp=18.0)

@@ -199,7 +199,7 @@ def test_paint_and_departures_by_hand():
 def test_a_wrong_spacer_shows_in_the_place_of_the_stops():
     found = reduce_triplet(measurement(placement__1__spacer_mm=25.5))
     assert found.steps[1] == pytest.approx(0.1e-3, abs=1e-8)
-    assert any("placement 2: by ranging the stops stand +100.0 µm" in note for note in found.notes)
+    assert any("placement 2: by ranging the stops are +100.0 µm" in note for note in found.notes)
     assert not any("by ranging the stops" in note for note in reduce_triplet(measurement()).notes)
 
 
@@ -325,9 +325,9 @@ def test_what_the_memos_index_leaves_out_is_told():
 def test_no_index_of_glass_is_offered_for_a_whole_cycle():
     text = " ".join(reduce_triplet(measurement(placement=document()["placement"][:1], d12_mm=500.0)).notes)
     assert "ranging and surface plate differ by" in text
-    assert "would join them" not in text
+    assert "would reconcile them" not in text
     near = reduce_triplet(measurement(ball__r1_mm=50.0626, ball__pc_b_mm=-173.741529))  # 50 um: 7e-4 of the ratio
-    assert any("would join them" in note for note in near.notes)
+    assert any("would reconcile them" in note for note in near.notes)
 
 
 def test_a_barometer_in_millimetres_of_mercury_is_suspected():
