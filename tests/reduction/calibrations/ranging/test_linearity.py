@@ -110,7 +110,7 @@ def test_positions_a_half_wavelength_apart_show_one_phase_and_no_cyclic_term(tab
     numbers = {"range_m": reads(2.4 + length, cosine=(8e-6,), sine=(0.0,)), "interferometer_m": length}
     found = calibrate_linearity(table(LAYOUT, numbers, **BASE, u_range_mm=1e-3))
     assert not found.record
-    assert "do not tell them apart" in found.notes[0]
+    assert "do not separate them" in found.notes[0]
 
 
 def test_an_interferometer_in_vacuum_lengths_is_brought_to_its_air(table):
