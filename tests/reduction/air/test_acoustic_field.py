@@ -177,7 +177,7 @@ def test_a_wrong_time_is_named_and_bad_ones_are_left_out():
     assert len(field.used) == 69
 
 
-def test_a_prior_that_does_not_fit_is_said_to_claim_too_little(field):
+def test_a_too_narrow_prior_is_reported(field):
     assert field.fit == "fits"
     stiff = FieldPrior(15.0, 8.0, (Scale(0.05, (80.0, 80.0, 40.0)),))
     said = inverted(heard(STATIONS), temperature=stiff).fit
@@ -239,7 +239,7 @@ def test_a_path_from_a_station_to_itself_is_refused():
         ),
     ],
 )
-def test_what_would_be_answered_wrongly_or_not_at_all_is_refused(change, complaint):
+def test_invalid_input_is_refused(change, complaint):
     given = {"stations": STATIONS, "source": SOURCE, "receiver": RECEIVER, "time": heard(STATIONS), "u_time": 1e-5}
     given |= {"u_position": 2e-3, **WEATHER, "temperature": TEMPERATURE, "wind": WIND, **change}
     with pytest.raises(ValidityError) as caught:

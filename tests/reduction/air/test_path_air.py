@@ -38,7 +38,7 @@ def changed(weather, keep=None, **columns):
     )
 
 
-def test_night_01_is_the_same_as_the_campaigns_own_air_within_what_is_claimed(night_01):
+def test_night_01_agrees_with_the_campaigns_air_within_the_claims(night_01):
     when, a, b = shots_of(night_01)
     air = site_air(night_01.site, night_01.weather, model="rueger1990")
     assert air.notes == ()
@@ -119,7 +119,7 @@ def test_wild_readings_and_contradicting_stations_are_named_and_kept(night_01):
     assert note == "temperature: WX1 and WX2 contradict each other, undecided which is wrong; calibrate them"
 
 
-def test_a_barometer_that_lies_among_three_is_named(night_01):
+def test_a_biased_barometer_among_three_is_named(night_01):
     station = night_01.site.weather_station[0]
     site = night_01.site.model_copy(
         update={"weather_station": (*night_01.site.weather_station, station.model_copy(update={"name": "WX3"}))}

@@ -53,7 +53,7 @@ def low_paths_off(night, reduction):
     return abs(float(np.mean(ranges.refractivity[marks] - true)))
 
 
-def test_each_benchmark_path_shows_its_index_beside_the_weathers(lied):
+def test_each_benchmark_path_reports_its_index_beside_the_weathers(lied):
     night, reduction, _ = lied
     series = benchmark_refractometers(reduction)
     assert [(s.benchmark, s.ranger) for s in series] == [(b.name, b.ranger) for b in night.benchmarks]
@@ -139,7 +139,7 @@ def sounded(campaign, rows):
     return dataclasses.replace(campaign, path_temperatures=path_temperature_columns(records))
 
 
-def test_sound_far_from_any_shot_changes_nothing_and_says_so(few_01, reduced_few_01):
+def test_sound_far_from_any_shot_is_noted_as_unused(few_01, reduced_few_01):
     start = float(few_01.shots.mjd_utc[0])
     far = sounded(few_01, [(start - 0.04, "ZY101", "ZEG41040L", 25.0, 0.1)])
     reduction = reduce_epoch(far)

@@ -105,7 +105,7 @@ def test_a_triplet_typed_three_decimetres_off_is_found_by_its_prisms_and_their_p
     assert not found.unresolved
 
 
-def test_what_four_rangers_cannot_tell_is_rejected_with_the_reason_and_never_guessed(few_01, reduced_few_01):
+def test_cycles_undecided_by_four_rangers_are_rejected_with_a_reason(few_01, reduced_few_01):
     reduction = reduce_epoch(target_off(few_01, "DP005"))
     before = reduced_few_01.status
     mine = [k for k, t in enumerate(few_01.shots.target) if t == "DP005" and before[k] == "used"]
@@ -162,7 +162,7 @@ def test_points_are_doubtful_by_their_own_uncertainty_before_the_settings(night_
     assert doubtful(target_off(night_01, "DP005", u=2.0), u_position=0.0105) == typed - {"DP005"}
 
 
-def test_a_record_says_the_uncertainty_of_its_position_in_millimetres(night_01):
+def test_a_record_states_its_position_uncertainty_in_millimetres(night_01):
     places = places_of(triplet_off(arm_off(target_off(night_01, "DP005"), "ZY113", u=25.0), "TR05", u=40.0))
     assert places["DP005"].u_start == pytest.approx(0.3)
     assert places["ZY113"].u_start == pytest.approx(0.025)
@@ -174,7 +174,7 @@ def test_a_record_says_the_uncertainty_of_its_position_in_millimetres(night_01):
             TargetRow.model_validate(fields | {"u_position_mm": bad})
 
 
-def test_a_shot_whose_cycles_hang_on_a_typed_position_is_thin(few_01, reduced_few_01, part, few_targets, few_rangers):
+def test_a_shot_whose_cycles_depend_on_a_typed_position_is_thin(few_01, reduced_few_01, part, few_targets, few_rangers):
     # one ranger only: nothing but the typed 10 mm predicts its range, and five of them reach a quarter wavelength
     r = reduced_few_01
     drop = (few_targets == "DP050") & (few_rangers != "ZY113")
@@ -188,7 +188,7 @@ def test_a_shot_whose_cycles_hang_on_a_typed_position_is_thin(few_01, reduced_fe
     assert not any("the whole cycles of" in n for n in r.notes)
 
 
-def test_a_campaign_of_nothing_but_unknown_cycles_is_refused_with_the_reason(
+def test_a_campaign_with_only_unknown_cycles_is_refused_with_a_reason(
     few_01, reduced_few_01, part, few_targets, few_references
 ):
     only = part(target_off(few_01, "DP005"), (few_targets == "DP005") | few_references)

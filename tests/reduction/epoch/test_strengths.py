@@ -265,7 +265,7 @@ def spreads(every, strength):
     return [np.sqrt(value) for p in parts for value in (p[0, 0], p[0, 0] + p[1, 1] - 2.0 * p[0, 1])]
 
 
-def test_a_campaign_that_shows_nothing_keeps_the_usual_strengths():
+def test_an_uninformative_campaign_keeps_the_usual_strengths():
     every, count = processes()
     none = Linear("nothing", np.zeros(1), np.ones(1), np.array([0]), np.zeros((1, 1)))
     found = estimated(every, none, count, ProcessStrength())
@@ -274,7 +274,7 @@ def test_a_campaign_that_shows_nothing_keeps_the_usual_strengths():
     np.testing.assert_allclose(found.telescope, 1.0, rtol=0.05)
 
 
-def test_quiet_air_and_wild_air_stay_within_what_air_can_be():
+def test_strengths_of_quiet_and_wild_air_stay_within_limits():
     rng = np.random.default_rng(9)
     quiet = ProcessStrength(AirStrength(1e-4, 1e-4, 1e-4, 1e-4, 1e-6), telescope=(1e-3,) * len(PARTS))
     one = estimated(*seen_processes(rng, quiet, sigma=1e-4), ProcessStrength())
@@ -375,7 +375,7 @@ def test_eddies_that_went_are_taken_back():
     assert _eddies(solution, 0.5, lengths) < 0.15
 
 
-def test_shots_that_nothing_checks_say_nothing_whatever_their_rounding():
+def test_unchecked_shots_give_no_information():
     rng = np.random.default_rng(6)
     solution, lengths = fits(rng, 0.3)
     checked = _eddies(solution, 0.0, lengths)
@@ -384,7 +384,7 @@ def test_shots_that_nothing_checks_say_nothing_whatever_their_rounding():
     assert _eddies(solution, 0.0, lengths) == pytest.approx(checked, rel=0.02)
 
 
-def test_more_than_two_ppm_no_air_holds_and_no_shot_says_nothing():
+def test_eddies_are_limited_to_two_ppm():
     rng = np.random.default_rng(5)
     solution, lengths = fits(rng, 20.0)
     assert _eddies(solution, 0.0, lengths) == pytest.approx(MOST_PPM)

@@ -86,7 +86,7 @@ def test_against_design_the_typed_places_count_as_sure_as_they_are(night_01):
 
 
 @pytest.mark.parametrize("optics", ["prime", "gregorian"])
-def test_the_beam_is_what_the_coordinator_says_of_the_same_points(night_01, optics):
+def test_the_beam_agrees_with_the_coordinators_for_the_same_points(night_01, optics):
     """`live_pose`, an older form with other weights, on exact points; only the prime focus is in it."""
     later = epoch(night_01, dish=(TURN, SHIFT), arm=(0.5 * TURN, 2.0 * SHIFT))
     before = epoch(night_01, seed=1)
@@ -124,7 +124,7 @@ def test_a_subreflector_that_goes_with_the_dish_leaves_the_beam_to_the_dish(nigh
     np.testing.assert_allclose(found.offset, [TURN[1], TURN[0], 0.0], rtol=0, atol=1e-8)
 
 
-def test_what_cannot_be_asked_is_refused(night_01):
+def test_invalid_requests_are_refused(night_01):
     later = epoch(night_01)
     with pytest.raises(InputError, match="one of the two"):
         pose_of_group(later, None, night_01)
@@ -146,7 +146,7 @@ def test_what_cannot_be_asked_is_refused(night_01):
 
 
 @pytest.mark.parametrize(("wrong", "said"), [((0.0, 0.5), "in elevation"), ((0.6, 0.0), "across the elevation axis")])
-def test_a_posture_that_is_not_the_dish_s_is_told_with_its_size_and_accuses_nobody(night_01, wrong, said):
+def test_a_posture_that_contradicts_the_dish_is_reported_without_accusation(night_01, wrong, said):
     """By hand: half a degree of elevation; 0.6 degrees of azimuth times cos 30 degrees, 0.520."""
     real = epoch(night_01)
     told = replace(real, posture=(POSTURE[0] - wrong[0] * DEGREE, POSTURE[1] - wrong[1] * DEGREE))

@@ -84,7 +84,7 @@ def test_a_distance_in_another_unit_is_named(factor, looks):
     assert found.u == pytest.approx(np.sqrt(1e-8 + 2e-8) * 1e3)
 
 
-def test_a_distance_within_five_u_agrees_and_beyond_it_accuses_nobody():
+def test_a_distance_within_five_u_agrees_and_beyond_it_is_undecided():
     ends = np.array([[0.0, 0.0, 0.0], [30.0, 40.0, 0.0]])
     u = np.sqrt(3e-8)
     for off, told in ((4.9 * u, False), (5.1 * u, True)):

@@ -37,14 +37,14 @@ def test_the_bulletins_printed_values_are_met():
     assert after - before == pytest.approx(1.0, abs=2e-3)
 
 
-def test_a_leap_second_makes_no_step_in_the_suns_way():
+def test_a_leap_second_makes_no_step_in_the_suns_path():
     mjd = 51_179.0 + np.array([-2, -1, 0, 1, 2]) / 86_400
     track = sun_at(mjd, GREEN_BANK).direction
     step = apart(track[1:], track[:-1])
     assert np.max(step) / np.min(step) < 1.01
 
 
-def test_outside_the_tables_it_is_zero_and_says_so():
+def test_outside_the_tables_ut1_utc_is_zero_with_a_status():
     far = rotation_at([41_400.0, 75_000.0])
     assert far.ut1_minus_utc[1] == 0.0
     assert far.code.tolist() == [0, 2]

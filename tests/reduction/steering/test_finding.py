@@ -70,7 +70,7 @@ def test_a_target_off_its_predicted_place_is_found(prime):
     assert len(np.unique(spot.looked_at, axis=0)) == len(spot.looked_at)  # no place twice
 
 
-def test_a_target_that_is_not_there_is_a_status_that_says_what_was_searched():
+def test_an_absent_target_is_a_status_with_the_searched_area():
     rng = np.random.default_rng(1)
     dark = ranger(rng, TRUE, peak=0.0)
     spot = find(TRUE, HEAD, dark, search_radius=1e-3)
@@ -139,14 +139,14 @@ def anywhere(rng):
 
 @draws(40, name="n")
 @pytest.mark.parametrize("how", [{}, {"missing": 0.2}, {"full": 4.0}])
-def test_the_centres_scatter_is_what_the_covariance_says_where_the_spot_is_gaussian(how, n):
+def test_the_centres_scatter_matches_the_covariance_for_a_gaussian_spot(how, n):
     """The mean of e' C^-1 e is 2, that of n fits has u = 2/sqrt(n)."""
     ratios, factors = errors(np.random.default_rng(7), n, anywhere, real=False, **how)
     assert np.mean(ratios) == pytest.approx(2.0, abs=4 * 2 / np.sqrt(n))
     assert np.mean(factors) == pytest.approx(1.0, abs=0.3)  # shafts within a count are bounded, not normal
 
 
-def test_a_real_spot_is_found_within_what_the_covariance_says():
+def test_a_real_spot_is_found_within_its_covariance():
     """Two apertures by diffraction, not the model: its misfit may widen the claim, which must not be too good."""
     n = 40
     ratios, factors = errors(np.random.default_rng(8), n, anywhere)
@@ -316,7 +316,7 @@ def test_a_name_that_would_break_the_table_is_refused():
         adjustment_readings([result], {"A,B": [1, 2, 3]}, 0.0)
 
 
-def test_every_move_of_a_search_is_asked_for_from_where_the_mirror_stands():
+def test_every_move_of_a_search_is_checked_from_the_mirrors_position():
     asked, at = [], np.add(np.rint(TRUE), [40.0, 10.0])
 
     def allowed(start, end):

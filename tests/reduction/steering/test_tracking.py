@@ -72,7 +72,7 @@ def test_a_drive_that_cannot_move_is_refused():
 
 
 @pytest.mark.parametrize("frame", ["ground", "alidade", "elevation", "reflector"])
-def test_points_move_with_their_frame_as_the_antennas_transforms_say(frame):
+def test_points_move_with_their_frame_like_the_antennas_transforms(frame):
     points = np.array([[10.0, 40.0, 20.0], [-5.0, 70.0, 1.0]])
     t = np.array([0.2, 30.0, 60.0, 153.3])
     place, speed, bend = SLEW.motion(points, frame, t)
@@ -145,7 +145,7 @@ def test_at_slew_rates_the_lines_stay_within_a_millimetre(ground):
     assert np.all((na >= limits[:, 0][:, None]) & (na <= limits[:, 1][:, None]) | ~good)
 
 
-def test_the_miss_is_what_estimate_and_bound_say(ground):
+def test_the_miss_agrees_with_estimate_and_bound(ground):
     stations, _ = ground
     t = np.array([40.0, 55.0])
     place, speed, bend = SLEW.motion(DISH, "reflector", t)
@@ -244,7 +244,7 @@ def test_stops_take_the_other_pointing_and_refuse_what_neither_reaches(ground):
     assert follow(mounted(stations), targets, START, intervals=1, interval=0.1 + 0.2).since[1] == 0.3
 
 
-def test_a_range_that_changes_by_half_a_wavelength_leaves_nothing_of_a_buffer():
+def test_a_range_change_of_half_a_wavelength_cancels_a_buffer():
     """The sum itself, sample by sample, as the electronics take it."""
     v, wave = np.array([0.02, 0.4, -0.9]), 0.19981
     _, left = smear(v, wavelength=wave)
@@ -256,7 +256,7 @@ def test_a_range_that_changes_by_half_a_wavelength_leaves_nothing_of_a_buffer():
 
 
 @pytest.mark.parametrize("frame", ["alidade", "elevation", "reflector"])
-def test_no_acceleration_exceeds_the_most_that_is_told(frame):
+def test_no_acceleration_exceeds_the_upper_limit(frame):
     points = np.concatenate([DISH, [[30.0, -20.0, 40.0], [0.0, 0.0, 0.0]]])
     _, _, a = SLEW.motion(points, frame, np.linspace(-1.0, SLEW.azimuth.duration + 1.0, 3000))
     size = np.linalg.norm(a, axis=-1)
