@@ -193,7 +193,7 @@ def _budgeted(partial: Explanation, scene: ShotScene, draws: int, seed: int, pro
     )
 
 
-def _missing_effects(mirror: Mirror, mount_known: bool) -> list[str]:
+def _missing_effects(mirror: Mirror, has_mount: bool) -> list[str]:
     """Effects of the head without a value in its mirror sheet.
 
     The budget cannot include them.
@@ -201,7 +201,7 @@ def _missing_effects(mirror: Mirror, mount_known: bool) -> list[str]:
     effects = {
         "u_amplitude_to_phase_rad": "coupling of amplitude to phase",
         "u_cyclic_mm": "cyclic terms",
-        **({"u_axis_mm": "offsets of axes and beam"} if mount_known else {}),
+        **({"u_axis_mm": "offsets of axes and beam"} if has_mount else {}),
     }
     missing = [effect for key, effect in effects.items() if getattr(mirror, key) is None]
     if not missing:

@@ -19,7 +19,7 @@ from catseye.reduction.surface.shape import LitAperture, Prisms, ShapeSettings, 
 
 
 @dataclass(frozen=True, eq=False)
-class DishWay:
+class DishEstimate:
     """One estimate of the dish's pose.
 
     command       that prints it
@@ -40,7 +40,7 @@ class DishWay:
     u_axis: np.ndarray
 
 
-def dish_ways(reduction: Reduction) -> tuple[DishWay, ...]:
+def dish_ways(reduction: Reduction) -> tuple[DishEstimate, ...]:
     """All estimates from the night's points; none without a dish."""
     surface, campaign = reduction.surface, reduction.campaign
     if surface is None:
@@ -58,7 +58,9 @@ def dish_ways(reduction: Reduction) -> tuple[DishWay, ...]:
     aperture = LitAperture.of(campaign.site.paraboloid)
     many = f"paraboloid through {len(names)} prisms"
     fit = surface.fit
-    ways = [_way("catseye reduce", f"{many}, focal length held", fit.translation, fit.rotation, fit.covariance, lean)]
+    ways = [
+        _estimate("catseye reduce", f"{many}, focal length held", fit.translation, fit.rotation, fit.covariance, lean)
+    ]
     for free, text in (
         (("vertex", "axis"), f"{many}, focal length held, each weighted by its share of the aperture"),
         (("vertex", "axis", "focal-length"), f"{many}, focal length free"),
@@ -68,14 +70,14 @@ def dish_ways(reduction: Reduction) -> tuple[DishWay, ...]:
         except EstimationError:
             continue
         command = "catseye surface" + ("" if "focal-length" in free else " --free vertex,axis")
-        ways.append(_way(command, text, shape.translation, shape.rotation, shape.covariance[:6, :6], lean))
+        ways.append(_estimate(command, text, shape.translation, shape.rotation, shape.covariance[:6, :6], lean))
     try:
         group = pose_of_group(solved_points(reduction), None, campaign, group="dish")
     except (InputError, EstimationError):
         return tuple(ways)
     body = group.pose
     text = f"{len(body.names)} points as one body against their design"
-    return (*ways, _way("catseye pose", text, body.translation, body.rotation, body.covariance, lean))
+    return (*ways, _estimate("catseye pose", text, body.translation, body.rotation, body.covariance, lean))
 
 
 def solved_points(reduction: Reduction) -> SolvedPoints:
@@ -91,9 +93,9 @@ def solved_points(reduction: Reduction) -> SolvedPoints:
     )
 
 
-def _way(
+def _estimate(
     command: str, fitted: str, translation: np.ndarray, rotation: np.ndarray, covariance: np.ndarray, lean: np.ndarray
-) -> DishWay:
+) -> DishEstimate:
     u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     u_axis = np.sqrt(np.einsum("ai,ij,aj->a", lean, covariance[3:6, 3:6], lean))
-    return DishWay(command, fitted, translation, rotation, u, lean @ rotation, u_axis)
+    return DishEstimate(command, fitted, translation, rotation, u, lean @ rotation, u_axis)

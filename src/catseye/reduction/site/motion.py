@@ -20,7 +20,7 @@ from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
 from catseye.records.site.folder import SiteFolder
 
 Array = NDArray[np.float64]
-KEPT = 3600.0  # s, retention of postures
+RETENTION = 3600.0  # s, retention of postures
 UNTHINNED = 300.0  # s with all readings: a shot comes within two minutes
 THINNED = 1.0  # s between older readings: used only for the age of a reference shot's posture
 LONGEST_GAP = 2.0  # s between readings, or after the last, for which rates hold
@@ -50,8 +50,8 @@ class PostureTrack:
         if read.ticks not in self._reads:
             insort(self._ticks, read.ticks)
         self._reads[read.ticks] = read
-        if len(self._ticks) > 2 and self._ticks[-1] - self._ticks[0] > 1.25 * KEPT / TICK_SECONDS:
-            first = bisect_right(self._ticks, self._ticks[-1] - round(KEPT / TICK_SECONDS))
+        if len(self._ticks) > 2 and self._ticks[-1] - self._ticks[0] > 1.25 * RETENTION / TICK_SECONDS:
+            first = bisect_right(self._ticks, self._ticks[-1] - round(RETENTION / TICK_SECONDS))
             for dropped in self._ticks[:first]:
                 del self._reads[dropped]
             del self._ticks[:first]
