@@ -213,7 +213,7 @@ def test_a_table_of_samples_is_as_good_as_a_wave_file(catseye, tmp_path, codes):
         ([FILES[0], "--sheet", EXAMPLE / "night.toml"], "does not say what its channels are"),
         ([EXAMPLE / "night.csv", "--write", EXAMPLE / "night.csv"], "is an input"),
         ([EXAMPLE / "night.csv", "--out", EXAMPLE], "is, holds or lies in the input"),
-        ([EXAMPLE / "night.toml"], "as the recording and as its sheet"),
+        ([EXAMPLE / "night.toml"], "is both recording and sheet"),
     ],
 )
 def test_what_cannot_be_done_is_1_in_one_line(catseye, arguments, said):

@@ -126,7 +126,7 @@ def test_a_whole_night_typed_to_two_centimetres_is_found_step_by_step(night_01, 
     both = np.isin(before.ranges.shot, found.ranges.shot)
     np.testing.assert_array_equal(before.ranges.cycles[both], found.ranges.cycles)
     assert len(found.unresolved) <= 12
-    assert any("points known too badly for the nearest integer: whole cycles found jointly" in n for n in found.notes)
+    assert any("points too uncertain for the nearest integer: whole cycles found jointly" in n for n in found.notes)
 
 
 def test_a_certified_distance_is_as_good_as_a_position(few_01, reduced_few_01):

@@ -41,8 +41,7 @@ def pose_status(result: PoseFindings) -> str:
     if pose.motion.degrees_of_freedom and pose.p < RIGID:
         what = "the pose, and the beam that follows from it," if result.beam is not None else "the pose"
         return (
-            f"the group does not move as a rigid body (p {pose.p:.2g}): {what} is a mean of its points' motions; "
-            "see residuals"
+            f"the group does not move as one (p {pose.p:.2g}): {what} is a mean of its points' motions; see residuals"
         )
     return "converged"
 
@@ -62,11 +61,11 @@ def _own_verdict(result: PoseFindings) -> Verdict:
     if status != "converged":
         return Verdict("doubtful", status)
     if not pose.motion.degrees_of_freedom:
-        return Verdict("doubtful", "as many coordinates as unknowns: nothing checks that the group is rigid")
+        return Verdict("doubtful", "as many coordinates as unknowns: nothing checks that the group moved as one")
     if result.pose.posture is not None and result.pose.posture.doubt:
         return Verdict("doubtful", result.pose.posture.doubt)
     removed = f", {len(pose.left_out)} left out" if pose.left_out else ""
-    return Verdict("good", f"{len(pose.names)} points move as a rigid body{removed} (p {pose.p:.2g})")
+    return Verdict("good", f"{len(pose.names)} points move as one{removed} (p {pose.p:.2g})")
 
 
 def largest_sky_rms() -> float:
