@@ -80,7 +80,7 @@ def test_the_samples_noise_of_night_01_gives_its_ranges_uncertainty(reduced_nigh
 
 def test_full_scale_and_grazing_light_are_reported():
     assert link_budget(replace(LINK, volts_per_ampere=1e7), PRISM, 20.0).clipped
-    with pytest.raises(ValidityError, match="nothing of the face"):
+    with pytest.raises(ValidityError, match="no part of the face"):
         link_budget(LINK, PRISM, 100.0, incidence=1.4)
     with pytest.raises(ValidityError, match="right angle"):
         link_budget(LINK, PRISM, 100.0, incidence=1.6)
