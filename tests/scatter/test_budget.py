@@ -184,7 +184,7 @@ def test_the_shots_are_very_different(shots, reduced_night_01, night_01):
     assert abs(scenes["3 % beam"].phasor) < 0.04
 
 
-def test_each_input_alone_scatters_as_its_line_of_the_budget_says(night_01, reduced_night_01, shots):
+def test_each_input_alone_scatters_as_its_line_of_the_budget(night_01, reduced_night_01, shots):
     """The total hides a wrong small line; alone, with twice its u, none hides."""
     scene = one_of("head with axes, coupling, waves", shots, reduced_night_01, night_01)
     items = items_of(scene)

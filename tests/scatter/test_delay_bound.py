@@ -96,7 +96,7 @@ def test_wrong_peaks_are_as_rare_as_the_least_snr_promises():
 
 
 @pytest.mark.parametrize(("kind", "snr"), [("chirp", 15.0), ("chirp", 20.0), ("long pulse", 100.0)])
-def test_wrong_peaks_are_as_frequent_as_foretold(kind, snr):
+def test_wrong_peaks_are_as_frequent_as_predicted(kind, snr):
     """Noise anywhere in the window for the chirp, its own side peaks for the pulse; first order, to 35 %."""
     template = sampled(SIGNALS[kind][0].__name__, FS, **SIGNALS[kind][1])
     plan = DelayPlan(template, sampling_hz=FS, window=8e-3)
@@ -114,7 +114,7 @@ def rumble(rng, shape, keep=0.97):
 
 
 @pytest.mark.parametrize("count", COUNTS)
-def test_in_coloured_noise_plain_claims_what_it_scatters_and_whitening_is_at_the_bound(count):
+def test_in_coloured_noise_plain_claims_hold_and_whitening_reaches_the_bound(count):
     """The bound: 1/(2 a^2 sum w^2 |S|^2/N) over the lines of a long transform, N the walk's own spectrum."""
     rng = np.random.default_rng(9)
     keep, level = 0.97, 0.6
@@ -137,7 +137,7 @@ def test_in_coloured_noise_plain_claims_what_it_scatters_and_whitening_is_at_the
 
 
 @pytest.mark.parametrize("count", COUNTS)
-def test_the_phase_transform_claims_what_it_scatters_above_the_bound(count):
+def test_the_phase_transform_scatters_as_claimed_above_the_bound(count):
     rows, true, _, bound = scene("chirp", count, 20, seed=2)
     found = DelayPlan(sampled("chirp", FS, **CHIRP), sampling_hz=FS, window=3e-3, weighting="phat")(rows, 0.015)
     good = found.status <= DelayStatus.ECHO

@@ -47,7 +47,7 @@ def scatter(trials, correlated):
 
 @draws(600, name="trials")
 @pytest.mark.parametrize("correlated", [False, True])
-def test_covariance_variance_factor_and_tests_are_what_they_claim(correlated, trials):
+def test_covariance_variance_factor_and_tests_match_their_claims(correlated, trials):
     normalised, factors, tests = scatter(trials, correlated)
     off, spread, small = (same_sigmas(bound, 600, trials) for bound in (0.07, 0.3, 0.05))
     assert normalised == pytest.approx(1.0, abs=off)  # 12 parameters, 600 trials: 1.7 %

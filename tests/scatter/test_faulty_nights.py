@@ -100,19 +100,19 @@ def check(seeds, epochs, *, low, high):
 
 
 @draws(3, name="nights")
-def test_a_few_faulty_nights_err_by_what_they_claim(nights):
+def test_a_few_faulty_nights_err_as_claimed(nights):
     """Means of three nights lie between 0.35 and 1.5, of one as seldom beyond what chance then allows."""
     low, high = (same_chance(bound, 3 * BODIES, nights * BODIES) for bound in (0.35, 1.5))
     check(list(range(601, 601 + nights)), 4, low=low, high=high)
 
 
 @pytest.mark.slow
-def test_forty_faulty_nights_err_by_what_they_claim():
+def test_forty_faulty_nights_err_as_claimed():
     check(list(range(601, 601 + NIGHTS)), EPOCHS, low=0.5, high=1.25)
 
 
 @draws(3, name="nights")
-def test_what_is_wrong_does_not_take_part(nights):
+def test_wrong_shots_are_not_used(nights):
     """Of the nights that are quick: whatever stands in a faulty line's shots has another status, or is rejected."""
     for seed in range(601, 601 + nights):
         told = faulty_night(seed, 4)

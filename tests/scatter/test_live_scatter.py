@@ -95,7 +95,7 @@ def tally(motion, seeds, epochs, **more):
 
 
 @draws(3, name="nights")
-def test_a_few_nights_of_tracking_err_by_what_they_claim(nights):
+def test_a_few_nights_of_tracking_err_as_claimed(nights):
     """Single nights were seen between 0.5 and 1.6: ten bodies and airs, not fifty points, are what is drawn."""
     mean, square, beam, _ = tally(TRACK, range(301, 301 + nights), 4)
     low, high, middle = (same_chance(bound, 3 * 10, nights * 10) for bound in (0.35, 1.5, 1.2))
@@ -116,7 +116,7 @@ def test_a_few_nights_of_tracking_err_by_what_they_claim(nights):
         pytest.param(TRACK, FEWER, (), "constant_velocity", id="constant velocity"),
     ],
 )
-def test_many_nights_err_by_what_they_claim(motion, nights, faults, filter_):
+def test_many_nights_err_as_claimed(motion, nights, faults, filter_):
     mean, square, beam, means = tally(motion, range(401, 401 + nights), EPOCHS, faults=faults, filter_=filter_)
     assert 0.5 < mean < 1.25
     assert max(square.values()) < 3.0, "no point is far worse than the rest"
@@ -128,7 +128,7 @@ def test_many_nights_err_by_what_they_claim(motion, nights, faults, filter_):
 
 
 @draws(50, 3, name="nights")
-def test_the_first_epoch_errs_by_what_it_claims(nights):
+def test_the_first_epoch_errs_as_claimed(nights):
     """It has typed places and no history. These fifty nights give 0.83 with u 0.04, 1.97 in the worst;
     `simulate --fast` with seeds 101 to 150 gave 0.75 and none beyond its band of 99 %. 3.75 was seen before typed
     places were told from known ones."""

@@ -50,7 +50,7 @@ def normalised(solution, network):
 
 
 @pytest.mark.parametrize("runs", RUNS)
-def test_coordinates_scatter_as_claimed_and_the_tests_alarm_as_often_as_they_say(network, runs):
+def test_coordinates_scatter_as_claimed_with_the_stated_false_alarm_rate(network, runs):
     rng = np.random.default_rng(1)
     squares, cost, alarms, family = [], [], [], []
     departures = []

@@ -22,7 +22,7 @@ def relative(found, true):
 
 
 @pytest.mark.parametrize("runs", RUNS)
-def test_corner_heights_scatter_as_their_whole_covariance_says(tmp_path, runs):
+def test_corner_heights_scatter_as_their_full_covariance(tmp_path, runs):
     """Everything drawn from the sheet's own claims: heights, warps, zeros, levels, shafts, survey, gauges, digits.
 
     The squared departure over the full covariance is chi-square with a degree of freedom a corner; the bound is its
@@ -99,7 +99,7 @@ def test_without_inclinometers_the_unknown_lean_is_in_the_claim(tmp_path, runs):
 
 
 @pytest.mark.parametrize("runs", RUNS)
-def test_false_alarms_are_as_rare_as_the_level_says(tmp_path, runs):
+def test_false_alarms_are_as_rare_as_the_level(tmp_path, runs):
     """Any reading in doubt in a good table: one table in twenty, give or take what runs allow."""
     layout, sheet = patch(side=2), tool(u_slope_urad=1.0, u_shape_um=1.0, u_set_um=300.0)
     alarms = 0

@@ -22,7 +22,7 @@ def holds(sample, claimed, count):
 
 @draws(3, name="thirds")
 @pytest.mark.parametrize("robust", [None, "igg3"])
-def test_poses_scatter_as_their_covariance_says(robust, thirds):
+def test_poses_scatter_as_their_covariance(robust, thirds):
     rng, n, count = np.random.default_rng(21), 8, (200 if robust is None else 30) * thirds
     x = rng.uniform(-30, 30, (n, 3))
     q1, q2 = (r @ r.T for r in rng.normal(size=(2, 3 * n, 4 * n)) * 3e-5)
@@ -49,7 +49,7 @@ def _full(x, q1, q2):
     ).covariance
 
 
-def test_pointing_fits_scatter_as_their_covariance_says():
+def test_pointing_fits_scatter_as_their_covariance():
     rng, n, count = np.random.default_rng(22), 60, 800
     a, e = rng.uniform(0, 2 * np.pi, n), rng.uniform(10, 80, n) * DEGREE
     truth = published().correction(a, e)
@@ -73,7 +73,7 @@ def test_without_a_claim_the_scatter_gives_the_uncertainty():
     assert np.std(w) == pytest.approx((72 / 70) ** 0.5, abs=4 / (2 * count) ** 0.5)  # Student's t
 
 
-def test_track_profiles_scatter_as_their_covariance_says():
+def test_track_profiles_scatter_as_their_covariance():
     rng, count = np.random.default_rng(24), 500
     azimuth = np.arange(0, 360, 40) * DEGREE
     q = np.repeat((np.array([[1.0, 0.3], [0.3, 0.7]]) * ARCSECOND**2)[None], len(azimuth), axis=0)

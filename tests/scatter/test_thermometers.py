@@ -45,14 +45,14 @@ def test_with_a_wave_thermometers_are_within_two_u_of_their_truth(found):
 
 
 @pytest.mark.parametrize("off_c", [2.0, 5.0])
-def test_the_lower_thermometer_which_benchmarks_know_is_named(found, off_c):
+def test_the_lower_thermometer_determined_by_benchmarks_is_named(found, off_c):
     told, coordinates = found("WX1", off_c)
     assert coordinates.refuted == (Parameter(ParameterKind.THERMOMETER, "WX1"),)
     assert max(told["thermometers"]) < 4.0
 
 
 @pytest.mark.parametrize(("station", "off_c"), [("WX1", 1.0), *(("WX2", off) for off in (1.0, 2.0, 3.0, 5.0))])
-def test_a_thermometer_that_nothing_knows_is_covered_and_both_candidates_are_told(found, station, off_c):
+def test_an_undetermined_thermometer_is_covered_and_both_candidates_named(found, station, off_c):
     (clean, _), (told, coordinates) = found("WX1", 0.0), found(station, off_c)
     assert coordinates.doubts  # not good
     if Parameter(ParameterKind.THERMOMETER, station) in coordinates.refuted:

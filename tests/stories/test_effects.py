@@ -60,9 +60,7 @@ def test_a_mirrors_offset_taken_as_247_mm_straight_up_spoils_the_ground_rangers(
     assert moved(few_clear[1], wrong, "ball") > 20e-6
 
 
-def test_a_twin_whose_h_corr_has_the_other_sign_is_seen_wrong_by_a_tenth_of_a_millimetre(
-    clear, clear_night, errors, written
-):
+def test_a_twin_with_the_opposite_h_corr_sign_is_off_by_a_tenth_of_a_millimetre(clear, clear_night, errors, written):
     night = simulate_night(SEED, faults=CLEAR, planted=Planted(signs={"h_corr": -1}))
     c = reduce_epoch(written(night)).coordinates
     for kind in ("dish", "triplet prism"):
@@ -117,9 +115,7 @@ def test_air_taken_as_the_stations_mean_spoils_the_scale(few_clear, monkeypatch)
 
 
 @pytest.mark.parametrize(("name", "error_mm"), [("ZY114", 0.3), ("ZY106", -0.3)])
-def test_a_sheets_zero_wrong_by_0_3_mm_is_found_and_named_and_nothing_goes_wrong(
-    few_clear, written_few, name, error_mm
-):
+def test_a_sheets_zero_wrong_by_0_3_mm_is_named_and_coordinates_stay_right(few_clear, written_few, name, error_mm):
     """Thirty of its sigmas. Held to the sheet, good shots were once rejected and the ranger went 0.26 mm wrong."""
     planted = Planted(d0_error_mm={name: error_mm})
     reduction = reduce_epoch(written_few(simulate_night(SEED, faults=CLEAR, planted=planted)))
@@ -143,7 +139,7 @@ def test_a_zero_wrong_by_0_3_mm_and_held_to_its_sheet_spoils_its_ranger(few_clea
     assert held.coordinates.variance_factor > few_clear[1].coordinates.variance_factor + 0.1 or held.rejected
 
 
-def test_a_lower_thermometer_that_lies_by_1_2_degrees_is_found_by_the_benchmarks(written_few, few_clear, errors, u):
+def test_a_lower_thermometer_biased_by_1_2_degrees_is_found_by_the_benchmarks(written_few, few_clear, errors, u):
     night = simulate_night(
         SEED,
         faults=Faults(0.0, 0.0, weak_ranger=None, wrong_position_mm=0.0, lying_thermometer_c=1.2, lying_station="WX1"),

@@ -53,7 +53,7 @@ def test_a_summer_day_of_another_posture_reduces_as_well(summer):
     good(summer[0], summer[2])
 
 
-def test_nothing_depends_on_names(summer, tmp_path):
+def test_results_do_not_depend_on_names(summer, tmp_path):
     """The same night under other names gives the same numbers; parameters stand in another order: rounding."""
     _, directory, reduction = summer
     for path in sorted(directory.rglob("*")):

@@ -84,7 +84,7 @@ def test_a_pointing_offset_of_two_arc_seconds_is_found_to_a_quarter_with_sixty_p
     np.testing.assert_allclose(values.mean(axis=0), turn[[1, 0]], rtol=0, atol=4 * u.max() / runs**0.5)
 
 
-def test_what_points_share_makes_the_beam_surer_than_its_parts(epoch, night_01):
+def test_common_errors_make_the_beam_more_certain_than_its_parts(epoch, night_01):
     """Rangers of the arm see the dish: their own motion is common to both, and a covariance without that is larger."""
     dish, arm = (pose_of_group(epoch, epoch, night_01, group=g, frame="reflector") for g in ("dish", "feed-arm"))
     joint = pointing_offset(dish.pose, arm.pose, night_01, cross=cross_covariance(arm, dish, night_01, earlier=epoch))
@@ -141,7 +141,7 @@ def whole(epoch, night_01, reduced_night_01):
     return seen_by_the_arm(x, epoch, zeros)
 
 
-def test_the_night_s_own_prisms_are_as_sure_as_the_propagation_has_them(epoch, night_01, reduced_night_01):
+def test_the_nights_prisms_are_as_uncertain_as_propagated(epoch, night_01, reduced_night_01):
     """What is taken to the whole dish below is first held against the reduction, for its own sixty prisms."""
     names = [n for n in epoch.names if n.startswith("DP")]
     zeros = np.array([reduced_night_01.coordinates.zeros[n][1] for n in ARM])
@@ -151,13 +151,13 @@ def test_the_night_s_own_prisms_are_as_sure_as_the_propagation_has_them(epoch, n
     np.testing.assert_allclose(rough, real, rtol=0.35)  # ranges differ: strength, incidence, air
 
 
-def test_the_dish_s_turn_is_known_to_two_tenths_with_the_rim_s_triplets(epoch, night_01):
+def test_the_rims_triplets_determine_the_dishs_turn_to_two_tenths(epoch, night_01):
     """The triplets tie the dish to the ground's rangers; a change of two independent nights."""
     found = pose_of_group(epoch, epoch, night_01, group="dish", frame="reflector")
     assert np.all(found.pose.u[3:5] < 0.2 * ARCSECOND)  # 0.18 and 0.11
 
 
-def test_of_the_whole_dish_s_prisms_alone_the_covariance_says_what_holds_them_back(whole, night_01):
+def test_the_covariance_of_the_dishs_prisms_shows_their_limiting_errors(whole, night_01):
     """2209 prisms: 0.02 arc seconds for their own ranges, 0.31 for where the arm's rangers are, which all share."""
     frame = nominal_frame(night_01)
     pivot, turn = frame.translation, frame.rotation

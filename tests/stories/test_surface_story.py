@@ -42,7 +42,7 @@ def test_astigmatism_of_0_3_mm_is_found_corrected_and_gone():
     assert np.std(left) < 1.15 * np.sqrt(np.mean(table.u_correction[rest] ** 2) + 25e-6**2 / 12)
 
 
-def test_the_night_shows_what_the_day_did_though_the_dish_came_back_elsewhere():
+def test_the_night_measures_the_days_change_of_a_displaced_dish():
     """Difference of two epochs at another pose: thermal bending of 0.1 mm to some um, with what it claims."""
     seen = np.arange(0, len(NAMES), 4)
     panels = 6.8e-5 * np.random.default_rng(1).normal(size=len(NAMES)) * COS

@@ -227,7 +227,7 @@ def judged(found, nights, k):
 
 
 @pytest.mark.parametrize("solve", [in_one, step_by_step])
-def test_the_feed_arm_is_found_in_ground_coordinates_within_what_is_claimed(site, solve):
+def test_the_feed_arm_is_found_in_ground_coordinates_as_claimed(site, solve):
     judged(scattered(site, solve, 24, 7), 24, 6)
 
 

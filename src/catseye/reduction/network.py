@@ -1,4 +1,4 @@
-"""The recipe for a network: adjusted plainly, robustly, or without wrong observations; weights estimated."""
+"""Recipe for a network: plain or robust adjustment, data snooping, variance components."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -29,27 +29,29 @@ from catseye.estimation.quality.robustness import (
 )
 from catseye.estimation.quality.variance_components import Components, GroupFactors, RowModel, variance_components
 
-FEW = 300  # points up to which a dense solution beside a known one is the quickest
+FEW = 300  # points up to which a dense solution beside an existing one is the quickest
 NEAR = 1e4  # variance factor of the plain solution up to which the search for wrong observations starts from it
 START = (5e-5, 0.5 * PPM)  # of the constant and the scale part of a ranger, m and ratio: any positive start will do
 
 Progress = Callable[[str, int, int], None]
-Placed = tuple[tuple[str, ...], tuple[str, ...]]  # names of points that were placed, and of those on an assumed side
+Placed = tuple[
+    tuple[str, ...], tuple[str, ...]
+]  # names of points with approximate places, and of those on an assumed side
 
 
 @dataclass(frozen=True, eq=False)
 class AdjustedNetwork:
-    """A network with its answer and how observations were treated.
+    """Network with its solution and the treatment of observations.
 
     solution     of the adjustment, with the treatment below
     treatment    "plain", "rejected", or the name of a robust method
-    weights      one (m,) a group: share of its claimed weight that each observation was given; 0 where left out
+    weights      one (m,) a group: share of its claimed weight that each observation has; 0 where left out
     rejected     one (m,) bool a group
-    undecided    one (m,) bool a group: contradicted by others, nothing says which is wrong; given next to no weight
-    rejections   what data snooping says of each it left out
-    components   estimated components of variance, where asked
-    notes        what a person should know, one line each
-    likely       one (m,) bool a group: what data snooping, one by one, would leave out; all that was left out where
+    undecided    one (m,) bool a group: contradicted by others, undecidable which is wrong; almost no weight
+    rejections   result of data snooping for each rejected observation
+    components   estimated components of variance, on request
+    notes        for the user, one line each
+    likely       one (m,) bool a group: candidates of data snooping, one by one; all rejected ones where
                  observations were rejected or weighed
     """
 
@@ -74,21 +76,23 @@ def adjusted(
     components: str | None = None,
     progress: Progress | None = None,
 ) -> AdjustedNetwork:
-    """A network's coordinates, every observation used as claimed unless asked otherwise.
+    """Adjusted coordinates of a network.
+
+    Every observation is used as claimed unless an argument says otherwise.
 
     network      from `records.network.any_file.read_network`
     datum        as `adjust_network`
     reject       leave out observations that the w test rejects, found from a robust start
-    robust       or give each the weight of an M-estimate: a key of `estimation.quality.robustness.WEIGHTS`
+    robust       or weigh each by an M-estimate: a key of `estimation.quality.robustness.WEIGHTS`
     level        of all tests together, for `reject`
     components   "rangers": estimate the constant and the ppm part of each ranger's claim; "groups": a factor a group
 
     Raises EstimationError for an unknown method, or where a network without an answer is to be treated.
     """
     if robust is not None and robust not in WEIGHTS:
-        raise EstimationError(f"robust method {robust!r} is not known (expected one of {', '.join(WEIGHTS)})")
+        raise EstimationError(f"robust method {robust!r} is unknown (expected one of {', '.join(WEIGHTS)})")
     if components not in (None, "rangers", "groups"):
-        raise EstimationError(f"variance components by {components!r} are not known (expected rangers or groups)")
+        raise EstimationError(f"variance components by {components!r} are unknown (expected rangers or groups)")
     network, placed = _placed(with_datum(network, datum))
     treated = reject or robust is not None or components is not None
     plain = replace(
@@ -97,8 +101,8 @@ def adjusted(
         assumed=placed[1],
     )
     sizes = [len(g.observed) for g in network.groups]
-    nothing = tuple(np.zeros(m, dtype=bool) for m in sizes)
-    result = AdjustedNetwork(plain, "plain", tuple(np.ones(m) for m in sizes), nothing, nothing, likely=nothing)
+    no_rows = tuple(np.zeros(m, dtype=bool) for m in sizes)
+    result = AdjustedNetwork(plain, "plain", tuple(np.ones(m) for m in sizes), no_rows, no_rows, likely=no_rows)
     if not plain.answered:
         return result
     count, engine = 0, _engine(plain)
@@ -145,7 +149,10 @@ def adjusted(
 def _likely(
     plain: NetworkSolution, solve: Callable[[Sequence[np.ndarray]], tuple[GroupFit, ...]], level: float
 ) -> tuple[np.ndarray, ...]:
-    """What data snooping, one by one, would leave out of a plain adjustment; nothing is, here."""
+    """Candidates that data snooping, one by one, would reject.
+
+    From a plain adjustment; nothing is rejected here.
+    """
     sizes = [len(fit.residual) for fit in plain.fits]
     tests = observation_tests(plain.fits, level=level)
     if not any(np.any(p < level) for p in tests.adjusted):
@@ -153,7 +160,7 @@ def _likely(
     options = SnoopingOptions(level=level)
     if plain.status.startswith(CONVERGED):
         return snoop(solve, sizes, options=options, weigh=False).rejected
-    start = estimate_robustly(solve, sizes, places=targets_of_ranges(plain.network))  # its tests say nothing
+    start = estimate_robustly(solve, sizes, places=targets_of_ranges(plain.network))  # its tests are void
     return snoop(solve, sizes, options=options, start=start.rejected, doubtful=start.undecided, weigh=False).rejected
 
 
@@ -164,7 +171,10 @@ def _with_rejections(
     placed: Placed,
     level: float,
 ) -> AdjustedNetwork:
-    """The answer without the observations that the w test rejects, by data snooping from a robust start."""
+    """Adjustment without observations that the w test rejects.
+
+    By data snooping from a robust start.
+    """
     start = estimate_robustly(solve, sizes, places=targets_of_ranges(network))
     chosen = snoop(solve, sizes, options=SnoopingOptions(level=level), start=start.rejected, doubtful=start.undecided)
     inflation = inflation_of(chosen.rejected, chosen.undecided)
@@ -180,7 +190,7 @@ def _with_rejections(
 
 
 def _placed(network: ObservationNetwork) -> tuple[ObservationNetwork, Placed]:
-    """The network with places found once for points that have none, and who these are."""
+    """Network with approximate places, and the names of placed points."""
     if not network.points.unplaced.any():
         return network, ((), ())
     begin, nothing = approximate(network), not np.isfinite(network.points.xyz).any()
@@ -192,7 +202,10 @@ def _placed(network: ObservationNetwork) -> tuple[ObservationNetwork, Placed]:
 
 
 def _engine(solution: NetworkSolution) -> str | None:
-    """The engine for many solutions on the way: the ranging one where it served, without falling back to another."""
+    """Engine for many intermediate solutions.
+
+    The ranging one where it served, without a fallback to another.
+    """
     return "ranging" if isinstance(solution.q, RangingCovariance) else None
 
 
@@ -205,7 +218,10 @@ def _final(
 def _with_components(
     network: ObservationNetwork, result: AdjustedNetwork, by: str, progress: Progress | None
 ) -> AdjustedNetwork:
-    """The answer with the claimed uncertainties replaced by estimated ones; what was left out stays out."""
+    """Adjustment with estimated instead of claimed uncertainties.
+
+    Rejected observations stay out.
+    """
     placed = (result.solution.approximate, result.solution.assumed)
     out = [np.where(w > 0.5, 1.0, np.inf) for w in result.weights] if result.treatment == "rejected" else None
     count, engine = 0, _engine(result.solution)
@@ -235,7 +251,10 @@ def _with_components(
 
 
 def _ranger_model(network: ObservationNetwork, solution: NetworkSolution) -> RowModel:
-    """sigma^2 = a^2 + (b D)^2 of each point that ranges, over all groups of ranges; other groups as claimed."""
+    """Variance model sigma^2 = a^2 + (b D)^2 per ranging point.
+
+    Over all groups of ranges; other groups as claimed.
+    """
     ranging = [points_of(g)[0] if isinstance(g, Distances) and g.covariance.ndim == 1 else None for g in network.groups]
     used = [o for o in ranging if o is not None]
     if not used:
@@ -278,12 +297,14 @@ def measured_on_paper(
     blunders: float = 0.0,
     progress: Progress | None = None,
 ) -> MonteCarloScatter:
-    """A planned network measured many times with what goes wrong outside, and adjusted each time; see `scatter`.
+    """Monte Carlo simulation of a planned network; see `scatter`.
 
-    network      with its datum as it will be; its coordinates are taken for the truth
-    runs, seed   how many, of which generator
+    It is measured many times with external errors, and adjusted each time.
+
+    network      with its datum as it will be; its coordinates are the truth
+    runs, seed   number of simulations, seed of the generator
     air_ppm      standard deviation of a scale error of all ranges together
-    station_ppm  the same of each ranger
+    station_ppm  the same for each ranger
     refraction   standard deviation of the coefficient of vertical refraction
     blunders     share of gross errors of 20 standard uncertainties; with them, wrong observations are rejected
     """

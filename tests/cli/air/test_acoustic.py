@@ -209,11 +209,11 @@ def test_a_table_of_samples_is_as_good_as_a_wave_file(catseye, tmp_path, codes):
     [
         ([EXAMPLE / "none.wav"], "none.toml: missing"),
         ([EXAMPLE / "none.wav", "--sheet", SHEET], "none.wav: missing"),
-        ([FILES[0], FILES[0], "--sheet", SHEET], "evening-1.wav: is given twice"),
+        ([FILES[0], FILES[0], "--sheet", SHEET], "evening-1.wav: appears twice"),
         ([FILES[0], "--sheet", EXAMPLE / "night.toml"], "has no channels"),
         ([EXAMPLE / "night.csv", "--write", EXAMPLE / "night.csv"], "is an input"),
         ([EXAMPLE / "night.csv", "--out", EXAMPLE], "is, holds or lies in the input"),
-        ([EXAMPLE / "night.toml"], "as the recording and as its sheet"),
+        ([EXAMPLE / "night.toml"], "is both recording and sheet"),
     ],
 )
 def test_what_cannot_be_done_is_1_in_one_line(catseye, arguments, said):
@@ -266,7 +266,7 @@ def test_a_file_by_two_of_its_names_is_given_twice(catseye):
     same = EXAMPLE.parent / "acoustic" / ".." / "acoustic" / "night.csv"
     status, out, complained = catseye("acoustic", EXAMPLE / "night.csv", same)
     assert (status, out) == (1, "")
-    assert "night.csv: is given twice" in complained
+    assert "night.csv: appears twice" in complained
 
 
 def test_times_of_a_sound_of_unknown_frequency_are_refused(catseye, tmp_path):

@@ -113,7 +113,7 @@ def test_what_is_missing_is_named(catseye, tmp_path):
     assert "no.csv: missing" in complaint
     status, _, complaint = catseye(plain(tmp_path, ROWS))
     assert status == 1
-    assert "has no sheet night.toml beside it and no path length is given" in complaint
+    assert "has no sheet night.toml beside it and there is no path length" in complaint
     status, _, complaint = catseye(tmp_path / "night.csv", "--sheet", tmp_path / "other.toml")
     assert status == 1
     assert "other.toml: missing" in complaint

@@ -31,7 +31,7 @@ def test_a_report_a_model_and_the_stars_used_are_written(catseye, tmp_path):
         "pointing", "fit", STARS, "--reject", "--out", out, "--write", model, "--write-stars", used
     )
     assert status == 0
-    assert "arcsec only" in said
+    assert "arcsec; over" in said
     files = "observations.csv pointing.json pointing.toml provenance.json report.html samplers.fits"
     assert sorted(p.name for p in out.iterdir()) == files.split()
     assert (out / "report.html").read_text().count("<img") == 3

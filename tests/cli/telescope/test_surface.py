@@ -169,7 +169,7 @@ def test_an_epoch_without_elevation_makes_no_table(catseye, tmp_path):
     paths = [table(tmp_path / f"{k}.csv", np.zeros(2209), k, np.arange(0, 2209, 60)) for k in range(3)]
     status, _, complaint = catseye(*paths)
     assert status == 1
-    assert "no elevation is known; say it by --elevation-deg" in complaint
+    assert "unknown elevation; set it by --elevation-deg" in complaint
 
 
 def test_another_programs_file_is_not_overwritten(catseye, tmp_path):

@@ -171,7 +171,7 @@ def test_claims_hold_against_much_scatter():
     check_scatter(3000, 12)
 
 
-def test_what_is_common_stays_common():
+def test_common_errors_do_not_average_out():
     found = temperatures(*times(np.full(4, 20.0)), 5e-6, **PATH, u_crosswind=0.0)
     u = found.u_temperature_c
     correlation = found.covariance_c2 / np.outer(u, u)

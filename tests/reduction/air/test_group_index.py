@@ -61,7 +61,7 @@ def test_any_coarse_length_within_20_mm_finds_the_whole_cycles(length, index, of
 
 
 @pytest.mark.parametrize(("off", "u_length"), [(0.0496, 1e-4), (0.0, 0.011)])
-def test_a_length_that_does_not_tell_the_cycles_gives_no_index(off, u_length):
+def test_an_uncertain_length_gives_no_index(off, u_length):
     found = absolute_group_index(
         flight_phase(1.00025, 100.0), path_length=100.0, u_path_length=u_length, expected_index=1.00025 + off / 100.0,
         u_expected_index=1e-6, u_phase=1e-3,

@@ -38,7 +38,7 @@ def changed(weather, keep=None, **columns):
     )
 
 
-def test_night_01_is_the_same_as_the_campaigns_own_air_within_what_is_claimed(night_01):
+def test_night_01_agrees_with_the_campaigns_air_within_the_claims(night_01):
     when, a, b = shots_of(night_01)
     air = site_air(night_01.site, night_01.weather, model="rueger1990")
     assert air.notes == ()
@@ -112,14 +112,14 @@ def test_wild_readings_and_contradicting_stations_are_named_and_kept(night_01):
     warmth = table.temperature_c.copy()
     warmth[row] += 5.0
     (note,) = site_air(night_01.site, changed(table, temperature_c=warmth)).notes
-    assert note.startswith("temperature: 1 of 288 readings are wild")
+    assert note.startswith("temperature: 1 of 288 readings are outliers")
     assert table.station[row] in note
     lying = table.temperature_c + 9.0 * (np.array(table.station) == "WX2")
     (note,) = site_air(night_01.site, changed(table, temperature_c=lying)).notes
-    assert note == "temperature: WX1 and WX2 contradict each other and nothing says which is wrong; compare them"
+    assert note == "temperature: WX1 and WX2 contradict each other, undecided which is wrong; calibrate them"
 
 
-def test_a_barometer_that_lies_among_three_is_named(night_01):
+def test_a_biased_barometer_among_three_is_named(night_01):
     station = night_01.site.weather_station[0]
     site = night_01.site.model_copy(
         update={"weather_station": (*night_01.site.weather_station, station.model_copy(update={"name": "WX3"}))}
@@ -165,5 +165,5 @@ def test_a_long_night_of_many_readings_is_averaged_by_itself(night_01):
 def test_names_that_are_no_stations_are_refused(night_01):
     with pytest.raises(InputError, match=r"weather station 'WX9' is not in site\.toml; it has WX1, WX2"):
         site_air(night_01.site, night_01.weather, without=("WX9",))
-    with pytest.raises(InputError, match="no weather reading is left without WX1, WX2"):
+    with pytest.raises(InputError, match="no weather reading remains without WX1, WX2"):
         site_air(night_01.site, night_01.weather, without=("WX1", "WX2"))

@@ -82,7 +82,7 @@ def test_every_phase_of_the_night_gives_the_index_within_its_u(night):
     assert np.nanmedian(np.abs(warm - true_at)) < 0.2
 
 
-def test_strays_are_named_and_wrong_weather_does_not_cost_the_phase(night):
+def test_outliers_are_named_and_wrong_weather_does_not_lose_the_phase(night):
     simulated, c = night(5, NOISY)
     status = np.array(c.status)
     # a foreign phase within 5 sigma, some 5 mrad of 2 pi, stays: here none does
@@ -119,7 +119,7 @@ def test_a_phase_of_the_wrong_sign_is_found_out_by_its_slope(night, tmp_path):
     assert right.slope.agrees is True
 
 
-def test_a_jump_of_the_path_begins_a_section_and_says_its_size(night):
+def test_a_jump_of_the_path_begins_a_section_and_reports_its_size(night):
     for size in (0.0003, -0.0003, 0.00006):  # the last, 4 mrad, is less than five u of a single reading
         simulated, c = night(11, PathPlan(jumps={4.0: size}, patch_c=0.0))
         assert [s.reason for s in c.followed.sections] == ["start", "jump"]
@@ -153,7 +153,7 @@ def test_a_gap_is_bridged_by_the_weather_or_named_as_ambiguous(night):
     plan = PathPlan(path_length=20000.0, gaps=gap, thermometers=5, noise_c=0.02, eddies_c=0.02, patch_c=0.0)
     simulated, far = night(12, plan)
     assert [s.reason for s in far.followed.sections] == ["start", "ambiguous gap"]
-    assert any("whole cycles are not tied" in note for note in far.notes)
+    assert any("whole cycles are not connected" in note for note in far.notes)
     good = np.isfinite(far.refractivity)  # each section stands on its own weather
     assert set(far.followed.section[good]) == {0, 1}
     assert np.max(np.abs(far.refractivity - simulated.index)[good]) < 0.2e-6
@@ -196,7 +196,7 @@ def test_the_ratio_is_above_one_where_the_paths_air_changes_less_than_the_sensor
     assert any("above 1 the path's air changes less" in note for note in c.notes)
 
 
-def test_the_calibration_stands_at_the_weather_that_its_index_belongs_to(night):
+def test_the_calibration_reports_the_weather_of_its_index(night):
     """With a jump: n_g(t0, h0, p0) and phase_0 are of the first section, not of the night, 2 ppm away."""
     _, c = night(11, PathPlan(jumps={4.0: 0.0003}, patch_c=0.0))
     assert len(c.followed.sections) == 2
@@ -237,7 +237,7 @@ def test_offsets_of_sensors_do_not_average_out(night):
     assert np.sqrt(sum(p**2 for p in c.budget.values())) == pytest.approx(c.u_index_0, rel=1e-9)
 
 
-def test_a_barometer_that_reads_wrong_does_not_move_the_mean_temperature(night, tmp_path):
+def test_a_biased_barometer_does_not_move_the_mean_temperature(night, tmp_path):
     """It moves the calibration by as much as the inversion: 1 hPa is 0.3 °C, and cancels."""
     simulated = simulate_path_night(16, PathPlan(patch_c=0.0, walk_mrad_per_root_hour=0.0))
     wrong = dataclasses.replace(simulated, pressure_hpa=simulated.pressure_hpa + 5.0)

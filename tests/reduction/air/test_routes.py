@@ -106,7 +106,7 @@ def test_air_above_its_barometer_is_thinner():
     assert high.humidity_percent == low.humidity_percent
 
 
-def test_air_far_from_its_barometer_says_what_it_does_not_know_of_the_pressure():
+def test_air_far_from_its_barometer_has_a_larger_u_of_pressure():
     """A barometric formula typed again, draws of lapse and gravity: 1 km up the pressure is known to 1.1 hPa only."""
     moist, t, u_t = Moisture("vapour_pressure_hpa", 0.0), 10.0, 0.5
     formula = air_by(t, 933.0, moist)[1]
@@ -144,7 +144,7 @@ def test_the_margin_of_a_surface_is_as_uncertain_as_the_instrument_makes_it():
         assert 0.0 < found.probability < 1.0
 
 
-def test_what_cannot_be_is_refused():
+def test_impossible_values_are_refused():
     with pytest.raises(ValidityError, match="height above the barometer 5000 m is outside -1000 to 1000 m"):
         air_by(20.0, 933.0, Moisture("dew_point_c", 10.0), above_barometer=5000.0)
     with pytest.raises(ValidityError, match="over saturation"):

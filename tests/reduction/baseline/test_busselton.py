@@ -99,7 +99,7 @@ def test_all_shots_agree_with_least_squares_by_hand(ts30):
     assert ts30.all_shots.x[1:] == pytest.approx(values[:5], abs=5e-5)  # the two formulas of the index
 
 
-def test_what_the_ts30_says_of_the_baseline_and_of_itself(ts30):
+def test_the_ts30_calibrates_the_baseline_and_itself(ts30):
     zero, u = ts30.solution.of("zero")
     assert zero * 1e3 == pytest.approx(-0.267, abs=0.01)
     assert u * 1e3 == pytest.approx(0.19, abs=0.02)

@@ -72,7 +72,7 @@ def heights(tmp_path):
     return made
 
 
-def test_a_slope_is_reduced_as_vectors_on_a_round_earth_say():
+def test_a_slope_is_reduced_like_vectors_on_a_round_earth():
     """2 km and 300 m of height: along the level surface at the reference height, by vectors from the centre."""
     arc = 2000.0 / (EARTH_RADIUS + 50.0)
     one = (EARTH_RADIUS + 120.0) * np.array([0.0, 1.0])
@@ -83,7 +83,7 @@ def test_a_slope_is_reduced_as_vectors_on_a_round_earth_say():
         horizontal_distance(np.array([20.0]), np.array([0.0]), np.array([30.0]))
 
 
-def test_perfect_shots_give_pillars_zero_and_nothing_else(tmp_path, heights):
+def test_perfect_shots_give_pillars_and_zero_exactly(tmp_path, heights):
     """Off the line, off the level, through changing air: 1 um is what 9 digits and the arc's curvature leave."""
     found = calibrate_baseline(table(tmp_path / "o.csv", zero=-0.0123), heights(), settings=EXACT)
     assert found.solution.x == pytest.approx(ALONG, abs=1e-6)
@@ -123,11 +123,11 @@ def test_effects_of_heights_are_those_of_moved_heights(tmp_path, heights):
         assert effect == pytest.approx(there.distance - base.distance, abs=5e-8)  # half of (1 mm)²/20 m
 
 
-def test_without_directions_or_heights_the_notes_say_what_was_assumed(tmp_path):
+def test_without_directions_or_heights_the_notes_state_the_assumptions(tmp_path):
     found = calibrate_baseline(table(tmp_path / "o.csv", aimed=False), None, settings=EXACT)
     text = " ".join(found.notes)
     assert "straight line" in text
-    assert "taken for level" in text
+    assert "taken as level" in text
     assert "scale is not determined" in text
     assert not found.solution.y.any()
     assert found.reference_height is None
@@ -156,13 +156,13 @@ def test_cyclic_terms_are_found_or_left_out_with_a_reason(tmp_path, heights):
     assert found.solution.of("cyclic sine 1")[0] == pytest.approx(-4e-4, abs=2e-6)
     blind = calibrate_baseline(seen, heights(), settings=replace(EXACT, unit_length=1e6))
     assert blind.cyclic == ()
-    assert any("do not tell them from the zero" in note for note in blind.notes)
+    assert any("do not separate them from the zero" in note for note in blind.notes)
     few = table(tmp_path / "f.csv", pairs=[(0, k) for k in range(1, 6)] + [(k, 5) for k in range(1, 5)])
     few = calibrate_baseline(few, heights(), settings=replace(EXACT, unit_length=1.5))
     assert any("3 redundant sets for 2" in note for note in few.notes)
 
 
-def test_lengths_corrected_in_the_field_are_told_from_raw_ones(tmp_path, heights):
+def test_lengths_corrected_in_the_field_are_detected(tmp_path, heights):
     """The light of raw lengths follows the weather, 1; of corrected ones not, 0."""
     rng = np.random.default_rng(1)
     raw = calibrate_baseline(table(tmp_path / "o.csv", rng, one=2e-4), heights(), settings=EXACT)
@@ -171,10 +171,10 @@ def test_lengths_corrected_in_the_field_are_told_from_raw_ones(tmp_path, heights
         assert found.weather[0] == pytest.approx(share, abs=3 * found.weather[1])
         assert found.weather[1] < 0.15
         assert {d.name: d.passed for d in found.decisions}["the light follows the weather as read"] is (share == 1.0)
-        assert any("no u here contains that" in note for note in found.notes) is (share == 0.0)
+        assert any("which no u here includes" in note for note in found.notes) is (share == 0.0)
 
 
-def test_a_shot_and_a_set_that_are_wrong_are_named_and_left_out_only_when_asked(tmp_path, heights):
+def test_wrong_shots_and_sets_are_named_and_rejected_only_on_request(tmp_path, heights):
     rng = np.random.default_rng(2)
     faulty = [((4, 1), 0.003)] + [((11, r), -0.004) for r in range(3)]
     seen = table(tmp_path / "o.csv", rng, shot=1e-4, one=2e-4, faulty=faulty)
@@ -233,7 +233,7 @@ def test_of_two_sets_that_contradict_each_other_neither_is_left_out(tmp_path, he
     assert found.keep.all()
     assert {s.rows for s in found.suspects} == {(36, 37, 38), (39, 40, 41)}
     assert all(set(s.rows + s.twins) == set(range(36, 42)) for s in found.suspects)
-    assert any("nothing tells which is wrong" in note for note in found.notes)
+    assert any("undecided which is wrong" in note for note in found.notes)
 
 
 def test_a_wrong_pillar_is_refused_with_its_line(tmp_path, heights):
@@ -290,7 +290,7 @@ def campaigns(path, tops, runs, seed):
 
 
 @draws(30, name="pairs")
-def test_what_is_claimed_is_what_pairs_of_campaigns_scatter(tmp_path, heights, pairs):
+def test_claims_match_the_scatter_of_pairs_of_campaigns(tmp_path, heights, pairs):
     """A standard deviation of 30 is known to 13 %; three of these."""
     missed, claimed = campaigns(tmp_path / "o.csv", heights(), pairs, 4)
     assert missed.std(axis=0) == pytest.approx(claimed, rel=same_sigmas(0.39, 30, pairs))
@@ -298,7 +298,7 @@ def test_what_is_claimed_is_what_pairs_of_campaigns_scatter(tmp_path, heights, p
 
 
 @pytest.mark.slow
-def test_what_is_claimed_is_what_600_pairs_of_campaigns_scatter(tmp_path, heights):
+def test_claims_match_the_scatter_of_600_pairs_of_campaigns(tmp_path, heights):
     missed, claimed = campaigns(tmp_path / "o.csv", heights(), 600, 5)
     assert missed.std(axis=0) == pytest.approx(claimed, rel=0.09)
 

@@ -190,7 +190,7 @@ def leakage_change(ranger, unit):
         ("thermometer WX2", lambda c, s: with_weather(c, "WX2", temperature_c=s), 0.5, -1),
     ],
 )
-def test_a_changed_record_moves_the_range_as_its_slope_says(planted, sight, key, change, step, sign):
+def test_a_changed_record_moves_the_range_by_its_slope(planted, sight, key, change, step, sign):
     """Samples to metres by the reduction's functions, the record changed; a reading raised is an offset raised.
 
     A thermometer's reading raised by its offset leaves the true air alone, so here, where the offset is taken as zero,
@@ -276,7 +276,7 @@ def test_a_shot_before_any_reference_pays_for_the_whole_walk(night_01, sight, pa
     assert scene.references.u_walk > 3.0 * sight(night_01, PRISM).references.u_walk
 
 
-def test_noise_and_converter_steps_together_are_the_samples_own_scatter(night_01, sight):
+def test_noise_and_converter_steps_add_up_to_the_samples_scatter(night_01, sight):
     scene = sight(night_01, PRISM)
     given = {item.key: item.given for item in items_of(scene)}
     together = np.hypot(given["noise"].u, given["steps"].u)
@@ -336,7 +336,7 @@ def test_a_shots_status_is_the_reductions(night_01, reduced_night_01, shot, stat
     assert (found.budget is None) == (status in ("reference", "blocked"))
 
 
-def test_what_the_network_says_stands_beside(night_01, reduced_night_01):
+def test_the_adjustments_result_is_reported_too(night_01, reduced_night_01):
     coordinates = reduced_night_01.coordinates
     found = explain_shot(night_01, PRISM, reduction=reduced_night_01)
     a, b = (coordinates.x[coordinates.index(name)] for name in (found.ranger, found.target))
@@ -479,7 +479,7 @@ def test_the_degrees_of_freedom_are_those_of_the_uncertainty_that_is_claimed(nig
     assert told == {7.0, 127.0}
 
 
-def test_what_the_sheet_does_not_say_is_named(night_01, reduced_night_01):
+def test_effects_missing_in_the_sheet_are_named(night_01, reduced_night_01):
     (note,) = explain_shot(night_01, PRISM, reduction=reduced_night_01, draws=0).notes
     assert note.startswith("not in this budget")
     assert "cyclic terms" in note
@@ -501,7 +501,7 @@ def sounded(campaign, shot, temperature_c=13.0, u=0.2):
 
 
 @pytest.mark.parametrize("shot", [PRISM, HOLLOW])
-def test_where_sound_tells_the_temperature_its_uncertainty_takes_the_thermometers_place(night_01, sight, shot):
+def test_sound_temperature_replaces_the_thermometers_uncertainty(night_01, sight, shot):
     plain, scene = sight(night_01, shot), sight(sounded(night_01, shot), shot)
     items = items_of(scene)
     slopes = numerical_sensitivity(measurement(scene, items), [item.given for item in items])

@@ -54,7 +54,7 @@ def test_a_held_parameter_stays_and_has_no_uncertainty():
     assert found.value("height") == pytest.approx(5.0, abs=1e-9)
 
 
-def test_what_no_reading_holds_is_named():
+def test_undetermined_parameters_are_named():
     with pytest.raises(EstimationError, match=r"rank deficient: .*rate"):
         fit_curved(
             decay([5.0, 0.8]) * 0 + 3.0,
@@ -64,7 +64,7 @@ def test_what_no_reading_holds_is_named():
         )
 
 
-def test_a_wrong_row_leaves_with_all_its_values_and_is_told():
+def test_a_wrong_row_is_rejected_with_all_its_values_and_reported():
     y = decay([5.0, 0.8])
     y[6] += 1.0
     rows = np.arange(len(X)) // 3

@@ -85,7 +85,7 @@ def test_a_component_below_zero_is_zero():
 
 
 @pytest.mark.parametrize("runs", RUNS)
-def test_false_alarms_come_as_often_as_the_level_says(runs):
+def test_false_alarms_are_as_frequent_as_the_level(runs):
     design, rng = line(20, 5)
     alarms = {"w": 0, "tau": 0}
     for _ in range(runs):
@@ -115,7 +115,7 @@ def test_readings_that_are_all_the_same_show_no_scatter():
         fit_readings(same, np.ones((3, 1)), unknown, names=["p"], effects=[Effect("e", np.ones(3), 0.1)])
 
 
-def test_what_cannot_be_rejected_is_refused():
+def test_readings_that_cannot_be_rejected_are_refused():
     design, rng = line(12, 7)
     y = 50.0 * rng.standard_normal(12)
     with pytest.raises(EstimationError, match="more than 33% of the readings would have to be rejected"):
@@ -139,7 +139,7 @@ def test_an_alternative_value_leaves_with_its_partner():
     assert fit.state(("",) * 12)[9] == "rejected"
 
 
-def test_groups_of_readings_that_agree_to_the_last_digit_say_what_is_missing():
+def test_groups_that_agree_to_the_last_digit_report_the_missing_u():
     same = np.kron(np.eye(3), np.ones((4, 4)))
     scatter = ObservedScatter(np.zeros((12, 12)), {"one": np.eye(12), "group": same})
     with pytest.raises(EstimationError, match="of one group agree to the last digit"):

@@ -54,7 +54,7 @@ def test_a_line_in_time_is_left_a_line_right_up_to_its_ends(night_01):
 
 
 @pytest.mark.parametrize("wander", [0.0, 0.3])
-def test_noise_of_readings_falls_to_what_the_record_claims(night_01, wander):
+def test_noise_of_readings_falls_to_the_records_claim(night_01, wander):
     """Of air that stands still far below a reading's 0.05 °C, of air that wanders by 0.3 °C a root hour by a half."""
     rng = np.random.default_rng(5)
     seconds = np.arange(0.0, 36001.0, 30.0)
@@ -172,7 +172,7 @@ def test_a_path_has_one_air_from_either_end(night_01):
     np.testing.assert_allclose(there.slopes, back.slopes, rtol=1e-12, atol=1e-20)
 
 
-def test_a_bend_of_one_degree_is_one_degree_warmer_half_way_and_nothing_at_the_stations(night_01):
+def test_a_bend_of_one_degree_is_one_degree_half_way_and_zero_at_the_stations(night_01):
     campaign, start = weathered(night_01, [0.0, 50.0], [0.0, 60.0], lambda s, i: 10.0 + 2.0 * i)
     field = AirField.of(campaign, ReductionSettings(air_model="rueger1990"))
     level = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 25.0], [0.0, 0.0, 50.0]])
@@ -206,7 +206,7 @@ def lined(campaign, rows):
 ENDS = [frozenset(("ZY101", "T")), frozenset(("ZY102", "T"))]
 
 
-def test_sound_takes_the_thermometers_place_on_its_own_line_and_leaves_the_vapour(night_01):
+def test_sound_replaces_the_thermometers_on_its_line_but_not_the_vapour(night_01):
     campaign, start = weathered(night_01, [0.0, 50.0], [0.0, 3600.0], lambda s, i: 10.0 + i)
     field = lined(campaign, [(start + 0.01, "T", "ZY101", 16.0, 0.2)])  # a line is the same from either end
     times = at(start, 864.0, 864.0)
@@ -235,7 +235,7 @@ def test_sound_counts_near_in_time_only_and_is_a_line_between_its_rows(night_01)
     np.testing.assert_allclose(field.lines[0].at(times)[0][1:4], [12.0, 12.5, 14.0], atol=1e-4)
 
 
-def test_slopes_of_a_sounded_line_are_derivatives_and_every_row_feels_its_own_u(night_01):
+def test_slopes_of_a_sounded_line_are_derivatives_scaled_by_each_rows_u(night_01):
     campaign, start = weathered(night_01, [0.0, 50.0], [0.0, 9000.0], lambda s, i: 10.0 + i)
     rows = [(start + s / SECONDS_PER_DAY, "ZY101", "T", 13.0, u) for s, u in ((1000.0, 0.1), (3000.0, 0.3))]
     times = at(start, 1000.0, 3000.0)
@@ -299,7 +299,7 @@ def test_a_station_that_falls_silent_keeps_its_last_reading_while_the_other_goes
     np.testing.assert_allclose(found[:, 1], [[14.0, 901.5, 60.0]] * 4, rtol=0, atol=1e-6)
 
 
-def test_a_station_with_one_reading_says_it_before_and_after(night_01):
+def test_a_station_with_one_reading_is_constant_in_time(night_01):
     campaign, start = trended(night_01, until=(3600.0, 0.0))
     found = AirField.of(campaign, ReductionSettings()).smoothed(at(start, -1800.0, 0.0, 1800.0, 5400.0))
     np.testing.assert_allclose(found[:, 1], [FIRST[1]] * 4, rtol=0, atol=1e-6)

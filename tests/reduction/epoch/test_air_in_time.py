@@ -134,7 +134,7 @@ def test_by_day_each_thermometer_may_be_too_warm_by_the_sines_share_of_the_sun(n
     assert sunshine > 0.0  # it reads too warm: the air is colder, the index higher
 
 
-def test_at_night_nothing_shines(night_01):
+def test_at_night_there_is_no_sunshine(night_01):
     field = AirField.of(weathered(night_01, None), ReductionSettings())
     assert field.errors == (ParameterKind.LAG,)
     assert field.sun.shape == (2, 0)
@@ -223,7 +223,7 @@ def test_an_east_gradient_of_a_hundredth_makes_a_path_100_m_east_a_degree_warmer
     assert abs(next(v for p, v in gradient.items() if (p.of, p.part) == ("east", "0"))) < 1e-6
 
 
-def test_a_station_that_stands_to_the_east_reads_the_air_there_and_not_the_middles(night_01):
+def test_a_station_in_the_east_reads_the_air_there_not_the_middles(night_01):
     """By hand: both stations at x = 100 read 10 °C, and it is 0.01 °C/m warmer to the east: 9 °C in the middle."""
     east = AirField.of(
         weathered(night_01, ((100.0, 0.0), (100.0, 0.0)), temperature=lambda s, i: 10.0), ReductionSettings()
@@ -237,7 +237,7 @@ def test_a_station_that_stands_to_the_east_reads_the_air_there_and_not_the_middl
     assert along_east(east, 0.0, values, y=50.0) == pytest.approx(index_at(10.5), abs=1e-8)  # n(T) is curved
 
 
-def test_the_gradient_with_height_between_the_stations_is_without_what_their_places_make(night_01):
+def test_the_height_gradient_excludes_the_effect_of_the_stations_places(night_01):
     """A mast 50 m higher and 100 m to the east reads 1 °C warmer: all of it is the site's 0.01 °C/m."""
     field = AirField.of(
         weathered(night_01, ((0.0, 0.0), (100.0, 0.0)), temperature=lambda s, i: 10.0 + i), ReductionSettings()

@@ -48,7 +48,7 @@ def knots(*, shots=600, span=(0.0, 3600.0), temperatures=TWO, others=(), zeta=(-
     return AirKnots.of(span, shots, temperatures, others, zeta=where)
 
 
-def test_hats_find_the_knot_before_and_the_way_to_the_next():
+def test_hats_find_the_knot_before_and_the_position_to_the_next():
     at = np.array([0.0, 10.0, 30.0])
     first, share = hats(at, np.array([-5.0, 0.0, 2.5, 10.0, 25.0, 30.0, 99.0]))
     assert first.tolist() == [0, 0, 0, 1, 1, 1, 1]  # never the last
@@ -98,7 +98,7 @@ def test_labels_name_every_parameter_once_in_the_order_of_the_columns():
         (100, 0.0, (2, 2, 2)),  # all shots at one time
     ],
 )
-def test_there_are_as_many_knots_as_shots_and_time_can_tell_apart(shots, span, count):
+def test_shots_and_time_limit_the_number_of_knots(shots, span, count):
     made = knots(shots=shots, span=(100.0, 100.0 + span))
     assert (len(made.level), len(made.slope), len(made.across)) == count
     for own in (made.level, made.slope, made.across):
@@ -111,7 +111,7 @@ def at_same_times(made):
     return np.isclose(made.level[:, None], made.slope)
 
 
-def test_what_two_stations_leave_unknown_is_by_hand_their_mean_and_half_their_difference():
+def test_two_stations_covariance_is_that_of_mean_and_half_difference():
     """Level is (a + b) / 2 and slope (b - a) / 2 of independent errors of 0.2 and 0.1 °C."""
     made = knots(shots=5000)
     k, m = len(made.level), len(made.slope)

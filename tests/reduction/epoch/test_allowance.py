@@ -83,7 +83,7 @@ def test_a_thermometer_that_is_ten_degrees_off_is_none(value):
     found = refused(NOTHING, {thermometer("WX1"): value}, field(), KNOWN, 12)
     assert found.held == {thermometer("WX1")}
     (text,) = found.texts
-    assert f"WX1's thermometer read {value:+.1f} °C too high" in text
+    assert f"a bias of WX1's thermometer by {value:+.1f} °C" in text
     assert "its record is kept" in text
     assert not found.same(NOTHING)
 
@@ -132,7 +132,7 @@ def test_a_thermometer_all_but_refuted_pulls_no_more_where_certified_paths_know_
     assert for_the_air(held, air, *adjusted).thermometers == {}
 
 
-def test_an_ordinary_gradient_asks_for_nothing():
+def test_an_ordinary_gradient_needs_no_allowance():
     for gradient in (0.9 * STEEPEST_DOWN, -0.0065, 0.0, 0.9 * STEEPEST_UP):
         air = field((10.0, 10.0 + 50.0 * gradient))
         found = for_the_air(NOTHING, air, *known(air, u=(SIGMA_C, SIGMA_C)))
@@ -141,7 +141,7 @@ def test_an_ordinary_gradient_asks_for_nothing():
         assert found.profile == 0.0
 
 
-def test_a_steep_inversion_widens_the_thermometer_of_which_the_ranges_know_nothing():
+def test_a_steep_inversion_widens_the_thermometer_undetermined_by_ranges():
     """By hand: 3 °C over 50 m are an inversion of 0.06 °C/m, or WX2, which nothing checks, is 3 °C off."""
     air = field((10.0, 13.0))
     found = for_the_air(NOTHING, air, *known(air, u=(0.05, 0.29)))
@@ -156,7 +156,7 @@ def test_a_steep_inversion_widens_the_thermometer_of_which_the_ranges_know_nothi
     np.testing.assert_allclose(found.sigmas(air), [0.3, np.hypot(0.3, 3.0), np.hypot(0.03, 0.3)], rtol=1e-6)
 
 
-def test_of_air_too_cold_above_what_is_beyond_the_usual_lapse_is_in_doubt():
+def test_for_air_too_cold_above_the_excess_over_the_usual_lapse_is_doubtful():
     """By hand: -2.5 °C over 50 m, of which the standard atmosphere has -0.325: 2.175 °C are left."""
     air = field((10.0, 7.5))
     found = for_the_air(NOTHING, air, *known(air, u=(0.28, 0.29)))
@@ -168,7 +168,7 @@ def test_of_air_too_cold_above_what_is_beyond_the_usual_lapse_is_in_doubt():
     assert "WX1's thermometer or WX2's thermometer is off by some 2.2 °C" in text
 
 
-def test_a_thermometer_that_is_found_biased_makes_no_gradient():
+def test_a_biased_thermometer_makes_no_gradient():
     air = field((10.0, 13.0))
     adjusted = known(air, values=(0.0, 2.9), u=(0.05, 0.05))
     found = for_the_air(NOTHING, air, *adjusted, dropped=[thermometer("WX2")])
@@ -182,7 +182,7 @@ def test_stations_at_one_height_show_no_gradient_to_judge():
     assert found.same(NOTHING)
 
 
-def test_a_steep_gradient_of_which_both_thermometers_are_known_still_bends_and_is_told():
+def test_a_steep_gradient_with_determined_thermometers_still_bends_and_is_noted():
     """Nobody doubts the thermometers, so it is an inversion; and an inversion's profile is no straight line."""
     air = field((10.0, 13.0))
     found = for_the_air(NOTHING, air, *known(air, u=(0.05, 0.05)))
@@ -214,7 +214,7 @@ def sloping(air, east, north=0.0):
     return known(air, values=values)
 
 
-def test_a_station_whose_place_nobody_said_is_off_by_the_gradient_over_the_site():
+def test_a_station_without_a_place_is_uncertain_by_the_gradient_over_the_site():
     air = field(placed=False)
     found = for_the_air(NOTHING, air, *sloping(air, 0.003, -0.004))
     expected = np.hypot(SIGMA_C, 0.005 * UNPLACED)
@@ -223,7 +223,7 @@ def test_a_station_whose_place_nobody_said_is_off_by_the_gradient_over_the_site(
     assert for_the_air(found, air, *sloping(air, 0.003, -0.004)).same(found)
 
 
-def test_a_station_whose_place_is_said_is_not_and_neither_is_any_in_even_air():
+def test_a_placed_station_or_even_air_needs_no_allowance():
     air = field()
     assert for_the_air(NOTHING, air, *sloping(air, 0.005)).same(NOTHING)
     air = field(placed=False)
@@ -233,7 +233,7 @@ def test_a_station_whose_place_is_said_is_not_and_neither_is_any_in_even_air():
 # -- the same allowance -----------------------------------------------------------------------------------------------
 
 
-def test_another_adjustment_is_asked_for_by_priors_and_families_and_by_no_doubt_that_is_only_considered():
+def test_only_changed_priors_and_families_require_another_adjustment():
     one = Allowance(
         held=frozenset([thermometer("WX1")]), thermometers={"WX2": 1.0}, profile=0.3, families={HEIGHT: 0.5}
     )
@@ -247,7 +247,7 @@ def test_another_adjustment_is_asked_for_by_priors_and_families_and_by_no_doubt_
     assert not dataclasses.replace(one, families={HEIGHT: 0.5, TIME: 0.1}).same(one)
 
 
-def test_a_doubt_that_is_considered_widens_by_what_a_prior_moves_the_answer():
+def test_a_considered_doubt_widens_by_the_priors_effect():
     """Against adjusting again with the prior's value moved by one standard uncertainty of the doubt."""
     air = field()
     every, rng = np.arange(air.count), np.random.default_rng(4)

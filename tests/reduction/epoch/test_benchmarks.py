@@ -53,7 +53,7 @@ def low_paths_off(night, reduction):
     return abs(float(np.mean(ranges.refractivity[marks] - true)))
 
 
-def test_each_benchmark_path_shows_its_index_beside_the_weathers(lied):
+def test_each_benchmark_path_reports_its_index_beside_the_weathers(lied):
     night, reduction, _ = lied
     series = benchmark_refractometers(reduction)
     assert [(s.benchmark, s.ranger) for s in series] == [(b.name, b.ranger) for b in night.benchmarks]
@@ -139,7 +139,7 @@ def sounded(campaign, rows):
     return dataclasses.replace(campaign, path_temperatures=path_temperature_columns(records))
 
 
-def test_sound_far_from_any_shot_changes_nothing_and_says_so(few_01, reduced_few_01):
+def test_sound_far_from_any_shot_is_noted_as_unused(few_01, reduced_few_01):
     start = float(few_01.shots.mjd_utc[0])
     far = sounded(few_01, [(start - 0.04, "ZY101", "ZEG41040L", 25.0, 0.1)])
     reduction = reduce_epoch(far)
@@ -147,7 +147,7 @@ def test_sound_far_from_any_shot_changes_nothing_and_says_so(few_01, reduced_few
     # what a distance of 100 m is rounded by moves a height that only its typed value holds (10 mm) as much more
     rounding = np.spacing(100.0) * reduced_few_01.coordinates.u / 100e-6
     assert np.all(moved <= np.maximum(1e-12, rounding))
-    assert any("they do nothing" in note for note in reduction.notes)
+    assert any("they are not used" in note for note in reduction.notes)
     assert reduction.coordinates.sound["ZEG41040L - ZY101"] == pytest.approx((0.0, 0.1))
 
 

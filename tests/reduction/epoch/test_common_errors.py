@@ -67,7 +67,7 @@ def moved(settled, error):
         "glass of batch 1",
     ],
 )
-def test_an_error_moves_the_answer_as_adjusting_again_with_it_does(settled, name):
+def test_an_error_moves_the_result_like_a_new_adjustment_with_it(settled, name):
     error = errors_of(settled, survey_scale_ppm=0.5, certificate_scale_ppm=0.1, sheets_at_c=20.0)[name]
     large = CommonError(  # beside what counts as settled; what is beyond the first order is a thousandth of it
         name,

@@ -71,7 +71,7 @@ def test_a_target_typed_three_decimetres_off_comes_out_where_it_was(few_01, redu
     assert compare(found, reduced_few_01.coordinates) < 1e-6
     notes = [n for n in found.notes if n.startswith("DP050")]
     assert len(notes) == 1
-    assert notes[0].startswith("DP050: position known to 300 mm only; whole cycles found jointly from 6 shots, next")
+    assert notes[0].startswith("DP050: position uncertain by 300 mm; whole cycles found jointly from 6 shots, next")
     assert not found.unresolved
     assert not found.ranges.thin.any()
     assert found.variance_factor == pytest.approx(reduced_few_01.coordinates.variance_factor, abs=1e-4)
@@ -91,7 +91,7 @@ def test_a_ranger_on_the_feed_arm_typed_three_decimetres_off_comes_out_where_it_
 ):
     found = few_adjusted(arm_off(few_01, "ZY113"))
     assert compare(found, reduced_few_01.coordinates) < 1e-6
-    assert any(n.startswith("ZY113: position known to 300 mm only; whole cycles found jointly") for n in found.notes)
+    assert any(n.startswith("ZY113: position uncertain by 300 mm; whole cycles found jointly") for n in found.notes)
 
 
 @pytest.mark.slow
@@ -105,7 +105,7 @@ def test_a_triplet_typed_three_decimetres_off_is_found_by_its_prisms_and_their_p
     assert not found.unresolved
 
 
-def test_what_four_rangers_cannot_tell_is_rejected_with_the_reason_and_never_guessed(few_01, reduced_few_01):
+def test_cycles_undecided_by_four_rangers_are_rejected_with_a_reason(few_01, reduced_few_01):
     reduction = reduce_epoch(target_off(few_01, "DP005"))
     before = reduced_few_01.status
     mine = [k for k, t in enumerate(few_01.shots.target) if t == "DP005" and before[k] == "used"]
@@ -113,7 +113,7 @@ def test_what_four_rangers_cannot_tell_is_rejected_with_the_reason_and_never_gue
     for k in mine:
         assert reduction.status[k] == "whole cycles unknown"
         reason = reduction.rejected[int(few_01.shots.shot[k])]
-        assert reason.startswith("whole cycles unknown: DP005 is typed to 300 mm only; of ")
+        assert reason.startswith("whole cycles unknown: typed position of DP005 is uncertain by 300 mm; of ")
         assert "range it from more stations" in reason
     assert "DP005" not in reduction.coordinates.points
     assert len(reduction.rejected) == len(reduced_few_01.rejected) + 4
@@ -126,7 +126,7 @@ def test_a_whole_night_typed_to_two_centimetres_is_found_step_by_step(night_01, 
     both = np.isin(before.ranges.shot, found.ranges.shot)
     np.testing.assert_array_equal(before.ranges.cycles[both], found.ranges.cycles)
     assert len(found.unresolved) <= 12
-    assert any("points known too badly for the nearest integer: whole cycles found jointly" in n for n in found.notes)
+    assert any("points too uncertain for the nearest integer: whole cycles found jointly" in n for n in found.notes)
 
 
 def test_a_certified_distance_is_as_good_as_a_position(few_01, reduced_few_01):
@@ -162,7 +162,7 @@ def test_points_are_doubtful_by_their_own_uncertainty_before_the_settings(night_
     assert doubtful(target_off(night_01, "DP005", u=2.0), u_position=0.0105) == typed - {"DP005"}
 
 
-def test_a_record_says_the_uncertainty_of_its_position_in_millimetres(night_01):
+def test_a_record_states_its_position_uncertainty_in_millimetres(night_01):
     places = places_of(triplet_off(arm_off(target_off(night_01, "DP005"), "ZY113", u=25.0), "TR05", u=40.0))
     assert places["DP005"].u_start == pytest.approx(0.3)
     assert places["ZY113"].u_start == pytest.approx(0.025)
@@ -174,7 +174,7 @@ def test_a_record_says_the_uncertainty_of_its_position_in_millimetres(night_01):
             TargetRow.model_validate(fields | {"u_position_mm": bad})
 
 
-def test_a_shot_whose_cycles_hang_on_a_typed_position_is_thin(few_01, reduced_few_01, part, few_targets, few_rangers):
+def test_a_shot_whose_cycles_depend_on_a_typed_position_is_thin(few_01, reduced_few_01, part, few_targets, few_rangers):
     # one ranger only: nothing but the typed 10 mm predicts its range, and five of them reach a quarter wavelength
     r = reduced_few_01
     drop = (few_targets == "DP050") & (few_rangers != "ZY113")
@@ -188,12 +188,13 @@ def test_a_shot_whose_cycles_hang_on_a_typed_position_is_thin(few_01, reduced_fe
     assert not any("the whole cycles of" in n for n in r.notes)
 
 
-def test_a_campaign_of_nothing_but_unknown_cycles_is_refused_with_the_reason(
+def test_a_campaign_with_only_unknown_cycles_is_refused_with_a_reason(
     few_01, reduced_few_01, part, few_targets, few_references
 ):
     only = part(target_off(few_01, "DP005"), (few_targets == "DP005") | few_references)
     with pytest.raises(
-        InputError, match=r"^shots\.csv: whole cycles unknown: DP005 is typed to 300 mm only; .*; nothing to adjust$"
+        InputError,
+        match=r"^shots\.csv: whole cycles unknown: typed position of DP005 is uncertain .*; nothing to adjust$",
     ):
         reduce_epoch(only)
 

@@ -48,7 +48,7 @@ def test_a_night_that_moistens_and_dries_has_one_spell_at_the_time_it_was_worst(
     )
 
 
-def test_frost_is_told_apart_and_a_single_sample_is_at_a_time(night_01):
+def test_frost_is_distinguished_and_a_single_sample_has_one_time(night_01):
     found = dew_risk(night(night_01, [-4.0, -4.0, -4.0], [60.0, 95.0, 60.0]), surface_minus_air_c=-3.0)
     (spell,) = found.spells
     assert spell.threat == "frost"
@@ -66,7 +66,7 @@ def test_stations_and_long_pauses_make_spells_of_their_own(night_01):
     ]  # fmt: skip
 
 
-def test_a_given_difference_shares_the_thermometer_with_the_dew_point(night_01):
+def test_a_typed_difference_shares_the_thermometer_with_the_dew_point(night_01):
     campaign = night(night_01, [10.0], [90.0])
     only_air = {"u_surface_c": 0.0, "u_temperature_c": 1.0, "u_humidity_percent": 0.0}
     shared = dew_risk(campaign, surface_minus_air_c=-3.0, **only_air).condensation.u_margin_k
@@ -75,7 +75,7 @@ def test_a_given_difference_shares_the_thermometer_with_the_dew_point(night_01):
     assert float(shared[0]) < 0.1 < 0.9 < float(apart[0])
 
 
-def test_a_measured_surface_is_interpolated_and_what_it_does_not_cover_is_not_judged(night_01):
+def test_a_measured_surface_is_interpolated_and_not_judged_outside(night_01):
     campaign = night(night_01, [10.0] * 5, [90.0] * 5)
     surface = SurfaceTemperature(
         START + np.array([250.0, 550.0, 650.0, 1100.0]) / SECONDS_PER_DAY, np.array([9.5, 8.0, 7.0, 5.0])
@@ -85,10 +85,10 @@ def test_a_measured_surface_is_interpolated_and_what_it_does_not_cover_is_not_ju
     expected = np.array([np.nan, 9.25, 7.5, 7.0 - 2.0 * 250 / 450, np.nan]) - dew
     np.testing.assert_allclose(found.condensation.margin_k, expected, atol=1e-5)  # an MJD resolves a microsecond
     assert found.condensation.deposit.tolist() == ["unknown", "none", "dew", "dew", "unknown"]
-    assert found.notes[-1].startswith("dew: the surface's temperature is unknown at 2 of 5 weather samples")
+    assert found.notes[-1].startswith("dew: surface temperature unknown at 2 of 5 weather samples")
 
 
-def test_between_readings_too_far_apart_nothing_is_judged(night_01):
+def test_long_gaps_between_readings_are_not_judged(night_01):
     campaign = night(night_01, [10.0] * 5, [90.0] * 5)
     surface = SurfaceTemperature(START + np.array([0.0, 1200.0]) / SECONDS_PER_DAY, np.array([9.0, 5.0]))
     found = dew_risk(campaign, surface=surface)
@@ -107,7 +107,7 @@ def test_fog_and_dry_air_at_zero_celsius_are_legal(night_01):
     assert found.condensation.deposit.tolist() == ["none", "frost"]
 
 
-def test_the_surface_is_asked_for_once_and_in_order(night_01):
+def test_surface_input_must_be_single_and_in_order(night_01):
     surface = SurfaceTemperature(np.array([START, START]), np.array([5.0, 5.0]))
     with pytest.raises(InputError, match="give either"):
         dew_risk(night_01)

@@ -25,7 +25,7 @@ def test_night_01s_stations_agree(few_01):
     ("offset", "said"),
     [({"pressure_hpa": 86.0}, "barometers"), ({"humidity_percent": -45.0}, "hygrometers")],
 )
-def test_stations_that_disagree_are_told_and_neither_thermometer_alone_is_blamed(few_01, offset, said):
+def test_disagreeing_stations_are_noted_and_no_single_thermometer_is_blamed(few_01, offset, said):
     reduction = reduce_epoch(with_offset(few_01, "WX2", **offset))
     (note,) = [n for n in reduction.notes if "disagree" in n]
     assert said in note
@@ -35,7 +35,7 @@ def test_stations_that_disagree_are_told_and_neither_thermometer_alone_is_blamed
     assert note in reduction.coordinates.doubts
 
 
-def test_a_certificate_a_metre_off_is_told_beside_the_typed_places_of_its_ends(few_01):
+def test_a_certificate_a_metre_off_is_noted_with_its_ends_typed_places(few_01):
     first, *others = few_01.benchmarks
     longer = first.model_copy(update={"certified_distance_mm": first.certified_distance_mm + 1000.0})
     reduction = reduce_epoch(dataclasses.replace(few_01, benchmarks=(longer, *others)))

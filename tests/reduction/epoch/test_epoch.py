@@ -73,7 +73,7 @@ def test_the_cycles_were_never_in_doubt_at_the_end(reduced_night_01):
     assert np.all((ranges.phase >= 0) & (ranges.phase < 2 * np.pi))
 
 
-def test_uncertainties_are_what_the_layout_promises(reduced_night_01):
+def test_uncertainties_meet_the_layouts_specification(reduced_night_01):
     """Issue 2: rms per coordinate of balls 60, triplet prisms 90, dish prisms 110, arm 66, struct 110 um."""
     c = reduced_night_01.coordinates
     groups = {"ball": [], "prism": [], "dish": [], "arm": [], "struct": []}
@@ -157,7 +157,7 @@ def test_reducing_twice_gives_the_same_bits(night_01, reduced_night_01):
     assert again.rejected == reduced_night_01.rejected
 
 
-def test_progress_is_told_from_samples_to_the_end(night_01, part, targets_01):
+def test_progress_is_reported_from_samples_to_the_end(night_01, part, targets_01):
     seen = []
     small = part(night_01, np.isin(targets_01, ["ZRG", "ZBM02", "TR01-B"]))
     reduce_epoch(small, progress=lambda *call: seen.append(call))

@@ -201,7 +201,7 @@ def test_each_effect_unknown_or_of_the_wrong_sign_spoils_the_coordinates(
     assert reversed_ == pytest.approx(2.0 * unknown, rel=0.1)
 
 
-def test_night_01_knows_of_no_effect_and_gets_no_parameter(network_01, reduced_night_01):
+def test_night_01_has_no_head_effects_and_no_parameters(network_01, reduced_night_01):
     assert not any(quantity.kind in HEAD_KINDS for quantity in network_01.layout.at)
     for name in network_01.rangers:
         _, parts = shot_group(network_01, name, np.array(network_01.layout.start))
@@ -242,9 +242,7 @@ def linear(campaign, phases, start):
     return network, answer
 
 
-def test_what_is_planted_within_the_priors_comes_back_but_for_what_the_covariance_leaves_open(
-    few_01, reduced_few_01, open_minded
-):
+def test_planted_effects_within_the_priors_are_recovered_within_the_covariance(few_01, reduced_few_01, open_minded):
     """Linear theory: parameters p of prior u^2 answer with p - C p/u^2, and coordinates x with -C_xp p/u^2.
 
     Both sides are independent: p goes in by traced rays and sums, C is the covariance that the reduction claims.
@@ -366,9 +364,7 @@ def changed(campaign, name, **said):
         ({"u_axis_mm": 0.01}, "u_axis_mm = 0.01"),
     ],
 )
-def test_axes_on_the_feed_arm_are_refused_since_nothing_says_how_the_mirror_is_turned(
-    few_01, reduced_few_01, said, shown
-):
+def test_axes_on_the_feed_arm_are_refused_without_the_mounts_orientation(few_01, reduced_few_01, said, shown):
     r = reduced_few_01
     with pytest.raises(InputError) as caught:
         build_network(changed(few_01, "ZY115", **said), r.phases, r.electronics, settings=r.settings)
@@ -376,7 +372,7 @@ def test_axes_on_the_feed_arm_are_refused_since_nothing_says_how_the_mirror_is_t
     assert "\n" not in str(caught.value)
 
 
-def test_axes_on_the_feed_arm_are_applied_where_the_record_says_how_the_mount_is_turned(few_01, reduced_few_01):
+def test_axes_on_the_feed_arm_are_applied_with_the_mounts_orientation(few_01, reduced_few_01):
     """The mount's z^ along the reflector's -z, y^ along its y: x^ is then -x, and at az 145.3, el 30 all is turned."""
     r = reduced_few_01
     turned = [
@@ -399,7 +395,7 @@ def test_axes_on_the_feed_arm_are_applied_where_the_record_says_how_the_mount_is
     assert correction[0] == pytest.approx(0.4e-3 - cube, abs=1e-6)
 
 
-def test_a_cube_behind_the_mirror_has_no_axis_correction_and_says_so(few_01, reduced_few_01):
+def test_a_cube_behind_the_mirror_has_no_axis_correction_and_is_reported(few_01, reduced_few_01):
     r = reduced_few_01
     ne0 = few_01.mirror_of("ZY104").ne0
     campaign = changed(few_01, "ZY104", u_axis_mm=0.01, elv_zrg=ne0 + 26_000)

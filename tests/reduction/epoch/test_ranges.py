@@ -140,7 +140,7 @@ def test_a_reference_of_foreign_strength_is_found_by_its_amplitude(night_01):
     bad = with_frames(night_01, k, lambda codes: turned(codes, 0.0, 1.1))
     _, rejected = follow_electronics(bad, measure_phases(bad, ReductionSettings()))
     assert list(rejected) == [k]
-    assert "something else is in the beam" in rejected[k]
+    assert "another object is in the beam" in rejected[k]
 
 
 def test_good_references_are_all_kept(night_01, reduced_night_01):
@@ -184,7 +184,7 @@ def test_a_site_whose_electronics_walk_otherwise_than_it_says_is_told(night_01):
         ranging = night_01.site.ranging.model_copy(update={"electronic_drift_mrad_per_sqrt_hour": claimed})
         told = dataclasses.replace(night_01, site=night_01.site.model_copy(update={"ranging": ranging}))
         (note,) = walk_notes(told, phases, wrong)
-        assert f"not by the {claimed:g} of site.toml: u_range is too {word}" in note
+        assert f"unlike the {claimed:g} of site.toml: u_range is too {word}" in note
 
 
 def test_a_walk_that_one_difference_contradicts_is_a_note_and_no_failure(night_01):
@@ -200,7 +200,7 @@ def test_a_walk_that_one_difference_contradicts_is_a_note_and_no_failure(night_0
     ranging = night_01.site.ranging.model_copy(update={"electronic_drift_mrad_per_sqrt_hour": 0.5})
     told = dataclasses.replace(night_01, site=night_01.site.model_copy(update={"ranging": ranging}))
     (note,) = walk_notes(told, phases, wrong)
-    assert "not by the 0.5 of site.toml: u_range is too small" in note
+    assert "unlike the 0.5 of site.toml: u_range is too small" in note
 
 
 def test_electronics_that_stand_still_are_told_without_limits_that_mean_nothing(night_01):

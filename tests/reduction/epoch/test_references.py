@@ -55,7 +55,7 @@ def test_a_reference_at_an_end_may_be_off_as_a_head_that_warms_up_is(night_01, p
 def test_the_same_inside_is_a_bad_reference_as_no_warm_up_bends_so_much(night_01, phases, inside, sign):
     wrong = rejected(night_01, phases, one(inside, sign * BETWEEN))
     assert list(wrong) == [inside]
-    assert f"phase {sign * BETWEEN:+.4f} rad off what the neighbouring references predict" in wrong[inside]
+    assert f"phase {sign * BETWEEN:+.4f} rad off the prediction by the neighbouring references" in wrong[inside]
 
 
 @pytest.mark.parametrize("end", [0, -1])

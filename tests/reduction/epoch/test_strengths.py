@@ -17,9 +17,9 @@ from catseye.reduction.epoch.strengths import (
     MOST_PPM,
     Processes,
     ProcessStrength,
-    _climbed,
     _eddies,
-    _Shown,
+    _estimated_strengths,
+    _Evidence,
     with_processes,
 )
 from catseye.reduction.epoch.telescope_motion import PARTS, WALK, TelescopeKnots
@@ -56,8 +56,8 @@ def strength_of(rng, true, *, sigma=0.3, before=0.5, usual=0.5, n=60, each=None)
     own = shape(n)
     groups = [observed(rng, true * drawn(rng, own), sigma), prior(before**2 * own)]
     solution = adjust(np.zeros(n), groups)
-    shown = _Shown.of(solution, np.arange(n), before**2 * own, 0.0 * own, [own])
-    return _climbed([shown], np.array([before]), np.array([usual]), low=LOW, high=HIGH)[0]
+    shown = _Evidence.of(solution, np.arange(n), before**2 * own, 0.0 * own, [own])
+    return _estimated_strengths([shown], np.array([before]), np.array([usual]), low=LOW, high=HIGH)[0]
 
 
 @pytest.mark.parametrize("true", [0.2, 1.0, 3.0])
@@ -84,8 +84,8 @@ def test_a_strength_of_experience_is_worth_six_observations():
         truth = 3.0 * rng.standard_normal(n)
         own = np.eye(n)
         groups = [Linear("seen", truth, np.full(n, 1e-8), np.arange(n), np.eye(n)), prior(own)]
-        shown = _Shown.of(adjust(np.zeros(n), groups), np.arange(n), own, 0.0 * own, [own])
-        (found,) = _climbed([shown], np.array([1.0]), np.array([1.0]), low=LOW, high=HIGH)
+        shown = _Evidence.of(adjust(np.zeros(n), groups), np.arange(n), own, 0.0 * own, [own])
+        (found,) = _estimated_strengths([shown], np.array([1.0]), np.array([1.0]), low=LOW, high=HIGH)
         expected = np.sqrt((truth @ truth + EXPERIENCE * 1.0) / (n + EXPERIENCE))
         # 3 %: steps end below a tenth of a variance's logarithm
         assert found == pytest.approx(expected, rel=0.03)
@@ -97,8 +97,8 @@ def test_where_nothing_is_observed_the_strength_stays_the_usual_one(before):
     own = shape(n)
     far = Linear("elsewhere", np.zeros(1), np.ones(1), np.array([n]), np.ones((1, 1)))
     solution = adjust(np.zeros(n + 1), [prior(before**2 * own), far])
-    shown = _Shown.of(solution, np.arange(n), before**2 * own, 0.0 * own, [own])
-    (found,) = _climbed([shown], np.array([before]), np.array([0.3]), low=LOW, high=HIGH)
+    shown = _Evidence.of(solution, np.arange(n), before**2 * own, 0.0 * own, [own])
+    (found,) = _estimated_strengths([shown], np.array([before]), np.array([0.3]), low=LOW, high=HIGH)
     assert found == pytest.approx(0.3, rel=0.05)  # to a tenth of a variance's logarithm
 
 
@@ -108,8 +108,8 @@ def test_strengths_end_at_their_limits():
     assert max(still) < 0.01
     n, own = 60, shape(60)
     groups = [observed(rng, 300.0 * drawn(rng, own), 0.1), prior(own)]
-    shown = _Shown.of(adjust(np.zeros(n), groups), np.arange(n), own, 0.0 * own, [own])
-    assert _climbed([shown], np.array([1.0]), np.array([1.0]), low=LOW, high=HIGH) == HIGH
+    shown = _Evidence.of(adjust(np.zeros(n), groups), np.arange(n), own, 0.0 * own, [own])
+    assert _estimated_strengths([shown], np.array([1.0]), np.array([1.0]), low=LOW, high=HIGH) == HIGH
 
 
 def test_two_processes_of_one_strength_are_judged_together():
@@ -120,10 +120,10 @@ def test_two_processes_of_one_strength_are_judged_together():
         for _ in range(2):
             own = shape(30)
             groups = [observed(rng, drawn(rng, own), 0.1), prior(own)]
-            shown.append(_Shown.of(adjust(np.zeros(30), groups), np.arange(30), own, 0.0 * own, [own]))
+            shown.append(_Evidence.of(adjust(np.zeros(30), groups), np.arange(30), own, 0.0 * own, [own]))
         one = np.ones(1)
-        together.append(_climbed(shown, one, one, low=LOW, high=HIGH)[0])
-        apart += [_climbed([each], one, one, low=LOW, high=HIGH)[0] for each in shown]
+        together.append(_estimated_strengths(shown, one, one, low=LOW, high=HIGH)[0])
+        apart += [_estimated_strengths([each], one, one, low=LOW, high=HIGH)[0] for each in shown]
     assert np.std(together) < np.std(apart)
     assert np.mean(together) == pytest.approx(1.0, abs=4.0 / np.sqrt(2.0 * 60.0 * 25.0) + 0.02)
 
@@ -152,7 +152,7 @@ def test_scores_are_derivatives_of_the_restricted_likelihood():
         return -0.5 * (free + group.observed @ inverse @ group.observed)
 
     solution = adjust(np.zeros(n + 1), [line, prior(total(np.ones(2)))])  # with other strengths than are asked for
-    shown = _Shown.of(solution, np.arange(n), total(np.ones(2)), known, shapes)
+    shown = _Evidence.of(solution, np.arange(n), total(np.ones(2)), known, shapes)
     seen, expected, _ = shown.scores(strength)
     for k in range(2):
         step = np.zeros(2)
@@ -265,7 +265,7 @@ def spreads(every, strength):
     return [np.sqrt(value) for p in parts for value in (p[0, 0], p[0, 0] + p[1, 1] - 2.0 * p[0, 1])]
 
 
-def test_a_campaign_that_shows_nothing_keeps_the_usual_strengths():
+def test_an_uninformative_campaign_keeps_the_usual_strengths():
     every, count = processes()
     none = Linear("nothing", np.zeros(1), np.ones(1), np.array([0]), np.zeros((1, 1)))
     found = estimated(every, none, count, ProcessStrength())
@@ -274,7 +274,7 @@ def test_a_campaign_that_shows_nothing_keeps_the_usual_strengths():
     np.testing.assert_allclose(found.telescope, 1.0, rtol=0.05)
 
 
-def test_quiet_air_and_wild_air_stay_within_what_air_can_be():
+def test_strengths_of_quiet_and_wild_air_stay_within_limits():
     rng = np.random.default_rng(9)
     quiet = ProcessStrength(AirStrength(1e-4, 1e-4, 1e-4, 1e-4, 1e-6), telescope=(1e-3,) * len(PARTS))
     one = estimated(*seen_processes(rng, quiet, sigma=1e-4), ProcessStrength())
@@ -375,7 +375,7 @@ def test_eddies_that_went_are_taken_back():
     assert _eddies(solution, 0.5, lengths) < 0.15
 
 
-def test_shots_that_nothing_checks_say_nothing_whatever_their_rounding():
+def test_unchecked_shots_give_no_information():
     rng = np.random.default_rng(6)
     solution, lengths = fits(rng, 0.3)
     checked = _eddies(solution, 0.0, lengths)
@@ -384,7 +384,7 @@ def test_shots_that_nothing_checks_say_nothing_whatever_their_rounding():
     assert _eddies(solution, 0.0, lengths) == pytest.approx(checked, rel=0.02)
 
 
-def test_more_than_two_ppm_no_air_holds_and_no_shot_says_nothing():
+def test_eddies_are_limited_to_two_ppm():
     rng = np.random.default_rng(5)
     solution, lengths = fits(rng, 20.0)
     assert _eddies(solution, 0.0, lengths) == pytest.approx(MOST_PPM)

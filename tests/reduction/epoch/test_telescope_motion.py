@@ -100,7 +100,7 @@ def test_a_dish_of_few_points_does_not_bend():
     assert np.all(KNOTS.slopes("ZY101", ["DP001"], a, b, towards)[0, at] != 0.0)
 
 
-def test_between_points_of_the_ground_nothing_moves_and_on_the_telescope_no_shift_shows():
+def test_ground_lines_do_not_move_and_a_common_shift_is_invisible():
     a = PLACES["ZY113"].start[None]
     b = PLACES["ZEG"].start[None]
     towards = (a - b) / np.linalg.norm(a - b)
@@ -113,7 +113,7 @@ def test_between_points_of_the_ground_nothing_moves_and_on_the_telescope_no_shif
     np.testing.assert_array_equal(KNOTS.slopes("ZY101", ["ZRG"], a, b, (a - b) / np.linalg.norm(a - b)), 0.0)
 
 
-def test_the_walk_is_from_zero_in_the_middle_and_its_halves_know_nothing_of_each_other():
+def test_the_walk_starts_at_zero_in_the_middle_with_independent_halves():
     knots = TelescopeKnots.of(2.0 * 3600.0, PLACES)
     np.testing.assert_allclose(knots.knots, [-3600.0, -1800.0, 1800.0, 3600.0])
     expected = np.array([[1.0, 0.5, 0.0, 0.0], [0.5, 0.5, 0.0, 0.0], [0.0, 0.0, 0.5, 0.5], [0.0, 0.0, 0.5, 1.0]])
@@ -131,7 +131,7 @@ def test_the_covariance_is_that_of_random_walks_that_are_drawn():
     np.testing.assert_allclose(np.cov(drawn.T), KNOTS.covariance, atol=0.17)
 
 
-def test_each_time_hangs_on_its_two_knots_and_the_middle_is_none():
+def test_each_time_depends_on_its_two_knots_and_the_middle_is_none():
     rng = np.random.default_rng(3)
     seconds = rng.uniform(-0.5 * HOURS * 3600.0, 0.5 * HOURS * 3600.0, 200)
     columns, share = KNOTS.columns(seconds)

@@ -66,7 +66,7 @@ def test_only_the_datums_z_is_held(network_01):
     assert held == ["ZY103-F z"]
 
 
-def test_points_nobody_fired_at_are_no_unknowns_but_a_whole_triplet_is(night_01, part, targets_01, reduced_night_01):
+def test_unmeasured_points_are_no_unknowns_but_a_complete_triplet_is(night_01, part, targets_01, reduced_night_01):
     keep = (targets_01 == "TR03-L") | (targets_01 == "ZRG") | (targets_01 == "ZBM02")
     few = reduce_epoch(part(night_01, keep)).coordinates
     seen = {p for p in few.points if not p.endswith("-F")}

@@ -141,7 +141,7 @@ def test_a_large_night_is_reduced_by_states_and_its_claims_hold(many, reduced_ma
     assert 0.9 < coordinates.variance_factor < 1.1
 
 
-def test_how_the_dish_stands_is_not_learned_from_typed_positions(many, reduced_many):
+def test_typed_positions_do_not_determine_the_dishs_pose(many, reduced_many):
     """All that is typed on the dish is moved and turned together, by some millimetres: the answer must not follow.
 
     As independent positions they would claim to know the dish's place to 10 mm over the root of 190, and pull it.
@@ -167,7 +167,7 @@ def test_how_the_dish_stands_is_not_learned_from_typed_positions(many, reduced_m
     assert np.abs((found.x[rows] - there.x[rows]) / there.u[rows]).max() < 0.1
 
 
-def test_prisms_in_a_block_and_what_many_share_on_the_border(many, reduced_many):
+def test_prisms_are_blocks_and_shared_parameters_the_border(many, reduced_many):
     network = build_network(many, reduced_many.phases, reduced_many.electronics, settings=ReductionSettings())
     border, at = network.border.columns, network.layout.at
     assert not border[network.layout.columns("DP007")].any()

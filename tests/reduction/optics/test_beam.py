@@ -37,7 +37,7 @@ def head():
     return reduce_beam(read_record(EXAMPLE, BeamTrain).model_copy(update={"distances_m": (20.0, 100.0)}))
 
 
-def test_what_returns_is_the_round_formula_of_the_link_budget():
+def test_the_return_agrees_with_the_link_budgets_round_formula():
     for aperture_mm in (25.4, 8.0):
         found = reduce_beam(plain(reflector={"radius_mm": aperture_mm}))
         known = gaussian_beam.returned_share(
@@ -68,7 +68,7 @@ def test_a_wider_detector_takes_more_light_and_never_none():
     assert [row.status for row in found.returned] == ["ok"] * 4
 
 
-def test_power_is_what_is_left_by_each_place(head):
+def test_power_is_the_product_of_the_shares(head):
     power = head.train.laser.power_mw * 1e-3
     for place in head.places:
         assert 0.0 < place.power <= power * (1.0 + 1e-12)
@@ -91,7 +91,7 @@ def test_the_same_aperture_twice_takes_its_share_once():
     assert twice[1].power == once[0].power == pytest.approx(1e-3 * -np.expm1(-2 * 0.64))
 
 
-def test_the_diode_leaves_the_collimator_as_wide_as_its_divergence_says(head):
+def test_the_collimated_beams_width_follows_from_the_divergence(head):
     collimator = head.places[0]
     half = np.radians([10.0, 28.0]) * np.sqrt(2.0 / np.log(2.0)) / 2.0
     # half maximum to 1/e^2 of a Gaussian angle; tan, and the waist's own size is nothing at 20 mm
@@ -153,7 +153,7 @@ def test_an_image_off_the_middle_reads_short(head):
     assert head.u_image == pytest.approx(2.0 * k * 5e-6 * np.hypot(10e-6, 5e-6), rel=1e-9)
 
 
-def test_an_uncertain_place_shifts_the_range_by_what_drawn_places_shift_it(head):
+def test_an_uncertain_place_shifts_the_range_like_drawn_places(head):
     diode = Photodiode(radius=1e-4, sheet_resistance=50.0, capacitance=0.5e-12)
     places = np.hypot(*(np.random.default_rng(6).normal(scale=5e-6, size=(2, 20_000)) + np.array([[10e-6], [0.0]])))
     spot = float(np.sqrt(np.mean(head.places[-1].radius ** 2)))
@@ -161,7 +161,7 @@ def test_an_uncertain_place_shifts_the_range_by_what_drawn_places_shift_it(head)
     assert head.range_effects["image off the middle"] == pytest.approx(drawn, rel=0.02)
 
 
-def test_two_isolators_hold_back_what_each_does(head):
+def test_two_isolators_multiply(head):
     one, two = (reduce_beam(plain(outward=[{"kind": "isolator", "turn_deg": 44.0}] * n)).laser for n in (1, 2))
     for key in ("isolation_db", "worst_isolation_db"):
         assert two[key] == pytest.approx(2.0 * one[key])
@@ -197,7 +197,7 @@ def test_less_isolation_moves_a_range_more(head):
     assert head.laser["range_bound_by_interference"] == pytest.approx(bound)
 
 
-def test_what_diffraction_cannot_follow_is_a_status_and_not_an_exception():
+def test_failed_diffraction_is_a_status_not_an_exception():
     found = reduce_beam(plain(reflector={"radius_mm": 18.0}, distances_m=[2.0, 120.0]))
     near, far = found.returned
     assert found.status == "ok"
@@ -226,7 +226,7 @@ def test_the_profile_meets_the_places(head):
     assert profile["range"][1][-1] == pytest.approx(next(p for p in head.places if p.leg == "reflector").radius)
 
 
-def test_a_glass_or_coating_that_nobody_knows_is_refused():
+def test_an_unknown_glass_or_coating_is_refused():
     for element, text in (
         ({"kind": "plate", "thickness_mm": 3.0, "glass": "ice"}, "glass 'ice' is not known"),
         ({"kind": "mirror", "coating": "paint"}, "coating 'paint' is not known"),

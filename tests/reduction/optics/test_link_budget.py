@@ -78,9 +78,9 @@ def test_the_samples_noise_of_night_01_gives_its_ranges_uncertainty(reduced_nigh
     assert 5e-6 < budget.u_range < 20e-6
 
 
-def test_full_scale_and_grazing_light_are_told():
+def test_full_scale_and_grazing_light_are_reported():
     assert link_budget(replace(LINK, volts_per_ampere=1e7), PRISM, 20.0).clipped
-    with pytest.raises(ValidityError, match="nothing of the face"):
+    with pytest.raises(ValidityError, match="no part of the face"):
         link_budget(LINK, PRISM, 100.0, incidence=1.4)
     with pytest.raises(ValidityError, match="right angle"):
         link_budget(LINK, PRISM, 100.0, incidence=1.6)
@@ -109,7 +109,7 @@ def test_each_part_of_the_budget_is_its_hand_computation():
     assert found.crosstalk_range == pytest.approx(0.09993082 * turned / (2 * np.pi), rel=1e-4)
 
 
-def test_a_wide_beam_gives_a_tilted_prism_what_its_clear_area_catches():
+def test_a_wide_beam_on_a_tilted_prism_follows_its_clear_area():
     wide = replace(LINK, waist=0.5)
     straight, tilted = (link_budget(wide, PRISM, 100.0, incidence=i).factors for i in (0.0, 0.3))
     share = clear_share(0.3, aperture=0.0254, height=0.0381, index=1.511)
@@ -117,7 +117,7 @@ def test_a_wide_beam_gives_a_tilted_prism_what_its_clear_area_catches():
 
 
 @pytest.mark.parametrize("off", [{"offset": -0.01}, {"offset": np.nan}, {"background": -1e-6}, {"background": np.inf}])
-def test_a_beam_off_by_less_than_nothing_and_dark_daylight_are_refused(off):
+def test_negative_offset_and_negative_daylight_are_refused(off):
     with pytest.raises(ValidityError, match="is not 0 or more and finite"):
         link_budget(LINK, PRISM, 100.0, **off)
 

@@ -23,7 +23,7 @@ def heights(relative, u, conforms=(0.5, 0.5, 0.5)):
     )
 
 
-def test_how_corners_stand_with_the_readings_own_scatter_taken_off():
+def test_corner_statistics_without_the_readings_scatter():
     """(100² + 200² + 300²)/3 = 46 666.7 as measured; less (10² + 20² + 30²)/3 = 466.7 is 46 200."""
     told = standing(heights((100.0, -200.0, 300.0), (10.0, 20.0, 30.0), (0.99, 0.02, 0.5)))
     assert told.rms == pytest.approx(MICRO * 46_666.667**0.5, rel=1e-6)
@@ -34,7 +34,7 @@ def test_how_corners_stand_with_the_readings_own_scatter_taken_off():
     assert standing(heights((5.0, -5.0, 5.0), (10.0, 10.0, 10.0))).rms_true == 0.0
 
 
-def test_what_turning_did_by_a_straight_line_through_zero():
+def test_turning_result_by_a_line_through_zero():
     """Asked -100, 200, -300; came -90, 220, -330. Variances 10² + 10² + 10², 20² + 10² + 10², 30² + 10² + 10² (readings
     before and after, the turn): (30 + 73.3 + 90)/(33.3 + 66.7 + 81.8) = 1.06333; rests 16.333, 7.333, -11.
     """

@@ -166,7 +166,7 @@ def test_a_wrong_reading_is_found_by_name_and_left_out(tmp_path, sheet):
     assert np.abs(z).max() < 4.0
 
 
-def test_of_two_placements_nothing_tells_which_is_wrong_and_both_are_left_out(tmp_path, sheet):
+def test_two_contradicting_placements_are_both_rejected(tmp_path, sheet):
     sheet = sheet.model_copy(update={"panel": sheet.panel.model_copy(update={"u_twist_um": 200.0})})
     rng = np.random.default_rng(7)
     layout = patch()

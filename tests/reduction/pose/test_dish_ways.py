@@ -17,7 +17,7 @@ def ways(reduced_night_01):
     return {way.command: way for way in dish_ways(reduced_night_01)}
 
 
-def test_reduce_is_told_as_the_reduction_has_it(ways, reduced_night_01):
+def test_reduce_estimate_equals_the_reduction(ways, reduced_night_01):
     way, pose = ways["catseye reduce"], reduced_night_01.surface.pose()
     np.testing.assert_array_equal(way.translation, pose["translation"])
     np.testing.assert_array_equal(way.rotation, pose["rotation"])
@@ -45,7 +45,7 @@ def test_a_free_focal_length_takes_ten_arc_seconds_of_the_offset_dish(ways):
     assert abs(free.axis - held.axis)[0] / ARCSECOND < 1.0
 
 
-def test_every_way_follows_a_dish_that_is_turned_by_a_known_amount(ways, reduced_night_01):
+def test_every_estimate_follows_a_known_turn_of_the_dish(ways, reduced_night_01):
     """The dish's points turned about the nominal vertex by hand: each way moves by that turn, signs and all."""
     turn = np.array([6.0, -4.0, 3.0]) * ARCSECOND
     coordinates = reduced_night_01.coordinates

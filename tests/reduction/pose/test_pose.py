@@ -86,7 +86,7 @@ def test_against_design_the_typed_places_count_as_sure_as_they_are(night_01):
 
 
 @pytest.mark.parametrize("optics", ["prime", "gregorian"])
-def test_the_beam_is_what_the_coordinator_says_of_the_same_points(night_01, optics):
+def test_the_beam_agrees_with_the_coordinators_for_the_same_points(night_01, optics):
     """`live_pose`, an older form with other weights, on exact points; only the prime focus is in it."""
     later = epoch(night_01, dish=(TURN, SHIFT), arm=(0.5 * TURN, 2.0 * SHIFT))
     before = epoch(night_01, seed=1)
@@ -124,11 +124,11 @@ def test_a_subreflector_that_goes_with_the_dish_leaves_the_beam_to_the_dish(nigh
     np.testing.assert_allclose(found.offset, [TURN[1], TURN[0], 0.0], rtol=0, atol=1e-8)
 
 
-def test_what_cannot_be_asked_is_refused(night_01):
+def test_invalid_requests_are_refused(night_01):
     later = epoch(night_01)
     with pytest.raises(InputError, match="one of the two"):
         pose_of_group(later, None, night_01)
-    with pytest.raises(InputError, match="'roof' is none of"):
+    with pytest.raises(InputError, match="'roof' is not one of"):
         group_names("roof", night_01)
     with pytest.raises(InputError, match="no points of the group 'subreflector'"):
         pose_of_group(later, None, night_01, group="subreflector")
@@ -138,7 +138,7 @@ def test_what_cannot_be_asked_is_refused(night_01):
         pose_of_group(later, later, night_01, points=["DP001", "DP002"])
     with pytest.raises(InputError, match="posture is unknown"):
         pose_of_group(later, replace(later, posture=None), night_01, group="dish")
-    with pytest.raises(InputError, match="'sky' is none of"):
+    with pytest.raises(InputError, match="'sky' is not one of"):
         frame_transform("sky", night_01)
     ground = pose_of_group(later, later, night_01, group="dish").pose
     with pytest.raises(FrameError, match="expected 'reflector'"):
@@ -146,7 +146,7 @@ def test_what_cannot_be_asked_is_refused(night_01):
 
 
 @pytest.mark.parametrize(("wrong", "said"), [((0.0, 0.5), "in elevation"), ((0.6, 0.0), "across the elevation axis")])
-def test_a_posture_that_is_not_the_dish_s_is_told_with_its_size_and_accuses_nobody(night_01, wrong, said):
+def test_a_posture_that_contradicts_the_dish_is_reported_without_accusation(night_01, wrong, said):
     """By hand: half a degree of elevation; 0.6 degrees of azimuth times cos 30 degrees, 0.520."""
     real = epoch(night_01)
     told = replace(real, posture=(POSTURE[0] - wrong[0] * DEGREE, POSTURE[1] - wrong[1] * DEGREE))
@@ -156,7 +156,7 @@ def test_a_posture_that_is_not_the_dish_s_is_told_with_its_size_and_accuses_nobo
     assert verdict.word == "doubtful"
     assert said in found.posture.doubt
     assert abs(np.linalg.norm(found.posture.offset) / DEGREE - size) < 0.01
-    assert "nothing here says which is wrong" in found.posture.doubt
+    assert "undecided which is wrong" in found.posture.doubt
 
 
 @pytest.mark.parametrize("frame", ["ground", "alidade", "reflector"])

@@ -51,7 +51,7 @@ def test_where_height_and_standard_air_do_not_decide_none_is_accused(offset):
     ]
     assert found.difference == pytest.approx(-offset, abs=0.2)
     assert found.accused == ""
-    assert "do not say which" in found.text
+    assert "do not decide which" in found.text
 
 
 def test_order_does_not_matter():
@@ -84,7 +84,7 @@ def test_a_distance_in_another_unit_is_named(factor, looks):
     assert found.u == pytest.approx(np.sqrt(1e-8 + 2e-8) * 1e3)
 
 
-def test_a_distance_within_five_u_agrees_and_beyond_it_accuses_nobody():
+def test_a_distance_within_five_u_agrees_and_beyond_it_is_undecided():
     ends = np.array([[0.0, 0.0, 0.0], [30.0, 40.0, 0.0]])
     u = np.sqrt(3e-8)
     for off, told in ((4.9 * u, False), (5.1 * u, True)):

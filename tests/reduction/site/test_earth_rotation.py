@@ -4,7 +4,7 @@ import pytest
 from catseye.errors import ValidityError
 from catseye.geometry.sky.sun import altitude_azimuth, sun_direction
 from catseye.records.site.site import Location
-from catseye.reduction.site.earth_rotation import FramePlace, RotationStatus, _each, place_of, rotation_at, sun_at
+from catseye.reduction.site.earth_rotation import FramePlace, RotationStatus, _directly, place_of, rotation_at, sun_at
 from sun_scene import GREEN_BANK, MORNING, apart, astropy_sun
 
 ARCSECOND = np.pi / 648_000
@@ -37,14 +37,14 @@ def test_the_bulletins_printed_values_are_met():
     assert after - before == pytest.approx(1.0, abs=2e-3)
 
 
-def test_a_leap_second_makes_no_step_in_the_suns_way():
+def test_a_leap_second_makes_no_step_in_the_suns_path():
     mjd = 51_179.0 + np.array([-2, -1, 0, 1, 2]) / 86_400
     track = sun_at(mjd, GREEN_BANK).direction
     step = apart(track[1:], track[:-1])
     assert np.max(step) / np.min(step) < 1.01
 
 
-def test_outside_the_tables_it_is_zero_and_says_so():
+def test_outside_the_tables_ut1_utc_is_zero_with_a_status():
     far = rotation_at([41_400.0, 75_000.0])
     assert far.ut1_minus_utc[1] == 0.0
     assert far.code.tolist() == [0, 2]
@@ -65,7 +65,7 @@ def test_inside_the_tables_astropy_agrees_within_five_arc_seconds():
 
 def test_many_times_are_interpolated_within_two_milliseconds_of_arc():
     mjd = MORNING + np.random.default_rng(2).uniform(0, 1, 3000)
-    exact = _each(mjd, GREEN_BANK)
+    exact = _directly(mjd, GREEN_BANK)
     assert np.max(np.abs(sun_at(mjd, GREEN_BANK).direction - exact)) < 1e-8  # the cubic's remainder, 5e-9
     grid = mjd.reshape(30, 100)
     assert sun_at(grid, GREEN_BANK).direction.shape == (30, 100, 3)
@@ -73,7 +73,7 @@ def test_many_times_are_interpolated_within_two_milliseconds_of_arc():
 
 def test_scattered_times_are_not_interpolated():
     mjd = np.linspace(45_000, 60_000, 100)
-    assert np.array_equal(sun_at(mjd, GREEN_BANK).direction, _each(mjd, GREEN_BANK))
+    assert np.array_equal(sun_at(mjd, GREEN_BANK).direction, _directly(mjd, GREEN_BANK))
 
 
 def test_a_site_record_and_its_air():

@@ -68,7 +68,7 @@ def test_a_triplets_normal_looks_at_the_aim_point(night_01):
         assert left.normal @ towards / np.linalg.norm(towards) > np.cos(np.radians(2.0))
 
 
-def test_places_say_what_is_there(night_01):
+def test_places_have_kind_and_body(night_01):
     places = places_of(night_01)
     assert set(places) | {"ZRG"} == set(night_01.target_names)
     for name, place in places.items():

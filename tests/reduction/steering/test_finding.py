@@ -70,7 +70,7 @@ def test_a_target_off_its_predicted_place_is_found(prime):
     assert len(np.unique(spot.looked_at, axis=0)) == len(spot.looked_at)  # no place twice
 
 
-def test_a_target_that_is_not_there_is_a_status_that_says_what_was_searched():
+def test_an_absent_target_is_a_status_with_the_searched_area():
     rng = np.random.default_rng(1)
     dark = ranger(rng, TRUE, peak=0.0)
     spot = find(TRUE, HEAD, dark, search_radius=1e-3)
@@ -86,7 +86,7 @@ def test_a_target_that_is_not_there_is_a_status_that_says_what_was_searched():
     gone = find(TRUE, HEAD, lambda at: np.nan, search_radius=5e-4)
     assert "without a reading" in gone.status
     fine = find(TRUE, SearchHead(HEAD.zeros, HEAD.azimuth_limits, 5e-5, 0.5, 0.02), dark, search_radius=5e-4)
-    assert fine.status.endswith("the spot is narrower than whole counts surely meet")
+    assert fine.status.endswith("the spot is narrower than the step of whole counts")
     narrow = SearchHead(HEAD.zeros, (TRUE[0] + 2, TRUE[0] + 500), RADIUS, 0.5, 0.02)
     assert "beyond the stops" in find(TRUE, narrow, dark, search_radius=1e-3).status
 
@@ -139,14 +139,14 @@ def anywhere(rng):
 
 @draws(40, name="n")
 @pytest.mark.parametrize("how", [{}, {"missing": 0.2}, {"full": 4.0}])
-def test_the_centres_scatter_is_what_the_covariance_says_where_the_spot_is_gaussian(how, n):
+def test_the_centres_scatter_matches_the_covariance_for_a_gaussian_spot(how, n):
     """The mean of e' C^-1 e is 2, that of n fits has u = 2/sqrt(n)."""
     ratios, factors = errors(np.random.default_rng(7), n, anywhere, real=False, **how)
     assert np.mean(ratios) == pytest.approx(2.0, abs=4 * 2 / np.sqrt(n))
     assert np.mean(factors) == pytest.approx(1.0, abs=0.3)  # shafts within a count are bounded, not normal
 
 
-def test_a_real_spot_is_found_within_what_the_covariance_says():
+def test_a_real_spot_is_found_within_its_covariance():
     """Two apertures by diffraction, not the model: its misfit may widen the claim, which must not be too good."""
     n = 40
     ratios, factors = errors(np.random.default_rng(8), n, anywhere)
@@ -165,11 +165,11 @@ def test_the_claims_hold_over_many_spots(how):
 
 
 def test_the_derivatives_of_the_fit_are_finite_differences():
-    from catseye.reduction.steering.spot_fit import _Sheet
+    from catseye.reduction.steering.spot_fit import _SpotModel
 
     rng = np.random.default_rng(3)
     xy = rng.uniform(-2, 2, (30, 2))
-    sheet = _Sheet(xy, rng.uniform(0, 5, 30), np.zeros(30, bool), HEAD, np.array([0.1, 0.2]))
+    sheet = _SpotModel(xy, rng.uniform(0, 5, 30), np.zeros(30, bool), HEAD, np.array([0.1, 0.2]))
     p = np.array([0.2, -0.3, 0.15, 4.0, 0.3, 0.6])
     for k in range(6):
         step = np.zeros(6)
@@ -267,7 +267,7 @@ def test_the_table_for_the_adjustment_has_the_columns_that_its_calibration_reads
         "A,1.00000,2.00000,3.00000,9000.123,5000.000,0.2,0.3,direct,52889.25000000001",
         "B,4.00000,5.00000,6.00001,59000.123,-5000.000,0.2,0.3,prime,52889.25000000001",
     ]
-    with pytest.raises(ValidityError, match="B was found and has no place"):
+    with pytest.raises(ValidityError, match="B was found but has no place"):
         adjustment_readings(results, {"A": [1, 2, 3]}, 0.0)
     with pytest.raises(ValidityError, match="none of 1 targets"):
         adjustment_readings(results[2:], {}, 0.0)
@@ -310,13 +310,13 @@ def test_a_spike_on_the_way_does_not_end_the_search():
 
 def test_a_name_that_would_break_the_table_is_refused():
     result = SearchResult("A,B", Spot("found", np.array([1.0, 2.0]), np.eye(2)), TimeTag(1, 0))
-    with pytest.raises(ValidityError, match="'A,B' is no name for a table"):
+    with pytest.raises(ValidityError, match="'A,B' is not a valid name for a table"):
         search_results([result])
-    with pytest.raises(ValidityError, match="'A,B' is no name for a table"):
+    with pytest.raises(ValidityError, match="'A,B' is not a valid name for a table"):
         adjustment_readings([result], {"A,B": [1, 2, 3]}, 0.0)
 
 
-def test_every_move_of_a_search_is_asked_for_from_where_the_mirror_stands():
+def test_every_move_of_a_search_is_checked_from_the_mirrors_position():
     asked, at = [], np.add(np.rint(TRUE), [40.0, 10.0])
 
     def allowed(start, end):

@@ -142,7 +142,7 @@ def test_a_slew_through_the_sun_is_refused_with_the_time_when_it_may_go():
         assert not own.slew(MORNING + early * (verdict.free_at_mjd - 12 * SECOND - MORNING), start, end).allowed
 
 
-def test_a_slew_into_the_sunrise_says_how_near_it_comes():
+def test_a_slew_into_the_sunrise_reports_its_clearance():
     # The cone counts for the whole of a move during which the Sun may rise: also where it has not yet.
     mjd = 52_889.0 + np.arange(0.4, 0.5, 1e-5)
     height = sun_at(mjd, GREEN_BANK).direction[:, 2] + np.sin(2 * DEGREE)
@@ -155,7 +155,7 @@ def test_a_slew_into_the_sunrise_says_how_near_it_comes():
         assert 0.0 <= verdict.clearance <= TOUCH
 
 
-def test_nothing_is_told_beyond_the_time_looked_ahead(monkeypatch):
+def test_no_time_is_reported_beyond_the_look_ahead(monkeypatch):
     own = guard()
     n = counts(STATION, STATION.scan_point + 100 * sun_at(MORNING + 0.16, GREEN_BANK).direction)
     comes = own.until(MORNING, n)
@@ -168,7 +168,7 @@ def test_boxes_are_named_and_never_become_free():
     target = np.array([147.0, -21.0, 4.0])  # in the control room
     own = guard(boxes=boxes()[:1])
     verdict = own.pointing(MORNING, counts(STATION, target))
-    assert "hits control-room; a box does not go away (people work behind the windows): choose" in verdict.reason
+    assert "hits control-room; a box is permanent (people work behind the windows): choose" in verdict.reason
     assert verdict.free_at_mjd is None
     over = counts(STATION, [135.0, -21.0, 9.3])  # 0.3 m above its near edge, and rising
     near = own.pointing(MORNING, over)

@@ -81,7 +81,7 @@ def test_a_gap_in_a_wall_is_found_and_a_shut_wall_blocks():
     assert route(own, MORNING, low, high, step=(600.0, 300.0)).status == RouteStatus.BLOCKED
 
 
-def test_ends_that_are_not_allowed_say_so():
+def test_forbidden_ends_are_reported():
     own = guard()
     assert route(own, MORNING, AT_SUN, END).status == RouteStatus.STARTS_INSIDE
     assert route(own, MORNING, START, AT_SUN).status == RouteStatus.TARGET_INSIDE

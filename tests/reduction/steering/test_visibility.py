@@ -106,7 +106,7 @@ def test_reasons_are_lines_that_a_person_reads(solids, scene):
     assert found.seen[np.ix_(ground, prisms)].mean() < 0.1
 
 
-def test_what_was_ranged_that_night_is_seen(night_01, scene):
+def test_targets_ranged_that_night_are_visible(night_01, scene):
     """Shots of the night, with nothing in the way: every one lies within the acceptance of its retroreflector."""
     rangers, targets, frames = scene
     found = visibility(rangers, targets, Solids(), frames=frames)

@@ -51,7 +51,7 @@ def by_hand(x, a, e, t):
     return rz(a) @ (x + np.array([0, 0, 0.5646e-3 * t]))
 
 
-def test_the_chain_is_what_the_file_says(antenna):
+def test_the_chain_follows_the_file(antenna):
     x = np.array([-2.67, 3.76, 47.3])
     found = antenna.ground_from("feed_arm", POSTURE).points(x)
     np.testing.assert_allclose(found, by_hand(x, 0.9, np.radians(38.0), -12.0), rtol=0, atol=1e-12)

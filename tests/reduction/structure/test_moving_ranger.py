@@ -87,7 +87,7 @@ def test_it_is_the_station_of_one_posture_with_the_deformed_arm(antenna, mirror)
         np.testing.assert_allclose(moving.station.scan_point[i], still.scan_point, rtol=0, atol=1e-12)
 
 
-def test_at_slew_rate_the_scan_point_moves_as_the_rates_say(antenna, mirror):
+def test_at_slew_rate_the_scan_point_moves_by_the_rates(antenna, mirror):
     moving = moving_ranger(RANGER, mirror, antenna, drive=DRIVE, times=TIMES, u_mount=1e-5)
     speed = np.diff(moving.station.scan_point, axis=0)[0] / 0.128
     # in the elevation frame the ranger stands (-8.9, -57.94, 65.85) m from the elevation axis, nearly
@@ -249,7 +249,7 @@ def test_strangers_are_refused(antenna, mirror):
     assert isinstance(DRIVE.posture(TIMES), TelescopePosture)
 
 
-def test_what_stands_on_the_alidade_does_not_follow_the_elevation_encoder(tmp_path):
+def test_points_on_the_alidade_do_not_follow_the_elevation_encoder(tmp_path):
     more = """
 [[frame]]
 name = "tower"
@@ -274,7 +274,7 @@ u_position_mm = 1.0
     np.testing.assert_array_equal(loose, still)
 
 
-def test_an_arm_that_ground_rangers_track_is_foretold_as_if_a_detector_saw_it(antenna, mirror):
+def test_an_arm_tracked_by_ground_rangers_is_predicted_as_by_a_detector(antenna, mirror):
     """Ground coordinates of a target at the arm's top, slewing and swinging, to where the arm's ranger will be."""
     rng, u, rate = np.random.default_rng(5), 2e-4, 7.8
     t = 100.0 + np.arange(400) / rate - 400 / rate

@@ -49,7 +49,7 @@ def planted(seed, *, epochs=40, n=8, noise=0.05, wind=(0.0, 0.0), own=0.0, hyste
     return GroupSeries("arm", "reflector", names, mjd, posture, way, places, spread, PIVOT, labels), true
 
 
-def test_what_was_planted_comes_back_and_is_foretold():
+def test_planted_motion_is_recovered_and_predicted():
     series, true = planted(1)
     found = fit_structure(series, SeriesModel(scatter=False))
     told = found.predict(series.posture.elevation, temperature_c=series.posture.temperature_c)
@@ -82,7 +82,7 @@ def test_foretelling_covers_the_truth_as_often_as_it_claims(runs):
     np.testing.assert_allclose(np.mean(u, axis=0)[:3], 0.3 * MILLIMETRE, rtol=same_sigmas(0.15, 60, runs))
 
 
-def test_epochs_left_out_are_met_as_claimed_and_too_small_a_claim_is_seen():
+def test_epochs_left_out_are_predicted_as_claimed_and_small_claims_detected():
     series, _ = planted(4, epochs=60, wind=(0.3, 3.0), own=0.1)
     honest = left_out(series, SeriesModel())
     assert 0.75 < honest.ratio < 1.3
@@ -129,7 +129,7 @@ def test_points_alone_and_points_together_agree_where_they_are_independent():
             np.testing.assert_allclose(a, b, rtol=1e-5, atol=1e-9 * np.abs(b).max())
 
 
-def test_outside_the_epochs_it_says_so():
+def test_predictions_outside_the_epochs_are_flagged():
     found = fit_structure(planted(1)[0])
     told = found.predict([5.0 * DEGREE, 45.0 * DEGREE], temperature_c=[10.0, 60.0])
     assert len(told.outside) == 2
@@ -139,7 +139,7 @@ def test_outside_the_epochs_it_says_so():
     assert far > near
 
 
-def test_what_is_unknown_or_floats_is_refused_by_name():
+def test_unknown_or_floating_quantities_are_refused_by_name():
     series, _ = planted(1)
     from dataclasses import replace
 

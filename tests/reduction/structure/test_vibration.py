@@ -104,7 +104,7 @@ def test_the_twins_modes_are_found_with_their_sizes_and_shapes(twin):
     assert any("3.9 Hz" in note for note in found.notes)
 
 
-def test_one_ranger_alone_says_that_it_does_not_know():
+def test_one_ranger_alone_leaves_the_alias_undecided():
     rng = np.random.default_rng(2)
     t = np.arange(3000) / RATE
     y = 100.0 + 1e-4 * np.sin(2 * np.pi * 5.0 * t) + U * rng.standard_normal(3000)
@@ -116,7 +116,7 @@ def test_one_ranger_alone_says_that_it_does_not_know():
     assert any("2.8 Hz are aliases is open" in note for note in found.notes)
 
 
-def test_two_targets_of_one_ranger_share_what_is_the_rangers():
+def test_two_targets_of_one_ranger_share_its_errors():
     """What the electronics do cancels; what moves a target stays, to the claimed uncertainty."""
     rng = np.random.default_rng(3)
     t = np.arange(2000) / RATE
@@ -133,7 +133,7 @@ def test_two_targets_of_one_ranger_share_what_is_the_rangers():
         difference(near, RangeSeries("ZY102", "X", t + 1e4, far.ranges, far.u))
 
 
-def test_interpolation_lets_through_what_it_says():
+def test_interpolation_passes_the_stated_power():
     rng = np.random.default_rng(4)
     t, part, f = np.arange(4000) / RATE, 0.3, 1.1
     still = RangeSeries("A", "X", t[:-1] + part / RATE, np.zeros(3999), np.full(3999, U))
@@ -160,7 +160,7 @@ def test_movements_are_the_twins_to_their_claimed_uncertainty(twin):
     assert np.mean(chi) == pytest.approx(3.0, rel=0.1)
     with pytest.raises(InputError, match="one plane"):
         movements(series[:3], np.array([[1.0, 0, 0], [0, 1, 0], [1, 1, 0]]))
-    with pytest.raises(InputError, match="three up"):
+    with pytest.raises(InputError, match="at least three"):
         movements(series[:2], e[:2])
 
 
@@ -173,5 +173,5 @@ def test_series_too_short_or_apart_are_refused():
         vibration([one(20)])
     with pytest.raises(InputError, match="overlap by 0 s"):
         vibration([one(200), one(200, 1e4)])
-    with pytest.raises(InputError, match="one up"):
+    with pytest.raises(InputError, match="at least one"):
         vibration([])

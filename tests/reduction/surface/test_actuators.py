@@ -39,7 +39,7 @@ def test_applied_corrections_make_the_dish_a_paraboloid(every):
 
 
 @pytest.mark.parametrize("count", [150, 600])
-def test_foretold_deviations_are_off_by_what_they_claim(count):
+def test_predicted_deviations_err_as_claimed(count):
     """Prisms left out of 2209: deviation from the paraboloid that the measured prisms' true places would give."""
     ratios, rel = [], []
     for seed in range(4):
@@ -79,7 +79,7 @@ def test_a_measured_actuator_is_known_better_and_supported_by_its_own_prism(tent
         assert row.correction_mm == -row.deviation_mm
 
 
-def test_a_target_beyond_the_limits_is_told_and_not_cut(tenth):
+def test_a_target_beyond_the_limits_is_reported_and_not_clipped(tenth):
     shape, free = tenth
     found = corrections(shape, NAMES, PLACES, positions={NAMES[7]: 25.4, NAMES[8]: -25.4}, roughness=free.roughness)
     np.testing.assert_array_equal(found.correction, free.correction)
@@ -88,7 +88,7 @@ def test_a_target_beyond_the_limits_is_told_and_not_cut(tenth):
     assert found.within.sum() == len(NAMES) - sum(outward)
     row = rows_of(found)[7]
     assert row.target_mm == pytest.approx(25.4 + row.correction_mm)
-    with pytest.raises(InputError, match=r"actuator = 'X1' of the positions is none"):
+    with pytest.raises(InputError, match=r"actuator = 'X1' of the positions is unknown"):
         corrections(shape, NAMES, PLACES, positions={"X1": 0.0}, roughness=free.roughness)
 
 

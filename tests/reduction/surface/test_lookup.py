@@ -48,7 +48,7 @@ def test_gravity_temperature_and_hysteresis_come_back_as_sure_as_claimed():
     assert rows[HYSTERESIS] < 0.2 * TRUE[HYSTERESIS]
 
 
-def test_the_table_is_the_way_up_and_down_at_the_mean_temperature():
+def test_the_table_holds_rising_and_falling_at_the_mean_temperature():
     found = lookup_of(epochs(np.random.default_rng(4), u=1e-8, temperatures=np.linspace(0.0, 20.0, len(ELEVATIONS))))
     k = found.shapes[0].expansion.terms.index(BENT)
     assert found.table_deg[0] == 10.0
@@ -59,13 +59,13 @@ def test_the_table_is_the_way_up_and_down_at_the_mean_temperature():
         np.testing.assert_allclose(found.table[:, k, column], middle + half * TRUE[HYSTERESIS], rtol=0, atol=1e-7)
 
 
-def test_what_the_epochs_cannot_tell_is_left_out_with_its_reason():
+def test_terms_undetermined_by_the_epochs_are_left_out_with_a_reason():
     rng = np.random.default_rng(5)
     up = lookup_of(epochs(rng, elevations=np.array(UP), temperatures=np.full(6, 10.0)))
     assert up.columns == ("constant", SIN, COS)
-    assert up.left_out[HYSTERESIS] == "elevation went one way only"
+    assert up.left_out[HYSTERESIS] == "elevation moved in one direction only"
     assert up.left_out[THERMAL] == "temperatures within 0.00 °C"
     two = lookup_of(epochs(rng, elevations=np.array([20.0, 60.0, 20.0])))
     assert SIN in two.left_out
-    with pytest.raises(EstimationError, match="2 epochs at least, 1 given"):
+    with pytest.raises(EstimationError, match="2 epochs at least, not 1"):
         lookup_of(epochs(rng, elevations=np.array([20.0, 30.0]))[:1])

@@ -110,7 +110,7 @@ def test_a_ball_beside_the_mid_point_counts_by_the_slope_of_the_line_of_sight():
     np.testing.assert_allclose(known.h_corr, beside.h_corr, atol=5e-9)
 
 
-def test_what_ranging_and_plate_say_does_not_depend_on_the_paint():
+def test_results_of_ranging_and_plate_do_not_depend_on_the_paint():
     scene, *_, lengths = recovered(50, 12, tilt=0.0)
     paint = 0.1e-3
     points = {name: getattr(scene, name) - paint for name in ("fiducial_1", "fiducial_2", "ball")}

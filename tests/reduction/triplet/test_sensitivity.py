@@ -28,7 +28,7 @@ def test_a_unit_as_designed_is_calibrated_and_used_without_error():
     assert np.abs(telescope_error(Departures(), scan_point=around(0.5))).max() < ROUNDING
 
 
-def test_each_departure_shows_in_the_calibration_as_appendix_a_says():
+def test_each_departure_affects_the_calibration_as_in_appendix_a():
     """The scan point over the left prism. D_MP is told from the wrong spacing; the ball from where it is not. Depths
     follow distances by the cosine of the sight, 1.5e-4: so 0.1 % of 2.6 um."""
     place = {"depth": 18.0, "aside": -0.3175, "above": 0.05}

@@ -77,7 +77,7 @@ def test_the_truth_leaves_no_residual(seed):
         assert np.abs(residual).max() < 0.12 * np.abs(without).max()
 
 
-def test_priors_are_given_once_for_every_parameter():
+def test_every_parameter_has_one_prior():
     units = [sheet(Rotation.identity(), [0.0, 0.0, 0.0])] * 3
     first = COUNT * np.arange(3)
     own = triplet_observations(units, TripletParameters(first))
@@ -90,7 +90,7 @@ def test_priors_are_given_once_for_every_parameter():
     assert shared[0].offset[:, :2].tolist() == [[11, 12]] * 3
 
 
-def test_a_lateral_offset_shows_where_a_unit_is_seen_in_many_postures():
+def test_a_lateral_offset_is_determined_by_many_postures():
     """Eight postures turned about all axes; prisms and ball known to 20 um each time: the offset of the ball, 0.3 mm
     with a prior of 0.2 mm, is found to u = 20 um sqrt(1 + 1/2) / sqrt(8) = 8.7 um, and lies within 4 u of the truth."""
     rng = np.random.default_rng(21)

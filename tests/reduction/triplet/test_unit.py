@@ -88,7 +88,7 @@ def test_a_misread_placement_is_named_and_kept():
     assert found.weights[4] == pytest.approx(0.2, abs=0.01)
 
 
-def test_a_slip_of_the_memos_rule_is_told_beside_ours():
+def test_a_slip_of_the_memos_rule_is_noted():
     found = reduced("TR06")
     assert found.cycles.n_1[0] == found.memo.n_1[0] + 1
     # one half wavelength in both prisms, none in the ball: H_corr off by 99.9 mm
@@ -158,7 +158,7 @@ def test_one_reading_of_the_prisms_for_several_flips_is_not_counted_twice():
     assert found.budget["phases"] == pytest.approx(one * np.sqrt(0.5 + 1 / 4), rel=1e-3)
 
 
-def test_the_index_of_the_glass_where_it_is_given():
+def test_the_index_of_the_glass_of_the_sheet_is_used():
     """The ball's glass outweighs the prisms' by 108 mm of path, which the air's index scales."""
     held = reduce_triplet(measurement())
     follows = reduce_triplet(measurement(bk7_group_index=N * 1.00025))
@@ -199,11 +199,11 @@ def test_paint_and_departures_by_hand():
 def test_a_wrong_spacer_shows_in_the_place_of_the_stops():
     found = reduce_triplet(measurement(placement__1__spacer_mm=25.5))
     assert found.steps[1] == pytest.approx(0.1e-3, abs=1e-8)
-    assert any("placement 2: by ranging the stops stand +100.0 µm" in note for note in found.notes)
+    assert any("placement 2: by ranging the stops are +100.0 µm" in note for note in found.notes)
     assert not any("by ranging the stops" in note for note in reduce_triplet(measurement()).notes)
 
 
-def test_a_coarse_distance_off_by_half_of_a_half_wavelength_is_told():
+def test_a_coarse_distance_off_by_a_quarter_wavelength_is_noted():
     off = {f"placement__{k}__d_toppl_mm": d + 45.0 for k, d in enumerate((18150.0, 18124.6, 18099.2))}
     found = reduce_triplet(measurement(**off))
     assert found.status == ("thin margin",) * 3
@@ -285,7 +285,7 @@ def test_a_random_unit_is_reduced_as_its_truth_within_its_uncertainty():
     assert abs(found.h_corr - truth) < 4.0 * found.u_h_corr
 
 
-def test_a_placement_written_twice_is_told_and_does_not_break_the_weights():
+def test_a_repeated_placement_is_noted_and_keeps_valid_weights():
     """Nothing but the phases differs between placements here, and they are the same."""
     own = document()["placement"][0]
     quiet = {f"u_{key}": 0.0 for key in ("temperature_c", "pressure_hpa", "humidity_percent")}
@@ -313,7 +313,7 @@ def test_equal_digits_are_no_proof_of_one_reading_where_they_are_few():
     )
 
 
-def test_what_the_memos_index_leaves_out_is_told():
+def test_omissions_of_the_memos_index_are_noted():
     (note,) = [note for note in reduced("TR99").notes if "as against vacuum" in note]
     # 4.30e-4 of the ratio times 124.6 and 108.1 mm
     assert "1.52750" in note
@@ -325,9 +325,9 @@ def test_what_the_memos_index_leaves_out_is_told():
 def test_no_index_of_glass_is_offered_for_a_whole_cycle():
     text = " ".join(reduce_triplet(measurement(placement=document()["placement"][:1], d12_mm=500.0)).notes)
     assert "ranging and surface plate differ by" in text
-    assert "would join them" not in text
+    assert "would reconcile them" not in text
     near = reduce_triplet(measurement(ball__r1_mm=50.0626, ball__pc_b_mm=-173.741529))  # 50 um: 7e-4 of the ratio
-    assert any("would join them" in note for note in near.notes)
+    assert any("would reconcile them" in note for note in near.notes)
 
 
 def test_a_barometer_in_millimetres_of_mercury_is_suspected():

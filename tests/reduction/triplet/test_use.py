@@ -88,7 +88,7 @@ def test_the_ball_above_the_prisms_is_nearer_to_the_feed_arm():
     assert float(found.d_mp[0, 0] - found.d_bc[0, 0]) == pytest.approx(0.5e-3, abs=1e-12)
 
 
-def test_the_series_of_figure_ten_and_what_it_leaves_out():
+def test_the_series_of_figure_ten_and_its_neglected_term():
     """Delta = N half wavelengths; the rest up to a wavelength in delta_1 + delta_2. D_12^2 (1 - sin^2) s / (16 Delta^2)
     with the sine of incidence towards a prism; third-order terms are a hundredth of it."""
     half = SPEED_OF_LIGHT / (2 * 1500e6 * 1.00025)
@@ -126,7 +126,7 @@ def test_angles_at_the_prisms_to_the_aim_differ_by_opposite_leans_and_hardly_mov
 
 
 @given(seeds)
-def test_the_obliquity_moves_with_the_normal_as_its_derivative_says(seed):
+def test_the_obliquity_moves_with_the_normal_by_its_derivative(seed):
     rng = np.random.default_rng(seed)
     u = unit(turn=Rotation.random(random_state=rng))
     s = before(u, rng, spread=0.5)

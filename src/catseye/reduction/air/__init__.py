@@ -1,1 +1,1 @@
-"""The air a night was measured in: refractometers, sound, what each path holds."""
+"""Air of a night: refractometers, sound, index along each path."""

@@ -1,8 +1,11 @@
-"""Temperature of the air along a path from travel times of sound, and the index of light along the same path.
+"""Air temperature along a path by sound, and the light's index there.
 
-Two directions at once give the wind and take it out (`atmosphere.sound.path`); one needs a wind from elsewhere. What is
-common to all measurements of a path is kept common: its length, the delay of loudspeaker and microphone, the station's
-pressure and humidity, the crosswind, the bend of the ray, the formula itself. Only times are noise.
+From travel times of sound.
+
+Two directions at once give the wind and take it out (`atmosphere.sound.path`); one needs a wind from another source.
+Errors common to all measurements of a path are modelled as common: its length, the delay of loudspeaker and microphone,
+the station's pressure and humidity, the crosswind, the bend of the ray, the formula itself. Only the times are
+independent.
 """
 
 from dataclasses import dataclass, replace
@@ -30,7 +33,7 @@ GRADIENT = ValidInterval("gradient of the speed", "1/s", -10.0, 10.0, "the notio
 
 @dataclass(frozen=True, eq=False)
 class StationAir:
-    """The air as a weather station has it; what is uncertain of it is common to all times.
+    """Air at a weather station; its errors are common to all times.
 
     pressure_hpa         one or (k,), with u_pressure_hpa
     humidity_percent     relative, one or (k,), with u_humidity_percent
@@ -47,12 +50,14 @@ class StationAir:
 
 @dataclass(frozen=True, eq=False)
 class SoundLine:
-    """The line between loudspeaker and microphone, and how sound runs on it; uncertainties common to all times.
+    """Line between loudspeaker and microphone.
+
+    And the propagation of sound on it; uncertainties common to all times.
 
     length, u_length     m, of the path, one or (k,)
-    delay, u_delay       s, of the equipment, taken off each time
+    delay, u_delay       s, of the equipment, subtracted from each time
     speed_gradient       1/s across the path, with u_speed_gradient: rays bend and arrive early (`bent_ray_excess`)
-    frequency_hz         of the sound: air's dispersion is taken off (`atmosphere.sound.dispersion`)
+    frequency_hz         of the sound: air's dispersion is subtracted (`atmosphere.sound.dispersion`)
     model                of its speed, a name in `atmosphere.sound.speed.MODELS`
     """
 
@@ -68,11 +73,11 @@ class SoundLine:
 
 @dataclass(frozen=True, eq=False)
 class PathWind:
-    """What is known of the wind on a path, m/s, each one or (k,).
+    """Prior of the wind on a path, m/s, each one or (k,).
 
     crosswind      expected across the path, u_crosswind its uncertainty: with no anemometer 0 and the rms wind of the
                    site. A crosswind slows sound whatever its sign (`straight_line_speed`)
-    wind, u_wind   along the path, positive from A to B: needed with one direction, refused with two
+    wind, u_wind   along the path, positive from A to B: required with one direction, an error with two
     """
 
     u_crosswind: ArrayLike
@@ -83,17 +88,19 @@ class PathWind:
 
 @dataclass(frozen=True, eq=False)
 class PathTemperatures:
-    """Mean temperatures of the air along a path at k times, and the group refractivity they give; nan where not used.
+    """Mean air temperatures along a path at k times, with refractivity.
+
+    nan where not used.
 
     temperature_c          (k,) °C
     u_temperature_c        (k,) standard uncertainty, all sources
-    covariance_c2          (k, k) K², with what is common to all
-    wind                   (k,) m/s along the path, positive from A to B; the one given where one direction was measured
+    covariance_c2          (k, k) K², common errors included
+    wind                   (k,) m/s along the path, positive from A to B; the input where one direction was measured
     u_wind                 (k,) m/s
     group_refractivity     (k,) n_g - 1 of the path
     u_group_refractivity   (k,) all sources, the formula of the index included
     covariance_group       (k, k) of the group refractivity
-    status                 k texts: `used`, or why not
+    status                 k texts: `used`, or the reason of rejection
     parts_c                source of uncertainty -> (k,) °C, its part of u_temperature_c; all but `time` common
     """
 
@@ -120,7 +127,9 @@ def path_temperatures(
     wavelength_um: float = 0.780,
     air_model: str = "ciddor_hill1999",
 ) -> PathTemperatures:
-    """Mean temperature along a path from the travel times of sound in one direction or, better, in both.
+    """Mean temperature along a path from travel times of sound.
+
+    In one direction or, better, in both.
 
     time_ab         (k,) or one, s, from the signal's departure at A to its arrival at B, delay included
     time_ba         the same from B to A at the same instants; None where one direction was measured
@@ -128,10 +137,10 @@ def path_temperatures(
     line            length, delay, bend, and how sound runs
     station         pressure and humidity
     wind            across the path; along it where one direction was measured
-    wavelength_um   of the light whose group refractivity is wanted
+    wavelength_um   of the light, for the group refractivity
     air_model       a name in `atmosphere.index.air.MODELS`
 
-    Relative humidity is held where temperature is sought, and where its uncertainty is carried on: a humidity read 1 %
+    Relative humidity is fixed in the solution for temperature, and its uncertainty is propagated: a humidity read 1 %
     too high at 20 °C lowers the temperature by 0.022 °C and so raises the index by more than it lowers it directly.
 
     Source: [PARKER04] eqs. 4.6 and 4.7 with the erratum of `atmosphere.sound.parker2004`; [JCGM100] eq. 13.
@@ -176,14 +185,14 @@ def path_temperatures(
     t = np.where(calm, t, np.nan)
     good = np.isfinite(t)
 
-    at = np.where(good, t, 20.0)  # only so that slopes exist everywhere; nan again below
-    heard = sound(at, p, h, model=line.model, co2_ppm=station.co2_ppm)
-    slope = heard.sensitivity
+    at = np.where(good, t, 20.0)  # for finite slopes everywhere; nan again below
+    sound_state = sound(at, p, h, model=line.model, co2_ppm=station.co2_ppm)
+    slope = sound_state.sensitivity
     e = humidity.vapour_pressure_hpa(at, p, h, MODELS[line.model].vapour_formula)
     lag = dispersion(at, p, e, frequency_hz=line.frequency_hz).of_a_pulse()[1]
     per_speed = np.where(good, 1.0 / slope.temperature_c, np.nan)
     noise = per_speed * np.sqrt((along.per_forth * u_time[0]) ** 2 + (along.per_back * u_time[1]) ** 2)
-    common = _common_parts(straight, per_speed, heard, lag, line, station)
+    common = _common_parts(straight, per_speed, sound_state, lag, line, station)
     covariance = np.diag(noise**2) + sum(np.outer(part, part) for part in common.values())
     light = air(at, p, h, wavelength_um=wavelength_um, model=air_model, co2_ppm=station.co2_ppm)
     group = _group_covariance(light, good, noise, common, station)
@@ -204,18 +213,20 @@ def path_temperatures(
 def _common_parts(
     straight: "_StraightSpeed",
     per_speed: np.ndarray,
-    heard: Sound,
+    sound_state: Sound,
     lag: np.ndarray,
     line: SoundLine,
     station: StationAir,
 ) -> dict[str, np.ndarray]:
-    """What each standard uncertainty that all times share does to the temperatures, °C (k,), by its cause.
+    """Effect of each common standard uncertainty on the temperatures, °C (k,).
+
+    By its cause.
 
     per_speed   °C per m/s, at each temperature
-    heard       the speed's slopes by weather, and its uncertainty
+    sound_state       the speed's slopes by weather, and its uncertainty
     lag         standard uncertainty of the dispersion, relative to the speed
     """
-    slope, formula = heard.sensitivity, heard.standard_uncertainty
+    slope, formula = sound_state.sensitivity, sound_state.standard_uncertainty
     along, bend_rms = straight.along, straight.bend_rms
     bend_square = np.where(bend_rms > 0.0, bend_rms**2, 1.0)
     return {
@@ -235,7 +246,10 @@ def _common_parts(
 def _group_covariance(
     light: AirState, good: np.ndarray, noise: np.ndarray, common: dict[str, np.ndarray], station: StationAir
 ) -> np.ndarray:
-    """Of the group refractivity: through the temperature, and what weather does at a given temperature as well."""
+    """Covariance of the group refractivity.
+
+    Through the temperature, and directly by weather at fixed temperature.
+    """
     slopes = light.sensitivity
     direct = {
         "pressure": slopes.pressure_hpa * station.u_pressure_hpa,
@@ -248,15 +262,17 @@ def _group_covariance(
 
 @dataclass(frozen=True, eq=False)
 class _SpeedAlong:
-    """What the times say: speed along the path without the wind along it, its slopes by the times, and the wind.
+    """Speed along the path, its slopes by the times, and the wind.
+
+    The wind along the path is subtracted.
 
     length      (k,) m
-    speed       (k,) m/s, of sound, the wind along it taken off
-    wind        (k,) m/s, measured or given
-    along       (k,) length over time, what the length scales, m/s
+    speed       (k,) m/s, of sound, the wind along it subtracted
+    wind        (k,) m/s, measured or from the input
+    along       (k,) length over time, slope by the relative length, m/s
     per_forth   (k,) of the speed by the time from A to B, m/s²; per_back from B to A
-    u_prior     (k,) standard uncertainty of a wind that was given, m/s
-    both        both directions were measured
+    u_prior     (k,) standard uncertainty of an input wind, m/s
+    both        True if both directions were measured
     """
 
     length: np.ndarray
@@ -286,12 +302,12 @@ class _SpeedAlong:
         )
 
     def less_wind(self, given: PathWind) -> "_SpeedAlong":
-        """With a wind that was given instead of measured."""
+        """Speed with an input wind instead of a measured one."""
         wind, u = (np.broadcast_to(np.asarray(v, float), self.speed.shape) for v in (given.wind, given.u_wind))
         return replace(self, speed=self.speed - wind, wind=wind, u_prior=u)
 
     def u_wind(self, u_time: np.ndarray, line: SoundLine) -> np.ndarray:
-        """(k,) m/s, standard uncertainty of the wind."""
+        """Standard uncertainty of the wind, (k,) m/s."""
         if not self.both:
             return self.u_prior
         noise = (self.per_forth * u_time[0]) ** 2 + (self.per_back * u_time[1]) ** 2
@@ -301,13 +317,15 @@ class _SpeedAlong:
 
 @dataclass(frozen=True, eq=False)
 class _StraightSpeed:
-    """The speed in still air on the straight line: that along the path less what bend and crosswind do.
+    """Speed in still air on the straight line.
 
-    along         what the times say
+    The speed along the path corrected for bend and crosswind.
+
+    along         by the times
     speed         (k,) m/s
-    u_crosswind   (k,) m/s, what is not known of the crosswind's part
+    u_crosswind   (k,) m/s, uncertainty of the crosswind's part
     bend_rms      1/s, rms gradient of the speed
-    early         (k,) share of the time by which a ray so bent comes early
+    early         (k,) relative early arrival of the bent ray
     spread        1/s², standard uncertainty of the gradient's square
     """
 
@@ -331,7 +349,7 @@ class _StraightSpeed:
 
 
 def _check(line: SoundLine, station: StationAir, wind: PathWind, u_time: np.ndarray, *, one_way: bool) -> None:
-    """Raise ValidityError for what is outside its limits, and for a wind that is missing or too much."""
+    """Raise ValidityError for limits, and for a missing or superfluous wind."""
     LENGTH.check(line.length)
     DELAY.check(line.delay)
     WIND.check(wind.crosswind)
@@ -355,13 +373,11 @@ def _check(line: SoundLine, station: StationAir, wind: PathWind, u_time: np.ndar
 def _check_wind_along(given: PathWind, one_way: bool) -> None:
     if not one_way:
         if given.wind is not None or given.u_wind is not None:
-            raise ValidityError(
-                "wind and u_wind are for one direction; two directions measure the wind: leave them out"
-            )
+            raise ValidityError("wind and u_wind are for one direction; two directions measure the wind: omit them")
         return
     if given.wind is None or given.u_wind is None:
         raise ValidityError(
-            "one direction does not tell wind from temperature: give wind and u_wind, m/s along the path"
+            "one direction does not separate wind from temperature: give wind and u_wind, m/s along the path"
         )
     WIND.check(given.wind)
     check_spreads(u_wind=given.u_wind)

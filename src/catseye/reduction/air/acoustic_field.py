@@ -1,8 +1,10 @@
-"""Temperature and wind between loudspeakers and microphones at known places, and the index along a laser's path there.
+"""Temperature and wind field from travel times of sound.
 
-Each travel time is the mean of the temperature along its path plus what the wind carries, over the derivative of the
+Between loudspeakers and microphones at known places; also the index along a laser's path there.
+
+Each travel time is the mean of the temperature along its path plus the wind's effect, over the derivative of the
 speed by the temperature (`estimation.shapes.tomography`). Places, delay, pressure, humidity and the formula's own
-departure are parameters with priors that all paths share. What is not taken off: variances along a path, 0.003 °C for 1
+departure are parameters with priors that all paths share. Neglected: variances along a path, 0.003 °C for 1
 K rms and 0.007 °C for 1 m/s rms (`atmosphere.sound.path`), and bent rays.
 """
 
@@ -19,18 +21,18 @@ from catseye.errors import EstimationError, ValidityError
 from catseye.estimation.shapes.tomography import FieldPrior, LineMeans, Lines, Tomogram, tomogram
 from catseye.reduction.air.acoustic import LENGTH, NO_TIME, OUTSIDE, USED, StationAir
 
-PASSES = 6  # the wind is taken off the speed exactly, again with each better wind
+PASSES = 6  # the wind is subtracted from the speed exactly, again with each better wind
 CLOSE_ENOUGH_C = 1e-6
-NOTHING = "no travel time of {} is that of sound in air; check the delay and the places"
-WINDIEST = 60.0  # m/s that a wind and a temperature other than expected may make together
+NO_SOUND_TIME = "no travel time of {} is that of sound in air; check the delay and the places"
+WINDIEST = 60.0  # m/s, largest joint effect of unexpected wind and temperature
 LINE = ValidInterval("length of the line", "m", 0.0, 10_000.0, "the notion of a path", places=1)
 COMMON = ("delay", "pressure", "humidity", "carbon dioxide", "dispersion", "formula")  # after places of stations
-UNLIKELY = 1e-3  # chance of so large a chi-square, below which the priors are said not to fit
+UNLIKELY = 1e-3  # chance of so large a chi-square, below which the priors do not fit
 
 
 @dataclass(frozen=True, eq=False)
 class LineAir:
-    """The air along t straight lines.
+    """Air along t straight lines.
 
     temperature_c          (t,) mean, °C
     covariance_c2          (t, t)
@@ -38,7 +40,7 @@ class LineAir:
     u_wind                 (t, 3)
     group_refractivity     (t,) n_g - 1
     u_group_refractivity   (t,) all sources, the formula of the index included
-    resolution             (t,) 0: the sound tells nothing beyond the prior; 1: all
+    resolution             (t,) 0: the sound adds nothing to the prior; 1: the prior is negligible
     """
 
     temperature_c: np.ndarray
@@ -57,11 +59,11 @@ class LineAir:
 
 @dataclass(frozen=True, eq=False)
 class SoundField:
-    """Temperature and wind between the stations of an array, from its travel times.
+    """Temperature and wind between an array's stations, from its times.
 
     tomogram   the estimate, its observations those used
-    status     a text for each time given: `used`, or why not
-    used       indices of the times used; `suspects` point into these times as given
+    status     a text for each input time: `used`, or the reason of rejection
+    used       indices of the times used; `suspects` point into these input times
     weather    pressure hPa, relative humidity % and carbon dioxide ppm assumed
     """
 
@@ -72,32 +74,34 @@ class SoundField:
 
     @property
     def fit(self) -> str:
-        """Whether times and priors go together, in words: "fits", or what does not and what to do."""
+        """Consistency of times and priors: "fits", or a text with the remedy."""
         from scipy.special import chdtrc
 
         chi_square, count = self.tomogram.chi_square, len(self.used)
         if chdtrc(count, chi_square) >= UNLIKELY:
             return "fits"
         return (
-            f"chi-square {chi_square:.0f} of {count} times: field and wind vary more than their priors say, and the "
+            f"chi-square {chi_square:.0f} of {count} times: field and wind vary more than their priors, and the "
             "uncertainties are too small; give larger scales, or leave out the suspects"
         )
 
     @property
     def suspects(self) -> np.ndarray:
-        """Indices, into the times given, of those that the others do not bear out."""
+        """Indices of the input times that contradict the others."""
         return self.used[self.tomogram.suspects]
 
     def along(
         self, start: ArrayLike, end: ArrayLike, *, wavelength_um: float = 0.780, air_model: str = "ciddor_hill1999"
     ) -> LineAir:
-        """Temperature, wind and group refractivity along straight lines, such as those of lasers.
+        """Temperature, wind and group refractivity along straight lines.
+
+        Such as those of lasers.
 
         start, end      (t, 3) or (3,), m
         wavelength_um   of the light
         air_model       a name in `atmosphere.index.air.MODELS`
 
-        Pressure and humidity are one for all lines, those of the station as the sound has corrected them.
+        Pressure and humidity are one for all lines, those of the station, corrected by the sound.
         """
         lines = Lines(np.atleast_2d(np.asarray(start, float)), np.atleast_2d(np.asarray(end, float)))
         LINE.check(np.linalg.norm(lines.end - lines.start, axis=1))
@@ -107,11 +111,11 @@ class SoundField:
         light = air(means.value, p, h, wavelength_um=wavelength_um, model=air_model, co2_ppm=co2_ppm)
         slopes = light.sensitivity
         direct = np.stack([slopes.pressure_hpa, slopes.humidity_percent], axis=1)  # (t, 2)
-        own = self.tomogram.parameter_covariance()[np.ix_(at, at)]
+        block = self.tomogram.parameter_covariance()[np.ix_(at, at)]
         variance = (
             slopes.temperature_c**2 * np.diag(means.covariance)
             + 2.0 * slopes.temperature_c * np.sum(direct * means.cross[:, at], axis=1)
-            + np.einsum("ti,ij,tj->t", direct, own, direct)
+            + np.einsum("ti,ij,tj->t", direct, block, direct)
             + light.standard_uncertainty**2
         )
         wind, u_wind = self._wind(lines)
@@ -128,8 +132,8 @@ class SoundField:
     def _wind(self, lines: Lines) -> tuple[np.ndarray, np.ndarray]:
         count = len(lines.start)
         if self.tomogram.vector is None:
-            nothing = np.full((count, 3), np.nan)
-            return nothing, nothing
+            undefined = np.full((count, 3), np.nan)
+            return undefined, undefined
         means = [self.tomogram.vector_along(lines, np.tile(axis, (count, 1))) for axis in np.eye(3)]
         return np.stack([m.value for m in means], axis=1), np.stack([m.u for m in means], axis=1)
 
@@ -138,8 +142,8 @@ class SoundField:
 class FieldTimes:
     """Travel times between the stations of an array, m of them.
 
-    source, receiver   (m,) which station sent, which heard
-    time               (m,) s, delay included; nan where none was found
+    source, receiver   (m,) sending and receiving station
+    time               (m,) s, delay included; nan without one
     u_time             one or (m,), s: noise of each
     delay, u_delay     s, of the equipment, common to all
     """
@@ -163,7 +167,9 @@ def sound_field(
     frequency_hz: float = 0.0,
     model: str = THERMOMETRY,
 ) -> SoundField:
-    """Temperature field and wind from travel times between loudspeakers and microphones.
+    """Temperature and wind field from travel times of sound.
+
+    Between loudspeakers and microphones.
 
     stations       (n, 3) m, places of loudspeakers and microphones
     times          between them
@@ -171,12 +177,12 @@ def sound_field(
     weather        pressure and humidity of the air, one number each: common to all
     temperature    prior of the field, °C
     wind           prior of each component of the wind, m/s, expected 0; None for still air
-    frequency_hz   of the sound: air's dispersion is taken off, a share of it is uncertain
+    frequency_hz   of the sound: air's dispersion is subtracted, a share of it is uncertain
     model          a name in `atmosphere.sound.speed.MODELS`
 
     Source: exact geometry of `atmosphere.sound.path`, [TARANTOLA05] for the estimate; linearised about each path's own
-    temperature and wind, again until nothing changes. Raises ValidityError for weather and shapes, EstimationError
-    where no time is left, or where temperature and wind do not settle.
+    temperature and wind, iterated to convergence. Raises ValidityError for weather and shapes, EstimationError
+    where no time remains, or where temperature and wind do not settle.
     """
     places, time = np.asarray(stations, float), np.asarray(times.time, float)
     source, receiver, u_time = _ends(places, times, time)
@@ -191,7 +197,7 @@ def sound_field(
     ray = places[receiver] - places[source]
     LENGTH.check(np.linalg.norm(ray, axis=1))
     if temperature.u_mean <= 0.0 and not temperature.scales:
-        raise ValidityError("the temperature's prior leaves nothing to find; give u_mean or scales")
+        raise ValidityError("the temperature's prior leaves nothing to estimate; give u_mean or scales")
     good = np.isfinite(time) & (time > times.delay)
     status = np.where(good, USED, NO_TIME).astype(object)
     paths = _Paths(places, source, receiver, time - times.delay, u_time)
@@ -202,37 +208,40 @@ def sound_field(
     limit = model_named(model).limits["temperature_c"]
     for turn in range(PASSES):
         if not np.any(good):
-            raise EstimationError(NOTHING.format(len(time)))
-        kept = paths.only(np.flatnonzero(good))
-        observed, along, design, outside = kept.linearised(at[good], blown[good], values, model, first=turn == 0)
+            raise EstimationError(NO_SOUND_TIME.format(len(time)))
+        usable = paths.only(np.flatnonzero(good))
+        observed, along, design, outside = usable.linearised(at[good], blown[good], values, model, first=turn == 0)
         if np.any(outside):
-            lost = np.flatnonzero(good)[outside]
-            status[lost], good[lost] = OUTSIDE, False
-            kept = paths.only(np.flatnonzero(good))
+            removed = np.flatnonzero(good)[outside]
+            status[removed], good[removed] = OUTSIDE, False
+            usable = paths.only(np.flatnonzero(good))
             observed, along, design = observed[~outside], along[~outside], design[~outside]
         if not np.any(good):
-            raise EstimationError(NOTHING.format(len(time)))
-        noise = np.diag((kept.per_second(along) * kept.u_time) ** 2)
+            raise EstimationError(NO_SOUND_TIME.format(len(time)))
+        noise = np.diag((usable.per_second(along) * usable.u_time) ** 2)
         along = np.zeros_like(along) if wind is None else along
-        estimate = tomogram(LineMeans(kept.lines, observed, noise, along, design, sigmas), temperature, wind)
-        at[good] = estimate.scalar_along(kept.lines).value
+        estimate = tomogram(LineMeans(usable.lines, observed, noise, along, design, sigmas), temperature, wind)
+        at[good] = estimate.scalar_along(usable.lines).value
         if wind is not None:
             axes = [np.tile(axis, (len(observed), 1)) for axis in np.eye(3)]
-            blown[good] = np.stack([estimate.vector_along(kept.lines, axis).value for axis in axes], axis=1)
-        beyond = good & ~((at >= limit.lower) & (at <= limit.upper))
-        status[beyond], good[beyond] = OUTSIDE, False
-        if not np.any(beyond) and np.max(np.abs(at[good] - before[good])) < CLOSE_ENOUGH_C:
+            blown[good] = np.stack([estimate.vector_along(usable.lines, axis).value for axis in axes], axis=1)
+        out_of_limits = good & ~((at >= limit.lower) & (at <= limit.upper))
+        status[out_of_limits], good[out_of_limits] = OUTSIDE, False
+        if not np.any(out_of_limits) and np.max(np.abs(at[good] - before[good])) < CLOSE_ENOUGH_C:
             break
         before = at.copy()
     else:
-        raise EstimationError(f"temperature and wind do not settle in {PASSES} passes; leave out the wildest times")
+        raise EstimationError(f"temperature and wind do not settle in {PASSES} passes; remove the most deviating times")
     return SoundField(estimate, tuple(str(s) for s in status), np.flatnonzero(good), values[:3])
 
 
 def _sigmas(
     coordinates: int, u_time: np.ndarray, u_delay: float, u_position: float, weather: StationAir, formula: float
 ) -> np.ndarray:
-    """Standard uncertainties of what all paths share: coordinates of the stations, then `COMMON`."""
+    """Standard uncertainties of the paths' common parameters.
+
+    Coordinates of the stations, then `COMMON`.
+    """
     check_spreads(
         u_time=u_time,
         u_position=u_position,
@@ -246,16 +255,19 @@ def _sigmas(
 
 
 def _ends(stations: np.ndarray, times: FieldTimes, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Source, receiver and noise of each time, (m,) each; ValidityError for other shapes and unknown stations."""
+    """Source, receiver and noise of each time, (m,) each.
+
+    ValidityError for other shapes and unknown stations.
+    """
     if stations.ndim != 2 or stations.shape[1] != 3:
         raise ValidityError(f"stations have the shape {stations.shape} (expected (n, 3), m)")
     ends = []
-    for name, given in (("source", times.source), ("receiver", times.receiver)):
-        index = np.asarray(given)
+    for name, columns in (("source", times.source), ("receiver", times.receiver)):
+        index = np.asarray(columns)
         if time.ndim != 1 or index.shape != time.shape:
             raise ValidityError(f"{name} has the shape {index.shape}, time {time.shape} (expected (m,) both)")
         if index.dtype.kind not in "iu" or np.any((index < 0) | (index >= len(stations))):
-            raise ValidityError(f"{name} is not all whole numbers from 0 to {len(stations) - 1}, a station each")
+            raise ValidityError(f"{name} is not a list of station numbers from 0 to {len(stations) - 1}")
         ends.append(index.astype(int))
     u_time = np.asarray(times.u_time, float)
     if u_time.shape not in ((), time.shape):
@@ -286,13 +298,15 @@ class _Paths:
         return np.linalg.norm(self.lines.end - self.lines.start, axis=1) / self.time
 
     def per_second(self, along: np.ndarray) -> np.ndarray:
-        """°C per second of travel time."""
+        """Temperature per second of travel time, °C."""
         return along * self.speed / self.time
 
     def linearised(self, at: np.ndarray, blown: np.ndarray, values: tuple, model: str, *, first: bool) -> tuple:
-        """Each time as a mean temperature, (m,) °C; °C per m/s of wind along it, °C per parameter; which are of no air.
+        """Each time as a mean temperature, (m,) °C, with slopes.
 
-        The first time round about the prior's temperature, since a wind not yet known may look like no air.
+        °C per m/s of wind along it, °C per parameter; and which are of no air.
+
+        In the first pass about the prior's temperature, since an unknown wind may look like no air.
         """
         p, h, co2_ppm, frequency_hz = values
         lines = self.lines
@@ -302,16 +316,16 @@ class _Paths:
         state = sound(at, p, h, model=model, co2_ppm=co2_ppm)
         per_speed = 1.0 / state.sensitivity.temperature_c
         if first:
-            heard = at + (speed - state.speed) * per_speed
+            temperature = at + (speed - state.speed) * per_speed
             outside = np.abs(speed - state.speed) > WINDIEST
         else:
-            heard = np.atleast_1d(
+            temperature = np.atleast_1d(
                 temperatures_c(
                     speed, p, h, vapour_pressure_hpa=None, model=model, co2_ppm=co2_ppm, frequency_hz=frequency_hz
                 )
             )
-            outside = np.isnan(heard)
-            at = np.where(outside, at, heard)
+            outside = np.isnan(temperature)
+            at = np.where(outside, at, temperature)
             state = sound(at, p, h, model=model, co2_ppm=co2_ppm)
             per_speed = 1.0 / state.sensitivity.temperature_c
         late = dispersion(at, p, state.vapour_pressure_hpa, frequency_hz=frequency_hz).of_a_pulse()[
@@ -335,4 +349,4 @@ class _Paths:
             axis=1,
         )
         design = np.concatenate([places.reshape(len(rows), self.stations.size), common], axis=1)
-        return heard + by_along * along, by_along, design, outside
+        return temperature + by_along * along, by_along, design, outside

@@ -1,6 +1,6 @@
-"""From recordings of sound, or a table of travel times, to the temperature of the air along a path.
+"""Air temperature along a path from recordings or travel times.
 
-A file is reduced by its sheet; files of one sheet are one path. What a shot could not tell is a status of that shot.
+A file is reduced by its sheet; files of one sheet are one path. A shot without a result has a status.
 """
 
 from collections.abc import Sequence
@@ -18,18 +18,18 @@ from catseye.reduction.air.acoustic import USED, PathTemperatures, PathWind, Sou
 from catseye.signal.delay.arrival import DelayPlan, DelayStatus
 from catseye.signal.delay.waveform import sampled
 
-WARMER_C, WINDIER = 15.0, 15.0  # °C and m/s off the prediction that the default window allows for
+WARMER_C, WINDIER = 15.0, 15.0  # °C and m/s, deviations from the prediction within the default window
 LOOP_WINDOW = 5e-3  # s, about the emission
 MICROSECOND = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class ChannelTrace:
-    """What the first shot of a channel looks like, for a figure.
+    """First shot of a channel, for a figure.
 
     time, samples       s from the file's first sample, and codes or volts about the arrival
-    lag, correlation    s, and the amplitude that a signal there would have
-    arrival             s, NaN where there is none
+    lag, correlation    s, and the amplitude of a signal there
+    arrival             s, NaN without one
     """
 
     channel: str
@@ -43,13 +43,13 @@ class ChannelTrace:
 
 @dataclass(frozen=True, eq=False)
 class SoundShots:
-    """k shots: when, how long the sound took, and what became of each channel.
+    """Times, travel times and status of k shots.
 
     mjd                of the emission, UTC
-    time_ab, time_ba   s, clock offset and loop-back taken off; NaN where there is none; time_ba None without one
+    time_ab, time_ba   s, clock offset and loop-back subtracted; NaN without a result; time_ba None for one direction
     u_time             (2, k) s
     snr                (2, k) of the correlations, NaN for a table of times
-    texts              what became of each shot: "ab: good; ba: good", or of a table's row ""
+    texts              status of each shot: "ab: good; ba: good", or "" for a table's row
     weather            temperature °C, pressure hPa, humidity %, each (k,)
     file               of each shot
     traces             for figures
@@ -89,11 +89,11 @@ class AcousticPath:
 
     @property
     def used(self) -> np.ndarray:
-        """(k,) bool: has a temperature."""
+        """True (k,) for shots with a temperature."""
         return np.array([status == USED for status in self.temperatures.status])
 
     def status(self, shot: int) -> str:
-        """What became of one shot, in words."""
+        """Status of one shot as a text."""
         text, formula = self.shots.texts[shot], self.temperatures.status[shot]
         return "; ".join(part for part in (text, "" if formula == USED else formula) if part) or USED
 
@@ -105,50 +105,53 @@ def reduce_acoustic(
     model: str = THERMOMETRY,
     air_model: str = "ciddor_hill1999",
 ) -> list[AcousticPath]:
-    """Temperatures of the paths that files of sound, or of travel times, measured.
+    """Temperatures of paths from files of sound or travel times.
 
     files       .wav or .csv
     sheet       of all of them; None: each file's own, its name with .toml
     model       formula of the speed of sound, a name in `atmosphere.sound.speed.MODELS`
     air_model   formula of the index, a name in `atmosphere.index.air.MODELS`
 
-    Raises InputError, one line with file, place, value and what was expected; a bad shot is a status.
+    Raises InputError, one line with file, place, value and expectation; a bad shot is a status.
     """
     groups: dict[Path, tuple[Path, list[Path]]] = {}
     for file in files:
-        beside = sheet if sheet is not None else file.with_suffix(".toml")
-        if beside.resolve() == file.resolve():
-            raise refusal(file.name, "is given as the recording and as its sheet (expected a sheet .toml)")
-        groups.setdefault(beside.resolve(), (beside, []))[1].append(file)
-    return [_path(beside, members, model, air_model) for beside, members in groups.values()]
+        sheet_path = sheet if sheet is not None else file.with_suffix(".toml")
+        if sheet_path.resolve() == file.resolve():
+            raise refusal(file.name, "is both recording and sheet (expected a sheet .toml)")
+        groups.setdefault(sheet_path.resolve(), (sheet_path, []))[1].append(file)
+    return [_path(sheet_path, members, model, air_model) for sheet_path, members in groups.values()]
 
 
-def _path(beside: Path, files: Sequence[Path], model: str, air_model: str) -> AcousticPath:
-    sheet, digest = read_sheet(beside)
-    hashes = {beside.name: digest}
+def _path(sheet_path: Path, files: Sequence[Path], model: str, air_model: str) -> AcousticPath:
+    sheet, digest = read_sheet(sheet_path)
+    hashes = {sheet_path.name: digest}
     parts = []
     for path in files:
         read = read_recording(path, sheet)
         if read.file in hashes:
-            raise refusal(read.file, "is given twice, or two files have that name (expected each once, names apart)")
+            raise refusal(read.file, "appears twice, or two files have that name (expected each once, different names)")
         hashes[read.file] = read.digest
         try:
-            parts.append(_timed(read, sheet) if isinstance(read, TravelTimes) else _heard(read, sheet, beside.name))
+            parts.append(
+                _timed(read, sheet) if isinstance(read, TravelTimes) else _recorded_shots(read, sheet, sheet_path.name)
+            )
         except ValidityError as problem:
             raise refusal(read.file, str(problem)) from problem
-    shots = _joined(parts, beside.name)
+    shots = _joined(parts, sheet_path.name)
     if shots.time_ba is None and sheet.u_wind_m_per_s is None:
         raise refusal(
-            beside.name, "u_wind_m_per_s is missing (expected wind_m_per_s and its u where one direction is measured)"
+            sheet_path.name,
+            "u_wind_m_per_s is missing (expected wind_m_per_s and its u where one direction is measured)",
         )
     try:
         temperatures = _temperatures(shots, sheet, model, air_model)
     except ValidityError as problem:
-        raise refusal(beside.name, str(problem)) from problem
-    return AcousticPath(sheet, beside.name, shots, temperatures, model, air_model, hashes)
+        raise refusal(sheet_path.name, str(problem)) from problem
+    return AcousticPath(sheet, sheet_path.name, shots, temperatures, model, air_model, hashes)
 
 
-def _heard(recording: Recording, sheet: AcousticSheet, sheet_file: str) -> SoundShots:
+def _recorded_shots(recording: Recording, sheet: AcousticSheet, sheet_file: str) -> SoundShots:
     """Travel times of the shots in a recording."""
     sampling_hz = recording.sampling_hz or sheet.sampling_hz
     start = sheet.start_of(recording.file)
@@ -167,9 +170,9 @@ def _heard(recording: Recording, sheet: AcousticSheet, sheet_file: str) -> Sound
     sent, u_sent, loop = emission, np.zeros(len(mjd)), None
     if "loop" in recording.samples:
         loop = listener.arrivals("loop", emission, LOOP_WINDOW)
-        both = {"ab", "ba"} <= recording.samples.keys()
-        # one loop serves both directions: in the mean its noise does not fall, so it counts twice in squares
-        sent, u_sent = loop.delay, loop.u_delay * (np.sqrt(2.0) if both else 1.0)
+        two_way = {"ab", "ba"} <= recording.samples.keys()
+        # one loop serves both directions: its noise does not average out, so it counts twice in squares
+        sent, u_sent = loop.delay, loop.u_delay * (np.sqrt(2.0) if two_way else 1.0)
     window = listener.window(flight, weather[0])
     if sheet.interval_s is not None and sheet.shots > 1 and sheet.interval_s <= 2.0 * window:
         raise refusal(
@@ -186,11 +189,11 @@ def _heard(recording: Recording, sheet: AcousticSheet, sheet_file: str) -> Sound
             u_times.append(np.zeros(len(mjd)))
             snrs.append(np.full(len(mjd), np.nan))
             continue
-        heard = listener.arrivals(channel, emission + flight + delay + sign * offset, window)
-        times[channel] = heard.delay - sent - sign * offset
-        u_times.append(np.sqrt(heard.u_delay**2 + u_sent**2 + (sheet.u_time_us * MICROSECOND) ** 2))
-        snrs.append(heard.snr)
-        for row, text in zip(texts, heard.texts, strict=True):
+        result = listener.arrivals(channel, emission + flight + delay + sign * offset, window)
+        times[channel] = result.delay - sent - sign * offset
+        u_times.append(np.sqrt(result.u_delay**2 + u_sent**2 + (sheet.u_time_us * MICROSECOND) ** 2))
+        snrs.append(result.snr)
+        for row, text in zip(texts, result.texts, strict=True):
             row.append(f"{channel}: {text}")
     if "ab" not in times:
         raise refusal(recording.file, "has no channel 'ab' (one direction is measured from ranger to target)")
@@ -204,9 +207,9 @@ def _heard(recording: Recording, sheet: AcousticSheet, sheet_file: str) -> Sound
 class _Arrivals:
     """Arrivals of k shots in one channel.
 
-    delay, u_delay   (k,) s, from the file's first sample; nan where none was found
+    delay, u_delay   (k,) s, from the file's first sample; nan without one
     snr              (k,)
-    texts            what became of each
+    texts            status of each
     """
 
     delay: np.ndarray
@@ -216,7 +219,7 @@ class _Arrivals:
 
 
 class _Listener:
-    """The known signal sought in the channels of one recording."""
+    """Search for the known signal in the channels of one recording."""
 
     def __init__(self, recording: Recording, sheet: AcousticSheet, sampling_hz: float, template: np.ndarray) -> None:
         self.recording, self.sheet, self.sampling_hz, self.template = recording, sheet, sampling_hz, template
@@ -242,7 +245,7 @@ class _Listener:
             raise refusal(
                 self.recording.file,
                 f"channel {channel!r}, arrivals are sought from {first:.4g} to {last:.4g} s "
-                f"(expected within its {n / self.sampling_hz:.4g} s: look at emission_s, interval_s, shots, window_ms)",
+                f"(expected within its {n / self.sampling_hz:.4g} s: check emission_s, interval_s, shots, window_ms)",
             )
         before = (plan.stretch - len(self.template)) // 2
         begin = np.clip(np.rint(expected * self.sampling_hz).astype(int) - before, 0, n - wide)
@@ -260,7 +263,10 @@ class _Listener:
         return _Arrivals(delay, np.where(good, delays.u_delay, np.nan), delays.snr, texts)
 
     def _quiet(self, samples: np.ndarray, until: float) -> np.ndarray | None:
-        """Noise for the whitened weights: after the near loudspeaker has ended, before the first arrival's window."""
+        """Noise for the whitened weights, or None.
+
+        After the near loudspeaker has ended, before the first arrival's window.
+        """
         if self.sheet.weighting != "whitened":
             return None
         begin = self.sheet.emission_s + len(self.template) / self.sampling_hz + LOOP_WINDOW
@@ -268,7 +274,10 @@ class _Listener:
 
 
 def _timed(times: TravelTimes, sheet: AcousticSheet) -> SoundShots:
-    """The rows of a table of travel times: the sheet's weather where the table has none."""
+    """Rows of a table of travel times.
+
+    The sheet's weather where the table has none.
+    """
     names = ("temperature_c", "pressure_hpa", "humidity_percent")
     from_sheet = sheet.weather_at(times.mjd)
     t, p, h = (times.weather.get(name, value) for name, value in zip(names, from_sheet, strict=True))
@@ -292,7 +301,7 @@ def _timed(times: TravelTimes, sheet: AcousticSheet) -> SoundShots:
 
 
 def _joined(parts: Sequence[SoundShots], sheet_file: str) -> SoundShots:
-    """All files of a path, in order of time."""
+    """Files of a path joined in order of time."""
     one_way = {part.time_ba is None for part in parts}
     if len(one_way) > 1:
         raise refusal(sheet_file, "some files have both directions and some one (expected the same in all of a path)")
@@ -317,7 +326,10 @@ def _joined(parts: Sequence[SoundShots], sheet_file: str) -> SoundShots:
 
 
 def frequency_hz(sheet: AcousticSheet) -> float:
-    """Of the sound, for the air's dispersion: the sheet's, else the root mean square of the signal's."""
+    """Frequency for the air's dispersion, Hz.
+
+    The sheet's, else the root mean square of the signal's.
+    """
     if sheet.frequency_hz is not None:
         return sheet.frequency_hz
     if sheet.signal is None:
@@ -376,9 +388,11 @@ def _temperatures(shots: SoundShots, sheet: AcousticSheet, model: str, air_model
 
 
 def _with_clock(temperatures: PathTemperatures, moved: PathTemperatures) -> PathTemperatures:
-    """The clock offset's uncertainty added, common to all: it goes into the wind, hardly into the temperature.
+    """Temperatures with the clock offset's uncertainty added.
 
-    moved   the same with the clock offset larger by its standard uncertainty
+    Common to all: it affects the wind, hardly the temperature.
+
+    moved   temperatures with the clock offset larger by its standard uncertainty
     """
     t, w = moved.temperature_c - temperatures.temperature_c, moved.wind - temperatures.wind
     n = moved.group_refractivity - temperatures.group_refractivity

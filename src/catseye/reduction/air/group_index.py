@@ -1,9 +1,11 @@
-"""A fixed path as a refractometer: the group index from the phase, absolutely and relatively, and benchmark paths.
+"""Group index from the phase of a fixed path (refractometer).
+
+Absolute and relative, and benchmark paths.
 
 With L = D - D0 (less the glass of the target) and phi the target's phase after the reference's,
 n_g = c/(2 L f) (N - phi/2pi), so that dphi/dn_g = -(4 pi f/c) L. The notes' 1.31 prints "+ phi/2pi"; 5.18 requires
-minus, and with it 1.32 to 1.34 and 1.36 to 1.38 change their sign: as printed, a refractometer shows the air upside
-down. 1.34 prints 6283 rad (c taken as 3e8 m/s), 6287.535 is right; 1.39 cuts 1.988e-8 to 1.98e-8.
+minus, and with it 1.32 to 1.34 and 1.36 to 1.38 change their sign: as printed, changes of the air have the wrong
+sign. 1.34 prints 6283 rad (c taken as 3e8 m/s), 6287.535 is right; 1.39 cuts 1.988e-8 to 1.98e-8.
 """
 
 from dataclasses import dataclass
@@ -27,7 +29,9 @@ MODULATION_HZ = 1500e6
 
 
 def phase_slope(path_length: ArrayLike, *, modulation_hz: float = MODULATION_HZ) -> NDArray[np.float64]:
-    """Change of the phase for each unit of group index, rad: below zero, as the phase falls with the optical length.
+    """Change of the phase for each unit of group index, rad.
+
+    Below zero, as the phase falls with the optical length.
 
     path_length     m, above 0: D - D0, one way
     modulation_hz   Hz, above 0
@@ -47,7 +51,7 @@ def phase_slope(path_length: ArrayLike, *, modulation_hz: float = MODULATION_HZ)
 def group_index(
     phase: ArrayLike, cycles: ArrayLike, *, path_length: ArrayLike, modulation_hz: float = MODULATION_HZ
 ) -> NDArray[np.float64]:
-    """Group index along a path of known length, from the phase and its whole cycles.
+    """Group index along a path of known length, from phase and cycles.
 
     phase           rad, the target's after the reference's
     cycles          N, whole half wavelengths that belong to this phase
@@ -61,7 +65,7 @@ def group_index(
     """
     turns = np.asarray(cycles) - np.asarray(phase, dtype=float) / TWO_PI
     if np.any(np.isinf(turns)):
-        raise ValidityError("phase or cycles are infinite; give nan where there is none")
+        raise ValidityError("phase or cycles are infinite; give nan for missing ones")
     return -TWO_PI * turns / phase_slope(path_length, modulation_hz=modulation_hz)
 
 
@@ -73,7 +77,7 @@ def relative_group_index(
     path_length: ArrayLike,
     modulation_hz: float = MODULATION_HZ,
 ) -> NDArray[np.float64]:
-    """Group index along a calibrated path, from how far the phase went since the calibration.
+    """Group index along a calibrated path, from the phase change.
 
     phase           rad, unwrapped from phase_0
     phase_0         rad, phase at the calibration
@@ -93,7 +97,7 @@ def relative_group_index(
 def length_sensitivity(
     phase_change: ArrayLike, *, path_length: ArrayLike, modulation_hz: float = MODULATION_HZ
 ) -> NDArray[np.float64]:
-    """Change of the relative group index for each metre that the path length is taken too long, 1/m.
+    """Change of the relative index per metre of error in path length, 1/m.
 
     phase_change    rad, since the calibration
     path_length     m, above 0: D - D0
@@ -110,12 +114,12 @@ def length_sensitivity(
 
 @dataclass(frozen=True, eq=False)
 class AbsoluteIndex:
-    """A group index from phase and length alone, one value a phase.
+    """Group index from phase and length alone, one value a phase.
 
-    group_index   nan where the whole cycles are not sure
+    group_index   nan where the whole cycles are uncertain
     u             its standard uncertainty
     cycles        N, the nearest integer
-    margin        m, how much further the expected optical length could be off before N changes
+    margin        m, additional error of the expected optical length before N changes
     status        int8 of `CycleStatus`: SURE, THIN or UNKNOWN
     """
 
@@ -136,7 +140,9 @@ def absolute_group_index(
     u_phase: ArrayLike,
     modulation_hz: float = MODULATION_HZ,
 ) -> AbsoluteIndex:
-    """Group index along a path of certified length, its whole cycles by the nearest integer with a margin of 5 sigma.
+    """Absolute group index along a path of certified length.
+
+    Its whole cycles are the nearest integer with a margin of 5 sigma.
 
     phase              rad, any: the target's after the reference's
     path_length        m, above 0: D - D0, with u_path_length (m)
@@ -144,8 +150,8 @@ def absolute_group_index(
     u_phase            rad
     modulation_hz      Hz, above 0
 
-    At 100 m and 1500 MHz a whole cycle is 1000 ppm of index: the length decides, the weather hardly matters. The same
-    length error then is in every index of the path; 0.1 mm in 100 m is 1 ppm.
+    At 100 m and 1500 MHz a whole cycle is 1000 ppm of index: the length decides, the weather is almost negligible. The
+    same length error then is in every index of the path; 0.1 mm in 100 m is 1 ppm.
 
     Source: [PARKER04] eq. 1.31 with the sign of 5.18; rule of `signal.cycles.whole.decision`; [JCGM100] eq. 10.
 
@@ -171,16 +177,18 @@ def absolute_group_index(
 
 @dataclass(frozen=True, eq=False)
 class BenchmarkSeries:
-    """One certified path of a campaign as a refractometer, a row a shot with a phase, in order of time.
+    """Certified path of a campaign as a refractometer, a row per shot.
+
+    Shots with a phase, in order of time.
 
     benchmark, ranger   names
     mjd_utc             (m,)
-    used                (m,) bool: took part in the adjustment
+    used                (m,) bool: used in the adjustment
     path, u_path        (m,) group refractivity by phase, certificate and the ranger's own sheet, and its u
-    u_common            of it what all rows share: certificate, D0, rest of leakage
-    weather, u_weather  (m,) by the stations as they read, and the u of their sensors' offsets and of the formula
-    adjusted            (m,) with the offsets that the adjustment found
-    too_warm_c, u_too_warm_c   °C that the thermometers would have to read too high for the mean difference of the used
+    u_common            part of it common to all rows: certificate, D0, residual leakage
+    weather, u_weather  (m,) by the stations' readings, and the u of their sensors' offsets and of the formula
+    adjusted            (m,) with the offsets of the adjustment
+    too_warm_c, u_too_warm_c   °C, bias of the thermometers that would explain the mean difference of the used
                         shots, and its u from the path's side; nan where none was used
     """
 
@@ -199,7 +207,7 @@ class BenchmarkSeries:
 
     @property
     def difference(self) -> NDArray[np.float64]:
-        """(m,) the path's index minus the weather's, as read."""
+        """Path's index minus the weather's as read, (m,)."""
         return self.path - self.weather
 
     @property
@@ -208,11 +216,11 @@ class BenchmarkSeries:
 
 
 def benchmark_refractometers(reduction: "Reduction") -> tuple[BenchmarkSeries, ...]:
-    """What every benchmark path of a campaign says of the air, beside its weather stations.
+    """Index of every benchmark path of a campaign, beside its weather.
 
     reduction   of a campaign
 
-    The path's index rests on the certificate and the ranger's sheet alone, not on what the adjustment made of them:
+    The path's index depends on the certificate and the ranger's sheet alone, not on their adjusted values:
     (n - 1) from n = vacuum length / (certified distance - D0 - glass - obliquity - head). Benchmarks without a shot
     that has a phase are left out. The turbulence of the path counts as part of its index.
 
@@ -241,8 +249,8 @@ def _series(reduction: "Reduction", field: AirField, benchmark: "BenchmarkRow", 
 
     at = np.searchsorted(electronics.shots, shots)
     per_metre = half / TWO_PI / certified  # refractivity per radian
-    rest = np.abs(1.0 / reduction.phases.phasor[shots] - 1.0 / electronics.reference[at])
-    leakage = per_metre * sheet.u_leakage_volt * rest
+    leakage_slope = np.abs(1.0 / reduction.phases.phasor[shots] - 1.0 / electronics.reference[at])
+    leakage = per_metre * sheet.u_leakage_volt * leakage_slope
     noise = np.diag(reduction.phases.u_phase[shots] ** 2) + electronics.joint(at)
     noise = per_metre**2 * noise
     u_length = np.hypot(benchmark.u_mm, sheet.u_d0_mm) * MILLIMETRE / certified
@@ -251,8 +259,8 @@ def _series(reduction: "Reduction", field: AirField, benchmark: "BenchmarkRow", 
 
     mjd = campaign.shots.mjd_utc[shots]
     a, b = (coordinates.x[coordinates.index(name)] for name in (benchmark.ranger, benchmark.target))
-    nothing = np.zeros(len(field.names))
-    air = field.along(mjd, np.tile(a, (len(rows), 1)), np.tile(b, (len(rows), 1)), nothing)
+    no_parameters = np.zeros(len(field.names))
+    air = field.along(mjd, np.tile(a, (len(rows), 1)), np.tile(b, (len(rows), 1)), no_parameters)
     t, p, h = field.smoothed(mjd).mean(axis=1).T
     chosen = MODELS[field.model]
     vapour = vapour_pressure_hpa(t, p, h, chosen.vapour_formula)

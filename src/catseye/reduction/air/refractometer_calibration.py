@@ -1,11 +1,13 @@
-"""Calibration of a refractometer path: n_g(t0, h0, p0) with phase(t0, h0, p0) from a night of both, then n_g(t).
+"""Calibration of a refractometer path by a night with weather.
 
-Every thermometer's index plus what the phase says of its change is one observation,
-    n_weather + dphi / K = n0 + delta dphi / K + b(t) / K + (what the sensors read too much) + formula + noise,
+n_g(t0, h0, p0) with phase(t0, h0, p0) from a night of both, then n_g(t).
+
+Every thermometer's index plus its change by the phase is one observation,
+    n_weather + dphi / K = n0 + delta dphi / K + b(t) / K + (sensor offsets) + formula + noise,
 K = 4 pi f L / c, dphi the phase since the reference phase, delta the relative error of the length L, b a drift of the
 phase. Offsets of sensors, the formula, delta and b are parameters with priors: they do not average out. Readings whose
-test statistic is beyond 3.5 are left out. The scatter that is found, and how it hangs together in time, makes the
-uncertainty where it is larger than what the sheet claims.
+test statistic is beyond 3.5 are left out. The estimated scatter and its correlation in time determine the
+uncertainty where it is larger than the sheet's claim.
 """
 
 from dataclasses import dataclass
@@ -17,7 +19,7 @@ from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
 from catseye.reduction.air.group_index import AbsoluteIndex, absolute_group_index
 from catseye.reduction.air.refractometer_fit import PathFit
 from catseye.reduction.air.refractometer_night import (
-    LASTING,
+    FEWEST_AFTER_JUMP,
     FollowedPhase,
     PathReadings,
     PathWeather,
@@ -29,13 +31,15 @@ from catseye.signal.cycles.whole import CycleStatus
 
 AGREES = 3.0  # standard uncertainties within which slopes agree
 UNKNOWN_SLOPE = 1e3  # prior u of a free slope over the theoretical one
-LEAST_SLOPE = 0.3  # u of the slope's ratio beyond which it tells nothing
+LEAST_SLOPE = 0.3  # u of the slope's ratio beyond which it is meaningless
 STATUS = ("good", "stray", "left out", "weather off", "no weather", "uncalibrated")
 
 
 @dataclass(frozen=True)
 class SlopeTest:
-    """How far the weather's index goes, fitted freely, over what the phase and -(4 pi f/c) L say of it.
+    """Ratio of the fitted weather index's changes to the theoretical ones.
+
+    The theory is the phase and -(4 pi f/c) L.
 
     ratio       1 when the phase follows the weather; above 1 the path's air changes less than the sensors'
     u           of the ratio, by the scatter
@@ -49,7 +53,7 @@ class SlopeTest:
 
 @dataclass(frozen=True, eq=False)
 class PathCalibration:
-    """A calibrated path and the index of its air; rows as in the readings.
+    """Calibrated path and the index of its air; rows as in the readings.
 
     index_0, u_index_0   group refractivity at phase_0 and its standard uncertainty, at the time mjd_0
     phase_0        rad, of the first calibrated section: the mean of its readings
@@ -57,19 +61,19 @@ class PathCalibration:
     names, x, covariance   of all parameters (ppm, °C, hPa, %, rad): see `names`
     budget         cause -> its part of u_index_0
     refractivity, u_refractivity   (m,) n_g - 1 by the phase; nan where the phase is not followed or not calibrated
-    temperature_c, u_temperature_c (m,) mean along the path that gives this index at the pressure and humidity read
+    temperature_c, u_temperature_c (m,) path mean that gives this index at the measured pressure and humidity
     residual       (m,) weather minus path, of the mean of the thermometers
     standardised   (m,) test statistic of the reading
     status         (m) a word of STATUS
     slope          test of the theoretical slope
-    thermometer_scatter   found over claimed, 1 at least
-    places         how much further apart the thermometers are than their offsets' u, 1 at least: u counts so much more
-    air_noise      found scatter of the weather's index against the path's beyond what the sheet claims
-    correlation    readings that hang together: factor on the variance of means, 1 for white noise
+    thermometer_scatter   estimated over claimed, 1 at least
+    places         factor on the thermometers' offsets' u by their differences, 1 at least
+    air_noise      estimated scatter of the weather's index against the path's beyond the sheet's claim
+    correlation    of readings in time: factor on the variance of means, 1 for white noise
     variance_factor, degrees_of_freedom   of the values used
     absolute       the index by phase and length alone at phase_0
-    path_length, u_path_length   m, that the weather's index asks for; nan where the whole cycles are not sure
-    notes          what a person should know
+    path_length, u_path_length   m, implied by the weather's index; nan where the whole cycles are uncertain
+    notes          for the user
     """
 
     readings: PathReadings
@@ -106,20 +110,22 @@ class PathCalibration:
     notes: tuple[str, ...]
 
     def of(self, name: str) -> tuple[float, float]:
-        """A parameter and its standard uncertainty."""
+        """Parameter and its standard uncertainty."""
         i = self.names.index(name)
         return float(self.x[i]), float(np.sqrt(self.covariance[i, i]))
 
 
 def calibrate_path(readings: PathReadings) -> PathCalibration:
-    """The index at a reference phase, its uncertainty, and from it the index of every phase of the night.
+    """Calibrate a path, and get the index of every phase of the night.
 
-    readings   as `read_path_readings` gives them
+    The index at a reference phase, with its uncertainty.
+
+    readings   from `read_path_readings`
 
     Raises EstimationError where no section has five readings with weather.
 
     Source: [PARKER04] sections 1.6, 1.6.2, eqs. 1.35, 1.36 with the sign of 5.18; least squares with priors,
-    [FOERSTNER16] chapter 4; tests, [BAARDA68]. Tested against scatter: u holds with strays, drift and offsets.
+    [FOERSTNER16] chapter 4; tests, [BAARDA68]. Tested against scatter: u holds with outliers, drift and offsets.
     """
     weather = path_weather(readings)
     followed = follow_phase(readings, weather)
@@ -129,11 +135,11 @@ def calibrate_path(readings: PathReadings) -> PathCalibration:
 
 
 def _calibration(fit: PathFit) -> PathCalibration:
-    """The answer in SI, from the fit in ppm."""
+    """Calibration in SI units, from the fit in ppm."""
     readings, followed = fit.readings, fit.followed
     mean, w_reading, _ = fit.tests()
     keep = fit.reading_in & fit.value_in.any(axis=1)
-    first = followed.section[fit.rows] == fit.calibrated[0]  # the section that phase_0 and index_0 belong to
+    first = followed.section[fit.rows] == fit.calibrated[0]  # the section of phase_0 and index_0
     keep = keep & first if (keep & first).any() else first
     when = float(readings.mjd_utc[fit.rows[keep]].mean())
     row = int(fit.rows[keep][np.argmin(np.abs(readings.mjd_utc[fit.rows[keep]] - when))])
@@ -143,8 +149,8 @@ def _calibration(fit: PathFit) -> PathCalibration:
     phase_0 = float(fit.phase_0[0])
     index_0 = fit.mean + float(at @ fit.x) * PPM
     u_0 = float(np.sqrt(at @ fit.covariance @ at)) * PPM
-    every = np.arange(len(readings))
-    refractivity, u, gradient = _indices(fit, every)
+    all_rows = np.arange(len(readings))
+    refractivity, u, gradient = _indices(fit, all_rows)
     temperature, u_temperature = _temperatures(fit, refractivity, gradient)
     residual, standardised = np.full(len(readings), np.nan), np.full(len(readings), np.nan)
     residual[fit.rows], standardised[fit.rows] = mean * PPM, w_reading
@@ -191,9 +197,11 @@ def _calibration(fit: PathFit) -> PathCalibration:
 
 
 def _absolute(readings: PathReadings, phase_0: float, index_0: float, u_0: float) -> tuple[AbsoluteIndex, float]:
-    """What the sheet's length says of the index at the reference phase, and the length that this index gives, m.
+    """Index at the reference phase by the sheet's length, and the length by the index.
 
-    The length is nan where its whole cycles are not sure; its standard uncertainty is u_0 of it.
+    Length in m.
+
+    The length is nan where its whole cycles are uncertain; its standard uncertainty is u_0 of it.
     """
     sheet = readings.sheet
     absolute = absolute_group_index(
@@ -212,7 +220,10 @@ def _absolute(readings: PathReadings, phase_0: float, index_0: float, u_0: float
 
 
 def _indices(fit: PathFit, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Group refractivity (m,) by the phase, its u, and its derivatives (m, q), ppm, by the parameters."""
+    """Group refractivity (m,) by the phase, its u, and derivatives.
+
+    Derivatives (m, q), ppm, by the parameters.
+    """
     at = fit.at(rows)
     change = at[:, fit.names.index("length")]
     value = fit.mean + (at @ fit.x - change) * PPM
@@ -223,10 +234,12 @@ def _indices(fit: PathFit, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
 
 
 def _temperatures(fit: PathFit, refractivity: np.ndarray, gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean temperature (m,) that gives the index at the pressure and humidity read, and its u; °C.
+    """Mean temperature (m,) for the index, and its u; °C.
+
+    At the pressure and humidity as read.
 
     n_model(t, p, h as read) = n_path - formula + dn/dp offset + dn/dh offset. A barometer that reads too high moved the
-    calibration by as much as it moves this inversion: the two cancel, and the covariance of the parameters says so.
+    calibration by as much as it moves this inversion: the two cancel, through the covariance of the parameters.
     """
     r, sheet = fit.readings, fit.readings.sheet
     rows = np.flatnonzero(np.isfinite(refractivity) & r.has_weather)
@@ -237,10 +250,10 @@ def _temperatures(fit: PathFit, refractivity: np.ndarray, gradient: np.ndarray) 
     warm = np.nanmean(r.temperature_c[rows], axis=1)
     first = len(fit.calibrated) + len(r.thermometers)
     sensors = np.stack([slopes[:, 1] / PPM, slopes[:, 2] / PPM, -np.ones(len(rows))], axis=1)
-    wanted = refractivity[rows] + sensors @ fit.x[first : first + 3] * PPM
+    target = refractivity[rows] + sensors @ fit.x[first : first + 3] * PPM
     inside = np.ones(len(rows), dtype=bool)
-    for _ in range(4):  # Newton: a step of 10 °C leaves 0.4, then 5e-4, then nothing
-        warm = warm + (wanted - group_refractivity(warm, *weather, **light)) / slopes[:, 0]
+    for _ in range(4):  # Newton: errors of 10 °C, 0.4, 5e-4, then 0
+        warm = warm + (target - group_refractivity(warm, *weather, **light)) / slopes[:, 0]
         inside &= (warm >= limits.lower) & (warm <= limits.upper)
         warm = np.clip(warm, limits.lower, limits.upper)  # where the model ends: no number, see `inside`
     by = gradient[rows].copy()
@@ -264,7 +277,10 @@ def _statuses(fit: PathFit) -> tuple[str, ...]:
 
 
 def _budget(fit: PathFit, at: np.ndarray) -> dict[str, float]:
-    """What each independent cause gives of the uncertainty of at'x, index: scatter, and each prior."""
+    """Contribution of each independent cause to the uncertainty of at'x.
+
+    Index; scatter, and each prior.
+    """
     by = fit.covariance @ at
     k = len(fit.readings.thermometers)
     first = len(fit.calibrated)
@@ -284,9 +300,12 @@ def _budget(fit: PathFit, at: np.ndarray) -> dict[str, float]:
     return parts
 
 
-def _slope(known: PathFit) -> SlopeTest:
-    """Of a fit that knows nothing of the length; noise of the phase flattens it, which is put right."""
-    fit = PathFit(known.readings, known.weather, known.followed)
+def _slope(free_fit: PathFit) -> SlopeTest:
+    """Slope test from a fit without prior of the length.
+
+    Noise of the phase flattens the slope, which is corrected.
+    """
+    fit = PathFit(free_fit.readings, free_fit.weather, free_fit.followed)
     at = fit.names.index("length")
     fit.prior[at, at] = (fit.prior[at, at] ** -0.5 + UNKNOWN_SLOPE) ** -2
     fit.run()
@@ -309,21 +328,23 @@ def _notes(fit: PathFit, slope: SlopeTest, absolute: AbsoluteIndex, index_0: flo
         if s.reason == "jump":
             notes.append(f"{where}: a jump of {s.text}")
         else:
-            notes.append(f"{where}: {s.text}; its whole cycles are not tied to those before")
+            notes.append(f"{where}: {s.text}; its whole cycles are not connected to those before")
     for number in range(len(followed.sections)):
         if number not in fit.calibrated:
-            notes.append(f"section {number + 1} has fewer than {LASTING} readings with weather: not calibrated")
+            notes.append(
+                f"section {number + 1} has fewer than {FEWEST_AFTER_JUMP} readings with weather: not calibrated"
+            )
     if slope.agrees is False:
         notes.append(
             f"phase and weather disagree: the weather's index changes {slope.ratio:.3f} ± {slope.u:.3f} times as much "
-            "as the phase says; above 1 the path's air changes less than the sensors'"
+            "as by the phase; above 1 the path's air changes less than the sensors'"
         )
     k, first = len(readings.thermometers), len(fit.calibrated)
     for i, name in enumerate(readings.thermometers if k > 1 else ()):
-        off, known = float(fit.x[first + i]), float(readings.u_temperature_c[i])
-        if abs(off) > AGREES * known > 0.0:
+        off, u_offset = float(fit.x[first + i]), float(readings.u_temperature_c[i])
+        if abs(off) > AGREES * u_offset > 0.0:
             notes.append(
-                f"{name} reads {off:+.2f} °C beside the others, {abs(off) / known:.0f} of its u: offset or place"
+                f"{name} reads {off:+.2f} °C beside the others, {abs(off) / u_offset:.0f} of its u: offset or place"
             )
     if absolute.status == CycleStatus.SURE:
         apart, u = float(absolute.group_index) - 1.0 - index_0, float(np.hypot(absolute.u, u_0))

@@ -1,6 +1,8 @@
-"""The normal equations of a refractometer's night: every thermometer's index against the phase, strays left out.
+"""Normal equations of a refractometer's night, outliers removed.
 
-See `refractometer_calibration`, which says what is observed and what is unknown.
+Every thermometer's index against the phase.
+
+See `refractometer_calibration` for observations and unknowns.
 """
 
 import numpy as np
@@ -10,16 +12,24 @@ from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import MILLIMETRE, PPM
 from catseye.errors import EstimationError
 from catseye.reduction.air.group_index import phase_slope
-from catseye.reduction.air.refractometer_night import LASTING, FollowedPhase, PathReadings, PathWeather, ReadingStatus
+from catseye.reduction.air.refractometer_night import (
+    FEWEST_AFTER_JUMP,
+    FollowedPhase,
+    PathReadings,
+    PathWeather,
+    ReadingStatus,
+)
 
-CRITICAL = 3.5  # |w| beyond which a value is left out: one good value in 2000
-ROUNDS = 30  # cap of rounds of leaving out and taking back
+CRITICAL = 3.5  # |w| beyond which a value is rejected: one good value in 2000
+ROUNDS = 30  # cap of rounds of rejection and reinstatement
 MOST_KNOTS = 48  # of the drift
-FEWEST_PLACES = 3  # thermometers that tell how much the air differs between them
+FEWEST_PLACES = 3  # least thermometers for an estimate of the air's differences between them
 
 
 class PathFit:
-    """The normal equations of one night, and which values take part; ppm, °C, hPa, %, rad.
+    """Normal equations of one night, and its used values.
+
+    Units ppm, °C, hPa, %, rad.
 
     Columns: one index a calibrated section, thermometers, barometer, hygrometer, formula, length, knots of the drift.
     """
@@ -31,9 +41,11 @@ class PathFit:
         good = followed.status == ReadingStatus.FOLLOWED
         fits = good & readings.has_weather
         numbers = range(len(followed.sections))
-        self.calibrated = [s for s in numbers if np.sum(fits & (followed.section == s)) >= LASTING]
+        self.calibrated = [s for s in numbers if np.sum(fits & (followed.section == s)) >= FEWEST_AFTER_JUMP]
         if not self.calibrated:
-            raise EstimationError(f"{readings.file}: no section of the phase has {LASTING} readings with weather")
+            raise EstimationError(
+                f"{readings.file}: no section of the phase has {FEWEST_AFTER_JUMP} readings with weather"
+            )
         self.rows = np.flatnonzero(fits & np.isin(followed.section, self.calibrated))
         self.good = good & np.isin(followed.section, self.calibrated)
         self.phase_0 = np.array([followed.phase[self.rows[followed.section[self.rows] == s]].mean()
@@ -58,18 +70,21 @@ class PathFit:
         self.scatter, self.air, self.correlation, self.places = 1.0, 0.0, 1.0, 1.0
 
     def _knots(self) -> np.ndarray:
-        """Hours at which the drift is a parameter, zero at the first reading; none where the sheet knows of none."""
+        """Hours of the drift's knots, zero at the first reading.
+
+        Empty where the sheet has no drift.
+        """
         span = float(self.hours[-1])
         if self.readings.sheet.drift_mrad_per_root_hour == 0.0 or span == 0.0:
             return np.zeros(0)
         return np.linspace(0.0, span, int(min(max(np.ceil(span), 1), MOST_KNOTS)) + 1)[1:]
 
     def _parameters(self) -> tuple[tuple[str, ...], np.ndarray]:
-        """Names, and the matrix of weights that is known beforehand."""
+        """Names, and the matrix of prior weights."""
         r, sheet = self.readings, self.readings.sheet
-        chosen, there = MODELS[sheet.air_model], np.isfinite(self.weather.index)
+        chosen, measured = MODELS[sheet.air_model], np.isfinite(self.weather.index)
         p, h = (float(np.mean(column[self.rows])) for column in (r.pressure_hpa, r.humidity_percent))
-        t, light = float(np.nanmean(r.temperature_c[there])), {"wavelength_um": sheet.wavelength_um}
+        t, light = float(np.nanmean(r.temperature_c[measured])), {"wavelength_um": sheet.wavelength_um}
         vapour = vapour_pressure_hpa(t, p, h, chosen.vapour_formula)
         formula = float(chosen.uncertainty(t, p, vapour, **light, co2_ppm=sheet.co2_ppm)) / PPM
         u_length = sheet.u_path_length_mm * MILLIMETRE / sheet.path_length_m
@@ -88,13 +103,18 @@ class PathFit:
         return (*names, *(f"drift at {h:.2f} h" for h in self.knots)), prior
 
     def at(self, rows: np.ndarray) -> np.ndarray:
-        """How the parameters make the path's index less dphi/K at readings (ppm): section, length, drift."""
+        """Derivatives of the path's index minus dphi/K at readings (ppm).
+
+        By section, length, drift.
+        """
         f = self.followed
         design = np.zeros((len(rows), len(self.names)))
         for k, s in enumerate(self.calibrated):
-            own = f.section[rows] == s
-            design[own, k] = 1.0
-            design[own, self.names.index("length")] = (f.phase[rows[own]] - self.phase_0[k]) * self.per_radian
+            in_section = f.section[rows] == s
+            design[in_section, k] = 1.0
+            design[in_section, self.names.index("length")] = (
+                f.phase[rows[in_section]] - self.phase_0[k]
+            ) * self.per_radian
         if len(self.knots):
             grid = np.concatenate([[0.0], self.knots])
             first = len(self.names) - len(self.knots)
@@ -103,12 +123,18 @@ class PathFit:
         return design
 
     def weights(self) -> tuple[np.ndarray, np.ndarray]:
-        """(n, k) of each value's own noise, and (n,) g: the weight matrix of a reading is diag(d) - g d d'."""
+        """Weights (n, k) of each value's noise, and (n,) g.
+
+        The weight matrix of a reading is diag(d) - g d d'.
+        """
         d = np.where(self.value_in & self.reading_in[:, None], 1.0, 0.0) / (self.scatter * self.noise_t[:, None]) ** 2
         return d, 1.0 / (1.0 / (self.noise_c + self.air**2) + d.sum(axis=1))
 
     def design(self) -> np.ndarray:
-        """(n, k, q) of every value: the path's index, and what sensors and formula add to the weather's."""
+        """Design (n, k, q) of every value.
+
+        The path's index, and effects of sensors and formula on the weather's.
+        """
         k = self.y.shape[1]
         full = np.repeat(self.common[:, None, :], k, axis=1)
         first = len(self.calibrated)
@@ -121,33 +147,41 @@ class PathFit:
         full, (d, g) = self.design(), self.weights()
         flat, root = full.reshape(-1, full.shape[2]), np.sqrt(d).ravel()
         pooled = np.einsum("nk,nkq->nq", d, full)
-        held = np.einsum("nk,nk->n", d, self.y)
+        weighted = np.einsum("nk,nk->n", d, self.y)
         normal = (flat * root[:, None]).T @ (flat * root[:, None]) - (pooled * g[:, None]).T @ pooled
-        right = (flat * d.ravel()[:, None]).T @ self.y.ravel() - pooled.T @ (g * held)
+        right = (flat * d.ravel()[:, None]).T @ self.y.ravel() - pooled.T @ (g * weighted)
         self.data = normal / self.correlation
         self.covariance = _inverse(self.data + self.prior)
         self.x = self.covariance @ (right / self.correlation)
         self.v = self.y - full @ self.x
 
     def tests(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Residual (n,) of readings' means, w (n,) of readings and w (n, k) of single values, taken out or not."""
-        own = 1.0 / (self.scatter * self.noise_t[:, None]) ** 2 * self.there
-        d = own * self.value_in
-        d = np.where(d.sum(axis=1, keepdims=True) > 0.0, d, own)
+        """Residuals (n,) of readings' means, and w of readings and values.
+
+        w (n,) of readings and w (n, k) of single values, used or not.
+        """
+        value_weight = 1.0 / (self.scatter * self.noise_t[:, None]) ** 2 * self.there
+        d = value_weight * self.value_in
+        d = np.where(d.sum(axis=1, keepdims=True) > 0.0, d, value_weight)
         total = d.sum(axis=1)
         common = self.noise_c + self.air**2
         mean = np.einsum("nk,nk->n", d, self.v) / total
         w_reading = mean / np.sqrt(1.0 / total + common)
-        others = total[:, None] - d  # a value against the mean of the rest: both share the reading's common noise
+        other_weight = (
+            total[:, None] - d
+        )  # a value against the mean of the others: both share the reading's common noise
         with np.errstate(divide="ignore", invalid="ignore"):
-            rest = (total[:, None] * mean[:, None] - d * self.v) / others
-            apart = np.where(self.there & (others > 0.0), self.v - rest, np.nan)
-            w_value = _about_medians(apart) / np.sqrt(1.0 / own + 1.0 / others)
-        alone = (others <= 0.0) | ~self.there
+            other_mean = (total[:, None] * mean[:, None] - d * self.v) / other_weight
+            apart = np.where(self.there & (other_weight > 0.0), self.v - other_mean, np.nan)
+            w_value = _about_medians(apart) / np.sqrt(1.0 / value_weight + 1.0 / other_weight)
+        alone = (other_weight <= 0.0) | ~self.there
         return mean, w_reading, np.where(alone, 0.0, w_value)
 
     def run(self) -> None:
-        """Values out and back in until nothing changes; scatter and its correlation in time as they are found."""
+        """Reject and reinstate values until nothing changes.
+
+        Scatter and its correlation in time are estimated in each round.
+        """
         self.x = np.zeros(len(self.names))
         self.x[: len(self.calibrated)] = [
             np.nanmedian(np.where(self.there, self.y, np.nan)[self.followed.section[self.rows] == s])
@@ -160,19 +194,22 @@ class PathFit:
             worst = np.abs(w_value) >= np.abs(w_value).max(axis=1, keepdims=True)  # of a reading one at a time
             value_in = self.there & ~((np.abs(w_value) > CRITICAL) & (worst | ~self.value_in))
             reading_in = np.abs(w_reading) <= CRITICAL
-            same = np.array_equal(value_in, self.value_in) and np.array_equal(reading_in, self.reading_in)
+            unchanged = np.array_equal(value_in, self.value_in) and np.array_equal(reading_in, self.reading_in)
             self.value_in, self.reading_in = value_in, reading_in
             before = (self.scatter, self.air, self.correlation)
             self.solve()
             self._spread()
-            now = (self.scatter, self.air, self.correlation)
-            if same and np.allclose(before, now, rtol=1e-3, atol=1e-4):
+            current = (self.scatter, self.air, self.correlation)
+            if unchanged and np.allclose(before, current, rtol=1e-3, atol=1e-4):
                 break
         self.solve()
         self._places()
 
     def _places(self) -> None:
-        """Thermometers that stand further apart than their offsets allow show as little of the path's mean as that."""
+        """Enlarge the thermometers' offsets' u by their differences.
+
+        Thermometers further apart than their offsets allow represent the path's mean as badly.
+        """
         k, first = len(self.readings.thermometers), len(self.calibrated)
         if k < FEWEST_PLACES:
             return
@@ -182,29 +219,35 @@ class PathFit:
         self.solve()
 
     def _spread(self) -> None:
-        """Noise of thermometers and of the air as the residuals show it, robustly, and its correlation in time."""
+        """Robust noise of thermometers and air, and its correlation in time.
+
+        From the residuals.
+        """
         d = np.where(self.there, 1.0, 0.0)
         count = d.sum(axis=1)
         mean = (d * self.v).sum(axis=1) / count
         several = count > 1
         if several.any():
-            rest = _about_medians(np.where(self.there, self.v - mean[:, None], np.nan)[several])
-            spread = rest / (self.noise_t[several] * np.sqrt(1.0 - 1.0 / count[several]))[:, None]
+            remainder = _about_medians(np.where(self.there, self.v - mean[:, None], np.nan)[several])
+            spread = remainder / (self.noise_t[several] * np.sqrt(1.0 - 1.0 / count[several]))[:, None]
             self.scatter = max(1.0, _spread_of(spread[np.isfinite(spread)]))
-        own = (self.scatter * self.noise_t) ** 2 / count + self.noise_c
-        self.air = float(np.sqrt(max(_spread_of(mean) ** 2 - float(np.median(own)), 0.0)))
+        expected = (self.scatter * self.noise_t) ** 2 / count + self.noise_c
+        self.air = float(np.sqrt(max(_spread_of(mean) ** 2 - float(np.median(expected)), 0.0)))
         keep = self.reading_in
-        self.correlation = _correlation((mean / np.sqrt(own + self.air**2))[keep])
+        self.correlation = _correlation((mean / np.sqrt(expected + self.air**2))[keep])
 
 
 def _inverse(normal: np.ndarray) -> np.ndarray:
-    """Inverse of a normal matrix whose units lie many powers of ten apart."""
+    """Inverse of a normal matrix with very different units."""
     size = np.sqrt(np.diag(normal))
     return np.linalg.inv(normal / np.outer(size, size)) / np.outer(size, size)
 
 
 def _about_medians(apart: np.ndarray) -> np.ndarray:
-    """Values (n, k) of each thermometer beside the others, without its usual one: that is its offset or its place."""
+    """Values (n, k) of each thermometer against the others, minus its median.
+
+    The median is its offset or its place.
+    """
     usual = [np.nanmedian(one) if np.isfinite(one).any() else 0.0 for one in apart.T]
     return apart - usual
 
@@ -215,12 +258,14 @@ def _spread_of(values: np.ndarray) -> float:
 
 
 def _correlation(values: np.ndarray) -> float:
-    """Factor on the variance of a mean: 1 + 2 sum of autocorrelations, up to where pairs of them stop being above 0.
+    """Factor on the variance of a mean: 1 + 2 sum of autocorrelations.
+
+    Up to where pairs of them are no longer above 0.
 
     Source: the initial positive sequence of [GEYER92].
     """
     n = len(values)
-    if n < 4 * LASTING:
+    if n < 4 * FEWEST_AFTER_JUMP:
         return 1.0
     centred = values - values.mean()
     size = 1 << (2 * n - 1).bit_length()

@@ -1,7 +1,9 @@
-"""Readings of a refractometer path: phases with the weather beside them, and the phase unwrapped over the night.
+"""Readings of a refractometer path, and its unwrapped phase.
 
-Phase and weather go together: what is left of the phase after the weather's prediction hardly changes, so that it
-tells a jump of the path from a change of the air, and carries the whole cycles over a gap when it is good enough.
+Phases with their weather, over a night.
+
+Phase and weather belong together: the phase minus the weather's prediction hardly changes, so that it separates a
+jump of the path from a change of the air, and bridges the whole cycles over a gap when it is accurate enough.
 """
 
 from collections.abc import Mapping
@@ -28,29 +30,29 @@ WEATHER = ("pressure_hpa", "humidity_percent")
 REQUIRED = ("mjd_utc", "phase_rad", *WEATHER)
 OPTIONAL = (*THERMOMETERS, "u_phase_rad", "amplitude_v", "left_out")
 
-SIGMAS = 5.0  # standard uncertainties that a step may be from its prediction, or that must fit into a quarter cycle
-LASTING = 5  # readings that must agree with each other before a step is a jump of the path and not a stray
-RECENT = 5  # readings whose median is the level that the next one is held against
+SIGMAS = 5.0  # standard uncertainties allowed between step and prediction, or within a quarter cycle
+FEWEST_AFTER_JUMP = 5  # consistent readings that make a step a jump of the path, not an outlier
+RECENT = 5  # readings whose median is the reference of the next one
 DEPARTURE_PPM = 0.5  # in an hour, growing with the root of time: path from the thermometers' place
-AIR_WALK_PPM = 3.0  # in an hour, likewise: of the air, where no weather was read
-WINDOW = 15  # readings on either side of a step too small for a single reading to show
-STEP = 6.0  # usual differences of two such windows, beyond which it is a step
-LONG_GAP = 10.0  # usual intervals: a longer one is named when it was bridged
+AIR_WALK_PPM = 3.0  # in an hour, likewise: of the air, without weather readings
+WINDOW = 15  # readings on either side of a step too small for single readings
+STEP = 6.0  # usual differences of two such windows, beyond which there is a step
+LONG_GAP = 10.0  # usual intervals: a longer one is reported when bridged
 
 Spread = Annotated[float, Within(0, 100)]
 
 
 class PathSheet(Certificate):
-    """What is known of a refractometer path; `FILE.toml` beside `FILE.csv`.
+    """Data sheet of a refractometer path; `FILE.toml` beside `FILE.csv`.
 
     path                     its name
     path_length_m            D - D0, less the glass of the target
-    u_path_length_mm         of it; 25 mm serve for changes, the absolute index wants micrometres
+    u_path_length_mm         of it; 25 mm suffice for changes, the absolute index needs micrometres
     modulation_hz, wavelength_um, air_model, co2_ppm   as for the index of air
-    u_temperature_c          of each thermometer's offset, what all its readings share; a list gives each its own
+    u_temperature_c          of each thermometer's offset, common to all its readings; a list has one per thermometer
     u_pressure_hpa, u_humidity_percent   likewise
     noise_temperature_c      scatter of a reading against the path's mean, and so on
-    u_phase_rad              of a phase, where the table has no column of that name
+    u_phase_rad              of a phase, if the table has no column of that name
     drift_mrad_per_root_hour of the electronics or the path, a random walk; 0: none
     """
 
@@ -74,7 +76,9 @@ class PathSheet(Certificate):
 
 @dataclass(frozen=True, eq=False)
 class PathReadings:
-    """A night of one path, m readings by k thermometers; weather that was not read is nan.
+    """Night of one path, m readings by k thermometers.
+
+    Missing weather is nan.
 
     sheet          of the path
     mjd_utc        (m,) in order
@@ -82,7 +86,7 @@ class PathReadings:
     temperature_c  (m, k)
     pressure_hpa, humidity_percent   (m,)
     thermometers   (k) names of their columns; u_temperature_c (k,) °C
-    left_out       (m) why the table leaves a reading out, "" where it does not
+    left_out       (m) reason that the table leaves a reading out, "" for none
     where          (m) place in the file
     """
 
@@ -105,12 +109,12 @@ class PathReadings:
 
     @property
     def hours(self) -> np.ndarray:
-        """(m,) h since the first reading."""
+        """Time since the first reading, (m,) h."""
         return (self.mjd_utc - self.mjd_utc[0]) * SECONDS_PER_DAY / 3600.0
 
     @property
     def has_weather(self) -> np.ndarray:
-        """(m,) bool: pressure, humidity and at least one thermometer were read."""
+        """True (m,) for pressure, humidity and at least one thermometer."""
         read = np.isfinite(self.pressure_hpa) & np.isfinite(self.humidity_percent)
         return read & np.isfinite(self.temperature_c).any(axis=1)
 
@@ -118,20 +122,22 @@ class PathReadings:
 def read_path_sheet(
     path: Path, changes: Mapping[str, object], *, needed: bool = False
 ) -> tuple[PathSheet | None, dict[str, str]]:
-    """FILE.toml with some of its keys changed, or a sheet of these keys alone where there is no file.
+    """Sheet FILE.toml with changes, or a sheet of these keys alone.
+
+    The latter without a file.
 
     path      of the sheet; it may be missing
-    changes   key -> value, as the command line gives them
-    needed    the file must be there
+    changes   key -> value, of the command line
+    needed    True if the file must exist
 
-    None where neither says the length of the path. Raises InputError for a bad sheet.
+    None where neither has the length of the path. Raises InputError for a bad sheet.
     """
-    folder, kept = Folder(path.parent), dict[str, object]()
+    folder, entries = Folder(path.parent), dict[str, object]()
     if needed or path.exists():
-        kept = folder.record(path.name, PathSheet).model_dump(exclude_unset=True)
+        entries = folder.record(path.name, PathSheet).model_dump(exclude_unset=True)
     elif "path_length_m" not in changes:
         return None, {}
-    values = {**kept, **changes}
+    values = {**entries, **changes}
     try:
         return PathSheet.model_validate(values), dict(folder.hashes)
     except ValidationError as problem:
@@ -139,26 +145,30 @@ def read_path_sheet(
 
 
 def read_path_readings(path: Path, sheet: PathSheet | None = None, sheet_hashes: dict | None = None) -> PathReadings:
-    """A night of one path: FILE.csv, columns as in docs/formats/refractometer.md.
+    """Night of one path from FILE.csv.
+
+    Columns as in docs/formats/refractometer.md.
 
     path           of the table
-    sheet          of the path, as `read_path_sheet` gives it
-    sheet_hashes   SHA-256 of what was read for it
+    sheet          of the path, from `read_path_sheet`
+    sheet_hashes   SHA-256 of its files
 
-    Raises InputError in one line: file, line, value, what was expected.
+    Raises InputError in one line: file, line, value, expectation.
     """
     folder, file = Folder(path.parent), path.name
     table = columns_of(folder.text(file), str(path), REQUIRED, optional=OPTIONAL)
     if sheet is None:
-        raise refusal(str(path), f"has no sheet {path.with_suffix('.toml').name} beside it and no path length is given")
+        raise refusal(str(path), f"has no sheet {path.with_suffix('.toml').name} beside it and there is no path length")
     if sheet.air_model not in MODELS:
         raise InputError(f"air_model = {shown(sheet.air_model)} is unknown (expected one of {', '.join(MODELS)})")
     named = tuple(name for name in THERMOMETERS if name in table.cells)
     if not named:
         raise refusal(str(path), "line 1, column 'temperature_c' is missing (or temperature_1_c, temperature_2_c ...)")
-    u_each = sheet.u_temperature_c if isinstance(sheet.u_temperature_c, tuple) else (sheet.u_temperature_c,)
-    if len(u_each) not in (1, len(named)):
-        raise InputError(f"u_temperature_c has {len(u_each)} values for {len(named)} thermometers (expected one each)")
+    u_columns = sheet.u_temperature_c if isinstance(sheet.u_temperature_c, tuple) else (sheet.u_temperature_c,)
+    if len(u_columns) not in (1, len(named)):
+        raise InputError(
+            f"u_temperature_c has {len(u_columns)} values for {len(named)} thermometers (expected one each)"
+        )
     mjd = table.numbers("mjd_utc")
     table.check("mjd_utc", (mjd >= EARLIEST_MJD) & (mjd <= LATEST_MJD), f"{EARLIEST_MJD:g} to {LATEST_MJD:g}")
     table.check("mjd_utc", np.diff(mjd, prepend=0.0) > 0.0, "later than the line before")
@@ -184,19 +194,19 @@ def read_path_readings(path: Path, sheet: PathSheet | None = None, sheet_hashes:
         pressure_hpa=weather["pressure_hpa"],
         humidity_percent=weather["humidity_percent"],
         thermometers=named,
-        u_temperature_c=np.broadcast_to(np.array(u_each), len(named)).astype(float),
+        u_temperature_c=np.broadcast_to(np.array(u_columns), len(named)).astype(float),
         left_out=tuple(table.cells.get("left_out", [""] * len(table))),
         where=table.where(),
         hashes={**folder.hashes, **(sheet_hashes or {})},
     )
     serving = readings.has_weather & np.array([not why for why in readings.left_out])
-    if serving.sum() < LASTING:
-        raise refusal(str(path), f"holds {serving.sum()} readings with weather (expected at least {LASTING})")
+    if serving.sum() < FEWEST_AFTER_JUMP:
+        raise refusal(str(path), f"holds {serving.sum()} readings with weather (expected at least {FEWEST_AFTER_JUMP})")
     return readings
 
 
 def _limited(table: TextColumns, name: str, limit) -> np.ndarray:
-    """A column of numbers within the model's limits; a blank cell is nan."""
+    """Column of numbers within the model's limits; a blank cell is nan."""
     values = table.numbers(name, blank=float("nan"))
     good = ~((values < limit.lower) | (values > limit.upper))
     table.check(name, good, f"{limit.lower:g} to {limit.upper:g} {limit.unit}, where {limit.source} holds")
@@ -205,11 +215,13 @@ def _limited(table: TextColumns, name: str, limit) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class PathWeather:
-    """Index by the weather at every reading, (m,) or (m, k); nan without weather.
+    """Index by the weather at every reading.
+
+    (m,) or (m, k); nan without weather.
 
     index         (m, k) group refractivity by each thermometer
     mean          (m,) by their mean
-    slopes        (m, 3) per °C, hPa, %, relative humidity held
+    slopes        (m, 3) per °C, hPa, %, at fixed relative humidity
     noise         (m,) of `mean`, by the sheet's noise of a reading
     """
 
@@ -220,30 +232,34 @@ class PathWeather:
 
 
 def path_weather(readings: PathReadings) -> PathWeather:
-    """The index by the weather: each thermometer's, their mean's, and the slopes. Source: the model's own."""
+    """Index by the weather: each thermometer's, their mean's, and slopes.
+
+    Source: the model's own.
+    """
     sheet, rows = readings.sheet, np.flatnonzero(readings.has_weather)
     light = {"wavelength_um": sheet.wavelength_um, "co2_ppm": sheet.co2_ppm, "model": sheet.air_model}
-    there = np.isfinite(readings.temperature_c[rows])
-    count = there.sum(axis=1)
-    warm = np.where(there, readings.temperature_c[rows], 0.0).sum(axis=1) / count
+    measured = np.isfinite(readings.temperature_c[rows])
+    count = measured.sum(axis=1)
+    warm = np.where(measured, readings.temperature_c[rows], 0.0).sum(axis=1) / count
     p, h = readings.pressure_hpa[rows], readings.humidity_percent[rows]
     state = air(warm, p, h, **light)
-    each = air(np.where(there, readings.temperature_c[rows], warm[:, None]), p[:, None], h[:, None], **light)
+    single = air(np.where(measured, readings.temperature_c[rows], warm[:, None]), p[:, None], h[:, None], **light)
     slopes = np.stack([np.broadcast_to(s, warm.shape) for s in state.sensitivity[:3]], axis=1)
     noises = (sheet.noise_temperature_c, sheet.noise_pressure_hpa, sheet.noise_humidity_percent)
     scatter = slopes * np.stack([noises[0] / np.sqrt(count), *(np.full(len(rows), n) for n in noises[1:])], axis=1)
     m, k = readings.temperature_c.shape
     index, mean, slope, noise = (np.full(shape, np.nan) for shape in ((m, k), m, (m, 3), m))
-    index[rows] = np.where(there, each.group_refractivity, np.nan)
+    index[rows] = np.where(measured, single.group_refractivity, np.nan)
     mean[rows], slope[rows], noise[rows] = state.group_refractivity, slopes, np.sqrt(np.sum(scatter**2, axis=1))
     return PathWeather(index, mean, slope, noise)
 
 
 class ReadingStatus(IntEnum):
-    """What became of a reading: FOLLOWED, STRAY (off its neighbours, which agree) or LEFT_OUT (by the table).
+    """Status of a reading: FOLLOWED, STRAY or LEFT_OUT.
 
-    A STRAY, too, is one whose own u spoils a prediction that would tell its whole cycles: faint, or hours without
-    weather.
+    A STRAY contradicts its neighbours, which agree; LEFT_OUT is by the table.
+
+    A STRAY is also one whose own u is too large for its whole cycles: faint, or hours without weather.
     """
 
     FOLLOWED = 0
@@ -256,8 +272,8 @@ class Section:
     """Readings between which the whole cycles are known.
 
     first, last   rows
-    reason        why it begins: "start", "jump" of path or electronics, "ambiguous gap"
-    text          the same for people
+    reason        of its begin: "start", "jump" of path or electronics, "ambiguous gap"
+    text          the same as a text
     """
 
     first: int
@@ -268,13 +284,13 @@ class Section:
 
 @dataclass(frozen=True, eq=False)
 class FollowedPhase:
-    """The phase of a night, unwrapped, in sections within which its whole cycles are known.
+    """Unwrapped phase of a night, in sections with known whole cycles.
 
-    phase      (m,) rad, continuous within a section; of a stray the turn nearest to its neighbours
+    phase      (m,) rad, continuous within a section; for an outlier the turn nearest to its neighbours
     section    (m,) number of the section
     status     (m,) int8 of `ReadingStatus`
-    sections   what they are
-    bridged    long gaps over which the weather carried the whole cycles, in words
+    sections   of the phase
+    bridged    long gaps bridged by the weather, as texts
     """
 
     phase: np.ndarray
@@ -285,30 +301,30 @@ class FollowedPhase:
 
 
 def follow_phase(readings: PathReadings, weather: PathWeather) -> FollowedPhase:
-    """The phase unwrapped over the night, held against what the weather predicts.
+    """Unwrap the phase over the night, compared with the weather's prediction.
 
-    A reading belongs to the section when what the weather leaves of its phase lies within five standard uncertainties
-    of the latest readings'. A gap over which that prediction is not good to a quarter cycle at five sigma ends the
-    section: its whole cycles are not guessed. A step that lasts for five readings is a jump of path or electronics and
-    begins a section, too; a shorter one is a stray. Steps below that are found by the medians of fifteen readings on
-    either side, six times what such medians usually differ by, and at least half of it sudden: air that slowly leaves
-    the thermometers' is no jump. A step of a whole number of turns cannot be seen.
+    A reading belongs to the section when its phase minus the weather's prediction lies within five standard
+    uncertainties of the latest readings'. A gap over which that prediction is not good to a quarter cycle at five sigma
+    ends the section: its whole cycles are not guessed. A step that persists for five readings is a jump of path or
+    electronics and begins a section, too; a shorter one is an outlier. Steps below that are found by the medians of
+    fifteen readings on either side, six times what such medians usually differ by, and at least half of it sudden: air
+    that slowly departs from the thermometers' is no jump. A step of a whole number of turns is undetectable.
 
     Source: [PARKER04] section 1.6; the rule is that of `signal.cycles.whole`: the nearest integer with a margin.
     """
     sheet, hours = readings.sheet, readings.hours
     slope = float(phase_slope(sheet.path_length_m, modulation_hz=sheet.modulation_hz))
     rows, read = np.flatnonzero([not why for why in readings.left_out]), np.isfinite(weather.mean)
-    smooth = _running_median(weather.mean[read])  # one wrong reading of the weather makes no phase a stray
+    smooth = _running_median(weather.mean[read])  # one wrong weather reading makes no phase an outlier
     expected = slope * (np.interp(hours, hours[read], smooth) - np.mean(smooth))
     unread = _to_nearest(hours, hours[read])
-    rest = readings.phase - expected
+    remainder = readings.phase - expected
     noise = np.interp(hours, hours[read], weather.noise[read])
     sigma = np.sqrt(readings.u_phase**2 + (slope * noise) ** 2 + (slope * AIR_WALK_PPM * PPM) ** 2 * unread)
-    steps = _wrapped(np.diff(rest[rows]))
+    steps = _wrapped(np.diff(remainder[rows]))
     scatter = float(1.4826 * np.median(np.abs(steps)) / np.sqrt(2.0)) if len(steps) else 0.0
     walk = np.hypot(sheet.drift_mrad_per_root_hour * 1e-3, slope * DEPARTURE_PPM * PPM)
-    follower = _Follower(hours, rest, np.maximum(sigma, scatter), walk, TWO_PI / slope * sheet.path_length_m)
+    follower = _Follower(hours, remainder, np.maximum(sigma, scatter), walk, TWO_PI / slope * sheet.path_length_m)
     return follower.follow(rows, expected, np.array([bool(why) for why in readings.left_out]))
 
 
@@ -318,19 +334,22 @@ def _running_median(values: np.ndarray) -> np.ndarray:
     return np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
 
 
-def _to_nearest(when: np.ndarray, those: np.ndarray) -> np.ndarray:
-    """(m,) time from each instant to the nearest of those, which ascend."""
-    after = np.clip(np.searchsorted(those, when), 1, len(those) - 1)
-    return np.minimum(np.abs(when - those[after - 1]), np.abs(when - those[after]))
+def _to_nearest(when: np.ndarray, reference_times: np.ndarray) -> np.ndarray:
+    """Time (m,) from each instant to the nearest reference time.
+
+    Reference times ascend.
+    """
+    after = np.clip(np.searchsorted(reference_times, when), 1, len(reference_times) - 1)
+    return np.minimum(np.abs(when - reference_times[after - 1]), np.abs(when - reference_times[after]))
 
 
 def _wrapped(angle):
-    """Nearest to zero of all turns of an angle."""
+    """Angle reduced to the turn nearest to zero."""
     return angle - TWO_PI * np.rint(angle / TWO_PI)
 
 
 class _Follower:
-    """Goes from reading to reading; `level` is the median of the latest that belong together."""
+    """Sequential unwrapping; `level` is the median of the latest readings."""
 
     def __init__(self, hours: np.ndarray, rest: np.ndarray, sigma: np.ndarray, walk: float, per_turn: float) -> None:
         self.hours, self.rest, self.sigma, self.walk, self.per_turn = hours, rest, sigma, walk, per_turn
@@ -342,7 +361,7 @@ class _Follower:
 
     def follow(self, rows: np.ndarray, expected: np.ndarray, left_out: np.ndarray) -> FollowedPhase:
         certain = SIGMAS * self.sigma[rows] < 0.25 * TWO_PI
-        if certain.any():  # a reading too faint to tell its own cycle ends no section: it is passed over
+        if certain.any():  # a reading too faint for its own cycle ends no section: it is skipped
             vague, rows = rows[~certain], rows[certain]
         else:
             vague = rows[:0]
@@ -355,7 +374,7 @@ class _Follower:
             if gap > 0.0 and SIGMAS * u >= 0.25 * TWO_PI:
                 if SIGMAS * np.sqrt(u**2 - self.sigma[row] ** 2) < 0.25 * TWO_PI:
                     self.turned[row] = self._level() + off
-                    continue  # not the gap is too long but this reading too vague
+                    continue  # the reading is too uncertain, not the gap too long
                 text = f"no reading for {gap:.2f} h, over which the prediction is good to {u / TWO_PI:.2f} cycles only"
                 self._begin(rows[place:], "ambiguous gap", text)
                 u, off = self._against(row)
@@ -366,7 +385,7 @@ class _Follower:
                 continue
             self.turned[row] = self._level() + off
             waiting.append(int(row))
-            if len(waiting) == LASTING and self._agree(waiting):
+            if len(waiting) == FEWEST_AFTER_JUMP and self._agree(waiting):
                 step = self._level()
                 self._begin(np.array(waiting), "jump", "")
                 step = float(_wrapped(self._level() - step))
@@ -374,7 +393,7 @@ class _Follower:
                 for old in waiting:
                     self._take(old, self._against(old)[1], 0.0, usual)
                 waiting = []
-            elif len(waiting) == LASTING:
+            elif len(waiting) == FEWEST_AFTER_JUMP:
                 waiting.pop(0)
         for row in vague:
             near = self.turned[rows[np.argmin(np.abs(self.hours[rows] - self.hours[row]))]]
@@ -384,7 +403,10 @@ class _Follower:
         return self._followed(expected)
 
     def _small_steps(self) -> None:
-        """Sections cut where the medians before and after differ by far more than they do elsewhere, largest first."""
+        """Cut sections at small steps, largest first.
+
+        Where the medians before and after differ by far more than elsewhere.
+        """
         while True:
             edges = [0, *sorted(row for row, _, _ in self.starts[1:]), len(self.rest)]
             best, where = 0.0, -1
@@ -408,7 +430,10 @@ class _Follower:
 
     @staticmethod
     def _sudden(values: np.ndarray) -> np.ndarray:
-        """What is left of each step between windows when a straight line runs on either side of it: none of a slope."""
+        """Sudden part of each step between windows.
+
+        A straight line runs on either side of it: a slope has none.
+        """
         place = np.arange(WINDOW) - 0.5 * (WINDOW - 1)
         toward = 1.0 / WINDOW + 0.5 * WINDOW * place / np.sum(place**2)  # the line's value at the window's late end
         late = np.convolve(values, toward[::-1], mode="valid")
@@ -416,7 +441,10 @@ class _Follower:
         return early[WINDOW:] - late[:-WINDOW]
 
     def _cut(self, values: np.ndarray) -> int:
-        """Where the values fall apart into two levels with the least sum of absolute departures."""
+        """Row that splits the values into two levels.
+
+        With the least sum of absolute departures.
+        """
         places = range(2, len(values) - 2)
         return min(places, key=lambda k: float(sum(np.abs(v - np.median(v)).sum() for v in (values[:k], values[k:]))))
 
@@ -424,8 +452,8 @@ class _Follower:
         return f"{step * 1e3:+.1f} mrad, as {step * self.per_turn / TWO_PI / MILLIMETRE:+.3f} mm of path"
 
     def _begin(self, rows: np.ndarray, reason: str, text: str) -> None:
-        """A new level: of the next readings the one that the others are nearest to."""
-        near = rows[: 2 * LASTING - 1]
+        """Begin a new level at the most central of the next readings."""
+        near = rows[: 2 * FEWEST_AFTER_JUMP - 1]
         apart = np.abs(_wrapped(self.rest[near][:, None] - self.rest[near]))
         centre = int(near[np.argmin(apart.sum(axis=1))])
         self.recent = [(int(near[0]), float(self.rest[centre]))]
@@ -435,7 +463,7 @@ class _Follower:
         return float(np.median([value for _, value in self.recent]))
 
     def _against(self, row: int) -> tuple[float, float]:
-        """Standard uncertainty of the prediction of a reading, and how far off it is, rad."""
+        """Standard uncertainty of a reading's prediction, and its error, rad."""
         last = self.recent[-1][0]
         level = 1.25 * self.sigma[last] / np.sqrt(len(self.recent))  # 1.25: of a median
         u = np.sqrt(self.sigma[row] ** 2 + level**2 + self.walk**2 * abs(self.hours[row] - self.hours[last]))
@@ -450,8 +478,8 @@ class _Follower:
         self.recent = [*([] if fresh else self.recent), (int(row), value)][-RECENT:]
 
     def _agree(self, rows: list[int]) -> bool:
-        """Whether the readings lie together, at a level of their own."""
-        apart = np.abs(_wrapped(self.rest[rows] - self.rest[rows[LASTING // 2]]))
+        """True if the readings agree on a level of their own."""
+        apart = np.abs(_wrapped(self.rest[rows] - self.rest[rows[FEWEST_AFTER_JUMP // 2]]))
         return bool(np.all(apart <= SIGMAS * np.sqrt(2.0) * self.sigma[rows]))
 
     def _followed(self, expected: np.ndarray) -> FollowedPhase:

@@ -1,6 +1,8 @@
-"""The air from what instruments read: a barometer's mercury to pressure, a hygrometer to vapour, both to the index.
+"""Air and index from instrument readings.
 
-Each way that the notes name ends in the same answer, with the uncertainty that its instruments give it.
+A barometer's mercury to pressure, a hygrometer to vapour, both to the index.
+
+Each route of the notes ends in the same answer, with the uncertainty of its instruments.
 """
 
 from collections.abc import Mapping
@@ -36,13 +38,13 @@ UNCERTAINTY_OF: Mapping[str, tuple[Hygrometer, ...]] = {  # argument -> readings
     "u_wet_bulb_c": ("wet_bulb_c", "ice_bulb_c"),
     "u_vapour_pressure_hpa": ("vapour_pressure_hpa",),
 }
-U_STANDARD_GRAVITY = 0.02  # m/s²: gravity at stations from 9.78 to 9.83 stands for 9.80665
-U_LAPSE = 0.0065  # °C/m, of air taken to be of one temperature: as much as the standard air's falls
+U_STANDARD_GRAVITY = 0.02  # m/s²: gravity at stations from 9.78 to 9.83, instead of 9.80665
+U_LAPSE = 0.0065  # °C/m, of air taken as isothermal: the standard air's lapse
 
 
 @dataclass(frozen=True)
 class Moisture:
-    """What an instrument of humidity read.
+    """Reading of an instrument of humidity.
 
     kind    relative humidity over liquid water (%), dew or frost point of a mirror (°C), wet bulb over water or over
             ice (°C), or the vapour pressure itself (hPa)
@@ -148,7 +150,9 @@ def pressure_of(  # noqa: PLR0913 - an instrument with all that corrects it
 
 @dataclass(frozen=True)
 class IndexFormula:
-    """The formula of an index of air, and the light that it is for, as `atmosphere.index.air.air` takes them.
+    """Formula of the index of air, and its light.
+
+    As `atmosphere.index.air.air` takes them.
 
     wavelength_um   of the light, in vacuum
     model           a name in `atmosphere.index.air.MODELS`
@@ -172,11 +176,11 @@ def station_pressure(
     u_reading_mmhg: ArrayLike = 0.0,
     u_mercury_c: ArrayLike = 0.0,
 ) -> tuple[float | NDArray[np.float64], float | NDArray[np.float64]]:
-    """Station pressure from a mercury barometer and its standard uncertainty, hPa.
+    """Station pressure from a mercury barometer, and its u, hPa.
 
     reading_mmhg     uncorrected height of the mercury on a brass scale, mm
     mercury_c        temperature of barometer and mercury, °C
-    gravity          local, m/s², measured; None: by the two below, which knows it to 3e-4 m/s²
+    gravity          local, m/s², measured; None: by the two below, accurate to 3e-4 m/s²
     latitude         rad
     elevation        m above the sea
     u_reading_mmhg   standard uncertainty of the reading, mm
@@ -209,20 +213,22 @@ def air_by(
     u_co2_ppm: ArrayLike = 0.0,
     formula: IndexFormula | None = None,
 ) -> tuple[AirState, float | NDArray[np.float64]]:
-    """The air and the standard uncertainty of its group index, formula and instruments.
+    """State of the air, and the standard uncertainty of its group index.
+
+    Of formula and instruments.
 
     temperature_c     of the air, °C
     pressure_hpa      at the barometer, hPa
-    moisture          what was read
+    moisture          the reading
     above_barometer   height of the air above the barometer, m, within 1 km: at rest and of one temperature between;
-                      what that leaves open of the pressure (a lapse of 6.5 °C/km: 0.012 hPa over 100 m, 1.1 hPa over
-                      1 km) and what gravity does enters the uncertainty
+                      the resulting error of the pressure (a lapse of 6.5 °C/km: 0.012 hPa over 100 m, 1.1 hPa over
+                      1 km) and the effect of gravity enter the uncertainty
     u_temperature_c   standard uncertainty of the temperature, °C; it reaches the index by the density and by the vapour
     u_pressure_hpa    of the pressure, hPa
     u_co2_ppm         of the carbon dioxide, ppm
     formula           of the index, with its light; None: the defaults
 
-    Raises ValidityError for what cannot be.
+    Raises ValidityError for impossible values.
     Source: [JCGM100] eq. 10; the instruments' equations are in `atmosphere.index.hygrometer`.
 
     >>> state, u = air_by(20.0, 933.0, Moisture("dew_point_c", 9.267, 0.2), formula=IndexFormula(model="rueger1990"))
@@ -232,16 +238,16 @@ def air_by(
     of = formula or IndexFormula()
     light = {"wavelength_um": of.wavelength_um, "model": of.model, "co2_ppm": of.co2_ppm}
     u = {"u_temperature_c": u_temperature_c, "u_pressure_hpa": u_pressure_hpa}
-    at, u["u_pressure_hpa"], at_per_c = _carried(
+    at, u["u_pressure_hpa"], at_per_c = _reduced_pressure(
         temperature_c, pressure_hpa, above_barometer, moisture, of.model, u_pressure_hpa
     )
     if moisture.kind == "humidity_percent":
         state = air(temperature_c, at, moisture.value, modulation_hz=of.modulation_hz, **light)
         slope = state.sensitivity
-        # a thermometer read too high also carries the pressure wrongly
+        # a thermometer's error also affects the reduced pressure
         by_c = slope._replace(temperature_c=slope.temperature_c + slope.pressure_hpa * at_per_c)
-        whole = replace(state, sensitivity=by_c)
-        return state, whole.combined_uncertainty(**u, u_humidity_percent=moisture.u, u_co2_ppm=u_co2_ppm)
+        combined = replace(state, sensitivity=by_c)
+        return state, combined.combined_uncertainty(**u, u_humidity_percent=moisture.u, u_co2_ppm=u_co2_ppm)
     vapour = read(temperature_c, at, moisture, model=of.model)
     state = air_of_vapour(temperature_c, at, vapour.vapour_pressure_hpa, modulation_hz=of.modulation_hz, **light)
     partials = group_partials(temperature_c, at, vapour.vapour_pressure_hpa, **light)
@@ -260,10 +266,12 @@ def formula_uncertainty(
     u_pressure_hpa: ArrayLike = 0.0,
     formula: IndexFormula | None = None,
 ) -> float | NDArray[np.float64]:
-    """Standard uncertainty that the formulas alone give the group index, with exact readings.
+    """Standard uncertainty of the group index by the formulas alone.
 
-    u_pressure_hpa   of the pressure, hPa, that the barometer's own formulas leave
-    others           as of `air_by`: saturation, psychrometer, and the air between, which is taken at rest, count
+    With exact readings.
+
+    u_pressure_hpa   of the pressure, hPa, by the barometer's own formulas
+    others           as of `air_by`: saturation, psychrometer, and the air between, taken at rest, count
 
     >>> float(formula_uncertainty(20.0, 933.0, Moisture("humidity_percent", 50.0, 2.0)))
     5e-08
@@ -288,10 +296,10 @@ def surface_of(
     u_temperature_c: ArrayLike = 0.0,
     u_pressure_hpa: ArrayLike = 0.0,
 ) -> Condensation:
-    """Whether a surface in this air will dew or frost over.
+    """Condensation of dew or frost on a surface in this air.
 
-    state             as `air_by` gives it
-    moisture          what was read: its uncertainty is the dew point's, and the air's temperature counts only where the
+    state             from `air_by`
+    moisture          the reading: its uncertainty is the dew point's, and the air's temperature counts only where the
                       instrument needs it (a mirror reads the dew point itself)
     surface_c         temperature of the surface, °C
     u_surface_c       its standard uncertainty, °C; uncorrelated with the air's
@@ -308,9 +316,9 @@ def surface_of(
     u_vapour = reading.standard_uncertainty_hpa(
         moisture.u, u_temperature_c=u_temperature_c, u_pressure_hpa=u_pressure_hpa
     )
-    # to rounding and the formulas' 0.2 % air may be a little more than saturated; the surface's answer is the same
+    # by rounding and the formulas' 0.2 % air may be a little oversaturated; the surface's result is the same
     relative = np.minimum(state.humidity_percent, 100.0)
-    # the threshold hangs on the vapour alone: its uncertainty, as humidity at a temperature that is exact
+    # the threshold depends on the vapour alone: its uncertainty, as humidity at an exact temperature
     u_humidity = 100.0 * u_vapour / humidity.saturation(state.temperature_c, state.pressure_hpa).pressure_hpa
     u = CondensationSpread(surface_c=u_surface_c, humidity_percent=u_humidity)
     return condensation(surface_c, state.temperature_c, state.pressure_hpa, humidity_percent=relative, u=u)
@@ -319,7 +327,9 @@ def surface_of(
 def read(
     temperature_c: ArrayLike, pressure_hpa: ArrayLike, moisture: Moisture, *, model: str
 ) -> hygrometer.VapourReading:
-    """Vapour pressure from an instrument, by the saturation formula that goes with the model where it has one.
+    """Vapour pressure from an instrument.
+
+    By the model's saturation formula where it has one.
 
     Over ice and in a psychrometer the formula is the notes', Buck's.
     """
@@ -337,7 +347,7 @@ def read(
     return hygrometer.of_wet_bulb(temperature_c, moisture.value, pressure_hpa, over_ice=over_ice)
 
 
-def _carried(
+def _reduced_pressure(
     temperature_c: ArrayLike,
     pressure_hpa: ArrayLike,
     above: ArrayLike,
@@ -345,16 +355,18 @@ def _carried(
     model: str,
     u_pressure_hpa: ArrayLike,
 ) -> tuple[ArrayLike, ArrayLike, float | NDArray[np.float64]]:
-    """Pressure at the air's height, its standard uncertainty but for the temperature's, its slope by that (hPa/°C).
+    """Pressure at the air's height, its u, and its slope by temperature.
 
-    The air between has the vapour that the instrument shows at the barometer.
+    u without the temperature's; slope in hPa/°C.
+
+    The air between has the vapour measured at the barometer.
     """
     ABOVE.check(above)
     if np.all(np.asarray(above) == 0.0):
         return pressure_hpa, u_pressure_hpa, 0.0
     e = read(temperature_c, pressure_hpa, moisture, model=model).vapour_pressure_hpa
-    carried = barometer.carried_pressure(
+    reduced = barometer.carried_pressure(
         pressure_hpa, temperature_c, 0.0, z_to=above, lapse_c_per_m=0.0, vapour_pressure_hpa=e
     )
-    u = carried.standard_uncertainty_hpa(u_pressure_hpa, u_lapse=U_LAPSE, u_gravity=U_STANDARD_GRAVITY)
-    return carried.pressure_hpa, u, carried.per_temperature_c
+    u = reduced.standard_uncertainty_hpa(u_pressure_hpa, u_lapse=U_LAPSE, u_gravity=U_STANDARD_GRAVITY)
+    return reduced.pressure_hpa, u, reduced.per_temperature_c

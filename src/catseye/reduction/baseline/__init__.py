@@ -1,1 +1,1 @@
-"""EDM baselines: pillar distances, an instrument against them, the tests of ISO 17123-4."""
+"""EDM baselines: pillar distances, instrument calibration, ISO 17123-4 tests."""

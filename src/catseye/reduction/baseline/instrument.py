@@ -1,6 +1,8 @@
-"""An EDM baseline: shots and weather to pillars, and to the zero, scale and cyclic terms of the instrument.
+"""Calibration of an EDM baseline.
 
-Signs: observed = (1 + scale) D + zero + cyclic. What an instrument shows too much is above zero; the correction that
+Shots and weather to pillars, and to the zero, scale and cyclic terms of the instrument.
+
+Signs: observed = (1 + scale) D + zero + cyclic. An instrument that reads too much has zero above 0; the correction that
 the standard adds to readings is -zero.
 """
 
@@ -26,7 +28,7 @@ from catseye.reduction.calibrations.check_outcome import CheckOutcome
 
 @dataclass(frozen=True, eq=False)
 class BaselineCalibration:
-    """The outcome of a baseline's calibration: pillars, instrument, tests.
+    """Result of a baseline's calibration: pillars, instrument, tests.
 
     observations   as read
     settings       assumptions
@@ -36,15 +38,15 @@ class BaselineCalibration:
     lengths        of all shots
     keep           (m,) the shots used
     solution       of those
-    test           the full test procedure with the sets' means, or why not
-    all_shots      the same with each shot as a distance of its own: its s is comparable with others' sheets
+    test           the full test procedure with the sets' means, or the reason against it
+    all_shots      the same with each shot as a single distance: its s is comparable with other sheets
     against        the known baseline, or None
     decisions      tests
-    suspects       shots and sets that the tests reject
-    rejected       (m,) why a shot was left out, "" for the others
+    suspects       shots and sets rejected by the tests
+    rejected       (m,) reason that a shot was left out, "" for the others
     cyclic         names of the cyclic terms; empty where left out
-    weather        share of the weather's changes that the light followed, and its u: 1 expected
-    notes          what a person should know
+    weather        share of the weather's changes in the measured lengths, and its u: 1 expected
+    notes          for the user
     """
 
     observations: BaselineShots
@@ -67,7 +69,7 @@ class BaselineCalibration:
 
     @property
     def order(self) -> np.ndarray:
-        """(n,) numbers of the pillars along the line."""
+        """Numbers (n,) of the pillars along the line."""
         return np.argsort(self.solution.x, kind="stable")
 
 
@@ -82,10 +84,10 @@ def calibrate_baseline(
     """Pillars and instrument from one table of shots.
 
     shots      as read, with the weather of each
-    heights    of the pillars; None takes them for level
-    against    known pillars; None finds them, the scale being as good as the instrument's frequency
+    heights    of the pillars; None: all level
+    against    known pillars; None: estimated, with the scale of the instrument's frequency
     settings   assumptions
-    progress   told of the steps
+    progress   called at each step
 
     Raises InputError for tables that do not join, EstimationError where the shots do not determine the answer.
     """
@@ -109,8 +111,8 @@ def _calibrated(
         by_scale = lengths.stretch**2 * lengths.distance * settings.u_scale_ppm * PPM
         columns = np.concatenate([lengths.systematic, by_scale[:, None]], axis=1)
         lengths = replace(lengths, systematic=columns, effects=(*lengths.effects, "scale of the instrument"))
-    known = None if against is None else _known(against)
-    job = BaselineJob(shots, lengths, settings, known, notes)
+    calibrated_pillars = None if against is None else _calibrated_places(against)
+    job = BaselineJob(shots, lengths, settings, calibrated_pillars, notes)
     keep, rejected, suspects, solution = job.cleaned(progress)
     solution, cyclic = job.with_cyclic(keep, solution)
     _refuse_gross(solution, job, keep)
@@ -130,8 +132,8 @@ def _calibrated(
     if any(d.name == FOLLOWS and d.passed is False for d in decisions) and not settings.corrected:
         share = np.mean((lengths.first / shots.slope)[keep]) / PPM
         notes.append(
-            f"the light did not follow the weather: if the lengths were corrected in the field, all are wrong by "
-            f"{share:+.1f} ppm in the mean, and no u here contains that; compare with --corrected"
+            f"the lengths did not follow the weather: if they were corrected in the field, all are wrong by "
+            f"{share:+.1f} ppm in the mean, which no u here includes; compare with --corrected"
         )
     return BaselineCalibration(
         shots,
@@ -155,7 +157,10 @@ def _calibrated(
 
 
 def _refuse_gross(solution: BaselineSolution, job: BaselineJob, keep: np.ndarray) -> None:
-    """A scatter at the ceiling of what is estimated is no noise; the row is the worst before anything was adjusted."""
+    """Raise InputError for gross contradictions.
+
+    A scatter at the ceiling of the estimate is no noise; the row is the worst before any adjustment.
+    """
     noise = solution.noise
     if np.isfinite(solution.u_noise).any() and np.any(np.array([noise.shot, noise.set, noise.air]) > 0.999 * CEILING):
         shots, x, y = job.shots, job.x, job.y
@@ -195,12 +200,15 @@ def _heights(
     settings: BaselineSettings,
     notes: list[str],
 ) -> tuple[np.ndarray, np.ndarray, float | None]:
-    """Heights and their u by the pillars' numbers, and the reference height (None: unknown)."""
+    """Heights and their u by the pillars' numbers, and reference height.
+
+    None: unknown.
+    """
     n = len(shots.names)
     if heights is None:
         if settings.reference_height is not None:
-            raise InputError("--reference-height-m needs --heights: without heights there is none to refer to")
-        notes.append("no heights of pillars: they are taken for level, which makes lengths on a slope too long")
+            raise InputError("--reference-height-m needs --heights: no reference without heights")
+        notes.append("no heights of pillars: taken as level, which makes lengths on a slope too long")
         return np.zeros(n), np.zeros(n), None
     touched = {shots.names[i] for i in (*shots.start, *shots.end)}
     for name in touched:
@@ -222,7 +230,7 @@ def _heights(
     return height, u, first if reference is None else reference
 
 
-def _known(against: Baseline) -> KnownPlaces:
+def _calibrated_places(against: Baseline) -> KnownPlaces:
     n = len(against.pillars)
     number = {name: i for i, name in enumerate(against.pillars)}
     rows = [number[entry[2:]] + (n if entry[0] == "y" else 0) for entry in against.known]
@@ -239,21 +247,24 @@ def _notes(
             f"{settings.u_scale_ppm:g} ppm (1σ)"
         )
         if not np.isfinite(shots.direction).any():
-            notes.append("no horizontal directions: the pillars are taken to stand in a straight line")
+            notes.append("no horizontal directions: the pillars are assumed to be in a straight line")
     if settings.unit_length is None:
-        notes.append("no cyclic terms: the instrument's unit length is not given (--unit-length-m)")
+        notes.append("no cyclic terms: the instrument's unit length is missing (--unit-length-m)")
     if not np.isfinite(solution.u_noise[1:]).any():
-        notes.append("too few redundant sets to estimate the noise: the maker's claim stands for it")
+        notes.append("too few redundant sets to estimate the noise: the maker's claim is used")
     elif solution.noise.air * float(np.max(solution.used.distance)) ** 2 > 4.0 * (solution.noise.set + 1e-12):
         notes.append(
-            f"sets scatter in proportion to distance, {solution.noise.air**0.5 / PPM:.1f} ppm: the air, or how its "
-            "temperature was read, more than pointing and centring"
+            f"sets scatter in proportion to distance, {solution.noise.air**0.5 / PPM:.1f} ppm: the air, or the "
+            "measurement of its temperature, more than pointing and centring"
         )
     return notes
 
 
 class BaselineRecordValues(TypedDict):
-    """Keys of BASELINE.toml that a calibration fills in; `records.laboratory.baseline.Baseline` explains them."""
+    """Keys of BASELINE.toml from a calibration.
+
+    `records.laboratory.baseline.Baseline` explains them.
+    """
 
     reference_height_m: float | None
     pillars: tuple[str, ...]
@@ -268,12 +279,15 @@ class BaselineRecordValues(TypedDict):
 
 
 def record_values(calibration: BaselineCalibration) -> BaselineRecordValues:
-    """What BASELINE.toml keeps of a calibration, pillars in their order along the line."""
+    """Values of a calibration for BASELINE.toml.
+
+    Pillars in their order along the line.
+    """
     s, order = calibration.solution, calibration.order
     rows, covariance = s.places
     n = len(s.x)
-    wanted = [int(np.flatnonzero(rows == r)[0]) for axis in (0, n) for r in order + axis if r in rows]
-    labels = [f"{'x' if rows[k] < n else 'y'} {calibration.names[rows[k] % n]}" for k in wanted]
+    selected = [int(np.flatnonzero(rows == r)[0]) for axis in (0, n) for r in order + axis if r in rows]
+    labels = [f"{'x' if rows[k] < n else 'y'} {calibration.names[rows[k] % n]}" for k in selected]
     zero, u_zero = s.of("zero")
     test = calibration.test if isinstance(calibration.test, FullTest) else None
     return {
@@ -282,7 +296,7 @@ def record_values(calibration: BaselineCalibration) -> BaselineRecordValues:
         "x_m": tuple(s.x[order].tolist()),
         "y_m": tuple(s.y[order].tolist()),
         "known": tuple(labels),
-        "covariance_mm2": tuple(map(tuple, (covariance[np.ix_(wanted, wanted)] / MILLIMETRE**2).tolist())),
+        "covariance_mm2": tuple(map(tuple, (covariance[np.ix_(selected, selected)] / MILLIMETRE**2).tolist())),
         "s_mm": test.s / MILLIMETRE if test is not None else None,
         "degrees_of_freedom": test.degrees_of_freedom if test is not None else None,
         "zero_mm": zero / MILLIMETRE,

@@ -1,4 +1,7 @@
-"""The adjustments of one baseline: with and without suspects, cyclic terms, the weather, against known pillars."""
+"""Adjustments of one baseline.
+
+With and without suspects, cyclic terms, the weather, against known pillars.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -21,11 +24,11 @@ from catseye.records.laboratory.baseline import BaselineShots
 from catseye.reduction.baseline.lengths import BaselineSettings, Lengths
 from catseye.reduction.baseline.statistical_tests import SuspectShot, suspects_of
 
-Progress = Callable[[str, int, int], None]  # what is done, steps done, steps in all
+Progress = Callable[[str, int, int], None]  # task, steps done, steps in total
 
 
 class BaselineJob:
-    """The adjustments of one calibration, which differ in what they leave out or add."""
+    """Adjustments of one calibration, with variants."""
 
     def __init__(
         self,
@@ -35,13 +38,13 @@ class BaselineJob:
         known: KnownPlaces | None,
         notes: list[str],
     ) -> None:
-        """Sights and approximate places of the pillars.
+        """Set up sights and approximate places of the pillars.
 
         shots      renumbered along the line
         lengths    their horizontal distances
         settings   assumptions
         known      pillars of a known baseline
-        notes      for a person; what is left out adds its line here
+        notes      for the user; each rejection adds a line
         """
         self.shots, self.lengths, self.settings, self.known, self.notes = shots, lengths, settings, known, notes
         count = len(shots.names)
@@ -68,7 +71,10 @@ class BaselineJob:
             self.x, self.y = known.x, known.y
 
     def solved(self, keep: np.ndarray, *, extra: Extra | None = None, noise: Claim | None = None) -> BaselineSolution:
-        """The adjustment of the shots kept (m,), with further unknowns, the noise estimated or given."""
+        """Adjustment of the selected shots (m,).
+
+        With further unknowns, the noise estimated or as an argument.
+        """
         part = None if extra is None else Extra(extra.names, extra.columns[keep])
         try:
             return adjust_baseline(
@@ -86,7 +92,10 @@ class BaselineJob:
             raise EstimationError(named(str(problem), self.shots.names)) from problem
 
     def _specified(self, keep: np.ndarray) -> Claim:
-        """The maker's claim as variances; repeats from their own scatter, or a tenth of the claim."""
+        """Maker's claim as variances.
+
+        Repeats from their own scatter, or a tenth of the claim.
+        """
         sights = self.sights.only(keep)
         a = (self.settings.specified_mm * MILLIMETRE) ** 2
         repeats = len(sights) - len(sights.shots)
@@ -94,11 +103,14 @@ class BaselineJob:
         return Claim(max(shot, 0.01 * a), a, (self.settings.specified_ppm * PPM) ** 2)
 
     def claimed(self, distance: np.ndarray) -> np.ndarray:
-        """Standard deviation that the maker claims, linear in the distance, m."""
+        """Standard deviation by the maker's claim, linear in the distance, m."""
         return self.settings.specified_mm * MILLIMETRE + self.settings.specified_ppm * PPM * distance
 
     def agreement(self, solution: BaselineSolution, cyclic: tuple[str, ...], keep: np.ndarray) -> BaselineSolution:
-        """Sets against the known pillars, a set's variance being what the maker claims; without directions."""
+        """Adjustment of sets to the known pillars.
+
+        A set's variance is the maker's claim; without directions.
+        """
         used = solution.used
         shot = max(solution.noise.shot, 1e-16)
         sets = np.maximum(self.claimed(used.mean(used.distance)) ** 2 - shot / used.shots, 1e-16)
@@ -117,7 +129,10 @@ class BaselineJob:
     def cleaned(
         self, progress: Progress | None
     ) -> tuple[np.ndarray, tuple[str, ...], tuple[SuspectShot, ...], BaselineSolution]:
-        """Shots used (m,), why others are not, what is suspect, and the solution; one rejection a step."""
+        """Used shots (m,), rejection reasons, suspects, and the solution.
+
+        One rejection a step.
+        """
         keep = np.ones(len(self.shots), bool)
         rejected = [""] * len(self.shots)
         most = max(1, len(self.shots) // 10)
@@ -130,15 +145,15 @@ class BaselineJob:
                 break
             worst = suspects[0]
             if worst.twins:
-                one, other = (", ".join(str(r + 1) for r in part) for part in (worst.rows, worst.twins))
+                rows_text, twins_text = (", ".join(str(r + 1) for r in part) for part in (worst.rows, worst.twins))
                 self.notes.append(
-                    f"row {one} and row {other} contradict each other and nothing tells which is wrong: none is left "
-                    "out; measure them again"
+                    f"row {rows_text} and row {twins_text} contradict each other, undecided which is wrong: none is "
+                    "left out; measure them again"
                 )
                 break
             if np.sum(~keep) + len(worst.rows) > most:
                 self.notes.append(
-                    f"no more than {most} of {len(keep)} shots are left out; the other suspects stay: look at them"
+                    f"no more than {most} of {len(keep)} shots are left out; the other suspects stay: check them"
                 )
                 break
             for row in worst.rows:
@@ -147,7 +162,10 @@ class BaselineJob:
         return keep, tuple(rejected), suspects, solution
 
     def cyclic_terms(self, names: tuple[str, ...]) -> Extra | None:
-        """cos and sin of the length shown, in unit lengths; what coefficient 1 m adds."""
+        """Cyclic terms: cos and sin of the displayed length, in unit lengths.
+
+        The effect of a coefficient of 1 m.
+        """
         if not names or self.settings.unit_length is None:
             return None
         phase = TWO_PI * self.shots.slope / self.settings.unit_length
@@ -155,7 +173,10 @@ class BaselineJob:
         return Extra(names, np.stack(columns, axis=1))
 
     def with_cyclic(self, keep: np.ndarray, solution: BaselineSolution) -> tuple[BaselineSolution, tuple[str, ...]]:
-        """The solution with cyclic terms and their names; that without and no names where nothing tells them apart."""
+        """Solution with cyclic terms and their names.
+
+        Without them where they are inseparable.
+        """
         if self.settings.unit_length is None:
             return solution, ()
         names = tuple(f"cyclic {f} {k + 1}" for k in range(self.settings.orders) for f in ("cosine", "sine"))
@@ -173,15 +194,18 @@ class BaselineJob:
             apart = 0.0
         if apart < SEPARABLE:
             self.notes.append(
-                f"cyclic terms left out: lengths in units of {self.settings.unit_length:g} m do not tell them from the "
-                f"zero and the pillars (separation {apart:.1g}, needed {SEPARABLE:g})"
+                f"cyclic terms left out: lengths in units of {self.settings.unit_length:g} m do not separate them from "
+                f"the zero and the pillars (separation {apart:.1g}, needed {SEPARABLE:g})"
             )
             return solution, ()
         return self.solved(keep, extra=terms), names
 
     def full_tests(self, solution: BaselineSolution) -> tuple[FullTest | str, FullTest | None, FullTest | None]:
-        """The standard's procedure along the line, what a pillar off it adds taken away first: of the sets' means with
-        equal weights, with the maker's as weights, and of all shots."""
+        """Tests of the standard along the line.
+
+        Offsets of pillars from it are removed first: of the sets' means with equal weights, with the maker's as
+        weights, and of all shots.
+        """
         used, y = solution.used, solution.y
         touched = np.unique(np.concatenate([used.start, used.end]))
         order = [int(i) for i in np.argsort(solution.x, kind="stable") if i in touched]
@@ -198,13 +222,15 @@ class BaselineJob:
         steep = used.distance - (used.stretch - 1.0) * solution.of("zero")[0]  # its part along the slope
         start, end, mean = used.start[used.first], used.end[used.first], used.mean(steep)
         try:
-            every = of(steep, used.start, used.end)
-            return of(mean, start, end), of(mean, start, end, self.claimed(mean)), every
+            all_sights = of(steep, used.start, used.end)
+            return of(mean, start, end), of(mean, start, end, self.claimed(mean)), all_sights
         except EstimationError as problem:
             return str(problem), None, None
 
     def weather(self, keep: np.ndarray, solution: BaselineSolution, cyclic: tuple[str, ...]) -> tuple[float, float]:
-        """Which share of the correction's changes the light followed: 1 - b, where b of them is left in the distances.
+        """Share of the correction's changes in the measured lengths.
+
+        1 - b, where b of them remains in the distances.
 
         The correction makes -D (n - mean n) of a change of n; lengths corrected in the field get it twice, b = 1.
         """
@@ -224,7 +250,7 @@ class BaselineJob:
 
 
 def named(text: str, names: tuple[str, ...]) -> str:
-    """Numbers of pillars in a message become their names."""
+    """Text with pillars' names for their numbers."""
     import re
 
     def name(m: re.Match[str]) -> str:

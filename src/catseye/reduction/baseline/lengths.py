@@ -1,4 +1,7 @@
-"""From what an instrument shows to horizontal distances between pillars, with what each common cause does to them."""
+"""Displayed lengths to horizontal distances between pillars.
+
+With the effect of each common cause.
+"""
 
 from dataclasses import dataclass
 
@@ -19,22 +22,23 @@ from catseye.records.laboratory.baseline import BaselineShots
 
 @dataclass(frozen=True)
 class BaselineSettings:
-    """What a baseline's reduction assumes.
+    """Assumptions of a baseline's reduction.
 
     air_model, wavelength_um, co2_ppm   of the group index; the carrier of both of Busselton's instruments
-    reference_index       group index for which the instrument shows lengths
-    corrected             True: the lengths shown carry the first velocity correction already
+    reference_index       group index of the displayed lengths
+    corrected             True: the displayed lengths contain the first velocity correction already
     refraction            coefficient k of the ray
-    u_temperature_c, u_pressure_hpa, u_humidity_percent   common to all shots: the sensors, and what one end says of the
-                          path; what changes from set to set is noise
-    u_scale_ppm           of the instrument's scale, where no known baseline tells it: its frequency
+    u_temperature_c, u_pressure_hpa, u_humidity_percent   common to all shots: the sensors, and the difference of one
+                                                          end from the
+                          path; changes from set to set are noise
+    u_scale_ppm           of the instrument's scale without a known baseline: its frequency
     u_direction_arcsec, u_centring_mm   of one set's circle reading, and across the line
     unit_length           m, of the cyclic terms; None leaves them out
     orders                of the cyclic terms, 1 to 4
-    specified_mm, specified_ppm   standard deviation a + b D that the maker claims
+    specified_mm, specified_ppm   standard deviation a + b D by the maker
     level                 of each test
-    reject                True: leave out what the tests of single shots and sets reject
-    reference_height      m; None takes the first pillar's, or the known baseline's
+    reject                True: leave out single shots and sets that the tests reject
+    reference_height      m; None: the first pillar's, or the known baseline's
     """
 
     air_model: str = "ciddor_hill1999"
@@ -60,14 +64,14 @@ class BaselineSettings:
 
 @dataclass(frozen=True, eq=False)
 class Lengths:
-    """Each shot's way from what was shown to the horizontal distance; all (m,).
+    """Corrections from displayed to horizontal distance of each shot; all (m,).
 
     index        group index of the air
     first, second, chord   corrections, m
     level        horizontal less slope, m
     distance     horizontal at the reference height, between the pillars' axes, m
-    stretch      what a metre more on the slope makes in it
-    systematic   (m, q) what one standard uncertainty of each common effect adds, m
+    stretch      derivative of the distance by the slope length
+    systematic   (m, q) effect of one standard uncertainty of each common cause, m
     effects      (q,) their names
     """
 
@@ -83,7 +87,9 @@ class Lengths:
 
 
 def horizontal_distance(chord, height_from, height_to, *, reference_height=0.0, radius=EARTH_RADIUS):
-    """Distance at a common height from the straight line between two points at heights of their own, in m.
+    """Distance at a common height from the slope distance, m.
+
+    Between two points at different heights.
 
     chord              straight line, m
     height_from        of its beginning, m
@@ -100,8 +106,8 @@ def horizontal_distance(chord, height_from, height_to, *, reference_height=0.0, 
     >>> round(float(horizontal_distance(20.4, 4.8, 4.754)), 6)
     20.399933
     """
-    chord, one, other = (np.asarray(v, float) for v in (chord, height_from, height_to))
-    rise = other - one
+    chord, height_1, height_2 = (np.asarray(v, float) for v in (chord, height_from, height_to))
+    rise = height_2 - height_1
     bad = np.flatnonzero(~(np.abs(rise) < chord))
     if len(bad):
         k = bad[0]
@@ -110,7 +116,7 @@ def horizontal_distance(chord, height_from, height_to, *, reference_height=0.0, 
             f"{float(np.ravel(np.broadcast_to(chord, rise.shape))[k]):g} m; expected less: check the heights"
         )
     common = radius + reference_height
-    half = 0.5 * np.sqrt((chord - rise) * (chord + rise) / ((radius + one) * (radius + other)))
+    half = 0.5 * np.sqrt((chord - rise) * (chord + rise) / ((radius + height_1) * (radius + height_2)))
     return 2.0 * common * np.arcsin(half)
 
 
@@ -122,7 +128,7 @@ def reduce_lengths(
     reference_height: float,
     settings: BaselineSettings,
 ) -> Lengths:
-    """Horizontal distances at one height, with what each common effect does to them.
+    """Horizontal distances at one height, with the common effects.
 
     shots              as read
     height, u_height   (n,) of the pillars by their numbers in `shots`, m
@@ -138,16 +144,16 @@ def reduce_lengths(
     second = second_velocity_correction(along, refraction=settings.refraction)
     chord = arc_to_chord_correction(along, refraction=settings.refraction)
     straight = along + second + chord
-    one, other = height[shots.start] + shots.instrument, height[shots.end] + shots.target
+    height_1, height_2 = height[shots.start] + shots.instrument, height[shots.end] + shots.target
     try:
-        distance = horizontal_distance(straight, one, other, reference_height=reference_height)
+        distance = horizontal_distance(straight, height_1, height_2, reference_height=reference_height)
     except ValidityError as problem:
-        k = int(np.flatnonzero(~(np.abs(other - one) < straight))[0])
+        k = int(np.flatnonzero(~(np.abs(height_2 - height_1) < straight))[0])
         raise refusal(shots.file, f"{shots.where[k]}, {problem}") from problem
     slopes = state.sensitivity
-    rise = other - one
+    rise = height_2 - height_1
     stretch = distance * straight / ((straight - rise) * (straight + rise))
-    per_index = -(stretch**2) * distance / state.group_index  # a rate on the slope shows in D by 1/cos² of itself
+    per_index = -(stretch**2) * distance / state.group_index  # a rate on the slope appears in D by 1/cos² of itself
     effects = {
         "temperature": per_index * slopes.temperature_c * settings.u_temperature_c,
         "pressure": per_index * slopes.pressure_hpa * settings.u_pressure_hpa,

@@ -1,4 +1,4 @@
-"""The tests of an EDM baseline: single shots and sets, and the questions of the standard."""
+"""Tests of an EDM baseline: single shots and sets, and ISO 17123-4's."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -15,18 +15,18 @@ if TYPE_CHECKING:
     from catseye.reduction.baseline.lengths import BaselineSettings
 
 FOLLOWS = "the light follows the weather as read"
-ALIKE = 0.99  # correlation of standardised residuals from which on an error of one set is not told from the other's
+ALIKE = 0.99  # correlation of standardised residuals that makes errors of two sets inseparable
 
 
 @dataclass(frozen=True)
 class SuspectShot:
-    """A shot, or a set of shots, that its test rejects.
+    """Shot or set of shots that its test rejects.
 
     kind   "shot" or "set"
     rows   of the table, counted from 0
     w      standardised residual
-    p      probability of one so large among all that were tested
-    twins  rows of other suspects that an error of these would look like: nothing tells which are wrong
+    p      probability of such a value among all tests
+    twins  rows of other suspects with the same effect: undecided which are wrong
     """
 
     kind: str
@@ -37,14 +37,16 @@ class SuspectShot:
 
 
 def suspects_of(solution: BaselineSolution, rows: np.ndarray, level: float) -> tuple[SuspectShot, ...]:
-    """Shots against their set, sets against the baseline, least probable first.
+    """Suspect shots and sets, least probable first.
+
+    Shots against their set, sets against the baseline.
 
     solution   an adjustment
     rows       (m,) where its shots stand in the table
     level      of all tests together
 
     The components of the noise come from the same residuals, so w follows the tau distribution; where the maker's claim
-    stands for them, those of sets follow the normal one.
+    replaces them, those of sets follow the normal one.
     Source: [BAARDA68] data snooping; [POPE76] tau.
     """
     used = solution.used
@@ -64,13 +66,16 @@ def suspects_of(solution: BaselineSolution, rows: np.ndarray, level: float) -> t
     wrong = tests * of_sets < level
     for i in np.flatnonzero(wrong):
         twin = wrong & (np.abs(solution.alike[i]) > ALIKE) & (np.arange(len(wrong)) != i)
-        its_rows, others = (tuple(rows[mask].tolist()) for mask in (used.set == i, twin[used.set]))
-        suspects.append(SuspectShot("set", its_rows, float(solution.w_set[i]), float(tests * of_sets[i]), others))
+        its_rows, twin_rows = (tuple(rows[mask].tolist()) for mask in (used.set == i, twin[used.set]))
+        suspects.append(SuspectShot("set", its_rows, float(solution.w_set[i]), float(tests * of_sets[i]), twin_rows))
     return tuple(sorted(suspects, key=lambda s: (s.p, -abs(s.w))))
 
 
 def _p_tau(w: np.ndarray, freedom: float) -> np.ndarray:
-    """Two-sided probability of a studentised residual at least so large; of a normal one for infinite freedom."""
+    """Two-sided probability of a studentised residual at least so large.
+
+    Of a normal one for infinite freedom.
+    """
     from scipy.stats import norm, t
 
     if np.isinf(freedom):
@@ -95,11 +100,11 @@ def decisions_of(
     """Every test with its outcome.
 
     solution    the adjustment
-    test        the full test procedure, or why it was not possible
+    test        the full test procedure, or the reason against it
     settings    level and claim
-    claimed     the full test procedure weighed by what the maker claims
+    claimed     the full test procedure weighted by the maker's claim
     agreement   the adjustment to the known pillars with the maker's claim as noise
-    weather     share that the light followed, and its u
+    weather     share of the weather's changes in the lengths, and its u
     against     the known baseline
     suspects    shots and sets that their tests reject
     """
@@ -114,7 +119,7 @@ def decisions_of(
             float(len(suspects)),
             0.0,
             not suspects,
-            "no shot and no set stands out" if not suspects else _outliers(suspects),
+            "no shot and no set is suspect" if not suspects else _outliers(suspects),
         ),
     )
 
@@ -122,7 +127,10 @@ def decisions_of(
 def _standard(
     test: FullTest | str, claimed: FullTest | None, settings: "BaselineSettings", against: "Baseline | None"
 ) -> list[CheckOutcome]:
-    """The standard's three questions; sets, each one distance, are the sample."""
+    """Three questions of the standard.
+
+    Sets, each one distance, are the sample.
+    """
     if isinstance(test, str) or claimed is None:
         return [CheckOutcome(f"ISO 17123-4 {q}", float("nan"), float("nan"), None, str(test)) for q in "ac"]
     claim = within_claim(claimed.s**2, claimed.degrees_of_freedom, settings.level)
@@ -130,7 +138,7 @@ def _standard(
     text = f"sets scatter {'as' if claim.passed else 'more than'} specified ({words})"
     outcomes = [CheckOutcome("ISO 17123-4 a: s within the claim", claim.statistic, claim.limit, claim.passed, text)]
     if against is not None and against.s_mm is not None and against.degrees_of_freedom:
-        same = same_precision(
+        precision_test = same_precision(
             test.s / MILLIMETRE,
             test.degrees_of_freedom,
             against.s_mm,
@@ -139,9 +147,17 @@ def _standard(
         )
         text = (
             f"s {test.s / MILLIMETRE:.3f} mm here, {against.s_mm:.3f} mm at the known baseline; "
-            f"the ratio of squares must be {same.lower:.3g} at least, too"
+            f"the ratio of squares must be {precision_test.lower:.3g} at least, too"
         )
-        outcomes.append(CheckOutcome("ISO 17123-4 b: same s as before", same.statistic, same.limit, same.passed, text))
+        outcomes.append(
+            CheckOutcome(
+                "ISO 17123-4 b: same s as before",
+                precision_test.statistic,
+                precision_test.limit,
+                precision_test.passed,
+                text,
+            )
+        )
     zero = is_nothing(test.zero, test.u_zero, test.degrees_of_freedom, level=settings.level)
     text = f"zero {test.zero / MILLIMETRE:+.3f} ± {test.u_zero / MILLIMETRE:.3f} mm is "
     text += "not significant" if zero.passed else "significant: correct for it"
@@ -149,7 +165,10 @@ def _standard(
 
 
 def _setups(solution: BaselineSolution, level: float) -> CheckOutcome:
-    """Do sets disagree by more than their shots do? F of the means' squares over the shots'."""
+    """Test of the sets' scatter against their shots' repeatability.
+
+    F of the means' squares over the shots'.
+    """
     from scipy.stats import f
 
     name = "sets agree as their shots do"
@@ -161,7 +180,7 @@ def _setups(solution: BaselineSolution, level: float) -> CheckOutcome:
     ratio = means / squares if squares > 0.0 else float("inf")
     limit = float(f.ppf(1.0 - level, between, within))
     text = (
-        "repeats tell the whole scatter"
+        "repeats show the total scatter"
         if ratio <= limit
         else "repeats hide most of it: pointing, centring and the air change from set to set"
     )
@@ -174,14 +193,17 @@ def _weather(weather: tuple[float, float], freedom: int, level: float) -> CheckO
     if not np.isfinite(share):
         return CheckOutcome(name, float("nan"), float("nan"), None, "the weather changed too little, or too few sets")
     one = is_nothing(share - 1.0, u, max(freedom - 1, 1), level=level)
-    text = f"lengths followed {share:.2f} ± {u:.2f} of the changes of index that the sensors say (1 expected)"
+    text = f"lengths followed {share:.2f} ± {u:.2f} of the sensors' changes of index (1 expected)"
     if not one.passed and abs(share) < abs(share - 1.0):
         text += ": as if corrected in the field already, or thermometers not in the air of the path"
     return CheckOutcome(name, one.statistic, one.limit, one.passed, text)
 
 
 def _instrument(solution: BaselineSolution, agreement: BaselineSolution, level: float) -> tuple[CheckOutcome, ...]:
-    """Zero and scale against known pillars, and whether the sets agree with those as well as the maker claims."""
+    """Zero and scale against known pillars, and agreement of the sets.
+
+    Agreement with the maker's claim.
+    """
     outcomes = []
     for key, unit, scale in (("zero", "mm", MILLIMETRE), ("scale", "ppm", PPM)):
         value, u = solution.of(key)

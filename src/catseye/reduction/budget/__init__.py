@@ -1,7 +1,7 @@
-"""The uncertainty of one range: every input from the samples to metres, its slope, its share, and a Monte Carlo beside.
+"""Uncertainty budget of one range, from samples to metres.
 
 scene        one shot with everything that its range follows from
-inputs       what of that is uncertain, with the slope of the range by each, worked out by hand
-chain        the same range as one function of drawn inputs, nothing linearised
-explanation  the recipe
+inputs       its uncertain inputs, with analytical slopes of the range by each
+chain        the same range as one function of drawn inputs, not linearised
+explanation  the recipe, with a Monte Carlo for comparison
 """

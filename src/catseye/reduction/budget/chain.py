@@ -1,7 +1,7 @@
-"""One range as a function of drawn inputs, from phasors to metres, nothing linearised: what the Monte Carlo runs.
+"""Range as a function of drawn inputs, for the Monte Carlo.
 
-It shares with the budget the list of inputs and no slope. Drift: a path of the electronics is drawn through all
-reference shots and the target's, and the interpolation is applied to it.
+From phasors to metres, not linearised. It shares with the budget the list of inputs and no slope. Drift: a path of
+the electronics is drawn through all reference shots and the target's, and the interpolation is applied to it.
 """
 
 import numpy as np
@@ -23,7 +23,7 @@ NODES = 3  # of the quadrature along the path: exact to degree 5 in height
 
 
 class DrawnInputs:
-    """Drawn inputs by key; a key that is no input answers its default."""
+    """Drawn inputs by key; an absent key returns its default."""
 
     def __init__(self, items: tuple[Item, ...], x: np.ndarray) -> None:
         self.at = {item.key: k for k, item in enumerate(items)}
@@ -34,7 +34,7 @@ class DrawnInputs:
         return self.x[:, self.at[key]] if key in self.at else np.full(len(self.x), default)
 
     def off(self, key: str) -> np.ndarray:
-        """How far it was drawn from its best value."""
+        """Deviation of an input from its best value."""
         return self(key) - self.best.get(key, 0.0)
 
     def orders(self, kind: str) -> list[np.ndarray]:
@@ -43,7 +43,10 @@ class DrawnInputs:
 
 
 def measurement(scene: ShotScene, items: tuple[Item, ...]) -> Model:
-    """The range (n,), m, of inputs (n, k) in the items' order and units."""
+    """Range (n,), m, as a function of inputs (n, k).
+
+    Inputs in the items' order and units.
+    """
 
     def model(x: np.ndarray) -> np.ndarray:
         v = DrawnInputs(items, x)
@@ -61,7 +64,10 @@ def measurement(scene: ShotScene, items: tuple[Item, ...]) -> Model:
 
 
 def drawing(scene: ShotScene, items: tuple[Item, ...]) -> Draw:
-    """A function of a generator and a number that draws so many inputs, the electronics' walk as a path."""
+    """Function that draws inputs, the electronics' walk as a path.
+
+    Its arguments are a generator and a number.
+    """
     inputs = [item.given for item in items]
     correlation = correlation_of(scene, items)
     walk = next(k for k, item in enumerate(items) if item.key == "walk")
@@ -75,7 +81,10 @@ def drawing(scene: ShotScene, items: tuple[Item, ...]) -> Draw:
 
 
 def _walked(scene: ShotScene, generator: np.random.Generator, n: int) -> np.ndarray:
-    """How far (n,), rad, the electronics were off what interpolation between noiseless references says."""
+    """Error (n,), rad, of the interpolated electronics phase.
+
+    Against interpolation between noiseless references.
+    """
     rows = felt(scene)
     references = scene.references
     when = np.append(references.seconds[rows], scene.seconds)
@@ -87,7 +96,10 @@ def _walked(scene: ShotScene, generator: np.random.Generator, n: int) -> np.ndar
 
 
 def _phase(scene: ShotScene, v: DrawnInputs) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The target's phasor (V), its phase after the electronics' (rad, not wrapped), the reference amplitude (V)."""
+    """Phasor, electronics-corrected phase and reference amplitude.
+
+    V; rad, not wrapped; V.
+    """
     leakage = v("leakage real") + 1j * v("leakage imaginary") - scene.leakage
     amplitude, direction = abs(scene.phasor), scene.phasor / abs(scene.phasor)
     noise = direction * (v.off("amplitude") + 1j * amplitude * (v.off("noise") + v.off("steps")))
@@ -112,7 +124,7 @@ def _index(scene: ShotScene, v: DrawnInputs) -> np.ndarray:
     bent = field.profile == "bend"
     slope = true @ arms / np.sum(arms**2) if bent else v("profile")
     pressure, humidity = v("pressure"), v("humidity")
-    legal = np.clip(humidity, 0.0, 100.0)  # beyond, the index goes on along its tangent
+    legal = np.clip(humidity, 0.0, 100.0)  # beyond, the index continues along its tangent
     light = {"wavelength_um": field.wavelength_um, "model": field.model}
     line = field.line_of_first
     warm, share = (0.0, 0.0) if line is None else line.at(scene.campaign.shots.mjd_utc[[scene.row]])
@@ -127,7 +139,7 @@ def _index(scene: ShotScene, v: DrawnInputs) -> np.ndarray:
         at = pressure_at(pressure[:, None], middle, z)
         if line is None:
             return group_refractivity(temperature, at, np.broadcast_to(legal[:, None], z.shape), **light)
-        # sound gives the temperature, the stations' air the vapour
+        # temperature by sound, vapour by the stations
         chosen = MODELS[field.model]
         vapour = vapour_pressure_hpa(temperature, at, legal[:, None], chosen.vapour_formula)
         state = (sound[:, None], at, vapour)
@@ -135,12 +147,15 @@ def _index(scene: ShotScene, v: DrawnInputs) -> np.ndarray:
 
     ends = (np.full(len(v.x), scene.a[2]), np.full(len(v.x), scene.b[2]))
     mean_refractivity = mean_over_height(profile, *ends, nodes=NODES)
-    beyond = best * (humidity - legal)
-    return 1.0 + mean_refractivity + beyond + (v("formula") + v("unread") + v("fluctuation")) * PPM
+    excess = best * (humidity - legal)
+    return 1.0 + mean_refractivity + excess + (v("formula") + v("unread") + v("fluctuation")) * PPM
 
 
 def _glass(scene: ShotScene, v: DrawnInputs) -> np.ndarray:
-    """Correction for the glass (n,), m, its reference point held where the records put it."""
+    """Correction for the glass (n,), m.
+
+    Its reference point stays where the records have it.
+    """
     place = scene.place
     n0 = scene.campaign.site.ranging.bk7_to_air_group_index_ratio
     n = v("ratio", n0)
@@ -162,12 +177,15 @@ def _glass(scene: ShotScene, v: DrawnInputs) -> np.ndarray:
     bends = scene.campaign.site.ranging.bk7_to_air_phase_index_ratio
     square = 1.0 - cosine**2
     in_glass = np.sqrt(n**2 - square) if bends is None else (n * bends - square) / np.sqrt(bends**2 - square)  # n cos r
-    typed = place.constant - float(range_constant(place.height, n0))  # Pc as the sheet prints it
+    typed = place.constant - float(range_constant(place.height, n0))  # Pc of the sheet
     return -height * in_glass + depth * cosine + typed
 
 
 def _axes(scene: ShotScene, v: DrawnInputs) -> np.ndarray:
-    """Correction (n,), m, for axes and beam that do not meet: less the target's change, plus the cube's."""
+    """Correction (n,), m, for axes and beam that do not meet.
+
+    Minus the target's change, plus the cube's.
+    """
     if "axes axis offset" not in v.at:
         return np.zeros(len(v.x))
     mirror = scene.mirror

@@ -1,4 +1,7 @@
-"""A shot explained: its range with a full budget before any adjustment, a Monte Carlo beside it, the network's word."""
+"""Explanation of one shot: budget, Monte Carlo, and the adjustment's result.
+
+The budget is of its range before any adjustment.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -21,19 +24,19 @@ from catseye.reduction.epoch.telescope_track import as_in_the_middle, carried_en
 from catseye.reduction.site.places import RangedPoint, places_of
 from catseye.signal.cycles.whole import CycleDecision, decision, unwrapped_length
 
-CHECKED = 0.05  # redundancy below which the other shots do not say where a target is
+CHECKED = 0.05  # redundancy below which the other shots do not determine a target
 
 
 @dataclass(frozen=True)
 class AdjustedShot:
-    """What the adjustment of the whole campaign says of the shot; lengths in metres.
+    """Result of the campaign's adjustment for one shot; lengths in metres.
 
-    range_, u_range         as this shot gives it with the estimated corrections; u without systematic parameters
+    range_, u_range         by this shot with the estimated corrections; u without systematic parameters
     residual                that minus the adjusted distance
     standardised            test statistic of the residual
     redundancy              share of an error of this shot that shows in its residual
     distance, u_distance    between the adjusted points
-    used                    took part
+    used                    True where the shot took part
     """
 
     range_: float
@@ -48,21 +51,21 @@ class AdjustedShot:
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """Everything that can be told of one shot.
+    """Explanation of one shot.
 
     shot, ranger, target, mjd_utc   of the record
-    status      what became of it; NOT_ADJUSTED without an adjustment
-    reason      why it was not used, None where it was
+    status      its final status; NOT_ADJUSTED without an adjustment
+    reason      reason that it was not used, None where it was
     phasor      V, the light, complex
     u_across    V, standard uncertainty of the quadrature across it, which turns its phase
-    scene       its measurement; None where there is no range, and then so are the next five
+    scene       its measurement; None without a range, and then so are the next five
     items       inputs of its range with units, slopes and sources
     budget      first order, metres
     cycles      whole cycles decided: margin (m, optical), probability of a slip
-    coarse      what the coarse length came from
-    scattered   of the Monte Carlo; None where it was not asked for
+    coarse      source of the coarse length
+    scattered   of the Monte Carlo; None without one
     adjusted    None without an adjustment
-    references  of the ranger, (shot id, seconds after this shot, weight), where it has any
+    references  of the ranger, (shot id, seconds after this shot, weight)
     notes       one line each
     """
 
@@ -96,18 +99,18 @@ def explain_shot(
     reduction: Reduction | None = None,
     progress: Progress | None = None,
 ) -> Explanation:
-    """Where a shot's range comes from and how well it is known, before any adjustment.
+    """Origin and uncertainty of a shot's range, before any adjustment.
 
-    campaign     as `read_campaign` gives it
+    campaign     from `read_campaign`
     shot         id in shots.csv
     settings     assumptions of the reduction
     assumptions  uncertainties that no record states
     draws, seed  of the Monte Carlo; none for 0
-    reduction    of this campaign with these settings, where it was made already
-    progress     called with (what, done, of how many)
+    reduction    of this campaign with these settings, if available
+    progress     called with (task, number done, total)
 
-    The distance is scan point to reference point as this shot alone gives it, zero and leakage by the sheet, air by the
-    weather stations. The places of both ends only say where the air is and which cycle it was: adjusted ones where the
+    The distance is scan point to reference point by this shot alone, zero and leakage by the sheet, air by the weather
+    stations. The places of both ends only determine the air and the whole cycles: adjusted ones where the
     campaign can be reduced, those of the records otherwise.
 
     Raises InputError where there is no such shot.
@@ -127,7 +130,7 @@ def explain_shot(
     phases = reduction.phases if reduction else measure_phases(campaign, settings, progress)
     _, wrong = follow_electronics(campaign, phases)
     status, reason = _status(campaign, phases, wrong, row, reduction)
-    known = Explanation(
+    partial = Explanation(
         shot=shot,
         ranger=campaign.shots.ranger[row],
         target=campaign.shots.target[row],
@@ -140,19 +143,19 @@ def explain_shot(
         notes=tuple(notes),
     )
     if campaign.shots.target[row] == REFERENCE or phases.reason[row] or status is ShotStatus.NO_REFERENCE:
-        return known
+        return partial
     ends, place = carried_ends(campaign, row, *_places(campaign, row, reduction))
     try:
         scene = scene_of(
             campaign, phases, wrong, row=row, ends=ends, place=place, settings=settings, assumptions=assumptions
         )
     except InputError as problem:
-        return replace(known, notes=(*known.notes, str(problem)))
-    return _budgeted(known, scene, draws, seed, progress)
+        return replace(partial, notes=(*partial.notes, str(problem)))
+    return _budgeted(partial, scene, draws, seed, progress)
 
 
 def budget_of(scene: ShotScene, items: tuple[Item, ...]) -> Budget:
-    """The first-order budget of a scene's range."""
+    """First-order budget of a scene's range."""
     return propagate(
         [item.given for item in items],
         np.array([item.slope for item in items]),
@@ -162,45 +165,48 @@ def budget_of(scene: ShotScene, items: tuple[Item, ...]) -> Budget:
 
 
 def scatter_of(scene: ShotScene, items: tuple[Item, ...], draws: int, *, seed: int) -> Scattered:
-    """The Monte Carlo of a scene's range."""
+    """Monte Carlo of a scene's range."""
     generator = np.random.default_rng(seed)
     scattered = monte_carlo(measurement(scene, items), drawing(scene, items), draws=draws, generator=generator)
     spreadless = any(i.given.distribution == STUDENT and i.given.degrees_of_freedom <= 2.0 for i in items)
     return replace(scattered, u=float("nan")) if spreadless else scattered  # such a t has no variance, only an interval
 
 
-def _budgeted(known: Explanation, scene: ShotScene, draws: int, seed: int, progress: Progress | None) -> Explanation:
+def _budgeted(partial: Explanation, scene: ShotScene, draws: int, seed: int, progress: Progress | None) -> Explanation:
     items = items_of(scene)
     budget = budget_of(scene, items)
     if progress is not None and draws:
         progress("Monte Carlo", 0, draws)
-    cycles, coarse = _cycles(scene, known.adjusted, items)
+    cycles, coarse = _cycles(scene, partial.adjusted, items)
     shots, references = scene.campaign.shots, scene.references
     neighbours = zip(references.shots, references.seconds - scene.seconds, references.weight, strict=True)
     return replace(
-        known,
+        partial,
         scene=scene,
         items=items,
         budget=budget,
         cycles=cycles,
         coarse=coarse,
         scattered=scatter_of(scene, items, draws, seed=seed) if draws else None,
-        notes=(*known.notes, *_unsaid(scene.mirror, known.ranger in scene.campaign.monuments)),
+        notes=(*partial.notes, *_missing_effects(scene.mirror, partial.ranger in scene.campaign.monuments)),
         references=tuple((int(shots.shot[k]), float(after), float(weight)) for k, after, weight in neighbours),
     )
 
 
-def _unsaid(mirror: Mirror, turns_known: bool) -> list[str]:
-    """What the mirror's sheet could have said of its head, and did not: the budget cannot count it."""
+def _missing_effects(mirror: Mirror, has_mount: bool) -> list[str]:
+    """Effects of the head without a value in its mirror sheet.
+
+    The budget cannot include them.
+    """
     effects = {
         "u_amplitude_to_phase_rad": "coupling of amplitude to phase",
         "u_cyclic_mm": "cyclic terms",
-        **({"u_axis_mm": "offsets of axes and beam"} if turns_known else {}),
+        **({"u_axis_mm": "offsets of axes and beam"} if has_mount else {}),
     }
     missing = [effect for key, effect in effects.items() if getattr(mirror, key) is None]
     if not missing:
         return []
-    return [f"not in this budget, as mirrors/{mirror.zp}.toml says nothing of them: {', '.join(missing)}"]
+    return [f"not in this budget, missing in mirrors/{mirror.zp}.toml: {', '.join(missing)}"]
 
 
 def _status(
@@ -235,7 +241,7 @@ def _adjusted(coordinates: AdjustedCoordinates, row: int) -> AdjustedShot | None
     a, b = (coordinates.x[coordinates.index(name)] for name in names)
     distance = float(np.linalg.norm(b - a))
     direction = (b - a) / distance
-    both = np.concatenate([-direction, direction])
+    derivative = np.concatenate([-direction, direction])
     return AdjustedShot(
         range_=float(ranges.range_[k]),
         u_range=float(ranges.u_range[k]),
@@ -243,13 +249,15 @@ def _adjusted(coordinates: AdjustedCoordinates, row: int) -> AdjustedShot | None
         standardised=float(ranges.standardised[k]),
         redundancy=float(ranges.redundancy[k]),
         distance=distance,
-        u_distance=float(np.sqrt(max(both @ coordinates.block(names) @ both, 0.0))),
+        u_distance=float(np.sqrt(max(derivative @ coordinates.block(names) @ derivative, 0.0))),
         used=bool(ranges.used[k]),
     )
 
 
 def _cycles(scene: ShotScene, adjusted: AdjustedShot | None, items: tuple[Item, ...]) -> tuple[CycleDecision, str]:
-    """What decides N: the distance that all other shots give where they do, the records' places otherwise.
+    """Decision on N, and the source of its coarse length.
+
+    The distance by all other shots where they determine it, else the records' places.
 
     Leaving a shot out turns its residual r into r / redundancy and its u into u / root redundancy.
     """
@@ -263,7 +271,7 @@ def _cycles(scene: ShotScene, adjusted: AdjustedShot | None, items: tuple[Item, 
         total = adjusted.u_range / np.sqrt(share)
         if not adjusted.used and adjusted.standardised:
             total = abs(adjusted.residual / adjusted.standardised)
-        u_coarse = float(np.sqrt(max(total**2 - u_length**2, 0.0)))  # `decision` puts the phase's own back
+        u_coarse = float(np.sqrt(max(total**2 - u_length**2, 0.0)))  # `decision` adds the phase's own again
         coarse, source = observed - scene.index * misfit, "the adjusted points, this shot left out"
     else:
         coarse = observed - scene.index * (scene.range_ - float(np.linalg.norm(scene.a - scene.b)))
@@ -273,7 +281,7 @@ def _cycles(scene: ShotScene, adjusted: AdjustedShot | None, items: tuple[Item, 
 
 
 def _u_typed(scene: ShotScene) -> float:
-    """Standard uncertainty, m, of the distance between the places of the records."""
+    """Standard uncertainty of the distance between the records' places, m."""
     total = 0.0
     places = places_of(scene.campaign)
     for name in (scene.ranger, scene.target):

@@ -1,7 +1,7 @@
-"""What is uncertain in one range, and by hand the slope of the range by each.
+"""Uncertain inputs of one range, with analytical slopes.
 
-With s = half / (2 pi n), metres a radian, l the way in air that the phase measured, P the target's phasor, R_j those of
-the references with weights w_j, G = -n_g h cos r + h_rp cos I the glass of a prism whose reference point is held:
+With s = half / (2 pi n), metres a radian, l the path length in air of the phase, P the target's phasor, R_j those of
+the references with weights w_j, G = -n_g h cos r + h_rp cos I the glass of a prism with a fixed reference point:
 
     phase of the target      -S = -(s + c'), c' the slope of the cyclic deviation by the phase
     phase of the electronics  S
@@ -32,7 +32,7 @@ from catseye.signal.detection.buffers import inspect_buffers
 from catseye.signal.detection.cycle_scatter import FEWEST_FOR_BATCHES
 from catseye.signal.systematics.cyclic import cyclic_slope
 
-NAMED = 0.01  # weight of a reference beyond which it has a line of its own
+NAMED = 0.01  # weight of a reference beyond which it has its own line
 DITHERED = 0.5  # codes of rms noise above which a converter's steps are averaged like noise
 ASSUMED = "assumed: "
 SHEET = "mirrors/{}.toml: "
@@ -46,7 +46,7 @@ class Item:
     given    name, value, standard uncertainty, distribution, degrees of freedom, in the unit
     unit     of value and u
     slope    m, range by the input, a unit
-    source   who says so
+    source   record or assumption
     """
 
     key: str
@@ -57,12 +57,18 @@ class Item:
 
 
 def items_of(scene: ShotScene) -> tuple[Item, ...]:
-    """Every input of a range, in the order of the light: samples, electronics, head, air, glass."""
+    """Inputs of a range in the order of the light.
+
+    Samples, electronics, head, air, glass.
+    """
     return (*_samples(scene), *_electronics(scene), *_head(scene), *_frequency(scene), *_air(scene), *_glass(scene))
 
 
 def correlation_of(scene: ShotScene, items: tuple[Item, ...]) -> np.ndarray:
-    """Of all inputs: the thermometers', as assumed; whatever acts on target and references alike is one input."""
+    """Correlation of all inputs.
+
+    The thermometers' as assumed; an effect on target and references alike is one input.
+    """
     r = np.eye(len(items))
     thermometers = [k for k, item in enumerate(items) if item.key.startswith("thermometer ")]
     for i in thermometers:
@@ -73,7 +79,10 @@ def correlation_of(scene: ShotScene, items: tuple[Item, ...]) -> np.ndarray:
 
 
 def _phase_slope(scene: ShotScene) -> tuple[float, float]:
-    """S and s, m a radian: by the electronics' phase with and without the cyclic deviation."""
+    """Slopes S and s, m a radian, of the range by the electronics' phase.
+
+    With and without the cyclic deviation.
+    """
     s = scene.half / (TWO_PI * scene.index)
     mirror = scene.mirror
     cosine, sine = (np.array(c) * MILLIMETRE for c in (mirror.cyclic_cosine_mm, mirror.cyclic_sine_mm))
@@ -81,12 +90,14 @@ def _phase_slope(scene: ShotScene) -> tuple[float, float]:
 
 
 def _noise(scene: ShotScene, row: int, phasor: complex) -> tuple[str, float]:
-    """Distribution and degrees of freedom of the noise across a buffer's phasor, as `measure_phases` finds it.
+    """Distribution and degrees of freedom of a buffer's phase noise.
+
+    Of the quadrature across the phasor, as in `measure_phases`.
 
     From 16 cycles on it is that of one quadrature, of fewer degrees where the noise is coloured; of both below that;
     one cycle alone is judged about its mean and three harmonics.
 
-    phasor   of the light: a leakage turns what is along and across
+    phasor   of the light: a leakage turns the directions along and across
     """
     shots = scene.campaign.shots
     m, n = int(shots.cycles[row]), int(shots.samples_per_cycle[row])
@@ -105,16 +116,16 @@ def _samples(scene: ShotScene) -> list[Item]:
     count = int(shots.cycles[row] * shots.samples_per_cycle[row])
     code = adc.full_scale_volt / 2 ** (adc.bits - 1)
     rms = scene.u_across * np.sqrt(0.5 * count)
-    # Without noise to move it over the steps every cycle repeats the same rounding, and more cycles average nothing.
+    # Without noise every cycle repeats the same rounding, and more cycles do not average it.
     rounded = count if rms >= DITHERED * code else int(shots.samples_per_cycle[row])
     u_steps = code / np.sqrt(12.0) * np.sqrt(2.0 / rounded)
-    u_rest = float(np.sqrt(max(scene.u_across**2 - u_steps**2, 0.0)))
+    u_noise = float(np.sqrt(max(scene.u_across**2 - u_steps**2, 0.0)))
     kind, degrees = _noise(scene, row, scene.phasor)
     noise = f"frames.npy row {shots.frame[row]}: scatter of {shots.cycles[row]} cycles, less the converter's steps"
     phase = float(np.mod(np.angle(scene.phasor), TWO_PI))
     coupling = scene.mirror.amplitude_to_phase_rad
     return [
-        Item("noise", Input("noise of the target", phase, u_rest / amplitude, kind, degrees), "rad", -slope, noise),
+        Item("noise", Input("noise of the target", phase, u_noise / amplitude, kind, degrees), "rad", -slope, noise),
         Item(
             "amplitude",
             Input("amplitude of the target", amplitude, scene.u_phasor, kind, degrees),
@@ -141,19 +152,19 @@ def _electronics(scene: ShotScene) -> list[Item]:
         kind, degrees = _noise(scene, row, complex(references.phasor[k]))
         after = references.seconds[k] - scene.seconds
         name = f"noise of reference shot {shots.shot[row]}"
-        given = Input(name, float(references.unwrapped[k]), float(references.u_phase[k]), kind, degrees)
+        quantity = Input(name, float(references.unwrapped[k]), float(references.u_phase[k]), kind, degrees)
         source = f"frames.npy row {shots.frame[row]}; {abs(after):.0f} s {'later' if after > 0 else 'before'}"
         source += f", weight {references.weight[k]:.3f}"
-        items.append(Item(f"reference {k}", given, "rad", slope * float(references.weight[k]), source))
-    rest = np.abs(references.weight) < NAMED
-    if rest.any():
-        u = float(np.sqrt(np.sum((references.weight * references.u_phase)[rest] ** 2)))
-        given = Input("noise of other references", 0.0, u)
-        items.append(Item("references", given, "rad", slope, f"{rest.sum()} shots of little weight"))
+        items.append(Item(f"reference {k}", quantity, "rad", slope * float(references.weight[k]), source))
+    minor = np.abs(references.weight) < NAMED
+    if minor.any():
+        u = float(np.sqrt(np.sum((references.weight * references.u_phase)[minor] ** 2)))
+        quantity = Input("noise of other references", 0.0, u)
+        items.append(Item("references", quantity, "rad", slope, f"{minor.sum()} shots of little weight"))
     drift = scene.campaign.site.ranging.electronic_drift_mrad_per_sqrt_hour
-    given = Input("walk of the electronics", references.phase, references.u_walk)
+    quantity = Input("walk of the electronics", references.phase, references.u_walk)
     source = f"site.toml: {drift:g} mrad in the first hour, as its square root; between {_gap(scene)}"
-    return [*items, Item("walk", given, "rad", slope, source)]
+    return [*items, Item("walk", quantity, "rad", slope, source)]
 
 
 def _gap(scene: ShotScene) -> str:
@@ -178,15 +189,15 @@ def _head(scene: ShotScene) -> list[Item]:
     items = []
     for key, unit, value in (("real", 1.0, leakage.real), ("imaginary", 1.0j, leakage.imag)):
         turn, level = (unit * (target - cube)).imag, (unit * (target - cube_level)).real
-        given = Input(f"leakage, {key}", value, mirror.u_leakage_volt)
+        quantity = Input(f"leakage, {key}", value, mirror.u_leakage_volt)
         by = slope * turn - s * mirror.amplitude_to_phase_rad * level
-        items.append(Item(f"leakage {key}", given, "V", by, f"{file}u_leakage_volt; in target and references alike"))
-    given = Input("distance of the cube D0", mirror.d0_mm, mirror.u_d0_mm)
-    return [*items, Item("d0", given, "mm", MILLIMETRE, f"{file}u_d0_mm"), *_effects(scene, file)]
+        items.append(Item(f"leakage {key}", quantity, "V", by, f"{file}u_leakage_volt; in target and references alike"))
+    quantity = Input("distance of the cube D0", mirror.d0_mm, mirror.u_d0_mm)
+    return [*items, Item("d0", quantity, "mm", MILLIMETRE, f"{file}u_d0_mm"), *_effects(scene, file)]
 
 
 def _effects(scene: ShotScene, file: str) -> list[Item]:
-    """Axes, coupling and cyclic deviation, where the sheet knows of them."""
+    """Axes, coupling and cyclic deviation, where the sheet has them."""
     mirror = scene.mirror
     unknowns = head_unknowns(scene.campaign, scene.ranger)
     corrections = head_corrections(
@@ -217,15 +228,15 @@ def _effects(scene: ShotScene, file: str) -> list[Item]:
                 ParameterKind.AMPLITUDE: ("coupling", "amplitude to phase"),
                 ParameterKind.CYCLIC: (f"cyclic {part}", f"cyclic, {part}"),
             }[kind]
-            given = Input(name, float(value), unknown.u / factor)
-            items.append(Item(key, given, unit, float(next(slopes)) * factor, file + unknown.key))
+            quantity = Input(name, float(value), unknown.u / factor)
+            items.append(Item(key, quantity, unit, float(next(slopes)) * factor, file + unknown.key))
     return items
 
 
 def _frequency(scene: ShotScene) -> list[Item]:
     f = scene.campaign.site.ranging.modulation_hz
-    given = Input("modulation frequency", f, scene.assumptions.u_frequency * f)
-    return [Item("frequency", given, "Hz", -scene.length / f, ASSUMED + "a rubidium oscillator left alone")]
+    quantity = Input("modulation frequency", f, scene.assumptions.u_frequency * f)
+    return [Item("frequency", quantity, "Hz", -scene.length / f, ASSUMED + "a rubidium oscillator left alone")]
 
 
 def _air(scene: ShotScene) -> list[Item]:
@@ -236,20 +247,20 @@ def _air(scene: ShotScene) -> list[Item]:
     fluctuation = scene.campaign.site.ranging.path_index_fluctuation_ppm
     items = []
     for k, name in enumerate(field.stations):
-        given = Input(f"offset of thermometer {name}", 0.0, float(field.sigmas[k]))
+        quantity = Input(f"offset of thermometer {name}", 0.0, float(field.sigmas[k]))
         source = ASSUMED + "never compared with a standard"
-        items.append(Item(f"thermometer {name}", given, "°C", by_index * float(scene.path.slopes[0, k]), source))
+        items.append(Item(f"thermometer {name}", quantity, "°C", by_index * float(scene.path.slopes[0, k]), source))
     at = len(field.stations)
     unit = "°C" if field.profile == "bend" else "°C/m"
-    given = Input(f"{field.profile} of temperature with height", 0.0, float(field.sigmas[at]))
+    quantity = Input(f"{field.profile} of temperature with height", 0.0, float(field.sigmas[at]))
     source = ASSUMED + ("half-way between the stations" if field.profile == "bend" else "stations at one height")
-    items.append(Item("profile", given, unit, by_index * float(scene.path.slopes[0, at]), source))
+    items.append(Item("profile", quantity, unit, by_index * float(scene.path.slopes[0, at]), source))
     line = field.line_of_first
     if line is not None:
         column = field.names.index(line.name)
-        given = Input(f"temperature of {line.name} by sound", 0.0, float(field.sigmas[column]))
+        quantity = Input(f"temperature of {line.name} by sound", 0.0, float(field.sigmas[column]))
         items.append(
-            Item("sound", given, "°C", by_index * float(scene.path.slopes[0, column]), "path_temperatures.csv")
+            Item("sound", quantity, "°C", by_index * float(scene.path.slopes[0, column]), "path_temperatures.csv")
         )
     chosen = MODELS[scene.settings.air_model]
     temperature = float(field.smoothed(scene.campaign.shots.mjd_utc[[scene.row]])[0, :, 0].mean())
@@ -278,7 +289,7 @@ def _air(scene: ShotScene) -> list[Item]:
             Input("air that no station reads", 0.0, field.u_unread(scene.path)[0] / PPM),
             "ppm",
             by_index * PPM,
-            "experience, before the ranges tell: docs/decisions/0017-air-as-a-process.md",
+            "experience, without the ranges: docs/decisions/0017-air-as-a-process.md",
         ),
         Item(
             "fluctuation",
@@ -291,13 +302,19 @@ def _air(scene: ShotScene) -> list[Item]:
 
 
 def mean_readings(scene: ShotScene) -> tuple[float, float]:
-    """Pressure, hPa, at the stations' mean height, and relative humidity, %, smoothed to the shot's instant."""
+    """Pressure and humidity, smoothed to the shot's instant.
+
+    hPa at the stations' mean height, and relative humidity in %.
+    """
     state = scene.field.smoothed(scene.campaign.shots.mjd_utc[[scene.row]])[0]
     return float(state[:, 1].mean()), float(state[:, 2].mean())
 
 
 def _weather_slopes(scene: ShotScene) -> tuple[float, float]:
-    """Of the path's mean group index by pressure (a hPa) and humidity (a %), temperature by the stations' line."""
+    """Slopes of the path's mean group index by pressure and humidity.
+
+    A hPa and a %; temperature by the stations' line.
+    """
     field = scene.field
     temperatures = field.smoothed(scene.campaign.shots.mjd_utc[[scene.row]])[0, :, 0]
     pressure, humidity = mean_readings(scene)
@@ -319,13 +336,13 @@ def _weather_slopes(scene: ShotScene) -> tuple[float, float]:
         )
         if line is None:
             return np.stack([moist.sensitivity.pressure_hpa, moist.sensitivity.humidity_percent])
-        # sound gives the temperature, the stations' air the vapour
+        # temperature by sound, vapour by the stations
         chosen = MODELS[field.model]
         saturated = saturation(level + slope * (z - middle), at, chosen.vapour_formula)
         state = (warm, at, moist.vapour_pressure_hpa)
-        held = chosen.partials(*state, wavelength_um=field.wavelength_um, co2_ppm=chosen.co2_ppm)
-        by_pressure = held.pressure_hpa + held.vapour_pressure_hpa * humidity / 100.0 * saturated.per_hpa
-        return np.stack([by_pressure, held.vapour_pressure_hpa * saturated.pressure_hpa / 100.0])
+        partials = chosen.partials(*state, wavelength_um=field.wavelength_um, co2_ppm=chosen.co2_ppm)
+        by_pressure = partials.pressure_hpa + partials.vapour_pressure_hpa * humidity / 100.0 * saturated.per_hpa
+        return np.stack([by_pressure, partials.vapour_pressure_hpa * saturated.pressure_hpa / 100.0])
 
     by_pressure, by_humidity = mean_over_height(slopes, scene.a[2], scene.b[2])
     return float(by_pressure), float(by_humidity)
@@ -355,11 +372,11 @@ def _glass(scene: ShotScene) -> list[Item]:
     file = f"triplets/{place.group}.toml: " if in_unit else "targets.toml: "
     u_normal = scene.settings.u_plate_normal if in_unit else scene.settings.u_normal
     by_angle = float(obliquity_slope(height, n, np.cos(scene.incidence), phase=bends))
-    given = Input("height of the prism", height / MILLIMETRE, place.u_constant / n / MILLIMETRE)
+    quantity = Input("height of the prism", height / MILLIMETRE, place.u_constant / n / MILLIMETRE)
     tilt = Input("angle of incidence", scene.incidence / DEGREE, u_normal / DEGREE)
     across = Input("tilt of the face across it", 0.0, u_normal / DEGREE)
     return [
-        Item("height", given, "mm", -in_glass * MILLIMETRE, f"{file}u_height_mm"),
+        Item("height", quantity, "mm", -in_glass * MILLIMETRE, f"{file}u_height_mm"),
         Item("ratio", ratio, "", -height / cos_r, melt),
         Item("incidence", tilt, "°", by_angle * DEGREE, f"{file}normal; u " + ASSUMED + "as the layout's README"),
         Item("across", across, "°", 0.0, "as the angle of incidence; second order only"),
@@ -367,11 +384,11 @@ def _glass(scene: ShotScene) -> list[Item]:
 
 
 def ball_of(scene: ShotScene) -> tuple[str, float, float, float]:
-    """File, radii and their standard uncertainty, mm, of the ball that a shot is on."""
+    """File, radii and their standard uncertainty, mm, of the shot's ball."""
     triplet = next(t for t in scene.campaign.triplets.values() if t.ball.target == scene.target)
     return f"triplets/{triplet.triplet}.toml: ", triplet.ball.r1_mm, triplet.ball.r2_mm, triplet.ball.u_r_mm
 
 
 def felt(scene: ShotScene) -> np.ndarray:
-    """References that the shot feels at all, indices into the scene's."""
+    """Indices of the references with a significant weight."""
     return np.flatnonzero(np.abs(scene.references.weight) >= FELT)

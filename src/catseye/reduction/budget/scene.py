@@ -1,4 +1,4 @@
-"""One shot with everything that its range follows from, at the best values."""
+"""One shot with all quantities of its range, at the best values."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from catseye.reduction.site.places import RangedPoint
 from catseye.signal.cycles.whole import fraction, unwrapped_length, whole_cycles
 from catseye.signal.drift.reference import drift_at
 
-FELT = 1e-6  # weight of a reference below which a shot does not feel it
+FELT = 1e-6  # weight of a reference below which it is negligible
 
 
 @dataclass(frozen=True)
 class Assumptions:
-    """Uncertainties that no record of a campaign states, each with its reason.
+    """Uncertainties that no record of a campaign states, with reasons.
 
     u_frequency                 of the modulation, relative: a rubidium oscillator left alone ages by some parts in 1e10
                                 a year
@@ -43,7 +43,9 @@ class Assumptions:
 
 @dataclass(frozen=True, eq=False)
 class References:
-    """The reference shots of one ranger as the electronics' phase at one instant depends on them, in order of time.
+    """Reference shots of one ranger with their weights at one instant.
+
+    In order of time; the weights are those of the electronics' phase.
 
     shots        (r,) indices into the campaign's shots
     seconds      (r,) after the campaign's first shot
@@ -53,7 +55,7 @@ class References:
     weight       (r,) of each phase in the electronics' phase; they sum to 1
     level        (r,) weight of each amplitude in the reference amplitude
     phase        rad, of the electronics
-    u_walk       rad, what the electronics may have walked off that
+    u_walk       rad, of that phase by the electronics' walk
     """
 
     shots: np.ndarray
@@ -68,13 +70,13 @@ class References:
 
     @property
     def amplitude(self) -> float:
-        """V, of the cube's return at that instant."""
+        """Amplitude of the cube's return at that instant, V."""
         return float(self.level @ np.abs(self.phasor))
 
 
 @dataclass(frozen=True, eq=False)
 class ShotScene:
-    """One shot with everything that its range follows from.
+    """One shot with all quantities of its range.
 
     row                  of the campaign's shots
     seconds              of the shot, after the campaign's first
@@ -85,7 +87,7 @@ class ShotScene:
     references           of its ranger
     field, path          the air, and its mean along the path
     phase                rad in [0, 2 pi), the target's after the electronics', as measured
-    cycles, margin       N and how far the coarse length was from another, m (vacuum)
+    cycles, margin       N, and distance of the coarse length from another number, m (vacuum)
     half                 m, half the modulation's wavelength in vacuum
     glass, obliquity     Pc and dPc, m
     incidence            rad, on a prism's face; 0 for others
@@ -132,17 +134,17 @@ class ShotScene:
 
     @property
     def leakage(self) -> complex:
-        """V, what was subtracted from every phasor of this ranger."""
+        """Leakage subtracted from every phasor of this ranger, V."""
         return complex(self.mirror.leakage_amplitude_volt * np.exp(1j * self.mirror.leakage_phase_rad))
 
     @property
     def length(self) -> float:
-        """m, of the way in air that the phase measured."""
+        """Path length in air measured by the phase, m."""
         return float(unwrapped_length(self.cycles, self.phase, self.half)) / self.index
 
     @property
     def range_(self) -> float:
-        """m, scan point to the target's point.
+        """Range from scan point to the target's point, m.
 
         Source: [PARKER04] eq. 5.18 and 5.19, with the glass and the head's corrections in metres.
         """
@@ -160,11 +162,11 @@ def scene_of(
     settings: ReductionSettings,
     assumptions: Assumptions | None = None,
 ) -> ShotScene:
-    """The scene of a shot on a target that has a phase and a reference.
+    """Scene of a target shot with a phase and a reference.
 
-    wrong   reference shots that were left out, by row, as `follow_electronics` gives them
+    wrong   rejected reference shots by row, from `follow_electronics`
     row     of the campaign's shots
-    ends    (3,) m, scan point and target where they are taken to be: they say where the air is and which cycle it was
+    ends    (3,) m, assumed scan point and target: they determine the air and the whole cycles
     place   the target's
 
     Raises InputError where the target's face looks away from the ranger: it cannot have returned the light.
@@ -216,7 +218,7 @@ def scene_of(
 
 
 def _obliquity(campaign: Campaign, place: RangedPoint, cosine: float) -> tuple[float, float]:
-    """Incidence on a prism's face, rad, and what it changes of the glass's range constant, m."""
+    """Incidence on a prism's face, rad, and its change of the range constant, m."""
     from catseye.optics.retroreflector.prism import obliquity_correction
 
     ranging = campaign.site.ranging
@@ -225,7 +227,7 @@ def _obliquity(campaign: Campaign, place: RangedPoint, cosine: float) -> tuple[f
 
 
 def references_of(campaign: Campaign, phases: Phases, wrong: Mapping[int, str], *, row: int) -> References:
-    """The good reference shots of a shot's ranger, and how the electronics' phase at the shot follows from them.
+    """Good reference shots of a shot's ranger, with their weights.
 
     Raises InputError where the ranger has none.
 
@@ -247,8 +249,10 @@ def references_of(campaign: Campaign, phases: Phases, wrong: Mapping[int, str], 
     unwrapped = np.unwrap(np.angle(phases.phasor[rows]))
     phase, covariance = drift_at(seconds, unwrapped, variance, time=when, random_walk=walk)
     unit = np.eye(len(rows))
-    weight = np.array([drift_at(seconds, each, variance, time=when, random_walk=walk)[0][0] for each in unit])
-    level = np.array([np.interp(when[0], seconds, each) for each in unit])
+    weight = np.array(
+        [drift_at(seconds, unit_vector, variance, time=when, random_walk=walk)[0][0] for unit_vector in unit]
+    )
+    level = np.array([np.interp(when[0], seconds, unit_vector) for unit_vector in unit])
     return References(
         shots=rows,
         seconds=seconds,
@@ -272,7 +276,7 @@ def _seconds(campaign: Campaign, row: int) -> float:
 
 
 def head_columns(campaign: Campaign, ranger: str) -> dict[Parameter, int]:
-    """First place of each unknown of a head in a list of all its parts."""
+    """First position of each unknown of a head in the list of all parts."""
     at: dict[Parameter, int] = {}
     first = 0
     for unknown in head_unknowns(campaign, ranger):

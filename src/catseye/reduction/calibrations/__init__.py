@@ -1,1 +1,1 @@
-"""Calibrations from tables of readings; `kinds` names them all."""
+"""Calibrations from tables of readings; `kinds` lists them."""

@@ -1,4 +1,7 @@
-"""What a calibration gives, whatever was calibrated: quantities with covariance, residuals, decisions, provenance."""
+"""Result of a calibration of any kind.
+
+Quantities with covariance, residuals, decisions, provenance.
+"""
 
 from dataclasses import dataclass, field
 
@@ -34,27 +37,28 @@ class Quantity:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """The outcome of one calibration: everything that its record and its certificate show.
+    """Result of one calibration, for its record and its certificate.
 
     kind         "reference-distance", "leakage", ...: as `catseye calibrate` calls it
     title        "Reference distance D0 of ZP103"
-    provenance   of the readings: serial, measured_on, valid_until, by, report, and what else the sheet says
-    quantities   what was found, in order
+    provenance   of the readings: serial, measured_on, valid_until, by, report, and other keys of the sheet
+    quantities   results, in order
     covariance   (q, q) of the quantities, in their units
     columns      headings of the table of readings, each with its unit in the name
-    rows         of that table: the readings, what was corrected, the residual, the test statistic, used or why not
+    rows         of that table: the readings, corrections, the residual, the test statistic, used or the reason against
+                 it
     decisions    tests
     variance_factor, degrees_of_freedom   of the adjustment; NaN and 0 where nothing was redundant
-    notes        what a person should know, one line each
-    curve        x, y, what was fitted for the figure: name -> (x, y) arrays; "readings" and "fit" at least; where they
-                 are there, "residuals" and "spectrum" are drawn below, "left out" among the readings
+    notes        for the user, one line each
+    curve        for the figure: name -> (x, y) arrays; "readings" and "fit" at least; where they
+                 exist, "residuals" and "spectrum" are drawn below, "left out" among the readings
     axes         labels of that figure
-    method       how the readings became the quantities, in a few sentences for the certificate
-    record       what can be copied into the record that the quantities belong to, by its keys: numbers or lists
+    method       method of the evaluation, in a few sentences for the certificate
+    record       entries for the record of the quantities, by its keys: numbers or lists
     equal_axes   the figure is a plane: both axes to one scale
-    fit          the adjustment behind it, if there was one
-    explained    share of the readings' variance that the model explains, where no fit tells
-    plausible    its numbers against what the kind's instruments can give, by `plausibility.judged`
+    fit          the adjustment, or None
+    explained    share of the readings' variance that the model explains, without a fit
+    plausible    its numbers against the limits of the kind's instruments, by `plausibility.judged`
     """
 
     kind: str
@@ -79,15 +83,15 @@ class Calibration:
 
     @property
     def states(self) -> tuple[str, ...]:
-        """What became of each reading; empty where the rows are results and no readings."""
+        """State of each reading; empty where the rows are results."""
         return tuple(str(row[-1]) for row in self.rows) if self.columns and self.columns[-1] == STATE else ()
 
     def value(self, key: str) -> float:
-        """The quantity of that key; KeyError where there is none."""
+        """Quantity with that key; KeyError without one."""
         return self._named(key).value
 
     def u(self, key: str) -> float:
-        """Its standard uncertainty; KeyError where there is none."""
+        """Standard uncertainty of a quantity; KeyError without one."""
         return self._named(key).u
 
     def _named(self, key: str) -> Quantity:

@@ -1,17 +1,17 @@
-"""The outcome of a test: a number, its limit, and what they mean."""
+"""Outcome of a test: a number, its limit, and their meaning."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class CheckOutcome:
-    """A statistical test or a comparison with a limit, with its outcome.
+    """Statistical test or comparison with a limit, with its outcome.
 
     name       "outliers: largest |w|"
-    statistic  what was computed
-    limit      what it was compared with
+    statistic  computed value
+    limit      of the statistic
     passed     the outcome; None where the data do not allow the test
-    text       what it means, one sentence
+    text       its meaning, one sentence
     least      the limit is the least that passes, not the most
     grave      a failure rejects the answer; otherwise it casts doubt on it
     """
@@ -26,7 +26,7 @@ class CheckOutcome:
 
     @property
     def comparison(self) -> str:
-        """The numbers with the side on which the limit stands; "" where nothing was compared.
+        """Statistic with the side of its limit; "" without a comparison.
 
         >>> CheckOutcome("arc, rad", 3.0, 1.57, True, "wide enough", least=True).comparison
         '3, at least 1.57'

@@ -1,7 +1,9 @@
-"""Readings that depend on what is sought by a curve: `fit_readings` about the latest values until they stay.
+"""Adjustment of readings that depend non-linearly on the parameters.
 
-A parameter is sought freely, or has a value and a standard uncertainty beforehand (a systematic effect, a value from
-another calibration); all come out with one covariance.
+`fit_readings` about the latest values, iterated to convergence.
+
+A parameter is free, or has a prior value and standard uncertainty (a systematic effect, a value from
+another calibration); all have one joint covariance.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,17 +27,17 @@ from catseye.reduction.calibrations.fit import (
 from catseye.reduction.calibrations.kind import quantities
 
 ROUNDS = 40
-SETTLED = 1e-4  # of a standard uncertainty: what a further round would move
+SETTLED = 1e-4  # of a standard uncertainty: change by a further round
 
 
 @dataclass(frozen=True)
 class ModelParameter:
-    """A parameter of a model.
+    """Parameter of a model.
 
-    name     what it is, for messages
-    start    where the search begins; the value known beforehand where there is one
-    step     of the differences that stand for derivatives, in its unit
-    u        standard uncertainty of that value; infinite where it is sought, zero holds it
+    name     for messages
+    start    start of the search; the prior value if there is one
+    step     of the numerical derivatives, in its unit
+    u        standard uncertainty of that value; infinite for a free parameter, zero holds it
     """
 
     name: str
@@ -46,12 +48,12 @@ class ModelParameter:
 
 @dataclass(frozen=True, eq=False)
 class CurvedFit:
-    """The outcome of `fit_curved` over p parameters.
+    """Result of `fit_curved` over p parameters.
 
-    parameters    as they went in
+    parameters    of the input
     values        (p,) of all of them
-    covariance    (p, p); rows and columns of held ones are zero
-    fit           the last linear one: residuals, tests; `predicted` is what the values predict
+    covariance    (p, p); rows and columns of fixed ones are zero
+    fit           the last linear one: residuals, tests; `predicted` is the values' prediction
     """
 
     parameters: tuple[ModelParameter, ...]
@@ -60,26 +62,31 @@ class CurvedFit:
     fit: CalibrationFit
 
     def index(self, name: str) -> int:
-        """Where a parameter stands; ValueError for another name."""
+        """Index of a parameter; ValueError for another name."""
         return [p.name for p in self.parameters].index(name)
 
     def value(self, name: str) -> float:
-        """The estimate of a parameter by its name."""
+        """Estimate of a parameter by its name."""
         return float(self.values[self.index(name)])
 
     def u(self, name: str) -> float:
-        """Its standard uncertainty."""
+        """Standard uncertainty of a parameter by its name."""
         k = self.index(name)
         return float(np.sqrt(self.covariance[k, k]))
 
-    def quantities(self, wanted: Sequence[tuple[str, str, str, str, float]]) -> tuple[tuple[Quantity, ...], np.ndarray]:
-        """Quantities and their covariance, each wanted as (parameter, key, unit, meaning, size of the unit)."""
-        at = [self.index(name) for name, *_ in wanted]
-        scale = np.array([1.0 / size for *_, size in wanted])
+    def quantities(
+        self, selection: Sequence[tuple[str, str, str, str, float]]
+    ) -> tuple[tuple[Quantity, ...], np.ndarray]:
+        """Quantities and their covariance.
+
+        Each selected by (parameter, key, unit, meaning, size of the unit).
+        """
+        at = [self.index(name) for name, *_ in selection]
+        scale = np.array([1.0 / size for *_, size in selection])
         covariance = self.covariance[np.ix_(at, at)] * np.outer(scale, scale)
         sought = [k for k, p in enumerate(self.parameters) if np.isinf(p.u)]
         turn = np.array([[s * (k == j) for j in sought] for k, s in zip(at, scale, strict=True)])
-        keys = [(key, unit, meaning) for _, key, unit, meaning, _ in wanted]
+        keys = [(key, unit, meaning) for _, key, unit, meaning, _ in selection]
         fit = self.fit if sought else None
         return quantities(keys, self.values[at] * scale, covariance, fit=fit, turn=turn), covariance
 
@@ -92,16 +99,16 @@ def fit_curved(
     scatter: ObservedScatter,
     options: FitOptions = EVERY_VALUE,
 ) -> CurvedFit:
-    """The parameters that fit readings best, where these depend on them by a curve.
+    """Best-fitting parameters of a non-linear model.
 
     observed     (m,)
     predict      function of the values (p,) of the parameters -> (m,)
-    parameters   p, each sought or with a standard uncertainty beforehand
+    parameters   p, each free or with a prior standard uncertainty
     scatter      of the observed values
-    options      which values take part, and the tests
+    options      used values, and the tests
 
-    Raises EstimationError where the readings do not hold every sought parameter (it names them), where too many would
-    be rejected, or where the search does not end.
+    Raises EstimationError where the readings do not determine every free parameter (it names them), where too many
+    would be rejected, or without convergence.
 
     Source: [FOERSTNER16] chapter 4 (Gauss-Newton with priors); derivatives by central differences.
     """
@@ -134,7 +141,7 @@ def fit_curved(
         if moved < SETTLED:
             if rejecting or not options.reject:
                 return CurvedFit(tuple(parameters), values, covariance, replace(fit, predicted=predict(values)))
-            rejecting = True  # far from the answer every reading looks wrong
+            rejecting = True  # far from the solution every reading looks wrong
     raise EstimationError(
         f"the values did not settle in {ROUNDS} rounds: check the sheet's nominal values, and the columns' signs"
     )
@@ -155,7 +162,10 @@ def _slopes(
 def _covariance(
     slopes: np.ndarray, scatter: ObservedScatter, fit: CalibrationFit, parameters: Sequence[ModelParameter]
 ) -> np.ndarray:
-    """(p, p) of all parameters together, which `fit_readings` gives for the sought ones alone."""
+    """Covariance (p, p) of all parameters together.
+
+    `fit_readings` gives that of the free ones alone.
+    """
     total = scatter.claimed + sum(
         (fit.components[name] ** 2 * matrix for name, matrix in scatter.unknown.items()), np.zeros_like(scatter.claimed)
     )
@@ -170,16 +180,18 @@ def _covariance(
     return answer
 
 
-def row_ends(fit: CalibrationFit, reasons: Sequence[str], each: int) -> list[tuple[float, str]]:
-    """Of each row of a table that gave `each` observed values, one after the other: statistic and state of the worst.
+def row_ends(fit: CalibrationFit, reasons: Sequence[str], row_size: int) -> list[tuple[float, str]]:
+    """Statistic and state of the worst value in each row of a table.
 
-    reasons   why a row was left out beforehand, "" where it was not
+    A row gave `row_size` observed values, one after the other.
+
+    reasons   reason that a row was left out beforehand, "" for none
     """
-    states = fit.state([reason for reason in reasons for _ in range(each)])
+    states = fit.state([reason for reason in reasons for _ in range(row_size)])
     order = (USED, SUSPECT, REJECTED)
     ends = []
-    for k in range(0, len(states), each):
-        statistic = max(fit.statistic[k : k + each], key=abs)
-        state = max(states[k : k + each], key=lambda s: order.index(s) if s in order else len(order))
+    for k in range(0, len(states), row_size):
+        statistic = max(fit.statistic[k : k + row_size], key=abs)
+        state = max(states[k : k + row_size], key=lambda s: order.index(s) if s in order else len(order))
         ends.append((float(statistic), state))
     return ends

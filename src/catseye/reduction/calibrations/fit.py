@@ -1,8 +1,8 @@
-"""The adjustment that all calibrations share: a line through readings, systematic effects with priors, tests.
+"""Linear adjustment with systematic effects and tests, for all calibrations.
 
-What is sought are a few parameters of a linear model. Systematic effects are further parameters with mean zero and a
+The unknowns are a few parameters of a linear model. Systematic effects are further parameters with mean zero and a
 known standard uncertainty. The scatter is either claimed, or estimated from the readings themselves (restricted maximum
-likelihood) where nobody claims it.
+likelihood) if not.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from catseye.estimation.quality.reliability import checked, global_test, single_
 from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.scatter import effective_degrees, restricted_likelihood
 
-TESTS = 3  # that share the level evenly: scatter, single readings, what the kind tests beside them
+TESTS = 3  # that share the level evenly: scatter, single readings, tests of the kind
 SCATTER_LIMIT = 0.05 / TESTS  # level of the test of the variance factor, two-sided
 MOST_REJECTED = 1.0 / 3.0  # of the readings: beyond it the model is wrong, not the readings
 USED, SUSPECT, REJECTED = "used", "suspect", "rejected"
@@ -25,11 +25,11 @@ USED, SUSPECT, REJECTED = "used", "suspect", "rejected"
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """A systematic effect that shifts all readings together.
+    """Systematic effect that shifts all readings together.
 
-    name     what it is, for the certificate
+    name     for the certificate
     column   (m,) change of the observed values for each unit of it
-    u        its standard uncertainty, in that unit; zero leaves it out
+    u        its standard uncertainty, in that unit; zero omits it
     """
 
     name: str
@@ -39,11 +39,11 @@ class Effect:
 
 @dataclass(frozen=True, eq=False)
 class ObservedScatter:
-    """How the observed values scatter: what is claimed, and matrices whose factors the readings decide.
+    """Scatter of the observed values: claimed, and unknown components.
 
-    claimed      (m, m) covariance, known beforehand
-    unknown      what scatters -> (m, m) matrix Q; its variance factor is estimated
-    size         of the numbers whose differences are observed: scatter that is their rounding is none
+    claimed      (m, m) prior covariance
+    unknown      component -> (m, m) matrix Q; its variance factor is estimated
+    size         of the numbers whose differences are observed: scatter below their rounding counts as none
     """
 
     claimed: np.ndarray
@@ -53,21 +53,21 @@ class ObservedScatter:
 
 @dataclass(frozen=True, eq=False)
 class CalibrationFit:
-    """The outcome over m observed values and p sought parameters.
+    """Result over m observed values and p free parameters.
 
-    x, covariance       (p,), (p, p) of the sought parameters, systematic effects included
-    scattered           (p, p) the part of it that comes from the scatter alone
+    x, covariance       (p,), (p, p) of the free parameters, systematic effects included
+    scattered           (p, p) the part of it by the scatter alone
     effects             effect -> its value and u after the adjustment
-    components          what scattered -> its estimated standard deviation
-    residual, predicted (m,) observed minus predicted, with the effects as estimated; what the sought parameters predict
+    components          component of scatter -> its estimated standard deviation
+    residual, predicted (m,) observed minus predicted, with the estimated effects; prediction of the free parameters
     sigma               (m,) standard uncertainty of the observed value, scatter alone
     statistic           (m,) standardised residual; of a value left out, that of its prediction
     active              (m,) bool
-    checked             (m,) bool: the others would show an error of it
+    checked             (m,) bool: an error of it would show in the others
     test, critical      "w" (scatter claimed) or "tau" (scatter estimated), and the limit of a single test
     variance_factor, degrees_of_freedom   NaN and the degrees where the scatter was estimated: it would be 1
     effective         (p,) degrees of freedom of each parameter's scattered variance; infinite where scatter is claimed
-    independent       no reading's scatter has a part in another's
+    independent       True if the readings' scatters are independent
     """
 
     x: np.ndarray
@@ -90,14 +90,17 @@ class CalibrationFit:
 
     @property
     def explained(self) -> float:
-        """Share of the variance of the values used that the sought parameters explain; NaN of values all alike."""
-        seen = (self.predicted + self.residual)[self.active]
-        total = float(np.var(seen))
+        """Share of the used values' variance explained by the parameters.
+
+        NaN for identical values.
+        """
+        observed = (self.predicted + self.residual)[self.active]
+        total = float(np.var(observed))
         return 1.0 - float(np.mean(self.residual[self.active] ** 2)) / total if total > 0.0 else float("nan")
 
     @property
     def suspects(self) -> np.ndarray:
-        """(m,) bool: takes part although the test rejects it."""
+        """True (m,) for used values that the test rejects."""
         return self.active & self.checked & (np.abs(self.statistic) > self.critical)
 
     def decisions(self, level: float = SCATTER_LIMIT) -> tuple[CheckOutcome, ...]:
@@ -144,7 +147,10 @@ class CalibrationFit:
         return tuple(outcomes)
 
     def state(self, reasons: Sequence[str]) -> tuple[str, ...]:
-        """(m,) of each value: used, suspect, rejected, or the reason why it was left out beforehand."""
+        """State (m,) of each value: used, suspect, rejected, or a reason.
+
+        The reason why it was left out beforehand.
+        """
         suspects = self.suspects
         return tuple(
             f"left out: {reason}" if reason else SUSPECT if s else USED if a else REJECTED
@@ -154,12 +160,12 @@ class CalibrationFit:
 
 @dataclass(frozen=True, eq=False)
 class FitOptions:
-    """Which observed values take part, and how they are tested.
+    """Used observed values, and their tests.
 
-    active     (m,) bool: takes part at the start; all if None
+    active     (m,) bool: used at the start; all if None
     together   (m,) labels: values of one label leave together, as both quadratures of a phasor; each alone if None
     reject     leave out what the test rejects, worst first, one at a time
-    level      of the tests together, chance of any false alarm; a third of it is that of the single readings
+    level      of the tests together, probability of a false alarm; a third of it is that of the single readings
     """
 
     active: np.ndarray | None = None
@@ -180,17 +186,17 @@ def fit_readings(
     effects: Sequence[Effect] = (),
     options: FitOptions = EVERY_VALUE,
 ) -> CalibrationFit:
-    """The parameters of a linear model that fit readings best.
+    """Least-squares parameters of a linear model of readings.
 
     observed   (m,)
-    design     (m, p) derivatives by the sought parameters
+    design     (m, p) derivatives by the free parameters
     scatter    of the observed values
     names      (p,) of the parameters, for messages
     effects    systematic, with priors
-    options    which values take part, and the tests
+    options    used values, and the tests
 
-    Raises EstimationError where the readings do not hold every parameter, or where a third of them
-    would have to go.
+    Raises EstimationError where the readings do not determine every parameter, or where a third of
+    them would be rejected.
 
     Source: [FOERSTNER16] chapter 4 (Gauss-Markov model with priors); [BAARDA68] (w test), [POPE76] (tau test);
     [PATTERSON71] (scatter from the readings).
@@ -251,7 +257,7 @@ def _fitted(
     degrees = np.full(p, np.inf)
     if components:
         block = np.ix_(on, on)
-        acting_on = [q[block] for q in scatter.unknown.values()]  # one that came out as zero is no less uncertain
+        acting_on = [q[block] for q in scatter.unknown.values()]  # one estimated as zero is no less uncertain
         degrees = effective_degrees(design[on], acting_on, covariance[block])
     return _outcome(solution, groups[0], [e.name for e in acting], components, on=on, level=level, effective=degrees)
 

@@ -1,4 +1,7 @@
-"""What a kind of calibration is: a layout of table and sheet, and the recipe that makes a Calibration of them."""
+"""Kind of calibration: layout of table and sheet, and its recipe.
+
+The recipe makes a Calibration of them.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,11 +18,11 @@ PROVENANCE = ("instrument", "serial", "measured_on", "valid_until", "by", "repor
 
 @dataclass(frozen=True)
 class PlausibleSpan:
-    """The values that a number can have.
+    """Plausible values of a number.
 
     low, high   bounds, in the number's own unit
-    reason      whence they are: the instrument, with its source
-    u           largest standard uncertainty that tells anything; that of knowing only the span if None
+    reason      source of the bounds: the instrument
+    u           largest useful standard uncertainty; None: that of knowing only the span
     """
 
     low: float
@@ -29,7 +32,7 @@ class PlausibleSpan:
 
     @property
     def most_u(self) -> float:
-        """The larger u says no more than the span itself.
+        """Largest useful standard uncertainty; a larger one adds nothing to the span.
 
         Source: [JCGM100] 4.3.7 (a quantity known to lie between two bounds and nothing else).
 
@@ -41,7 +44,7 @@ class PlausibleSpan:
 
 @dataclass(frozen=True)
 class ReadingScatter:
-    """The largest standard deviation that a reading of this kind can have.
+    """Largest standard deviation of a reading of this kind.
 
     most     in `unit`
     size     of that unit in the fit's own
@@ -56,11 +59,13 @@ class ReadingScatter:
 
 @dataclass(frozen=True)
 class Plausibility:
-    """What a calibration of a kind can give at all, stated once beside its recipe; `plausibility.judged` compares.
+    """Limits of a kind's readings and results.
+
+    Stated once beside its recipe; `plausibility.judged` compares.
 
     scatter     of a reading; None where nothing is adjusted
     sizes       pattern of quantities' keys -> their span, in the units of the keys
-    explained   least share of the readings' variance that the model explains; 0 where what is sought may be zero
+    explained   least share of the readings' variance that the model explains; 0 where the quantity may be zero
     columns     column -> span of its readings, beyond which one is more likely mistyped than measured
     varying     column -> its period, 0 if it has none: modulo that it must take two values at least
     """
@@ -76,10 +81,10 @@ class Plausibility:
 class CalibrationKind:
     """One kind of calibration.
 
-    about       what it finds, one line for the command line
+    about       its result, one line for the command line
     layout      of its table and sheet
     recipe      function (readings, reject) -> Calibration; reject: leave out what the tests reject
-    plausible   what its readings and its answer can be at all
+    plausible   limits of its readings and its result
     """
 
     about: str
@@ -89,15 +94,15 @@ class CalibrationKind:
 
 
 def provenance(readings: SheetReadings) -> dict[str, object]:
-    """Who measured what with which files, then every other key of the sheet as it was given."""
+    """Provenance: who measured what with which files, then the sheet's other keys."""
     sheet = readings.sheet
     stated = {key: getattr(sheet, key) for key in PROVENANCE}
-    rest = {
+    other_keys = {
         key: value
         for key, value in sheet.model_dump().items()
         if key not in stated and key not in ("format", "kind") and value is not None
     }
-    return {**stated, "inputs_sha256": dict(readings.hashes), "sheet": rest}
+    return {**stated, "inputs_sha256": dict(readings.hashes), "sheet": other_keys}
 
 
 def quantities(
@@ -108,12 +113,14 @@ def quantities(
     fit: CalibrationFit | None = None,
     turn: np.ndarray | None = None,
 ) -> tuple[Quantity, ...]:
-    """Quantities from (key, unit, meaning), values and covariance in the units.
+    """Quantities from (key, unit, meaning), values and covariance.
 
-    fit, turn   what they come from, and the derivatives (q, p) by its parameters: the part of u that was estimated from
+    In the units of the keys.
+
+    fit, turn   their source, and the derivatives (q, p) by its parameters: the part of u that was estimated from
                 few readings widens the interval
 
-    Source: [JCGM100] G.4.1, Welch and Satterthwaite; the scatter's own degrees as `effective_degrees` has them.
+    Source: [JCGM100] G.4.1, Welch and Satterthwaite; the scatter's own degrees by `effective_degrees`.
     """
     variance = np.diag(covariance)
     coverage = np.full(len(variance), 2.0)
@@ -129,7 +136,9 @@ def quantities(
 
 
 def student(degrees: ArrayLike, deviations: float) -> np.ndarray:
-    """Standard deviations, of a scatter from so many degrees of freedom, that hold as much as these of a normal one.
+    """Standard deviations of Student's distribution, equivalent to normal ones.
+
+    For a scatter with so many degrees of freedom.
 
     >>> student([2.0, np.inf], 3.0).round(2).tolist()
     [19.21, 3.0]
@@ -141,7 +150,10 @@ def student(degrees: ArrayLike, deviations: float) -> np.ndarray:
 
 
 def residuals_by_number(fit: CalibrationFit, scale: float) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Curves of the residuals in order of the readings, in units of `scale`: for readings that share no other axis."""
+    """Residuals in order of the readings, in units of `scale`, as curves.
+
+    For readings without another common axis.
+    """
     count, on = np.arange(1, len(fit.residual) + 1), fit.active
     residual = fit.residual / scale
     return {
@@ -152,9 +164,11 @@ def residuals_by_number(fit: CalibrationFit, scale: float) -> dict[str, tuple[np
 
 
 def scatter_notes(fit: CalibrationFit, unit: str, scale: float, *, sought: int | None = None) -> tuple[str, ...]:
-    """How the readings scatter and from how many degrees of freedom, in a unit of `scale` SI units.
+    """Notes on the readings' scatter and its degrees of freedom.
 
-    sought   how many of the first parameters are of interest; all if None
+    In a unit of `scale` SI units.
+
+    sought   number of leading parameters of interest; all if None
     """
     from scipy.special import stdtrit
 

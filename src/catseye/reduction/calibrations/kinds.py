@@ -1,4 +1,4 @@
-"""Calibrations from tables of readings: one kind is one file with a RECIPE, and one line here."""
+"""Kinds of calibrations: one file with a RECIPE and one line here each."""
 
 from pathlib import Path
 
@@ -65,14 +65,15 @@ KINDS: dict[str, CalibrationKind] = {
 
 
 def calibrate(kind: str, path: Path | str, sheet: Path | str | None = None, *, reject: bool = False) -> Calibration:
-    """A calibration from a table of readings and the sheet beside it.
+    """Calibration from a table of readings and its sheet.
 
     kind     a name in KINDS
     path     of the table
     sheet    of the sheet; the table's with the ending .toml if None
     reject   leave out the readings that the tests reject; they stay in the table
 
-    Raises InputError for an unknown kind or a bad file, EstimationError where the readings do not hold what is sought.
+    Raises InputError for an unknown kind or a bad file, EstimationError where the readings do not determine the
+    quantities.
     """
     if kind not in KINDS:
         raise InputError(f"calibration {kind!r} is unknown (expected one of {', '.join(KINDS)})")

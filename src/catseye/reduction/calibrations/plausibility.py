@@ -1,4 +1,6 @@
-"""The judge of every calibration: its scatter, sizes, u and columns against what the kind's instruments can give.
+"""Plausibility of a calibration: scatter, sizes, u and columns.
+
+Against the limits of the kind's instruments.
 
 Tests of the kind ask whether the readings agree with each other and with what the sheet claims. A column that is
 negated, doubled or shifted often agrees with itself; then only size tells: a height gauge does not scatter by 18 mm.
@@ -19,9 +21,9 @@ from catseye.reduction.calibrations.calibration import Calibration
 from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.kind import CalibrationKind, Plausibility
 
-GRAVE = 10.0  # times a limit: beyond it the answer is rejected, up to it doubted
-SAME = 1e-6  # of a period, or of a column's largest value: what rounding makes of equal readings
-NAMED = 4  # cures that are told; more say that no column stands out
+GRAVE = 10.0  # times a limit: beyond it the result is rejected, up to it doubtful
+ROUNDING = 1e-6  # of a period, or of a column's largest value: rounding of equal readings
+NAMED = 4  # reported cures; more mean that no column is suspect
 MOST_TRIED = 5000  # readings times cures: beyond it the search is left out, a few seconds
 SERIAL = 4.0  # standard deviations of the correlation of neighbours; 3e-5 by chance
 FEWEST = 12  # readings that tell such a correlation
@@ -36,9 +38,9 @@ WAYS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 
 
 def judged(kind: CalibrationKind, readings: SheetReadings, calibration: Calibration) -> Calibration:
-    """The calibration with `plausible`: each limit of its kind, and the column that its failure points to.
+    """Calibration with `plausible`: limits, and the suspect column.
 
-    kind, readings   what it was made with, for the cures
+    kind, readings   its input, for the cures
 
     Where every limit holds and the scatter is that of the instrument the outcomes are few: one a limit that the kind
     states for a reading, and one for all quantities.
@@ -68,27 +70,27 @@ def _outcomes(limits: Plausibility, readings: SheetReadings, calibration: Calibr
 
 
 def _columns(limits: Plausibility, readings: SheetReadings) -> Iterator[CheckOutcome]:
-    """Columns that hold one value where several are needed, and values that were hardly measured."""
+    """Constant columns that must vary, and implausible values."""
     for name, period in limits.varying.items():
         if name not in readings.numbers:
             continue
         values = readings.numbers[name][readings.active]
         away = values - values[0]
         away = np.abs(away - period * np.round(away / period) if period else away)
-        if not np.any(away > SAME * (period or float(np.max(np.abs(values))))):
-            again = f" (modulo {period:g})" if period else ""
+        if not np.any(away > ROUNDING * (period or float(np.max(np.abs(values))))):
+            modulo_text = f" (modulo {period:g})" if period else ""
             yield CheckOutcome(
                 f"column {name}: different values", 1.0, 2.0, False,
-                f"column {name} holds {values[0]:g} in every reading{again}: it tells nothing, where it must vary",
+                f"column {name} holds {values[0]:g} in every reading{modulo_text} (expected values that vary)",
                 least=True,
             )  # fmt: skip
     for name, span in limits.columns.items():
         if name not in readings.numbers:
             continue
         values = readings.numbers[name][readings.active]
-        beyond = np.maximum(span.low - values, values - span.high)
-        if np.any(beyond > 0.0):
-            worst = float(values[np.argmax(beyond)])
+        excess = np.maximum(span.low - values, values - span.high)
+        if np.any(excess > 0.0):
+            worst = float(values[np.argmax(excess)])
             low = worst < span.low
             yield CheckOutcome(
                 f"column {name}: {'smallest' if low else 'largest'}", worst, span.low if low else span.high, False,
@@ -98,7 +100,7 @@ def _columns(limits: Plausibility, readings: SheetReadings) -> Iterator[CheckOut
 
 
 def _humidity(readings: SheetReadings) -> Iterator[CheckOutcome]:
-    """A humidity that is likely a fraction of 1, of the sheet or its column."""
+    """Humidity that is likely a fraction of 1, of the sheet or its column."""
     of_sheet = getattr(readings.sheet, "humidity_percent", None)
     values = readings.numbers.get("humidity_percent", np.array([] if of_sheet is None else [of_sheet], dtype=float))
     for text in humidity_doubts(values):
@@ -107,23 +109,23 @@ def _humidity(readings: SheetReadings) -> Iterator[CheckOutcome]:
 
 
 def _scatter(limits: Plausibility, calibration: Calibration) -> Iterator[CheckOutcome]:
-    """The scatter of a reading, estimated or claimed, against the instrument's."""
+    """Scatter of a reading, estimated or claimed, against the instrument's."""
     fit, scatter = calibration.fit, limits.scatter
     if fit is None or scatter is None:
         return
-    seen = fit.components or {"claimed scatter of the best reading": float(np.min(fit.sigma[fit.active]))}
-    for name, deviation in seen.items():
-        found = deviation / scatter.size
-        said = (
-            f"the readings scatter by {found:.3g} {scatter.unit}, the instrument by {scatter.most:g} at most: "
-            if found > scatter.most
+    deviations = fit.components or {"claimed scatter of the best reading": float(np.min(fit.sigma[fit.active]))}
+    for name, deviation in deviations.items():
+        size = deviation / scatter.size
+        text = (
+            f"the readings scatter by {size:.3g} {scatter.unit}, the instrument by {scatter.most:g} at most: "
+            if size > scatter.most
             else ""
         )
-        yield _at_most(f"{name}, {scatter.unit}", found, scatter.most, f"{said}{scatter.reason}")
+        yield _at_most(f"{name}, {scatter.unit}", size, scatter.most, f"{text}{scatter.reason}")
 
 
 def _explained(limits: Plausibility, calibration: Calibration) -> Iterator[CheckOutcome]:
-    """The part of the readings' variance that the model leaves."""
+    """Share of the readings' variance outside the model."""
     if limits.explained <= 0.0:
         return
     share = calibration.explained
@@ -138,7 +140,10 @@ def _explained(limits: Plausibility, calibration: Calibration) -> Iterator[Check
 
 
 def _sizes(limits: Plausibility, calibration: Calibration) -> Iterator[CheckOutcome]:
-    """Each quantity and its u within the kind's span; one outcome where all are."""
+    """Each quantity and its u within the kind's span.
+
+    One outcome if all are.
+    """
     failed = False
     for q in calibration.quantities:
         for span in (s for pattern, s in limits.sizes.items() if fnmatchcase(q.key, pattern)):
@@ -161,7 +166,9 @@ def _sizes(limits: Plausibility, calibration: Calibration) -> Iterator[CheckOutc
 
 
 def _neighbours(calibration: Calibration) -> Iterator[CheckOutcome]:
-    """Residuals of neighbours that go together: something in the order of the readings is not in the model.
+    """Correlation of neighbouring residuals.
+
+    Something in the order of the readings is missing in the model.
 
     Only where the scatter is one of independent readings. The correlation of m neighbours scatters by 1/sqrt(m) about a
     little less than zero, as the fit takes a part away [FOERSTNER16].
@@ -186,15 +193,18 @@ def _neighbours(calibration: Calibration) -> Iterator[CheckOutcome]:
     )
 
 
-def _at_most(name: str, found: float, most: float, text: str) -> CheckOutcome:
-    return CheckOutcome(name, found, most, bool(found <= most), text, grave=bool(found > GRAVE * most))
+def _at_most(name: str, statistic: float, most: float, text: str) -> CheckOutcome:
+    return CheckOutcome(name, statistic, most, bool(statistic <= most), text, grave=bool(statistic > GRAVE * most))
 
 
 # ----------------------------------------------------------------------------------------------------------- cures
 
 
 def _advice(kind: CalibrationKind, readings: SheetReadings) -> str:
-    """The columns that, changed on a copy, make the readings plausible; "" where none or many do."""
+    """Columns whose change on a copy makes the readings plausible, as a text.
+
+    "" if none or many do.
+    """
     copies = list(_changed(kind, readings))
     if len(readings) * len(copies) > MOST_TRIED:
         return ""
@@ -205,7 +215,10 @@ def _advice(kind: CalibrationKind, readings: SheetReadings) -> str:
 
 
 def _holds(kind: CalibrationKind, readings: SheetReadings) -> bool:
-    """Every limit of the kind is kept, with all readings: no single wrong one drives the scatter so far."""
+    """True if every limit of the kind is kept, with all readings.
+
+    No single wrong one has such an effect on the scatter.
+    """
     try:
         calibration = kind.recipe(readings, False)
     except (CatseyeError, np.linalg.LinAlgError):
@@ -214,18 +227,25 @@ def _holds(kind: CalibrationKind, readings: SheetReadings) -> bool:
 
 
 def _changed(kind: CalibrationKind, readings: SheetReadings) -> Iterator[tuple[str, SheetReadings]]:
-    """Copies of readings with one column changed or two neighbours exchanged, within the layout's limits."""
+    """Copies of readings with one change, within the layout's limits.
+
+    One column changed or two neighbours exchanged.
+    """
     numbers = {name: values for name, values in readings.numbers.items() if name != TIME}
     bounds = {**kind.layout.optional, **kind.layout.required}
-    candidates = [(f"{name} {way}", {name: change(v)}) for name, v in numbers.items() for way, change in WAYS.items()]
+    candidates = [
+        (f"{name} {change_name}", {name: change(v)})
+        for name, v in numbers.items()
+        for change_name, change in WAYS.items()
+    ]
     candidates += [(f"{a} and {b} exchanged", {a: numbers[b], b: numbers[a]}) for a, b in pairwise(numbers)]
     for how, change in candidates:
         inside = (
             (limit := bounds[name]) is None or bool(np.all((values >= limit.low) & (values <= limit.high)))
             for name, values in change.items()
         )
-        same = all(np.array_equal(values, numbers[name]) for name, values in change.items())
-        if not same and all(inside):
+        unchanged = all(np.array_equal(values, numbers[name]) for name, values in change.items())
+        if not unchanged and all(inside):
             yield how, replace(readings, numbers={**readings.numbers, **change})
     for name, words in readings.words.items():
         for how, moved in (("moved up a row", (*words[1:], words[0])), ("moved down a row", (words[-1], *words[:-1]))):

@@ -1,4 +1,4 @@
-"""How much readings scatter, found from the readings: restricted maximum likelihood of one or two variances."""
+"""Restricted maximum likelihood of one or two variances of scatter."""
 
 from collections.abc import Sequence
 
@@ -20,7 +20,7 @@ def restricted_likelihood(
     claimed: np.ndarray,
     size: float = 0.0,
 ) -> np.ndarray:
-    """Variance factors (k,) of the components of a covariance, none below zero.
+    """Variance factors (k,) of covariance components, none below zero.
 
     observed     (m,)
     design       (m, p) derivatives by the parameters of the mean
@@ -48,24 +48,24 @@ def restricted_likelihood(
     basis = np.linalg.qr(design, mode="complete")[0][:, np.linalg.matrix_rank(design) :].T
     z = basis @ observed
     parts = [basis @ q @ basis.T for q in components]
-    known = basis @ claimed @ basis.T
+    claimed_part = basis @ claimed @ basis.T
     total = float(z @ z) / len(z)
     if np.sqrt(total) <= ROUNDING * max(size, float(np.max(np.abs(observed)))):
         raise EstimationError("the readings do not scatter at all; state the scatter's standard uncertainty")
     theta = np.array([total / len(parts) / max(np.trace(q) / len(z), 1e-300) for q in parts])
     floor = NEGLIGIBLE * theta
-    value = _likelihood(z, parts, known, theta)
+    value = _likelihood(z, parts, claimed_part, theta)
     for _ in range(ROUNDS):
-        step = _score_step(z, parts, known, theta, floor)
+        step = _score_step(z, parts, claimed_part, theta, floor)
         for halving in range(30):
             trial = np.maximum(theta + step * 0.5**halving, floor)
-            better = _likelihood(z, parts, known, trial)
+            better = _likelihood(z, parts, claimed_part, trial)
             if better >= value - 1e-12 * abs(value):
                 break
         moved = np.abs(trial - theta)
         theta, value = trial, better
         if np.all(moved <= STEP * np.maximum(theta, floor)):
-            if len(theta) > 1 and theta[0] <= 2.0 * floor[0] and np.linalg.matrix_rank(known) < len(z):
+            if len(theta) > 1 and theta[0] <= 2.0 * floor[0] and np.linalg.matrix_rank(claimed_part) < len(z):
                 raise EstimationError(
                     "readings of one group agree to the last digit, only groups differ; state the standard uncertainty "
                     "of one reading (that of its last digit at least)"
@@ -74,8 +74,8 @@ def restricted_likelihood(
     raise EstimationError("the scatter of the readings was not found: state its standard uncertainty in the sheet")
 
 
-def _likelihood(z: np.ndarray, parts: Sequence[np.ndarray], known: np.ndarray, theta: np.ndarray) -> float:
-    covariance = known + sum(t * q for t, q in zip(theta, parts, strict=True))
+def _likelihood(z: np.ndarray, parts: Sequence[np.ndarray], claimed_part: np.ndarray, theta: np.ndarray) -> float:
+    covariance = claimed_part + sum(t * q for t, q in zip(theta, parts, strict=True))
     try:
         lower = np.linalg.cholesky(covariance)
     except np.linalg.LinAlgError:
@@ -84,10 +84,13 @@ def _likelihood(z: np.ndarray, parts: Sequence[np.ndarray], known: np.ndarray, t
 
 
 def _score_step(
-    z: np.ndarray, parts: Sequence[np.ndarray], known: np.ndarray, theta: np.ndarray, floor: np.ndarray
+    z: np.ndarray, parts: Sequence[np.ndarray], claimed_part: np.ndarray, theta: np.ndarray, floor: np.ndarray
 ) -> np.ndarray:
-    """Fisher scoring; a component at zero whose score points below stays there."""
-    weight = np.linalg.inv(known + sum(t * q for t, q in zip(theta, parts, strict=True)))
+    """Step of Fisher scoring.
+
+    A component at zero with a negative score stays there.
+    """
+    weight = np.linalg.inv(claimed_part + sum(t * q for t, q in zip(theta, parts, strict=True)))
     pulled = [weight @ q for q in parts]
     score = np.array([z @ w @ weight @ z - np.trace(w) for w in pulled])
     free = ~((theta <= 2.0 * floor) & (score < 0.0))
@@ -99,7 +102,9 @@ def _score_step(
 
 
 def effective_degrees(design: np.ndarray, components: Sequence[np.ndarray], covariance: np.ndarray) -> np.ndarray:
-    """Degrees of freedom (p,) of each parameter's variance where the components were estimated.
+    """Degrees of freedom (p,) of each parameter's variance.
+
+    Where the components were estimated.
 
     design       (m, p)
     components   k matrices Q (m, m) whose factors were estimated

@@ -1,1 +1,1 @@
-"""The main path: a night's shots to ranges, whole cycles, coordinates, surface and pose."""
+"""Main pipeline: shots to ranges, whole cycles, coordinates, surface and pose."""

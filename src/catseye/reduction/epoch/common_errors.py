@@ -1,10 +1,11 @@
-"""Errors that many shots have in common and no parameter of the adjustment stands for: considered in its covariance.
+"""Errors common to many shots that the adjustment does not estimate.
 
-Sheets of one bench, one batch of glass, air that lines share with their neighbours: beside 700 shots they are nothing,
-beside 20 000 they are all that is left. No range tells them apart, so the answer keeps to the records, and its
-covariance takes them in: an error d of the rows moves all parameters by Q A'P d. What records state with a u is taken
-at that u, in common; what records of one kind share beyond that is said in `[in_common]` of site.toml, and what axes
-and amplitudes of a head do on its mirror's sheet. `docs/studies/neglected.md` has the size of each for a whole dish.
+They are considered in its covariance. Sheets of one bench, one batch of glass, air that lines share with their
+neighbours: beside 700 shots they are negligible, beside 20 000 nothing else remains. No range separates them, so the
+answer keeps to the records, and its covariance includes them: an error d of the rows moves all parameters by Q A'P d.
+What records state with a u is taken at that u, in common; what records of one kind share beyond that is given in
+`[in_common]` of site.toml, and the errors of axes and amplitudes of a head on its mirror's sheet.
+`docs/studies/neglected.md` has the size of each for a whole dish.
 
 Source: consider parameters, [SCHMIDT66].
 """
@@ -36,8 +37,8 @@ from catseye.reduction.epoch.unknowns import (
 
 STEEL_PER_K = 12e-6
 U_WAVELENGTH_UM = 1e-3  # of each head: site.toml gives one for all, 0.780, to its last digit
-OF_BENCH = np.sqrt(0.5)  # of the u of a D0: half of its variance is the bench's, which calibrated them all
-OF_NEIGHBOURS = np.sqrt(0.5)  # of a line's residual: half of its variance is its neighbours', too; no record says
+OF_BENCH = np.sqrt(0.5)  # of the u of a D0: half of its variance is from the bench that calibrated them all
+OF_NEIGHBOURS = np.sqrt(0.5)  # of a line's residual: half of its variance is shared with neighbours; no record exists
 BATCH = 100  # prisms of one melt and one polishing, by serial order
 ALIKE_M = 5.0  # lines of one ranger share their air where their ends are so near: the outer scale close to a dish
 NODES = 12  # of a path
@@ -45,7 +46,7 @@ NODES = 12  # of a path
 
 @dataclass(frozen=True, eq=False)
 class CommonError:
-    """Something that rows have in common, at one standard uncertainty.
+    """An error common to rows, at one standard uncertainty.
 
     shots    ranger: (m,) m, change of its shots' optical lengths
     priors   name of a prior: change of its rows' observed values, one array a prior of that name
@@ -59,7 +60,10 @@ class CommonError:
 def considered(
     network: CampaignNetwork, solution: LeastSquaresSolution, shots: list[tuple[ShotGroup, ShotParts]]
 ) -> LeastSquaresSolution:
-    """The solution with all common errors in its covariance; its values stay."""
+    """Solution with all common errors in its covariance.
+
+    Its values stay.
+    """
     errors = list(common_errors(network, solution.x, [part for _, part in shots]))
     return replace(solution, q=Widened(solution.q, reach_of(network, solution, shots, errors)))
 
@@ -70,7 +74,10 @@ def reach_of(
     shots: list[tuple[ShotGroup, ShotParts]],
     errors: list[CommonError],
 ) -> np.ndarray:
-    """(n, errors): what all parameters move by, for one standard uncertainty of each."""
+    """Shift of all parameters by one standard uncertainty of each error.
+
+    (n, errors).
+    """
     pushed = np.zeros((len(solution.x), len(errors)))
     groups = [*(group for group, _ in shots), *network.priors]
     used: dict[str, int] = {}
@@ -98,7 +105,7 @@ def reach_of(
 
 
 def common_errors(network: CampaignNetwork, x: np.ndarray, parts: list[ShotParts]) -> Iterator[CommonError]:
-    """All that is considered, at one standard uncertainty each."""
+    """All considered errors, at one standard uncertainty each."""
     sights = [_Sight.of(network, x, part) for part in parts]
     yield from _of_heads(network, parts, sights)
     yield from _of_glass(network, parts, sights)
@@ -108,7 +115,9 @@ def common_errors(network: CampaignNetwork, x: np.ndarray, parts: list[ShotParts
 
 @dataclass(frozen=True, eq=False)
 class _Sight:
-    """One ranger's shots: ends (m, 3) m, group index (m,), and the weather in the middle of the stations (m,).
+    """One ranger's shots.
+
+    Ends (m, 3) m, group index (m,), and the weather in the middle of the stations (m,).
 
     gradient   (m,) °C/m, of the stations
     """
@@ -213,11 +222,11 @@ def _of_air(network: CampaignNetwork, parts: list[ShotParts], sights: list[_Sigh
         wet[s.name] = part.distance * per_percent * ((even - s.humidity[:, None]) @ weight)
     yield CommonError("vapour even with height, not relative humidity", wet)
     for part, s in zip(parts, sights, strict=True):
-        now, redder = (
+        error, redder = (
             air.refractivity_of(s.temperature, s.pressure, s.humidity, wavelength_um=air.wavelength_um + more)
             for more in (0.0, U_WAVELENGTH_UM)
         )
-        yield CommonError(f"wavelength of {part.name}", {part.name: part.distance * (redder - now)})
+        yield CommonError(f"wavelength of {part.name}", {part.name: part.distance * (redder - error)})
     ppm = OF_NEIGHBOURS * path_ppm(network)
     if ppm > 0.0:
         for part, s in zip(parts, sights, strict=True):
@@ -228,7 +237,10 @@ def _of_air(network: CampaignNetwork, parts: list[ShotParts], sights: list[_Sigh
 
 
 def _per_percent(network: CampaignNetwork, s: _Sight, z: np.ndarray) -> np.ndarray:
-    """(m,) of the refractivity at heights z by % of humidity: downwards, as fog is no wetter, but not below 0."""
+    """Change (m,) of the refractivity at heights z by % of humidity.
+
+    Downwards, as fog is no wetter, but not below 0.
+    """
     air = network.field
     above = z - air.heights.mean()
     dry = (s.temperature + s.gradient * above, s.pressure - LAPSE_HPA_PER_M * above)
@@ -237,10 +249,12 @@ def _per_percent(network: CampaignNetwork, s: _Sight, z: np.ndarray) -> np.ndarr
 
 
 def _smooth(ends: np.ndarray) -> np.ndarray:
-    """(m, k) smooth shapes over the ends of lines, as large as what lines share with neighbours makes each of them.
+    """Smooth shapes (m, k) over the ends of lines.
+
+    As large as the air that lines share with their neighbours makes each of them.
 
     What falls off as exp(-r / L) has, over a surface much larger than L^2, in each smooth shape of mean square 1 the
-    variance 2 pi L^2 / area of a line's; all six of second order, or as many as the ends tell apart.
+    variance 2 pi L^2 / area of a line's; all six of second order, or as many as the ends resolve.
     """
     if len(ends) < 3:
         return np.zeros((len(ends), 0))
@@ -249,7 +263,7 @@ def _smooth(ends: np.ndarray) -> np.ndarray:
     u, v = (away @ axes[:2].T / max(float(spread[0]) / np.sqrt(len(ends)), 1e-9)).T
     area = TWO_PI * 2.0 * float(spread[0] * spread[1]) / len(ends)  # of an ellipse of these second moments: 4 pi s1 s2
     if area < ALIKE_M**2:
-        return np.zeros((len(ends), 0))  # all ends are one place: such lines are parameters of their own
+        return np.zeros((len(ends), 0))  # all ends are one place: such lines have parameters of their own
     shapes = np.stack([np.ones(len(u)), u, v, u * v, u**2, v**2], axis=1)
     basis, size, _ = np.linalg.svd(shapes, full_matrices=False)
     basis = basis[:, size > 1e-6 * size[0]] * np.sqrt(len(ends))

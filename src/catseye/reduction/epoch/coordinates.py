@@ -1,4 +1,7 @@
-"""From phases to coordinates: one adjustment of points, ranger zeros, leakage, air and prism normals together."""
+"""Phases to coordinates by one adjustment.
+
+It solves for points, ranger zeros, leakage, air and prism normals together.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -40,7 +43,7 @@ from catseye.reduction.site.places import RangedPoint
 
 @dataclass(frozen=True, eq=False)
 class AdjustedCoordinates:
-    """The adjusted network.
+    """Result of the network adjustment.
 
     points       names in order; places their records where they can be ranged to (fixed points are no places)
     x            (points, 3) m, ground frame
@@ -49,18 +52,18 @@ class AdjustedCoordinates:
     shots        used shots at each point, fired there or from there
     ranges       every shot with a phase
     zeros        ranger: correction to its range, m, and standard uncertainty
-    heads        how far each effect of a head is off its sheet, m or rad, and its u: "cyclic ZY101 sine 1"
-    leakage      ranger: what is left of its leakage, V (real, imaginary)
+    heads        correction of each effect of a head to its sheet, m or rad, and its u: "cyclic ZY101 sine 1"
+    leakage      ranger: residual leakage, V (real, imaginary)
     air          name: estimate and standard uncertainty of thermometer offsets (°C) and profile
-    sound        line: what it is found to read too warm, °C, and u; for lines of path_temperatures.csv
+    sound        line: its bias, °C (positive: too warm), and u; for lines of path_temperatures.csv
     refractivity_ppm   mean group refractivity over the used paths
     variance_factor, degrees_of_freedom   of everything but typed positions and instruments' limits
     fits         of all groups, for reports
-    notes        what a person should know, one line each
-    unresolved   index into the campaign's shots: why its whole cycles cannot be known; such shots are not in `ranges`
-    strength     of the processes in time, as the ranges have them
-    doubts       why the answer is not good although its tests passed, a sentence each
-    refuted      whose priors the ranges contradict, so that they are left out: thermometers, zeros, sounded lines
+    notes        for the user, one line each
+    unresolved   index into the campaign's shots: reason for unknown whole cycles; such shots are not in `ranges`
+    strength     of the processes in time, by the ranges
+    doubts       reasons against a good verdict although all tests passed, a sentence each
+    refuted      parameters whose priors the ranges contradict and are left out: thermometers, zeros, sounded lines
     """
 
     points: tuple[str, ...]
@@ -96,17 +99,20 @@ class AdjustedCoordinates:
         return np.array([at[name] for name in names], dtype=int)
 
     def block(self, names: Sequence[str]) -> np.ndarray:
-        """Covariance (3k, 3k) of some points, in the order given."""
+        """Covariance (3k, 3k) of some points, in their order."""
         return self.joint.block(self.rows(names))
 
     @property
     def covariance(self) -> np.ndarray:
-        """(3 points, 3 points) m^2, order x y z of each point; EstimationError where there are too many."""
+        """Covariance (3 points, 3 points) m^2, order x y z per point.
+
+        EstimationError where there are too many.
+        """
         return self.joint.matrix()
 
     @property
     def u(self) -> np.ndarray:
-        """(points, 3) m, standard uncertainties."""
+        """Standard uncertainties (points, 3) m."""
         return self.joint.u
 
 
@@ -118,12 +124,12 @@ def adjust_coordinates(
     settings: ReductionSettings,
     progress: Progress | None = None,
 ) -> AdjustedCoordinates:
-    """Coordinates of everything that was ranged to or from, with full covariance.
+    """Coordinates of every ranged point, with full covariance.
 
     Cycles, incidence angles and the air along the paths follow from the coordinates, so the adjustment is repeated
-    until they no longer change. Wrong shots are searched for in the first pass, and in the second once more with what
-    the dish then says of its own prisms; later passes keep the choice. Before the first pass `resolve_cycles` looks
-    after points that are typed too badly for the nearest integer.
+    until they no longer change. Wrong shots are searched for in the first pass, and in the second once more with the
+    dish as a prior of its own prisms; later passes keep the choice. Before the first pass `resolve_cycles` handles
+    points that are typed too badly for the nearest integer.
 
     Source: [PARKER04] eq. 5.18 and 5.19 for the range, in optical metres: N c/2f - phase c/(4 pi f) =
     n_path D - n (Pc + dPc + D0 + zero); [GOLDMAN00] eq. B.1 for dPc. The priors are the records' uncertainties.
@@ -132,8 +138,8 @@ def adjust_coordinates(
     network = build_network(campaign, phases, electronics, settings=settings, motion=motion)
     resolved = resolve_cycles(network, progress)
     if resolved.rejected:
-        left = without_shots(electronics, set(resolved.rejected))
-        network = build_network(campaign, phases, left, settings=settings, motion=motion)
+        remaining = without_shots(electronics, set(resolved.rejected))
+        network = build_network(campaign, phases, remaining, settings=settings, motion=motion)
     if not network.rangers:
         why = next(iter(resolved.rejected.values()), "no shot on any target has a usable phase and reference")
         raise InputError(f"shots.csv: {why}; nothing to adjust")
@@ -152,10 +158,10 @@ def adjust_coordinates(
 
 
 def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCoordinates:
-    """What an adjusted network says of points, ranges, heads and air.
+    """Points, ranges, heads and air of an adjusted network.
 
-    settled    as `settle_network` gave it
-    resolved   what was known of whole cycles before
+    settled    result of `settle_network`
+    resolved   whole cycles resolved beforehand
     """
     network, solution, shots = settled
     ranges = ranges_of(network, solution, shots)
@@ -176,10 +182,10 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCo
     def estimate(column: int) -> tuple[float, float]:
         return float(solution.x[column]), float(np.sqrt(variance[column]))
 
-    lasting = zip(layout.air, network.field.names, strict=False)  # what follows are errors in time
-    every = {n: estimate(int(k)) for k, n in lasting}
-    sound = {line.name: every[line.name] for line in network.field.lines}
-    air = {n: value for n, value in every.items() if n not in sound}
+    constant_parameters = zip(layout.air, network.field.names, strict=False)  # what follows are errors in time
+    air_estimates = {n: estimate(int(k)) for k, n in constant_parameters}
+    sound = {line.name: air_estimates[line.name] for line in network.field.lines}
+    air = {n: value for n, value in air_estimates.items() if n not in sound}
     wrong = wrong_records(network, solution, air)
     leakage_at = {n: layout.columns(Parameter(ParameterKind.LEAKAGE, n), 2) for n in network.rangers}
     used_paths = ranges.refractivity[ranges.used]

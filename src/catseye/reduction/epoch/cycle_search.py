@@ -1,4 +1,7 @@
-"""One point's shots as a search for its whole cycles, every other end being known."""
+"""Search for the whole cycles of one point's shots.
+
+Every other end is taken as known.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -14,16 +17,16 @@ from catseye.optics.retroreflector.prism import obliquity_slope
 from catseye.reduction.epoch.shots import ShotParts, other_ends, shot_group
 from catseye.reduction.epoch.unknowns import CampaignNetwork
 
-RANGES = 8  # shots a search takes part with at most: more say little new, and bring wrong ones
-WRONG = 0.01  # share of shots with light from elsewhere in their return: in night-01 seven of seven hundred
-TRIES = 3  # other shots a search may be repeated with
-TURNS = 3  # searches until the point is found where dPc was taken
+RANGES = 8  # most shots in a search: more add little, and wrong ones
+WRONG = 0.01  # share of shots with a stray reflection: in night-01 seven of seven hundred
+TRIES = 3  # repetitions of a search with other shots
+TURNS = 3  # searches until the result agrees with the place where dPc was taken
 SETTLED = 1e-3  # m, by which it may be off: dPc changes by a thousandth of that at most
 
 
 @dataclass(frozen=True, eq=False)
 class CycleScene:
-    """The whole network, and its parameters and covariance from the safe shots.
+    """Network with parameters and covariance from the safe shots.
 
     parts      one of each ranger, every shot a row
     solution   of the safe shots and the records
@@ -35,7 +38,9 @@ class CycleScene:
 
 
 def search(scene: CycleScene, name: str, shots: set[int]) -> Located:
-    """Where a point is by its shots, each other end being known; repeated with other shots if the first do not fit.
+    """Position of a point by its shots, other ends known.
+
+    Repeated with other shots if the first do not fit.
 
     scene   the network, adjusted without these shots
     name    of the point
@@ -43,19 +48,22 @@ def search(scene: CycleScene, name: str, shots: set[int]) -> Located:
     """
     scene = replace(scene, network=scene.network.of_shots(shots))
     problem = _problem(scene, name, scene.solution.x)
-    left = np.arange(len(problem.lengths))
+    available = np.arange(len(problem.lengths))
     answers = []
     for _ in range(TRIES):
-        chosen = _best_shots(problem, left)
+        chosen = _best_shots(problem, available)
         answers.append(_settled(scene, name, chosen, problem.located(chosen, wider=True)))
-        left = np.setdiff1d(left, chosen)
-        if answers[-1].status is AmbiguityStatus.FOUND or len(left) < 5:
+        available = np.setdiff1d(available, chosen)
+        if answers[-1].status is AmbiguityStatus.FOUND or len(available) < 5:
             break
     return next((a for a in answers if a.status is AmbiguityStatus.FOUND), answers[0])
 
 
 def _settled(scene: CycleScene, name: str, chosen: np.ndarray, located: Located) -> Located:
-    """The search again with dPc, air and head as they are where the point was found, until it is found there."""
+    """Search repeated until the place used for its corrections agrees.
+
+    dPc, air and head are taken at the place that was found.
+    """
     for _ in range(TURNS):
         if not np.isfinite(located.x).all():
             return located
@@ -71,14 +79,16 @@ def _settled(scene: CycleScene, name: str, chosen: np.ndarray, located: Located)
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """The search for one point: where it may be, and its shots as lengths modulo a half wavelength.
+    """Search for one point.
+
+    Its prior place, and its shots as lengths modulo a half wavelength.
 
     start, prior   (3,) m and (3, 3) m^2
     stations       (r, 3) m, the other ends
     lengths        (r,) m, distance as each shot gives it with one of the possible whole cycles
     periods        (r,) m, half wavelengths in air
-    covariance     (r, r) m^2: the shots' noise and what is uncertain of everything but this point
-    u_glass        (r,) m, by how much dPc may be that of another direction
+    covariance     (r, r) m^2: the shots' noise and the uncertainty of everything but this point
+    u_glass        (r,) m, of dPc by the uncertain direction
     """
 
     start: np.ndarray
@@ -103,37 +113,43 @@ class _Problem:
 
 
 def _problem(scene: CycleScene, name: str, x: np.ndarray) -> _Problem:
-    """The search for one point by the shots of the network, dPc, air and head being those at the parameters x."""
+    """Search for one point by the shots of the network.
+
+    dPc, air and head are those at the parameters x.
+    """
     network, solution = scene.network, scene.solution
-    own = network.layout.columns(name)
+    columns = network.layout.columns(name)
     pairs = [shot_group(network, ranger, x) for ranger in network.rangers]
     n = 1.0 + np.concatenate([part.refractivity for _, part in pairs])
     slopes = np.concatenate([full_jacobian(group, x) for group, _ in pairs]) / n[:, None]
-    slopes[:, own] = 0.0
+    slopes[:, columns] = 0.0
     noise = block_diag(*(g.covariance if g.covariance.ndim == 2 else np.diag(g.covariance) for g, _ in pairs))
     covariance = noise / np.outer(n, n) + solution.q.carried(csr_array(slopes))
     misses = np.concatenate([group.observed - group.predict(x)[0] for group, _ in pairs]) / n
-    stations = np.array([other_ends(g, r, int(own[0]), x=x) for g, _ in pairs for r in range(len(g.observed))])
-    distance = np.linalg.norm(stations - x[own], axis=1)
+    stations = np.array([other_ends(g, r, int(columns[0]), x=x) for g, _ in pairs for r in range(len(g.observed))])
+    distance = np.linalg.norm(stations - x[columns], axis=1)
     prior = spread(scene, name)
     u_place = float(np.sqrt(np.linalg.eigvalsh(prior)[-1]))
     turn = np.concatenate([_by_direction(network, part) for _, part in pairs])
     half = 0.5 * SPEED_OF_LIGHT / network.campaign.site.ranging.modulation_hz
     return _Problem(
-        solution.x[own], prior, stations, distance + misses, half / n, covariance, np.abs(turn) * u_place / distance
+        solution.x[columns], prior, stations, distance + misses, half / n, covariance, np.abs(turn) * u_place / distance
     )
 
 
 def spread(scene: CycleScene, name: str) -> np.ndarray:
     """Covariance (3, 3) m^2 of a point before its waiting shots."""
-    own = scene.network.layout.columns(name)
-    covariance = scene.solution.q.within(own)
+    columns = scene.network.layout.columns(name)
+    covariance = scene.solution.q.within(columns)
     in_unit = any(name in t.targets for t in scene.network.campaign.triplets.values())
     return 3.0 * covariance if in_unit else covariance  # one typed position stands for three points: no averaging
 
 
 def _by_direction(network: CampaignNetwork, part: ShotParts) -> np.ndarray:
-    """(m,) derivative of each shot's dPc by its angle of incidence, m/rad; 0 for what is no prism."""
+    """Derivative (m,) of dPc by the incidence angle, m/rad.
+
+    0 for other reflectors than prisms.
+    """
     ranging = network.campaign.site.ranging
     ratio, bends = ranging.bk7_to_air_group_index_ratio, ranging.bk7_to_air_phase_index_ratio
     places = [network.places[target] for target in part.target]
@@ -142,17 +158,17 @@ def _by_direction(network: CampaignNetwork, part: ShotParts) -> np.ndarray:
     return np.where([p.normal is not None for p in places], slope, 0.0)
 
 
-def _best_shots(problem: _Problem, left: np.ndarray) -> np.ndarray:
-    """Up to RANGES of the shots that are left, each the one that adds most to those before it."""
+def _best_shots(problem: _Problem, available: np.ndarray) -> np.ndarray:
+    """Up to RANGES of the available shots, greedily the most informative."""
     towards = problem.stations - problem.start
     e = towards / np.linalg.norm(towards, axis=1)[:, None]
     noise = np.diag(problem.covariance)
     covariance = np.array(problem.prior)
     chosen: list[int] = []
-    rest = [int(i) for i in left]
-    while rest and len(chosen) < RANGES:
-        gain = np.array([e[i] @ covariance @ e[i] / noise[i] for i in rest])
-        best = rest.pop(int(np.argmax(gain)))
+    candidates = [int(i) for i in available]
+    while candidates and len(chosen) < RANGES:
+        gain = np.array([e[i] @ covariance @ e[i] / noise[i] for i in candidates])
+        best = candidates.pop(int(np.argmax(gain)))
         reach = covariance @ e[best]
         covariance = covariance - np.outer(reach, reach) / (noise[best] + e[best] @ reach)
         chosen.append(best)

@@ -1,10 +1,10 @@
-"""Whole cycles where a typed position is too bad for the nearest integer: found jointly from all rangers, or refused.
+"""Whole cycles of points typed too badly for the nearest integer.
 
-A shot's nearest integer is safe while misfit and five standard uncertainties of its coarse length stay under a quarter
-wavelength. Shots that keep this are adjusted first; what they and the records (benchmarks, triplets' dimensions) then
-say of the others may make those safe. Points that are still known too badly are searched for with
-`estimation.ambiguity.search`, against the stations as adjusted, round after round: rangers of the feed arm first, then
-what only these have seen.
+A shot's nearest integer is safe while misfit and five standard uncertainties of its coarse length stay under a
+quarter wavelength. Such shots are adjusted first; they and the records (benchmarks, triplets' dimensions) may then
+make others safe. Points that are still too uncertain are searched for jointly from all rangers with
+`estimation.ambiguity.search`, against the stations as adjusted, round after round: rangers of the feed arm first,
+then points that only these have seen. A point without an answer is refused.
 """
 
 from dataclasses import dataclass
@@ -31,19 +31,19 @@ from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.shots import ShotGroup, shot_group
 from catseye.reduction.epoch.unknowns import THERMOMETERS, ZEROS, CampaignNetwork, build_network
 
-KEPT = 5.0  # standard uncertainties of misfit that the margin must be worth
+REQUIRED_SIGMAS = 5.0  # standard uncertainties of misfit that the margin must hold
 ROUNDED = 1.01  # the layout's 15 mm in space are 8.7 mm a coordinate; its rounded 10 mm pass, being 1 in 1000 too large
-MANY = 6  # points from which one note stands for all
+MANY = 6  # more points than this share one note
 ROUNDS = 8  # cap of rounds; each makes a point safe, or is the last
 
 
 @dataclass(frozen=True, eq=False)
 class Resolved:
-    """What is known before the first pass of the adjustment.
+    """Result before the first pass of the adjustment.
 
-    starts     point: (3,) m, where the adjustment shall begin instead of the typed position
-    rejected   index into the campaign's shots: why its whole cycles cannot be known
-    notes      one line a point
+    starts     point: (3,) m, start of the adjustment instead of the typed position
+    rejected   index into the campaign's shots: reason that its whole cycles are unknown
+    notes      one line per point
     """
 
     starts: dict[str, np.ndarray]
@@ -52,10 +52,12 @@ class Resolved:
 
 
 def resolve_cycles(network: CampaignNetwork, progress: Progress | None = None) -> Resolved:
-    """Better starts for points typed to decimetres, and the shots on them whose whole cycles stay unknown.
+    """Better starts for badly typed points.
+
+    Also the shots on them whose whole cycles stay unknown.
 
     network    of all shots that have a phase
-    progress   called with (what, done, of how many)
+    progress   called with (task, number done, total)
 
     Nothing happens where every typed position keeps five standard uncertainties within a quarter wavelength.
     Raises EstimationError where the safe shots alone find no answer.
@@ -67,11 +69,11 @@ def resolve_cycles(network: CampaignNetwork, progress: Progress | None = None) -
     if not doubtful:
         return Resolved({}, {}, ())
     ends = {int(k): {name, targets[k]} for name, e in network.electronics.items() for k in e.shots}
-    waiting = {k for k, both in ends.items() if both & doubtful}
+    waiting = {k for k, names in ends.items() if names & doubtful}
     if not waiting:
         return Resolved({}, {}, ())
     x = np.array(network.layout.start)
-    asked = frozenset(doubtful)
+    candidates = frozenset(doubtful)
     last: dict[str, Located] = {}
     found_as: dict[str, Located] = {}
     for turn in range(ROUNDS):
@@ -83,34 +85,37 @@ def resolve_cycles(network: CampaignNetwork, progress: Progress | None = None) -
         waiting -= safe
         placed = {n for n in doubtful if not _too_wide(network, spread(scene, n))}
         doubtful -= placed
-        placed_now = set()
+        located = set()
         for name in sorted(doubtful & {n for k in waiting for n in ends[k]}):
             mine = {k for k in waiting if name in ends[k] and not (ends[k] - {name}) & doubtful}
             if not mine:
                 continue
             last[name] = search(scene, name, mine)
             if last[name].status is AmbiguityStatus.FOUND:
-                placed_now.add(name)
-        for name in placed_now:
+                located.add(name)
+        for name in located:
             x[network.layout.columns(name)] = last[name].x
             found_as[name] = last[name]
-        doubtful -= placed_now
-        waiting = {k for k in waiting if ends[k] & doubtful}  # wrong ones among the others show in the adjustment
-        if not waiting or not (placed_now or safe or placed):
+        doubtful -= located
+        waiting = {k for k in waiting if ends[k] & doubtful}  # wrong shots among the others appear in the adjustment
+        if not waiting or not (located or safe or placed):
             break
     if progress is not None:
         progress("whole cycles", ROUNDS, ROUNDS)
-    lost = sorted({name for k in waiting for name in ends[k] & doubtful})
-    starts = {name: x[network.layout.columns(name)] for name in sorted(asked)}  # a lost one may have safe shots as well
+    unresolved = sorted({name for k in waiting for name in ends[k] & doubtful})
+    starts = {
+        name: x[network.layout.columns(name)] for name in sorted(candidates)
+    }  # an unresolved point may have safe shots as well
     rejected = {k: _reason(network, settings, sorted(ends[k] & doubtful), last) for k in sorted(waiting)}
-    notes = [*_found_notes(network, settings, found_as), *_lost_notes(network, settings, lost, last)]
+    notes = [*_found_notes(network, settings, found_as), *_unresolved_notes(network, settings, unresolved, last)]
     return Resolved(starts, rejected, tuple(notes))
 
 
 def doubtful_points(network: CampaignNetwork) -> set[str]:
-    """Typed points whose uncertainty does not keep five standard uncertainties within a quarter wavelength.
+    """Typed points too uncertain for the nearest integer.
 
-    So are those that contradict a certified distance, whatever they claim.
+    Their uncertainty does not keep five standard uncertainties within a quarter wavelength, or they contradict a
+    certified distance, whatever they claim.
     """
     usual, places = network.settings.u_position, network.places
     wide = {n for n, p in places.items() if p.typed and _too_wide(network, p.u_typed(usual) ** 2 * np.eye(3))}
@@ -120,26 +125,29 @@ def doubtful_points(network: CampaignNetwork) -> set[str]:
             typed = [p for p in ends if p.typed]
             miss = float(np.linalg.norm(ends[0].start - ends[1].start)) - b.certified_distance_mm * MILLIMETRE
             u = float(np.linalg.norm([b.u_mm * MILLIMETRE, *(p.u_typed(usual) for p in typed)]))
-            wide |= {p.name for p in typed if abs(miss) > KEPT * ROUNDED * u}
+            wide |= {p.name for p in typed if abs(miss) > REQUIRED_SIGMAS * ROUNDED * u}
     return wide
 
 
 def without_shots(electronics: dict[str, ElectronicsPhase], out: set[int]) -> dict[str, ElectronicsPhase]:
-    """The electronics at the shots that are left; a ranger without any stays, empty."""
-    left = {}
+    """Electronics at the remaining shots.
+
+    A ranger without any stays, empty.
+    """
+    remaining = {}
     for name, e in electronics.items():
         keep = np.array([int(k) not in out for k in e.shots], dtype=bool)
-        left[name] = e.of(keep)
-    return left
+        remaining[name] = e.of(keep)
+    return remaining
 
 
 def line_errors(
     group: ShotGroup, targets: tuple[str, ...], fit: GroupFit, *, solution: LeastSquaresSolution
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What all the other lines say of each shot's range: by how much it is off, and with what u, optical metres.
+    """Error of each shot's range by all other lines, and its u.
 
-    Used repeats on one line come from one coarse length, so that their whole cycles are wrong together: the error they
-    have in common is e'Pv / e'P_v e, e being 1 for them, as `adjust` has it for a single shot.
+    Optical metres. Used repeats on one line come from one coarse length, so that their whole cycles are wrong
+    together: their common error is e'Pv / e'P_v e, e being 1 for them, as `adjust` has it for a single shot.
     """
     error, u = fit.estimated_error.copy(), fit.detectable_error / NONCENTRALITY
     on = np.flatnonzero(fit.active)
@@ -152,12 +160,12 @@ def line_errors(
         return error, u
     weight = np.linalg.inv(group.covariance[np.ix_(on, on)])
     weighed = weight @ full_jacobian(group, solution.x)[on]
-    rest = weight @ fit.residual[on]
+    weighted_residual = weight @ fit.residual[on]
     for one in np.flatnonzero(repeats > 1):
         mine = line == one
-        own, seen = weight[np.ix_(mine, mine)].sum(), weighed[mine].sum(axis=0)
-        visible = max(own - seen @ solution.covariance @ seen, 1e-12 * own)
-        error[on[mine]], u[on[mine]] = rest[mine].sum() / visible, visible**-0.5
+        weight_sum, gradient = weight[np.ix_(mine, mine)].sum(), weighed[mine].sum(axis=0)
+        visible = max(weight_sum - gradient @ solution.covariance @ gradient, 1e-12 * weight_sum)
+        error[on[mine]], u[on[mine]] = weighted_residual[mine].sum() / visible, visible**-0.5
     return error, u
 
 
@@ -171,28 +179,39 @@ def _apart_line_errors(
     error: np.ndarray,
     u: np.ndarray,
 ) -> None:
-    """`line_errors` of independent rows, line by line, so many of each; errors and u are changed in place."""
+    """`line_errors` of independent rows, so many per line.
+
+    Errors and u are changed in place.
+    """
     jacobian = group.predict(solution.x)[1]
     first = np.cumsum(repeats) - repeats
     for count in np.unique(repeats[repeats > 1]):
         mine = rows[first[repeats == count][:, None] + np.arange(count)]
         weight = 1.0 / group.covariance[mine]
         columns = group.columns[mine].reshape(len(mine), -1)
-        seen = (jacobian[mine] * weight[..., None]).reshape(len(mine), -1)
-        own = weight.sum(axis=1)
-        visible = np.maximum(own - np.sum(solution.q.products(columns, seen) * seen, axis=1), 1e-12 * own)
+        gradient = (jacobian[mine] * weight[..., None]).reshape(len(mine), -1)
+        weight_sum = weight.sum(axis=1)
+        visible = np.maximum(
+            weight_sum - np.sum(solution.q.products(columns, gradient) * gradient, axis=1), 1e-12 * weight_sum
+        )
         error[mine] = (np.sum(weight * fit.residual[mine], axis=1) / visible)[:, None]
         u[mine] = visible[:, None] ** -0.5
 
 
 def _too_wide(network: CampaignNetwork, covariance: np.ndarray) -> bool:
-    """Whether a point is known too badly, in its worst direction, for the nearest integer."""
+    """True if a point is too uncertain for the nearest integer.
+
+    In its worst direction.
+    """
     quarter = 0.25 * SPEED_OF_LIGHT / network.campaign.site.ranging.modulation_hz
-    return bool(KEPT * np.sqrt(np.linalg.eigvalsh(covariance)[-1]) > ROUNDED * quarter)
+    return bool(REQUIRED_SIGMAS * np.sqrt(np.linalg.eigvalsh(covariance)[-1]) > ROUNDED * quarter)
 
 
 def _adjusted(network: CampaignNetwork, x: np.ndarray, waiting: set[int]) -> CycleScene:
-    """The network adjusted without the shots that wait, wrong ones left out; all parameters with covariance."""
+    """Network adjusted without the waiting shots.
+
+    Wrong shots are left out; all parameters with covariance.
+    """
     electronics = without_shots(network.electronics, waiting)
     used: set[int] = set()
     part = build_network(
@@ -232,7 +251,7 @@ def _adjusted(network: CampaignNetwork, x: np.ndarray, waiting: set[int]) -> Cyc
     pairs = [shot_group(network, name, x) for name in network.rangers]
     active = [np.isin(p.electronics.shots, sorted(used)) for _, p in pairs]
     active += [np.ones(len(g.observed), dtype=bool) for g in network.priors]
-    whole = adjust(
+    adjusted = adjust(
         x,
         [*(g for g, _ in pairs), *network.priors],
         free=np.array(network.layout.free),
@@ -240,24 +259,27 @@ def _adjusted(network: CampaignNetwork, x: np.ndarray, waiting: set[int]) -> Cyc
         names=network.layout.names,
         solver=SolverSettings(border=network.border),
     ).require_converged()
-    pairs = [shot_group(network, name, whole.x) for name in network.rangers]
-    return CycleScene(network, [p for _, p in pairs], whole)
+    pairs = [shot_group(network, name, adjusted.x) for name in network.rangers]
+    return CycleScene(network, [p for _, p in pairs], adjusted)
 
 
 def _safe(scene: CycleScene, waiting: set[int]) -> set[int]:
-    """Waiting shots whose range is predicted so well by all the others that the nearest integer is safe."""
+    """Waiting shots whose nearest integer is safe.
+
+    All the others predict their range well enough.
+    """
     half = 0.5 * SPEED_OF_LIGHT / scene.network.campaign.site.ranging.modulation_hz
     safe = set()
     for fit, part in zip(scene.solution.fits, scene.parts, strict=False):
         u = fit.detectable_error / NONCENTRALITY
-        misfit = fit.estimated_error - half * np.rint(fit.estimated_error / half)  # cycles were those of an older place
-        kept = np.abs(misfit) + KEPT * u < 0.5 * half
-        safe |= {int(k) for k, ok in zip(part.electronics.shots, kept, strict=True) if ok}
+        misfit = fit.estimated_error - half * np.rint(fit.estimated_error / half)  # cycles belong to an older place
+        resolved = np.abs(misfit) + REQUIRED_SIGMAS * u < 0.5 * half
+        safe |= {int(k) for k, ok in zip(part.electronics.shots, resolved, strict=True) if ok}
     return safe & waiting
 
 
 def _u_mm(network: CampaignNetwork, settings: ReductionSettings, name: str) -> float:
-    """Standard uncertainty of each coordinate as typed."""
+    """Standard uncertainty of each coordinate as typed, mm."""
     return network.places[name].u_typed(settings.u_position) / MILLIMETRE
 
 
@@ -265,11 +287,11 @@ def _found_notes(network: CampaignNetwork, settings: ReductionSettings, located:
     if len(located) > MANY:
         least = min(located, key=lambda name: located[name].discrimination)
         return [
-            f"{len(located)} points known too badly for the nearest integer: whole cycles found jointly; least sure "
+            f"{len(located)} points too uncertain for the nearest integer: whole cycles found jointly; least certain "
             f"{least}, {_next(located[least])}"
         ]
     return [
-        f"{name}: position known to {_u_mm(network, settings, name):.0f} mm only; whole cycles found "
+        f"{name}: position uncertain by {_u_mm(network, settings, name):.0f} mm; whole cycles found "
         f"jointly from {len(one.cycles)} shots{', one of them left out' * (one.left_out >= 0)}, {_next(one)}"
         for name, one in sorted(located.items())
     ]
@@ -281,21 +303,22 @@ def _next(located: Located) -> str:
     return f"next candidate at least {np.sqrt(located.discrimination):.0f} sigma worse"
 
 
-def _lost_notes(
-    network: CampaignNetwork, settings: ReductionSettings, lost: list[str], last: dict[str, Located]
+def _unresolved_notes(
+    network: CampaignNetwork, settings: ReductionSettings, unresolved: list[str], last: dict[str, Located]
 ) -> list[str]:
-    if len(lost) > MANY:
+    if len(unresolved) > MANY:
         return [
-            f"{len(lost)} points have shots whose whole cycles are unknown, see rejected: {', '.join(lost[:MANY])} ..."
+            f"{len(unresolved)} points have shots whose whole cycles are unknown, see rejected: "
+            f"{', '.join(unresolved[:MANY])} ..."
         ]
-    return [str(_reason(network, settings, [name], last)) for name in lost]
+    return [str(_reason(network, settings, [name], last)) for name in unresolved]
 
 
 def _reason(
     network: CampaignNetwork, settings: ReductionSettings, names: list[str], last: dict[str, Located]
 ) -> Reason:
-    """Why the whole cycles of a shot are unknown, by the points that it hangs on."""
+    """Reason for unknown whole cycles, by the points at the shot's ends."""
     name = names[0]
     u = _u_mm(network, settings, name)
-    why = last[name].text if name in last else "the other ends of its shots are known as badly; survey it better"
-    return Reason(ShotStatus.CYCLES_UNKNOWN, f"{name} is typed to {u:.0f} mm only; {why}")
+    why = last[name].text if name in last else "the other ends of its shots are as uncertain; survey it better"
+    return Reason(ShotStatus.CYCLES_UNKNOWN, f"typed position of {name} is uncertain by {u:.0f} mm; {why}")

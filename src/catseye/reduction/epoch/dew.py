@@ -1,8 +1,8 @@
-"""When a campaign's retroreflectors and mirrors are at risk of dew or frost, by its weather stations.
+"""Risk of dew or frost on retroreflectors and mirrors, by weather stations.
 
-[PARKER04] section 1.4.1: dew on the retroreflectors and the reflected power falls. What decides is the temperature of
-the glass, which under a clear sky is some kelvin below the air's and is in no weather file: it is given here, as
-measured or as a difference to the air (`condensation.radiative_depression_k` gives a cautious estimate of it).
+[PARKER04] section 1.4.1: dew on the retroreflectors reduces the reflected power. The temperature of the glass decides,
+which under a clear sky is some kelvin below the air's and is in no weather file: it is an argument here, as measured
+or as a difference to the air (`condensation.radiative_depression_k` gives a cautious estimate of it).
 """
 
 from dataclasses import dataclass
@@ -15,8 +15,8 @@ from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import utc_text
 from catseye.records.night.campaign import ObservedSite
 
-LONGEST_GAP = 900.0  # s between two readings of a surface that are joined, and two samples at risk of one spell
-LEAST_PROBABILITY = 0.1  # of a deposit, from which on a person should look
+LONGEST_GAP = 900.0  # s, longest gap between joined readings of a surface, or between samples at risk of one spell
+LEAST_PROBABILITY = 0.1  # of a deposit: the user should check
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class SurfaceTemperature:
 
 @dataclass(frozen=True)
 class Spell:
-    """A stretch of time at risk near one weather station.
+    """Time at risk near one weather station.
 
     station           its name
     start_mjd_utc     first sample at risk
@@ -43,7 +43,7 @@ class Spell:
     u_margin_k        its standard uncertainty, K
     threshold_c       dew or frost point there, °C
     threat            "dew" or "frost"
-    probability       the largest of the stretch, that a deposit forms
+    probability       largest during the spell, that a deposit forms
     """
 
     station: str
@@ -57,7 +57,7 @@ class Spell:
     probability: float
 
     def line(self) -> str:
-        """The spell in one line for a person."""
+        """Spell as one line of text."""
         side = "below" if self.margin_k < 0.0 else "above"
         worst = (
             f"{abs(self.margin_k):.1f} K {side} the {self.threat} point of {self.threshold_c:.1f} °C "
@@ -74,13 +74,13 @@ class Spell:
 
 @dataclass(frozen=True, eq=False)
 class DewRisk:
-    """Margins of a surface at every weather sample, and what to say of them.
+    """Margins of a surface at every weather sample, with notes.
 
     mjd_utc        (n,) time of the weather sample
     station        (n,) names
-    condensation   what the air of each does to the surface; margin and probability nan where its temperature is unknown
-    spells         stretches at risk, in order of time
-    notes          one line for each, and what could not be judged
+    condensation   effect of the air at the surface's temperature; margin and probability nan where that is unknown
+    spells         times at risk, in order
+    notes          one line per spell, and samples that could not be judged
     """
 
     mjd_utc: np.ndarray
@@ -100,16 +100,16 @@ def dew_risk(
     u_humidity_percent: float = 3.0,
     least_probability: float = LEAST_PROBABILITY,
 ) -> DewRisk:
-    """The risk of dew and frost during a campaign.
+    """Risk of dew and frost during a campaign.
 
     surface_minus_air_c   surface less air, °C; below zero under a clear night sky
     surface               or its measured temperature, interpolated between readings at most 900 s apart
     u_surface_c           standard uncertainty of the difference, or of the measured temperature, °C
-    u_temperature_c       of a station's thermometer, °C: a given difference moves with it, and so does the dew point
+    u_temperature_c       of a station's thermometer, °C: affects a surface typed as a difference, and the dew point
     u_humidity_percent    of a station's hygrometer, %
-    least_probability     of a deposit from which on a sample is at risk, 0 to 1
+    least_probability     of a deposit above which a sample is at risk, 0 to 1
 
-    Raises InputError unless exactly one of both temperatures is given, and for readings out of order.
+    Raises InputError unless exactly one of the two temperatures is present, and for readings out of order.
     Source: [PARKER04] section 1.4.1.
     """
     if (surface is None) == (surface_minus_air_c is None):
@@ -121,9 +121,9 @@ def dew_risk(
         u_surface_c, covariance = float(np.hypot(u_surface_c, u_temperature_c)), u_temperature_c**2
     else:
         temperature = _between(surface, weather.mjd_utc)
-    known = np.isfinite(temperature)
+    finite = np.isfinite(temperature)
     state = condensation(
-        np.where(known, temperature, weather.temperature_c),
+        np.where(finite, temperature, weather.temperature_c),
         weather.temperature_c,
         weather.pressure_hpa,
         humidity_percent=weather.humidity_percent,
@@ -135,12 +135,12 @@ def dew_risk(
         ),
     )
     state = state._replace(
-        margin_k=np.where(known, state.margin_k, np.nan),
-        deposit=np.where(known, state.deposit, "unknown"),
-        probability=np.where(known, state.probability, np.nan),
+        margin_k=np.where(finite, state.margin_k, np.nan),
+        deposit=np.where(finite, state.deposit, "unknown"),
+        probability=np.where(finite, state.probability, np.nan),
     )
     station = np.array(weather.station)
-    at_risk = known & (state.probability >= least_probability)
+    at_risk = finite & (state.probability >= least_probability)
     spells = [
         _spell(name, rows, weather.mjd_utc, state)
         for name in sorted(set(weather.station))
@@ -148,16 +148,16 @@ def dew_risk(
     ]
     spells.sort(key=lambda spell: (spell.start_mjd_utc, spell.station))
     notes = [spell.line() for spell in spells]
-    if not known.all():
+    if not finite.all():
         notes.append(
-            f"dew: the surface's temperature is unknown at {np.count_nonzero(~known)} of {len(known)} weather samples "
-            f"(readings lie over {LONGEST_GAP:.0f} s apart, or begin later or end earlier); they are not judged"
+            f"dew: surface temperature unknown at {np.count_nonzero(~finite)} of {len(finite)} weather samples "
+            f"(readings over {LONGEST_GAP:.0f} s apart, or starting later or ending earlier); they are not judged"
         )
     return DewRisk(weather.mjd_utc, weather.station, state, tuple(spells), tuple(notes))
 
 
 def _between(surface: SurfaceTemperature, mjd_utc: np.ndarray) -> np.ndarray:
-    """Straight lines between readings; nan outside them and in gaps."""
+    """Linear interpolation of the readings; nan outside them and in gaps."""
     when, values = np.asarray(surface.mjd_utc, float), np.asarray(surface.temperature_c, float)
     if when.ndim != 1 or when.shape != values.shape or len(when) == 0:
         raise InputError(f"dew: {when.shape} times and {values.shape} surface temperatures do not pair up")
@@ -174,7 +174,10 @@ def _between(surface: SurfaceTemperature, mjd_utc: np.ndarray) -> np.ndarray:
 
 
 def _stretches(marked: np.ndarray, mjd_utc: np.ndarray) -> list[np.ndarray]:
-    """The rows of one station at risk, cut where none was for long: the scatter of readings makes no new spell."""
+    """Rows of one station at risk, split at long gaps.
+
+    The scatter of readings makes no new spell.
+    """
     if len(marked) == 0:
         return []
     return np.split(marked, np.flatnonzero(np.diff(mjd_utc[marked]) * SECONDS_PER_DAY > LONGEST_GAP) + 1)

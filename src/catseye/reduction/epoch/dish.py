@@ -1,4 +1,4 @@
-"""Which prisms are on the dish, and what that says of each of them."""
+"""Prisms on the dish, and the prior that the dish gives each."""
 
 import numpy as np
 
@@ -11,9 +11,9 @@ from catseye.records.night.campaign import ObservedSite
 from catseye.reduction.epoch.unknowns import CampaignNetwork
 from catseye.reduction.site.places import nominal_frame
 
-FEWEST = 12  # prisms that must agree before they speak of others
-WELL_KNOWN = 0.001  # m, largest standard uncertainty of a coordinate of a prism that shapes the dish here
-ROUNDS = 5  # of leaving out the prisms that stand out
+FEWEST = 12  # prisms that must agree before they predict others
+LARGEST_U = 0.001  # m, largest standard uncertainty of a coordinate of a prism that shapes the dish here
+ROUNDS = 5  # of removing outlying prisms
 
 
 def dish_prisms(campaign: ObservedSite) -> list[str]:
@@ -25,35 +25,39 @@ def dish_prisms(campaign: ObservedSite) -> list[str]:
 
 
 def dish_advice(network: CampaignNetwork, x: np.ndarray, covariance: Covariance) -> list[Linear]:
-    """For each dish prism the plane of the dish at its typed place, as an observation that may judge but not shape.
+    """Plane of the dish at each prism, as a prior.
+
+    It may judge shots but not shape the result.
 
     x            (n,) parameters of an adjustment
     covariance   of the parameters
 
-    The dish is the paraboloid through the well-known prisms without those that stand out, because a prism whose place
-    was decided by a foreign return is well known and wrong. Too few of them give no advice.
+    The dish is the paraboloid through the well-known prisms without outliers, because a prism whose place was
+    decided by a stray reflection is precise and wrong. Too few of them give no prior.
     """
     layout, campaign, limit = network.layout, network.campaign, network.settings.u_surface
     names = np.array([n for n in dish_prisms(campaign) if n in layout.points])
     if not len(names):
         return []
     columns = np.array([layout.columns(n) for n in names])
-    known = np.sqrt(covariance.diagonal()[columns].max(axis=1)) < WELL_KNOWN
+    well_determined = np.sqrt(covariance.diagonal()[columns].max(axis=1)) < LARGEST_U
     nominal = nominal_frame(campaign)
     focal_length = campaign.site.paraboloid.focal_length_mm * MILLIMETRE
     for _ in range(ROUNDS):
-        count = int(known.sum())
+        count = int(well_determined.sum())
         if count < FEWEST:
             return []
         try:
-            fit = fit_paraboloid(x[columns[known]], np.zeros((count, 3, 3)), nominal, focal_length=focal_length)
+            fit = fit_paraboloid(
+                x[columns[well_determined]], np.zeros((count, 3, 3)), nominal, focal_length=focal_length
+            )
         except EstimationError:
             return []
         off = np.abs(fit.deviation - np.median(fit.deviation))
         agree = off < max(3.0 * 1.4826 * float(np.median(off)), limit)
         if agree.all():
             break
-        known[np.flatnonzero(known)[~agree]] = False
+        well_determined[np.flatnonzero(well_determined)[~agree]] = False
     typed = fit.frame.inverse().points([network.places[n].start for n in names])
     slope = typed[:, :2] / (2.0 * focal_length)
     foot = np.column_stack([typed[:, :2], np.sum(typed[:, :2] ** 2, axis=1) / (4.0 * focal_length)])

@@ -1,4 +1,4 @@
-"""The main job: a campaign's samples to coordinates, pose and surface."""
+"""Main recipe: a campaign's samples to coordinates, pose and surface."""
 
 from dataclasses import dataclass, replace
 
@@ -24,11 +24,11 @@ from catseye.reduction.site.places import sheet_notes
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """Everything that a campaign gave.
+    """Result of reducing a campaign.
 
     status     of each shot, in the campaign's order
     rejected   shot id: reason; reference shots included
-    notes      what a person should know, one line each
+    notes      for the user, one line each
     """
 
     campaign: Campaign
@@ -42,18 +42,23 @@ class Reduction:
     notes: tuple[str, ...]
 
     def held(self) -> "Reduction":
-        """The same with the covariance of its points at hand, which files and page ask for most of."""
+        """Reduction with its point covariance cached.
+
+        Files and report use that covariance most.
+        """
         return replace(self, coordinates=replace(self.coordinates, joint=self.coordinates.joint.held()))
 
 
 def reduce_epoch(
     campaign: Campaign, settings: ReductionSettings | None = None, progress: Progress | None = None
 ) -> Reduction:
-    """Coordinates, pose and surface of one campaign during which nothing moved, or the telescope as its postures say.
+    """Coordinates, pose and surface of one campaign.
 
-    campaign   as `read_campaign` gives it
+    During a campaign nothing moves, or the telescope moves by its postures.
+
+    campaign   from `read_campaign`
     settings   assumptions beyond the records (default: those of the layout)
-    progress   called with (what, done, of how many)
+    progress   called with (task, number done, total)
 
     Raises InputError where nothing can be adjusted and EstimationError where the adjustment finds no answer.
     """
@@ -99,17 +104,17 @@ def _misfit(coordinates: AdjustedCoordinates, row: int, settings: ReductionSetti
     ranges = coordinates.ranges
     error, w = ranges.residual[row], ranges.standardised[row]
     if abs(w) <= settings.critical:
-        other = f"this shot and another on {ranges.target[row]} contradict each other"
-        return Reason(ShotStatus.UNDECIDED, f"{other}, and nothing says which is wrong; both are left out")
+        conflict = f"this shot and another on {ranges.target[row]} contradict each other"
+        return Reason(ShotStatus.UNDECIDED, f"{conflict}, and nothing decides which is wrong; both are left out")
     text = (
         f"range {abs(error) * 1e3:.3f} mm too {'long' if error > 0 else 'short'} "
-        f"for the adjusted points (w {w:.1f}, limit {settings.critical}): light from elsewhere in the return"
+        f"for the adjusted points (w {w:.1f}, limit {settings.critical}): stray reflection"
     )
     return Reason(ShotStatus.REFLECTED, text)
 
 
 def _weak_rangers(campaign: Campaign, phases: Phases) -> list[str]:
-    """Rangers whose returns are a small part of what the others get."""
+    """Rangers whose returns are much weaker than the others'."""
     usual: dict[str, float] = {}
     amplitude = phases.amplitude
     for name in campaign.rangers:

@@ -1,12 +1,12 @@
-"""What a ranger's own head adds to its ranges beyond zero and leakage, as far as its mirror sheet knows of it.
+"""Corrections of a ranger's head beyond zero and leakage.
 
-Three effects, each only where the sheet gives a value or an uncertainty for it:
-    axes        the mirror's axes and the beam do not meet: of target and reference cube, each at its own angles
-    amplitude   the phase grows with ln(amplitude); counted from the ranger's own reference shots, interpolated to the
-                instant of the shot, so that the references themselves need no correction
-    cyclic      a wave of the phase after the electronics'
-The sheet's values are corrected; how far off they may be are parameters of the ranger, shared by all its shots, with
-the sheet's uncertainties as priors (u_axis_mm: the four offsets independent of each other).
+Three effects, each only where the mirror sheet gives a value or an uncertainty for it:
+axes        the mirror's axes and the beam do not meet: of target and reference cube, each at its own angles
+amplitude   the phase grows with ln(amplitude); counted from the ranger's own reference shots, interpolated to the
+            instant of the shot, so that the references themselves need no correction
+cyclic      a wave of the phase after the electronics'
+The sheet's values are applied; their errors are parameters of the ranger, shared by all its shots, with the sheet's
+uncertainties as priors (u_axis_mm: the four offsets independent of each other).
 
 A campaign's records carry no encoder counts: a shot is taken as fired in the direct pointing, unless the mirror's
 azimuth limits forbid that and allow the prime one.
@@ -30,17 +30,17 @@ from catseye.reduction.site.stations import AXES, station_in
 from catseye.signal.systematics.amplitude import amplitude_by_coefficient, amplitude_phase
 from catseye.signal.systematics.cyclic import cyclic_design, cyclic_range
 
-UNSAID_ORDERS = 2  # of a cyclic deviation of which the sheet says the uncertainty alone
+UNSAID_ORDERS = 2  # of a cyclic deviation for which the sheet gives only the uncertainty
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """How far an effect's values may be off the sheet's: a parameter of a few parts, expected zero.
+    """Error of an effect's sheet values: an unknown of expectation zero.
 
     quantity   in the layout
     parts      of it
     u          of each, m or rad
-    key        where the sheet says so
+    key        of the sheet
     """
 
     quantity: Parameter
@@ -51,10 +51,10 @@ class Unknown:
 
 @dataclass(frozen=True, eq=False)
 class HeadCorrections:
-    """What to add to one ranger's ranges.
+    """Corrections to add to one ranger's ranges.
 
     value     (m,) m, by the sheet
-    columns   (m, q) parameters that say how far the sheet is off
+    columns   (m, q) parameters of the sheet's errors
     slopes    (m, q) derivatives of the correction by these, metres a unit
     """
 
@@ -63,15 +63,15 @@ class HeadCorrections:
     slopes: np.ndarray
 
     def at(self, x: np.ndarray) -> np.ndarray:
-        """(m,) m, by the sheet and the parameters x together."""
+        """Correction (m,), m, by the sheet and the parameters x."""
         return self.value + np.sum(self.slopes * x[self.columns], axis=1)
 
 
 def head_unknowns(campaign: ObservedSite, name: str) -> list[Unknown]:
-    """The parameters of a ranger's head; none for a sheet that knows nothing of these effects.
+    """Unknowns of a ranger's head; none without these effects.
 
-    Raises InputError for a feed-arm ranger whose sheet speaks of its axes while feedarm.toml does not say how its mount
-    is turned.
+    Raises InputError for a feed-arm ranger with axis offsets in its sheet if feedarm.toml does not give the orientation
+    of its mount.
     """
     mirror = campaign.mirror_of(name)
     unknowns = []
@@ -114,7 +114,7 @@ def head_corrections(
 
     The amplitude's own noise is left out: it adds coefficient^2/2 of the phase's u, at most half a percent.
 
-    Source: [PARKER04] section 5.3 (axes), chapter 6, item 5 (amplitude), 5.2.1 (what makes a cyclic deviation).
+    Source: [PARKER04] section 5.3 (axes), chapter 6, item 5 (amplitude), 5.2.1 (causes of a cyclic deviation).
     """
     mirror = campaign.mirror_of(name)
     m = len(phase)
@@ -134,8 +134,10 @@ def head_corrections(
         value = value + change
         columns.append(np.broadcast_to(at[unknown.quantity] + np.arange(len(unknown.parts)), by.shape))
         slopes.append(by)
-    none = np.zeros((m, 0))
-    return HeadCorrections(value, np.concatenate([none.astype(int), *columns], 1), np.concatenate([none, *slopes], 1))
+    no_columns = np.zeros((m, 0))
+    return HeadCorrections(
+        value, np.concatenate([no_columns.astype(int), *columns], 1), np.concatenate([no_columns, *slopes], 1)
+    )
 
 
 def _orders(mirror: Mirror) -> int:
@@ -143,7 +145,9 @@ def _orders(mirror: Mirror) -> int:
 
 
 def _axes(campaign: ObservedSite, name: str, sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Correction (m,) and its derivatives (m, 4) by the four offsets: less the target's change, plus the cube's.
+    """Correction (m,) and its derivatives (m, 4) by the offsets.
+
+    By the four offsets: minus the target's change, plus the cube's.
 
     Source: [PARKER04] eq. 2.8 and 2.12 for the mirror's axes, 2.21 and 2.22 for the cube's angles.
     """
@@ -155,7 +159,7 @@ def _axes(campaign: ObservedSite, name: str, sight: np.ndarray) -> tuple[np.ndar
     if np.isnan(phi).any():
         raise ValidityError(
             f"{name}: a target lies straight behind its mirror, where no beam reaches it: check the typed position and "
-            "how its mount is turned"
+            "the orientation of its mount"
         )
     change, slopes = path_change(theta, phi, np.linalg.norm(target, axis=-1), offsets, prime=prime)
     theta_0, phi_0 = azimuth_angle(mirror.azm_zrg, mirror.na0), elevation_angle(mirror.elv_zrg, mirror.ne0)
@@ -170,21 +174,24 @@ def _axes(campaign: ObservedSite, name: str, sight: np.ndarray) -> tuple[np.ndar
 
 
 def mounted(campaign: ObservedSite, name: str) -> MirrorStation:
-    """The ranger's mirror as it stands; InputError on the feed arm where feedarm.toml does not say how it is turned."""
+    """Mirror station of the ranger in its mount.
+
+    InputError on the feed arm where feedarm.toml does not give the orientation.
+    """
     station, mirror = station_in(campaign, name), campaign.mirror_of(name)
     if station is not None:
         return station
-    said = next((key for key in AXES if getattr(mirror, key)), "u_axis_mm")
+    sheet_key = next((key for key in AXES if getattr(mirror, key)), "u_axis_mm")
     raise refusal(
         f"mirrors/{mirror.zp}.toml",
-        f"{said} = {getattr(mirror, said)} cannot be applied: {name} is on the feed arm and no record says how its "
-        "mirror is turned (expected mount_z and mount_y in feedarm.toml, or no axis_offset_mm, mirror_offset_mm, "
-        "beam_x_mm, beam_y_mm, u_axis_mm)",
+        f"{sheet_key} = {getattr(mirror, sheet_key)} cannot be applied: {name} is on the feed arm and no record gives "
+        "the orientation of its mirror (expected mount_z and mount_y in feedarm.toml, or no axis_offset_mm, "
+        "mirror_offset_mm, beam_x_mm, beam_y_mm, u_axis_mm)",
     )
 
 
 def only_prime(mirror: Mirror, theta: np.ndarray) -> np.ndarray:
-    """Where the azimuth limits forbid the direct pointing and allow the prime one."""
+    """True where the azimuth limits allow only the prime pointing."""
 
     low, high, direct = mirror.az_low_limit, mirror.az_high_limit, azimuth_counts(theta, mirror.na0)
     return ~within(direct, low, high) & (within(direct + HALF_TURN, low, high) | within(direct - HALF_TURN, low, high))

@@ -1,4 +1,4 @@
-"""What an adjustment noticed about records and shots, a line each."""
+"""Notes of an adjustment on records and shots, one line each."""
 
 from collections.abc import Mapping
 
@@ -25,18 +25,18 @@ from catseye.reduction.site.agreement import StationSeries, distance_disagreemen
 
 
 def cycle_notes(ranges: RangeShots) -> list[str]:
-    """Points on which the whole cycles of used shots hang on little."""
+    """Points with uncertain whole cycles of used shots."""
     thin = {}
     for name, rows in _by_target(ranges):
         used = ranges.used[rows]
         doubtful = int((used & ranges.thin[rows]).sum())
         if doubtful:
             thin[name] = (
-                f"{name}: the whole cycles of {doubtful} of its {used.sum()} shots are not beyond doubt: without "
-                "each, position and other shots do not say its range to a quarter wavelength at five sigma"
+                f"{name}: the whole cycles of {doubtful} of its {used.sum()} shots are uncertain: without "
+                "each, position and other shots do not predict its range to a quarter wavelength at five sigma"
             )
-    what = "points have shots whose whole cycles are not beyond doubt without them, to a quarter wavelength at 5 sigma"
-    return _together(thin, what)
+    what = "points have shots with uncertain whole cycles, not predicted otherwise to a quarter wavelength at 5 sigma"
+    return _summarized(thin, what)
 
 
 def _by_target(ranges: RangeShots) -> list[tuple[str, np.ndarray]]:
@@ -46,15 +46,15 @@ def _by_target(ranges: RangeShots) -> list[tuple[str, np.ndarray]]:
     return list(zip(names.tolist(), rows, strict=True))
 
 
-def _together(notes: Mapping[str, str], what: str) -> list[str]:
-    """A note a point; of many one line for all."""
+def _summarized(notes: Mapping[str, str], what: str) -> list[str]:
+    """One note per point; a single line for many points."""
     if len(notes) <= MANY:
         return list(notes.values())
     return [f"{len(notes)} {what}: {', '.join(list(notes)[:MANY])} ..."]
 
 
 def loss_notes(ranges: RangeShots) -> list[str]:
-    """Targets that lost all shots, or hang on one that no other checks; rangers that lost most of theirs."""
+    """Targets without used or checked shots; rangers that lost most shots."""
     unmeasured, unchecked = {}, {}
     for name, mine in _by_target(ranges):
         used = ranges.used[mine]
@@ -62,19 +62,21 @@ def loss_notes(ranges: RangeShots) -> list[str]:
         if not used.any():
             unmeasured[name] = (
                 f"{name}: none of its {len(mine)} shots fits the others and its typed position: its coordinates here "
-                "are not measured; check its typed position or say how bad it is (u_position_mm)"
+                "are not measured; check its typed position or give its uncertainty (u_position_mm)"
             )
         elif not used.all() and alone.any():
             unchecked[name] = (
                 f"{name}: {(~used).sum()} of its {len(mine)} shots contradict the rest and nothing checks "
-                f"{alone.sum()} of those left: it may be further off than its uncertainty says; range it again"
+                f"{alone.sum()} of those left: its error may exceed its uncertainty; range it again"
             )
     notes = [
-        *_together(unmeasured, "points have no shot that fits the others and their typed positions: not measured here"),
-        *_together(
+        *_summarized(
+            unmeasured, "points have no shot that fits the others and their typed positions: not measured here"
+        ),
+        *_summarized(
             unchecked,
-            "points lost shots that contradict the rest, and nothing checks those left: they may be further off than "
-            "their uncertainties say; range them again",
+            "points lost shots that contradict the rest, and nothing checks those left: their errors may "
+            "exceed their uncertainties; range them again",
         ),
     ]
     ranger = np.array(ranges.ranger)
@@ -82,8 +84,8 @@ def loss_notes(ranges: RangeShots) -> list[str]:
         mine = ranger == name
         if mine.sum() > 2 and (mine & ~ranges.used).sum() > mine.sum() / 2:
             notes.append(
-                f"{name}: {(mine & ~ranges.used).sum()} of its {mine.sum()} shots do not fit: rather its survey, its "
-                "mirror sheet or its samples than light from elsewhere"
+                f"{name}: {(mine & ~ranges.used).sum()} of its {mine.sum()} shots do not fit: more likely its survey, "
+                "mirror sheet or samples than a stray reflection"
             )
     return notes
 
@@ -91,24 +93,26 @@ def loss_notes(ranges: RangeShots) -> list[str]:
 def wrong_records(
     network: CampaignNetwork, solution: LeastSquaresSolution, air: dict[str, tuple[float, float]]
 ) -> list[str]:
-    """Records that the ranges, or each other, contradict: thermometers, zeros, effects of heads, weather stations.
+    """Records contradicted by the ranges or by each other.
+
+    Thermometers, zeros, effects of heads, weather stations.
 
     air   estimate and standard uncertainty of each thermometer's offset, °C
     """
     notes = disagreements(network)
     for group, fit in zip(network.priors, solution.fits[-len(network.priors) :], strict=True):
-        if fit.name in (THERMOMETERS, ZEROS):  # not of all, where earlier epochs know some already
+        if fit.name in (THERMOMETERS, ZEROS):  # not of all, where earlier epochs determined some
             owners = [network.layout.parameters[c].of for c in np.ravel(group.columns).tolist()]
         if fit.name == THERMOMETERS:
             for station, active in zip(owners, fit.active, strict=True):
                 value, u = air[station]
                 if not active:
-                    notes.append(f"{station}'s thermometer is biased: it reads {value:+.2f} °C too high (u {u:.2f} °C)")
+                    notes.append(f"{station}'s thermometer is biased by {value:+.2f} °C (u {u:.2f} °C)")
         if fit.name == ZEROS:
             for ranger, active, off, u in zip(owners, fit.active, fit.residual, fit.sigma, strict=True):
                 if not active:
                     notes.append(
-                        f"{ranger}'s zero is not the sheet's: its ranges ask for {-off / MILLIMETRE:+.3f} mm, "
+                        f"{ranger}'s zero is not the sheet's: its ranges imply {-off / MILLIMETRE:+.3f} mm, "
                         f"{abs(off) / u:.0f} u_d0: see d0_mm of {network.campaign.mirror_of(ranger).zp}"
                     )
         if fit.name == HEADS and np.any(np.abs(fit.standardised) > network.settings.critical):
@@ -122,14 +126,17 @@ def wrong_records(
 
 
 def disagreements(network: CampaignNetwork) -> list[str]:
-    """Records that cannot be right: humidity typed as a fraction, stations or distances that contradict each other."""
+    """Records that cannot be right.
+
+    Humidity typed as a fraction, stations or distances that contradict each other.
+    """
     weather = network.campaign.weather
     names, series = np.array(weather.station), []
     for station in network.campaign.site.weather_station:
-        own = names == station.name
-        readings = weather.mjd_utc[own], weather.temperature_c[own], weather.pressure_hpa[own]
-        series.append(StationSeries(station.name, station.elevation_m, *readings, weather.humidity_percent[own]))
-    found = list(weather_disagreements([s for s in series if len(s.mjd)]))
+        rows = names == station.name
+        readings = weather.mjd_utc[rows], weather.temperature_c[rows], weather.pressure_hpa[rows]
+        series.append(StationSeries(station.name, station.elevation_m, *readings, weather.humidity_percent[rows]))
+    conflicts = list(weather_disagreements([s for s in series if len(s.mjd)]))
     for mark in network.campaign.benchmarks:
         ends = [network.places[name] for name in (mark.ranger, mark.target) if name in network.places]
         if len(ends) == 2:
@@ -141,9 +148,9 @@ def disagreements(network: CampaignNetwork) -> list[str]:
                 ends=np.array([end.start for end in ends]),
                 covariance=np.diag(u**2),
             )
-            found += [] if apart is None else [apart]
+            conflicts += [] if apart is None else [apart]
     fractions = [f"weather.csv: {s.name}: {text}" for s in series for text in humidity_doubts(s.humidity_percent)]
-    return [*fractions, *(each.text for each in found)]
+    return [*fractions, *(conflict.text for conflict in conflicts)]
 
 
 def record_notes(
@@ -151,7 +158,7 @@ def record_notes(
 ) -> list[str]:
     """Notes on the records, one line each.
 
-    contradicted   as `wrong_records` gave them
+    contradicted   result of `wrong_records`
     count          used shots at each point
     """
     notes = list(contradicted)
@@ -159,8 +166,8 @@ def record_notes(
     left_out = max((states.neglected for states in network.states.values()), default=0.0)
     if left_out > WEAK:
         notes.append(
-            f"so many shots leave modes of the electronics to the shots' own errors, the strongest with "
-            f"{100.0 * left_out:.0f} % of their variance: shots between the same two references share that"
+            f"with so many shots, weak modes of the electronics count as the shots' own errors, the strongest with "
+            f"{100.0 * left_out:.0f} % of their variance, which shots between the same two references share"
         )
     typed = [n for n, p in sorted(network.places.items()) if p.typed and count[n] >= 3]  # fewer do not place a point
     moved = np.array([np.linalg.norm(solution.x[network.layout.columns(n)] - network.places[n].start) for n in typed])
@@ -179,7 +186,10 @@ def record_notes(
 
 
 def doubts_of(network: CampaignNetwork, solution: LeastSquaresSolution, wrong: list[str]) -> tuple[str, ...]:
-    """Reasons that the answer is not good: wrong records, allowances, thermometers at the end of their priors."""
+    """Reasons against a good verdict.
+
+    Wrong records, allowances, thermometers at the end of their priors.
+    """
     doubts = [*wrong, *network.allowance.texts]
     air = network.field
     sigmas = network.allowance.sigmas(air)
@@ -193,7 +203,7 @@ def doubts_of(network: CampaignNetwork, solution: LeastSquaresSolution, wrong: l
 def sound_notes(
     network: CampaignNetwork, solution: LeastSquaresSolution, ranges: RangeShots, sound: dict[str, tuple[float, float]]
 ) -> list[str]:
-    """What each sounded line did to the index of its shots, and whether the ranges believe it."""
+    """Effect of each sounded line, and the ranges' test of it."""
     w = next((f.standardised for f in solution.fits if f.name == SOUND), np.zeros(0))
     mjd = network.campaign.shots.mjd_utc[ranges.shot]
     pairs = [frozenset(pair) for pair in zip(ranges.ranger, ranges.target, strict=True)]

@@ -1,4 +1,4 @@
-"""Every range of an adjusted network, with its corrections, residual and tests."""
+"""Ranges of an adjusted network, with corrections, residuals and tests."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from catseye.estimation.least_squares.adjustment import (
     GroupFit,
     LeastSquaresSolution,
 )
-from catseye.reduction.epoch.cycles import KEPT, line_errors
+from catseye.reduction.epoch.cycles import REQUIRED_SIGMAS, line_errors
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.shots import ShotGroup, ShotParts
 from catseye.reduction.epoch.unknowns import (
@@ -19,29 +19,31 @@ from catseye.reduction.epoch.unknowns import (
 
 @dataclass(frozen=True, eq=False)
 class RangeShots:
-    """Every target shot that has a phase, one row a shot, sorted by ranger; lengths in metres.
+    """Target shots that have a phase, one row per shot.
+
+    Sorted by ranger; lengths in metres.
 
     shot              index into the campaign's shots
     ranger, target    names
     phase             rad, the target's phase after the electronics' at that instant, [0, 2 pi)
     electronics       rad, phase of the electronics at that instant
-    cycles, margin    whole half wavelengths and how far the coarse length was from another number
+    cycles, margin    whole half wavelengths, and distance of the coarse length from another number
     refractivity      n_g - 1 along the path
     incidence         rad, on a prism's face; 0 for others
-    glass, obliquity  Pc (with what was estimated of it) and dPc, metres
-    zero, leakage     estimated corrections of the ranger's zero and of the rest of its leakage, to the range
-    moved             what brings the range to the campaign's middle: the telescope's expansion and shift, and averages
+    glass, obliquity  Pc (with its estimated correction) and dPc, metres
+    zero, leakage     estimated corrections to the range by the ranger's zero and its residual leakage
+    moved             correction to the campaign's middle: the telescope's expansion and shift, and averages
                       of many shots that are allowed for
-    head              what the mirror's axes, the coupling of amplitude to phase and cyclic terms add to the range
-    range_            distance scan point to target as this shot gives it, all corrections applied
+    head              correction for the mirror's axes, the coupling of amplitude to phase and cyclic terms
+    range_            distance scan point to target by this shot, all corrections applied
     u_range           its standard uncertainty: noise, electronics and path; systematic parameters not counted
     residual          range_ minus the adjusted distance
     standardised      test statistic of the adjustment
     redundancy        of the adjustment
     detectable        smallest error that a test at the level 0.1 % finds four times in five, m; rejection at |w| = 3.5
                       asks for 5 % more
-    used              took part
-    thin              its whole cycles are not beyond doubt: what all other lines and the records predict of this range
+    used              True where the shot took part
+    thin              cycles uncertain: the prediction of this range by all other lines and the records
                       misses it by so much, or is so uncertain, that misfit and five standard uncertainties reach a
                       quarter wavelength; repeats on one line share their cycles and do not check each other
     """
@@ -86,16 +88,16 @@ def ranges_of(
         zero.append(own_zero)
         leakage.append(-(part.leakage_slope @ x[layout.columns(Parameter(ParameterKind.LEAKAGE, part.name), 2)]) / n)
         constants = [Parameter(ParameterKind.GLASS, t) for t in part.target]
-        rest = [x[layout.at[c]] if c in layout.at else 0.0 for c in constants]
-        glass.append(part.glass + np.array(rest))
-        own = fit.residual + part.shared_error(x)
-        residual.append(own / n)
-        range_.append(np.linalg.norm(to - at, axis=1) + own / n)
+        glass_correction = [x[layout.at[c]] if c in layout.at else 0.0 for c in constants]
+        glass.append(part.glass + np.array(glass_correction))
+        local_error = fit.residual + part.shared_error(x)
+        residual.append(local_error / n)
+        range_.append(np.linalg.norm(to - at, axis=1) + local_error / n)
         u_range.append(np.sqrt(part.variance) / n)
         redundancy.append(_redundancy(group, part, fit, solution))
         detectable.append(fit.detectable_error / n)
         error, u = line_errors(group, part.target, fit, solution=solution)
-        thin.append(np.abs(error) + KEPT * u >= quarter)
+        thin.append(np.abs(error) + REQUIRED_SIGMAS * u >= quarter)
     join = np.concatenate
     return RangeShots(
         shot=join([p.electronics.shots for p in parts]),
@@ -125,7 +127,9 @@ def ranges_of(
 
 
 def _redundancy(group: ShotGroup, part: ShotParts, fit: GroupFit, solution: LeastSquaresSolution) -> np.ndarray:
-    """(m,) redundancy numbers of ranges, what they share with others counted as theirs.
+    """Redundancy numbers (m,) of ranges.
+
+    Errors that they share with others count as theirs.
 
     With the shared errors B z as parameters, C = D + B S B' and P_v as it is without them, P_v C = P_v D + D^-1 A Q B':
     so 1 - a Q (a - b)' / D.

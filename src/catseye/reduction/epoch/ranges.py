@@ -1,4 +1,7 @@
-"""From buffers of samples to phases free of leakage, and the electronics' drift from the reference shots."""
+"""Sample buffers to phases free of leakage, and electronics drift.
+
+The drift is from the reference shots.
+"""
 
 import math
 from collections.abc import Callable, Collection, Sequence
@@ -21,20 +24,20 @@ from catseye.signal.drift.states import DriftStates, drift_states
 from catseye.signal.drift.walk import estimate_walk, walk_test
 from catseye.signal.systematics.leakage import subtract_leakage
 
-Progress = Callable[[str, int, int], None]  # what is being done, how many are done, of how many
+Progress = Callable[[str, int, int], None]  # task, number done, total
 
 MRAD_PER_ROOT_HOUR = 1e-3 / 60.0  # rad per root second
-SURPRISE = 5.0  # standard uncertainties by which a reference may miss its neighbours' prediction
-WARM_UP = 0.03  # rad, more allowed at the ends of a ranger's block, where a transient is extrapolated
-BEND = 0.005  # rad, more allowed inside, where only its curvature counts
-REFERENCE_AMPLITUDE = 0.03  # relative change of the internal return beyond which something else is in it
+LARGEST_ERROR = 5.0  # largest error of a reference's prediction by its neighbours, in standard uncertainties
+WARM_UP = 0.03  # rad, additional tolerance at the ends of a ranger's block, where a transient is extrapolated
+BEND = 0.005  # rad, additional tolerance inside, where only its curvature counts
+REFERENCE_AMPLITUDE = 0.03  # relative change of the internal return beyond which it is not the cube's alone
 
 WRONG = {BufferStatus.DROPOUT: ShotStatus.DROPOUT, BufferStatus.STUCK: ShotStatus.STUCK}
 
 
 @dataclass(frozen=True, eq=False)
 class ShotPhase:
-    """What one shot's samples say: a row of `Phases`."""
+    """Result from one shot's samples: a row of `Phases`."""
 
     phasor: complex
     u_phasor: float
@@ -47,7 +50,7 @@ class ShotPhase:
 
 @dataclass(frozen=True, eq=False)
 class Phases:
-    """What every shot's samples say, in the order of the campaign's shots.
+    """Results from all shots' samples, in the campaign's order.
 
     phasor      V, complex, free of leakage
     u_phasor    V, standard uncertainty of each quadrature, from the samples' own scatter, the two taken as alike
@@ -56,7 +59,7 @@ class Phases:
     offset      V
     harmonics   V, (n, 2), amplitudes of harmonics 2 and 3
     largest     V, largest magnitude of a sample
-    reason      why a shot cannot be used, None where it can
+    reason      reason that a shot cannot be used, None where it can
     """
 
     phasor: np.ndarray
@@ -69,7 +72,7 @@ class Phases:
 
     @staticmethod
     def of(shots: Sequence["ShotPhase"]) -> "Phases":
-        """Phases that were found one by one, as columns."""
+        """Phases from single shots, as columns."""
         return Phases(
             np.array([s.phasor for s in shots], dtype=complex),
             np.array([s.u_phasor for s in shots]),
@@ -92,21 +95,24 @@ class Phases:
 
     @property
     def u_phase(self) -> np.ndarray:
-        """rad, from the samples' noise; infinite without a return."""
+        """Standard uncertainty of the phase from the samples' noise, rad.
+
+        Infinite without a return.
+        """
         amplitude = self.amplitude
         return np.divide(self.u_across, amplitude, out=np.full_like(self.u_across, np.inf), where=amplitude > 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class ElectronicsPhase:
-    """The drifting phase of one ranger's electronics at its usable target shots.
+    """Electronics phase of one ranger at its usable target shots.
 
     shots        (m,) indices into the campaign's shots
     phase        (m,) rad
     covariance   (m, m) rad^2, from the noise of the references and the walk between them; with `walk` its diagonal
-    reference    (m,) V, complex: the reference phasor that the leakage acts on; its magnitude, the cube's return at
-                 that instant, is what amplitude-to-phase coupling counts from
-    walk         how the errors are correlated, of a campaign too large for a matrix
+    reference    (m,) V, complex: reference phasor on which the leakage acts; its magnitude, the cube's return at
+                 that instant, is the origin of amplitude-to-phase coupling
+    walk         correlation model of a campaign too large for a matrix
     """
 
     shots: np.ndarray
@@ -116,7 +122,7 @@ class ElectronicsPhase:
     walk: "ReferenceWalk | None" = None
 
     def joint(self, rows: np.ndarray) -> np.ndarray:
-        """(k, k) rad^2, covariance of some of the shots."""
+        """Covariance of some of the shots, (k, k) rad^2."""
         if self.walk is None:
             return self.covariance[np.ix_(rows, rows)]
         return drift_at(
@@ -128,12 +134,12 @@ class ElectronicsPhase:
         )[1]
 
     def of(self, keep: np.ndarray) -> "ElectronicsPhase":
-        """The same at some of the shots, (m,) bool."""
-        whole = self.covariance.ndim == 2
+        """Electronics phase at some of the shots, (m,) bool."""
+        is_matrix = self.covariance.ndim == 2
         return ElectronicsPhase(
             self.shots[keep],
             self.phase[keep],
-            self.covariance[np.ix_(keep, keep)] if whole else self.covariance[keep],
+            self.covariance[np.ix_(keep, keep)] if is_matrix else self.covariance[keep],
             self.reference[keep],
             None if self.walk is None else replace(self.walk, seconds=self.walk.seconds[keep]),
         )
@@ -141,7 +147,7 @@ class ElectronicsPhase:
 
 @dataclass(frozen=True, eq=False)
 class ReferenceWalk:
-    """What the errors of a ranger's electronics follow from.
+    """Model of the errors of a ranger's electronics.
 
     seconds              (m,) s, of the shots
     reference_seconds    (r,) s, and
@@ -155,7 +161,10 @@ class ReferenceWalk:
     random_walk: float
 
     def states(self, noise: np.ndarray) -> DriftStates:
-        """The errors as hidden parameters; noise (m,) rad^2 as in `drift_states`."""
+        """Errors as hidden parameters.
+
+        noise (m,) rad^2 as in `drift_states`.
+        """
         return drift_states(
             self.reference_seconds,
             self.reference_variance,
@@ -166,29 +175,31 @@ class ReferenceWalk:
 
 
 def measure_phases(campaign: Campaign, settings: ReductionSettings, progress: Progress | None = None) -> Phases:
-    """Phase and amplitude of every shot, leakage removed, with the reason where a shot shows no light.
+    """Phase and amplitude of every shot, leakage removed.
 
-    A return is called blocked when what is left after the leakage is not five times its own uncertainty, that of the
-    leakage included; dead when the samples do not even hold the leakage, which would otherwise be taken, with its sign
-    changed, for a return; clipped when a sample stands at the converter's end; dropout and stuck see
-    `signal.detection.buffers`; doubted when `doubts.csv` says that it was not believed while it was measured.
+    With a reason where a shot shows no light.
+
+    A return is called blocked when the remainder without leakage is not five times its own uncertainty, that of the
+    leakage included; dead when the samples do not even hold the leakage, which with its sign changed would otherwise
+    look like a return; clipped when a sample stands at the converter's end; dropout and stuck see
+    `signal.detection.buffers`; doubted when `doubts.csv` marks it as doubtful during the measurement.
     """
     shots, adc = campaign.shots, campaign.site.adc
     n = len(shots.shot)
     volts_per_code = adc.full_scale_volt / 2 ** (adc.bits - 1)
     detected = Detections.empty(n)
     shapes = sorted(set(zip(shots.cycles.tolist(), shots.samples_per_cycle.tolist(), strict=True)))
-    done = 0
+    processed = 0
     for cycles, samples_per_cycle in shapes:
         alike = np.flatnonzero((shots.cycles == cycles) & (shots.samples_per_cycle == samples_per_cycle))
         for start in range(0, len(alike), 64):
             rows = alike[start : start + 64]
             samples = campaign.frames[shots.frame[rows], : cycles * samples_per_cycle]
             detected.put(rows, samples, samples_per_cycle, volts_per_code, adc.bits)
-            done += len(rows)
+            processed += len(rows)
             if progress is not None:
-                progress("samples to phases", done, n)
-    let_go(campaign.frames)  # of a whole dish a third of a gigabyte
+                progress("samples to phases", processed, n)
+    let_go(campaign.frames)  # a third of a gigabyte for a whole dish
     mirrors = [campaign.mirror_of(ranger) for ranger in shots.ranger]
     phases = judged_phases(
         detected,
@@ -198,16 +209,16 @@ def measure_phases(campaign: Campaign, settings: ReductionSettings, progress: Pr
         settings=settings,
         usual_of=lambda a: _usual_amplitude(campaign, a),
     )
-    told = [campaign.doubted.get(int(shot)) for shot in shots.shot]
-    both = zip(phases.reason, told, strict=True)
+    doubts = [campaign.doubted.get(int(shot)) for shot in shots.shot]
+    pairs = zip(phases.reason, doubts, strict=True)
     return replace(
-        phases, reason=tuple(reason or (why and Reason(ShotStatus.DOUBTED, why)) or None for reason, why in both)
+        phases, reason=tuple(reason or (why and Reason(ShotStatus.DOUBTED, why)) or None for reason, why in pairs)
     )
 
 
 @dataclass(frozen=True, eq=False)
 class BufferDetection:
-    """What synchronous detection found in one buffer: a row of `Detections`, V."""
+    """Synchronous detection of one buffer, V: a row of `Detections`."""
 
     raw: complex
     u_phasor: float
@@ -222,10 +233,11 @@ class BufferDetection:
 
 @dataclass(frozen=True, eq=False)
 class Detections:
-    """What synchronous detection found in n buffers, leakage still in it; fields as in
-    `signal.detection.phase.Detection`.
+    """Synchronous detection of n buffers, leakage included.
 
-    wrong   why a buffer's samples cannot be believed, None where they can
+    Fields as in `signal.detection.phase.Detection`.
+
+    wrong   reason that a buffer's samples are invalid, None where they are valid
     """
 
     raw: np.ndarray
@@ -240,7 +252,7 @@ class Detections:
 
     @staticmethod
     def empty(n: int) -> "Detections":
-        """Detections of n buffers, to be filled."""
+        """Empty detections of n buffers."""
         one, three = np.zeros(n), np.zeros((n, 3))
         return Detections(
             np.zeros(n, dtype=complex),
@@ -255,7 +267,7 @@ class Detections:
         )
 
     def row(self, k: int) -> BufferDetection:
-        """One buffer's, as plain numbers."""
+        """Detection of one buffer, as plain numbers."""
         return BufferDetection(
             complex(self.raw[k]),
             float(self.u_phasor[k]),
@@ -271,14 +283,17 @@ class Detections:
     def put(
         self, rows: np.ndarray, samples: np.ndarray, samples_per_cycle: int, volts_per_code: float, bits: int
     ) -> None:
-        """Detect buffers (b, cycles samples_per_cycle) of one shape into rows (b,)."""
+        """Detect buffers of one shape into rows (b,).
+
+        Samples (b, cycles samples_per_cycle).
+        """
         ends = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
-        seen = inspect_buffers(samples, samples_per_cycle, volts_per_code, converter_ends=ends)
-        detection = seen.detection
+        quality = inspect_buffers(samples, samples_per_cycle, volts_per_code, converter_ends=ends)
+        detection = quality.detection
         for k, row in enumerate(rows):
-            wrong = WRONG.get(BufferStatus(seen.status[k]))
+            wrong = WRONG.get(BufferStatus(quality.status[k]))
             if wrong is not None:
-                self.wrong[row] = Reason(wrong, seen.detail(k))
+                self.wrong[row] = Reason(wrong, quality.detail(k))
         self.total[rows], self.between[rows] = detection.scatter.total, detection.scatter.between
         self.raw[rows], self.u_phasor[rows], self.offset[rows] = detection.phasor, detection.u_phasor, detection.offset
         self.harmonics[rows], self.largest[rows], self.clipped[rows] = (
@@ -297,12 +312,12 @@ def judged_phases(
     settings: ReductionSettings,
     usual_of: Callable[[np.ndarray], np.ndarray],
 ) -> Phases:
-    """Phasors free of leakage, their uncertainties, and why a shot cannot be used.
+    """Phasors free of leakage, with uncertainties and rejection reasons.
 
     detected                     n buffers
     cycles, samples_per_cycle    (n,)
     mirrors                      n, the sheets of the heads
-    usual_of                     from amplitudes (n,), V, to what is usual for each; for the text of a blocked one
+    usual_of                     usual amplitude of each for amplitudes (n,), V; for the text of a blocked one
     """
     n = len(detected.raw)
     phasor = subtract_leakage(
@@ -311,7 +326,7 @@ def judged_phases(
         np.array([m.leakage_phase_rad for m in mirrors]),
     )
     scatter = CycleScatter(cycles, detected.total, detected.between, np.zeros(n, dtype=np.int64))
-    enough = cycles >= FEWEST_FOR_BATCHES  # with fewer one quadrature alone tells too little of its own scatter
+    enough = cycles >= FEWEST_FOR_BATCHES  # with fewer, the scatter of one quadrature is too uncertain
     u_across = np.where(enough, np.sqrt(scatter.variance(phasor)[0][:, 1]), detected.u_phasor)
     usual = usual_of(np.abs(phasor))
     reason = [
@@ -340,10 +355,10 @@ def why_not(
     settings: ReductionSettings,
     usual: float,
 ) -> Reason | None:
-    """Why a buffer's phase cannot be used, None where it can.
+    """Rejection reason of a buffer's phase; None if valid.
 
     buffer      leakage in it
-    phasor      V, without
+    phasor      V, leakage removed
     sampling    cycles and samples a cycle
     usual       V, for the text
     """
@@ -366,25 +381,27 @@ def why_not(
 
 
 def _usual_amplitude(campaign: ObservedSite, amplitude: np.ndarray) -> np.ndarray:
-    """Median amplitude of each shot's ranger, reference and target shots apart."""
+    """Median amplitude per ranger, reference and target shots separate."""
     key = np.array([f"{r} {t == REFERENCE}" for r, t in zip(campaign.shots.ranger, campaign.shots.target, strict=True)])
     usual = np.zeros(len(amplitude))
-    for each in np.unique(key):
-        usual[key == each] = np.median(amplitude[key == each])
+    for group in np.unique(key):
+        usual[key == group] = np.median(amplitude[key == group])
     return usual
 
 
 def follow_electronics(
     campaign: ObservedSite, phases: Phases, dense_shots: int = ReductionSettings.dense_shots
 ) -> tuple[dict[str, ElectronicsPhase], dict[int, Reason]]:
-    """Phase of each ranger's electronics at its target shots, and what was rejected on the way (index: reason).
+    """Phase of each ranger's electronics at its target shots.
 
-    dense_shots   usable target shots of all rangers up to which the errors' covariances are matrices
+    Also the rejected references (index: reason).
 
-    References that miss what the others predict, or whose amplitude is not that of the cube alone, are left out; a
+    dense_shots   most usable target shots of all rangers for which the errors' covariances are matrices
+
+    References that miss the prediction of the others, or whose amplitude is not that of the cube alone, are left out; a
     ranger without any good reference cannot range.
 
-    Source: [PARKER04] eqs. 5.12 and 5.13; between references the electronics walk at random by the site's figure.
+    Source: [PARKER04] eqs. 5.12 and 5.13; between references a random walk of the site's strength.
     """
     shots = campaign.shots
     seconds = (shots.mjd_utc - shots.mjd_utc[0]) * SECONDS_PER_DAY
@@ -408,24 +425,26 @@ def follow_electronics(
             rejected.update({int(k): Reason(ShotStatus.NO_REFERENCE, text) for k in lit})
             continue
         unwrapped = np.unwrap(np.angle(phases.phasor[references]))
-        known = seconds[references], unwrapped, variance[references]
+        references_data = seconds[references], unwrapped, variance[references]
         level = np.interp(seconds[lit], seconds[references], phases.amplitude[references])
         if large:
-            phase, u = drift_along(*known, time=seconds[lit], random_walk=walk)
-            between = ReferenceWalk(seconds[lit], known[0], known[2], walk)
+            phase, u = drift_along(*references_data, time=seconds[lit], random_walk=walk)
+            between = ReferenceWalk(seconds[lit], references_data[0], references_data[2], walk)
             electronics[name] = ElectronicsPhase(lit, phase, u**2, level * np.exp(1j * phase), between)
         else:
-            phase, covariance = drift_at(*known, time=seconds[lit], random_walk=walk)
+            phase, covariance = drift_at(*references_data, time=seconds[lit], random_walk=walk)
             electronics[name] = ElectronicsPhase(lit, phase, covariance, level * np.exp(1j * phase))
     return electronics, rejected
 
 
 def walk_notes(campaign: ObservedSite, phases: Phases, wrong: Collection[int]) -> list[str]:
-    """A line where the good references of all rangers together walk otherwise than the site's figure says.
+    """Note if the good references walk unlike the site's figure.
+
+    Tested for all rangers together, at one in a thousand.
 
     wrong   references that are left out, indices into the campaign's shots
 
-    Each ranger's first reference is left out too: a warm-up is no walk. Tested at one in a thousand.
+    Each ranger's first reference is left out too: a warm-up is no walk.
     """
     shots = campaign.shots
     good = np.array([t == REFERENCE for t in shots.target]) & np.array([not r for r in phases.reason])
@@ -434,7 +453,7 @@ def walk_notes(campaign: ObservedSite, phases: Phases, wrong: Collection[int]) -
     rows = [r for r in rows if len(r) > 1 and np.ptp(shots.mjd_utc[r]) > 0.0]
     if not rows:
         return []
-    told = campaign.site.ranging.electronic_drift_mrad_per_sqrt_hour
+    site_walk = campaign.site.ranging.electronic_drift_mrad_per_sqrt_hour
     k = np.concatenate(rows)
     references = (
         (shots.mjd_utc[k] - shots.mjd_utc[0]) * SECONDS_PER_DAY,
@@ -442,10 +461,12 @@ def walk_notes(campaign: ObservedSite, phases: Phases, wrong: Collection[int]) -
         phases.u_phase[k] ** 2,
     )
     series = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
-    test = walk_test(*references, random_walk=told * MRAD_PER_ROOT_HOUR, series=series, probability=0.999)
+    test = walk_test(*references, random_walk=site_walk * MRAD_PER_ROOT_HOUR, series=series, probability=0.999)
     if test.passed:
         return []
-    verdict = f"not by the {told:g} of site.toml: u_range is too {'small' if test.statistic > test.high else 'large'}"
+    verdict = (
+        f"unlike the {site_walk:g} of site.toml: u_range is too {'small' if test.statistic > test.high else 'large'}"
+    )
     try:
         walk = estimate_walk(*references, series=series)
     except EstimationError:  # the test needs one difference of references, an estimate two
@@ -467,35 +488,38 @@ def _wrong_references(
     for k in references:
         if len(references) > 2 and abs(phases.amplitude[k] / usual - 1.0) > REFERENCE_AMPLITUDE:
             text = (
-                f"return {phases.amplitude[k]:.3f} V where the cube gives {usual:.3f} V: something else is in the beam"
+                f"return {phases.amplitude[k]:.3f} V where the cube gives {usual:.3f} V: another object is in the beam"
             )
             wrong[int(k)] = Reason(ShotStatus.BAD_REFERENCE, text)
     while True:
-        left = np.array([k for k in references if k not in wrong], dtype=int)
-        if len(left) < 3:
+        remaining = np.array([k for k in references if k not in wrong], dtype=int)
+        if len(remaining) < 3:
             return wrong
-        difference, allowed = _surprises(seconds, phases, variance, left, walk)
+        difference, allowed = _prediction_errors(seconds, phases, variance, remaining, walk)
         suspects = np.flatnonzero(np.abs(difference) > allowed)
         if not len(suspects):
             return wrong
-        # A wrong reference makes its neighbours look wrong too: it is the one without which the others agree best.
-        rest = []
+        # A wrong reference makes its neighbours look wrong too: without it the others agree best.
+        ratios = []
         for suspect in suspects:
-            d, a = _surprises(seconds, phases, variance, np.delete(left, suspect), walk)
-            rest.append(float(np.max(np.abs(d) / a)))
-        worst = int(suspects[int(np.argmin(rest))])
+            d, a = _prediction_errors(seconds, phases, variance, np.delete(remaining, suspect), walk)
+            ratios.append(float(np.max(np.abs(d) / a)))
+        worst = int(suspects[int(np.argmin(ratios))])
         text = (
-            f"phase {difference[worst]:+.4f} rad off what the neighbouring references predict "
+            f"phase {difference[worst]:+.4f} rad off the prediction by the neighbouring references "
             f"(allowed {allowed[worst]:.4f})"
         )
-        wrong[int(left[worst])] = Reason(ShotStatus.BAD_REFERENCE, text)
+        wrong[int(remaining[worst])] = Reason(ShotStatus.BAD_REFERENCE, text)
 
 
-def _surprises(
+def _prediction_errors(
     seconds: np.ndarray, phases: Phases, variance: np.ndarray, references: np.ndarray, walk: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """How far each of two or more references (in order of time) is off what the others predict, and may be; rad."""
+    """Prediction error of each reference by the others, and its limit.
+
+    Two or more references in order of time; rad.
+    """
     phase = np.unwrap(np.angle(phases.phasor[references]))
     difference, u = reference_surprise(seconds[references], phase, variance[references], random_walk=walk)
     at_an_end = np.isin(np.arange(len(references)), (0, len(references) - 1))
-    return difference, SURPRISE * u + np.where(at_an_end, WARM_UP, BEND)
+    return difference, LARGEST_ERROR * u + np.where(at_an_end, WARM_UP, BEND)

@@ -1,10 +1,10 @@
-"""What becomes of a shot, and why one is not used."""
+"""Status of a shot, and the reason that it is not used."""
 
 from enum import StrEnum
 
 
 class ShotStatus(StrEnum):
-    """What became of a shot; the value is what people and programs read."""
+    """Status of a shot; the value is for people and programs."""
 
     USED = "used"
     REFERENCE = "reference"
@@ -18,22 +18,24 @@ class ShotStatus(StrEnum):
     NOISE_UNKNOWN = "noise unknown"
     BLOCKED = "blocked"
     DEAD = "dead"
-    # what it is compared with
+    # its comparison
     BAD_REFERENCE = "bad reference"
     NO_REFERENCE = "no reference"
     NO_RANGER = "no ranger"
-    REFUSED = "refused"  # by the reduction, which could not take it
+    REFUSED = "refused"  # not accepted by the reduction
     NO_PLACE = "no place"
     NO_POSTURE = "no posture"
     # its range among the others
     CYCLES_UNKNOWN = "whole cycles unknown"
     REFLECTED = "reflected"
     UNDECIDED = "undecided"
-    DOUBTED = "doubted"  # while it was measured, by doubts.csv
+    DOUBTED = "doubted"  # during the measurement, by doubts.csv
 
 
 class Reason(str):
-    """Why a shot is not used: a line for people, which begins with the status, and the status itself for code.
+    """Reason that a shot is not used.
+
+    A line for people that begins with the status, and the status itself for code.
 
     >>> reason = Reason(ShotStatus.BLOCKED, "return 0.0010 V, below the limit of 0.0200 V")
     >>> reason, reason.status.name
@@ -41,20 +43,20 @@ class Reason(str):
     """
 
     status: ShotStatus
-    text: str  # what follows the status
+    text: str  # after the status
     __slots__ = ("status", "text")
 
     def __new__(cls, status: ShotStatus, text: str) -> "Reason":
-        made = super().__new__(cls, f"{status}: {text}")
-        made.status, made.text = status, text
-        return made
+        reason = super().__new__(cls, f"{status}: {text}")
+        reason.status, reason.text = status, text
+        return reason
 
     def __reduce__(self) -> tuple[type["Reason"], tuple[ShotStatus, str]]:
         return Reason, (self.status, self.text)
 
 
 def status_of(line: str) -> ShotStatus | None:
-    """The status that a line of a journal begins with, None for a line of another kind.
+    """Status that a journal's line begins with; None without one.
 
     >>> status_of("no reference: the ranger has no good shot on its internal cube yet").name
     'NO_REFERENCE'

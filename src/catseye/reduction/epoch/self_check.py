@@ -1,8 +1,9 @@
-"""Averages of residuals over many shots: what the model does not know shows where each shot alone is in order.
+"""Averages of residuals over many shots, as a test of the model.
 
-A family of patterns cuts the shots into bins (by time, height, ranger, elevation, incidence, length); an error common
-to a bin is tested as one more parameter. A family in which one stands out is told, and its bins become parameters of
-the spread that they show, so that what is claimed covers it.
+An error unknown to the model appears there though each shot alone is in order. A family of patterns divides the shots
+into bins (by time, height, ranger, elevation, incidence, length); an error common to a bin is tested as one more
+parameter. A family with a significant bin is reported, and its bins become parameters of the spread that they show,
+so that the claimed uncertainty covers it.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,7 +26,7 @@ FEWEST = 30  # shots that a bin needs
 
 @dataclass(frozen=True)
 class Family:
-    """A way to cut shots into bins.
+    """Rule that divides shots into bins.
 
     name    for people: "by height"
     unit    of an error common to a bin: "ppm" of the path or "mm"
@@ -45,9 +46,9 @@ FAMILIES = (TIME, HEIGHT, RANGER, ELEVATION, INCIDENCE, LENGTH)
 class Sorting:
     """Bins of one family.
 
-    family   which
+    family   its rule
     labels   of the bins, for people
-    of       from a ranger and its shots to their bins
+    of       function of a ranger and its shots: their bins
     """
 
     family: Family
@@ -55,23 +56,28 @@ class Sorting:
     of: Callable[[str, np.ndarray], np.ndarray]
 
     def bins(self, ranger: str, shots: np.ndarray) -> np.ndarray:
-        """Bin of each of a ranger's shots, by their index in the campaign; -1 for none."""
+        """Bin of each of a ranger's shots, -1 for none.
+
+        Shots by their index in the campaign.
+        """
         return self.of(ranger, shots)
 
 
 def sortings(campaign: ObservedSite, places: dict[str, RangedPoint], shots: dict[str, np.ndarray]) -> list[Sorting]:
-    """The families' bins, by typed places: they do not change while an adjustment settles.
+    """Bins of the families, by typed places.
+
+    They do not change while an adjustment settles.
 
     shots   ranger: indices of its usable shots
     """
-    every = [(name, k) for name, own in shots.items() for k in own.tolist()]
+    all_shots = [(name, k) for name, ranger_shots in shots.items() for k in ranger_shots.tolist()]
     targets = campaign.shots.target
-    a = np.array([places[name].start for name, _ in every]).reshape(-1, 3)
-    b = np.array([places[targets[k]].start for _, k in every]).reshape(-1, 3)
-    rows = np.array([k for _, k in every], dtype=int)
+    a = np.array([places[name].start for name, _ in all_shots]).reshape(-1, 3)
+    b = np.array([places[targets[k]].start for _, k in all_shots]).reshape(-1, 3)
+    rows = np.array([k for _, k in all_shots], dtype=int)
     length = np.linalg.norm(b - a, axis=1)
     seconds = (campaign.shots.mjd_utc[rows] - campaign.shots.mjd_utc.min()) * SECONDS_PER_DAY
-    normals = [places[targets[k]].normal for _, k in every]
+    normals = [places[targets[k]].normal for _, k in all_shots]
     toward = (a - b) / np.maximum(length, 1e-9)[:, None]
     incidence = np.array([np.nan if n is None else n @ t for n, t in zip(normals, toward, strict=True)])
     values = {
@@ -81,18 +87,18 @@ def sortings(campaign: ObservedSite, places: dict[str, RangedPoint], shots: dict
         LENGTH: (length, 1.0, "m"),
     }
     count = int(np.clip(np.ptp(seconds) / TIME_BIN, 2, 24)) if len(seconds) else 0
-    found = (
+    result = (
         [_by_value(TIME, rows, seconds, np.linspace(0.0, np.ptp(seconds), count + 1), (60.0, "min"))] if count else []
     )
-    for family, (value, unit, said) in values.items():
-        known = value[np.isfinite(value)]
-        if len(known) >= 2 * FEWEST:
-            edges = np.unique(np.quantile(known, np.linspace(0.0, 1.0, BINS + 1)))
+    for family, (value, unit, unit_name) in values.items():
+        finite = value[np.isfinite(value)]
+        if len(finite) >= 2 * FEWEST:
+            edges = np.unique(np.quantile(finite, np.linspace(0.0, 1.0, BINS + 1)))
             if len(edges) > 2:
-                found.append(_by_value(family, rows, value, edges, (unit, said)))
+                result.append(_by_value(family, rows, value, edges, (unit, unit_name)))
     names = tuple(shots)
     number = {name: i for i, name in enumerate(names)}
-    return [*found, Sorting(RANGER, names, lambda ranger, own: np.full(len(own), number[ranger]))]
+    return [*result, Sorting(RANGER, names, lambda ranger, ranger_shots: np.full(len(ranger_shots), number[ranger]))]
 
 
 def _by_value(
@@ -101,12 +107,12 @@ def _by_value(
     inside = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
     bin_of = dict(zip(rows.tolist(), np.where(np.isfinite(values), inside, -1).tolist(), strict=True))
     labels = tuple(f"{a / unit[0]:.0f} to {b / unit[0]:.0f} {unit[1]}" for a, b in pairwise(edges))
-    return Sorting(family, labels, lambda ranger, own: np.array([bin_of[int(k)] for k in own], dtype=int))
+    return Sorting(family, labels, lambda ranger, shots: np.array([bin_of[int(k)] for k in shots], dtype=int))
 
 
 @dataclass(frozen=True)
 class Average:
-    """An error that a bin's shots have in common, beyond the model.
+    """Error common to a bin's shots, beyond the model.
 
     label      of the bin
     estimate   unit of the family
@@ -127,7 +133,7 @@ class Average:
 
 @dataclass(frozen=True)
 class FamilyCheck:
-    """A family's averages.
+    """Averages of one family.
 
     spread   of the bins' true errors beyond what noise explains, unit of the family; 0 where none stands out
     """
@@ -138,36 +144,39 @@ class FamilyCheck:
 
     @property
     def worst(self) -> Average:
-        """The average that stands out most."""
+        """Most significant average."""
         return max(self.averages, key=lambda a: abs(a.w))
 
     @property
     def passed(self) -> bool:
-        """True where no average stands out."""
+        """True where no average is significant."""
         return abs(self.worst.w) <= CRITICAL
 
     def text(self) -> str:
-        """What stands out, in a sentence."""
+        """Most significant average, in a sentence."""
         worst, unit = self.worst, self.family.unit
         return (
-            f"ranges depart {self.family.name} beyond what the model explains: {worst.label} by "
+            f"ranges depart {self.family.name} more than the model explains: {worst.label} by "
             f"{worst.estimate:+.3g} {unit} (u {worst.u:.2g} {unit}, {worst.shots} shots, w {worst.w:.1f}); "
-            f"{self.spread:.2g} {unit} are allowed for"
+            f"{self.spread:.2g} {unit} are included in the uncertainties"
         )
 
 
 def unit_of(family: Family, index: np.ndarray, distance: np.ndarray) -> np.ndarray:
-    """(m,) m, what a unit of a family's error is in the optical lengths; index (m,) of the paths."""
+    """Unit of a family's error in the optical lengths, (m,) m.
+
+    index (m,) of the paths.
+    """
     return PPM * distance if family.unit == "ppm" else MILLIMETRE * index
 
 
 def self_checks(
     groups: Sequence[ObservationGroup],
     solution: LeastSquaresSolution,
-    found: Sequence[Sorting],
+    families: Sequence[Sorting],
     lines: Sequence[tuple[str, np.ndarray, np.ndarray, np.ndarray]],
 ) -> list[FamilyCheck]:
-    """Every family's averages over the used shots.
+    """Averages of every family over the used shots.
 
     groups   as adjusted, the rangers' first
     lines    of each ranger's group: name, shots (m,), index (m,), distance (m,) m
@@ -175,11 +184,11 @@ def self_checks(
     influence = Influence(groups, solution)
     total = int(influence.first[-1])
     columns, owners = [], []
-    for sorting in found:
+    for sorting in families:
         vectors = np.zeros((total, len(sorting.labels)))
         shots = np.zeros(len(sorting.labels), dtype=int)
-        for (name, own, index, distance), low, fit in zip(lines, influence.first, solution.fits, strict=False):
-            bins = sorting.bins(name, own)
+        for (name, ranger_shots, index, distance), low, fit in zip(lines, influence.first, solution.fits, strict=False):
+            bins = sorting.bins(name, ranger_shots)
             on = np.flatnonzero((bins >= 0) & fit.active)
             vectors[low + on, bins[on]] = unit_of(sorting.family, index, distance)[on]
             shots += np.bincount(bins[on], minlength=len(shots))

@@ -1,4 +1,7 @@
-"""A ranger's shots as observations: distances in optical metres, with every correction and its derivative."""
+"""A ranger's shots as observations.
+
+Distances in optical metres, with every correction and its derivative.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,23 +27,23 @@ ShotGroup = Distances | MovingDistances
 
 @dataclass(frozen=True, eq=False)
 class ShotParts:
-    """The pieces of one ranger's ranges, for the record of every correction.
+    """Components of one ranger's ranges, for the record of every correction.
 
     name, electronics  of the ranger; its other fields have a row a shot
     target             names
     phase              rad, the target's after the electronics', as measured
-    cycles, margin     whole half wavelengths and how far the coarse length was from another number, m
+    cycles, margin     whole half wavelengths, and distance of the coarse length from another number, m
     refractivity       n_g - 1 along the path
     incidence          rad, on a prism's face
     glass, obliquity   Pc and dPc, m
-    leakage_slope      (m, 2) m/V, of the observed optical length by the rest of leakage
-    head               what the ranger's head asks to add to the range: `head.at(x)` with the estimated parameters
+    leakage_slope      (m, 2) m/V, of the observed optical length by the residual leakage
+    head               correction of the range for the ranger's head: `head.at(x)` with the estimated parameters
     distance           m, of the adjusted points
-    variance           m^2, of the optical length, with all that it shares with other shots
+    variance           m^2, of the optical length, errors shared with other shots included
     lasting            parameters of the telescope's motion since the middle and of averages that are allowed for, -1
                        for none; and the derivatives of the optical length by them, m
-    shared             parameters that stand for what it shares, -1 for none; and the derivatives of the optical length
-                       by them, m: of a large campaign, else none
+    shared             parameters of the shared errors, -1 for none; and the derivatives of the optical length
+                       by them, m: of a large campaign, else None
     """
 
     name: str
@@ -61,31 +64,34 @@ class ShotParts:
     shared: tuple[np.ndarray, np.ndarray]
 
     def lasting_error(self, x: np.ndarray) -> np.ndarray:
-        """(m,) m, that the optical lengths have beyond the points, as the parameters x have it."""
+        """Errors (m,), m, of the optical lengths beyond the points.
+
+        By the parameters x.
+        """
         columns, slopes = self.lasting
         return np.asarray(np.sum(np.where(columns < 0, 0.0, x[columns]) * slopes, axis=1))
 
     @property
     def shared_errors(self) -> SharedErrors | None:
-        """What the shots share as parameters; None where their covariance has it."""
+        """Shared errors as parameters; None where covariances hold them."""
         columns, slopes = self.shared
         return SharedErrors(columns, slopes, self.variance) if columns.shape[1] else None
 
     def shared_error(self, x: np.ndarray) -> np.ndarray:
-        """(m,) m, of the optical lengths, as the parameters x have it."""
+        """Shared errors (m,), m, of the optical lengths, by the parameters x."""
         columns, slopes = self.shared
         return np.asarray(np.sum(np.where(columns < 0, 0.0, x[columns]) * slopes, axis=1))
 
 
 @dataclass(frozen=True, eq=False)
 class _Sights:
-    """Where one ranger's m shots begin and end, at their own times.
+    """Begin and end of one ranger's m shots, at their own times.
 
     origin, target   (m,) columns of the ranger's and the targets' x
     a, b             (m, 3) m, ground: scan points and targets
     distance         (m,) m
     towards          (m, 3) unit, from target to ranger
-    turns            rotation and shift of both ends from the network's epoch to each shot; None where nothing moves
+    turns            rotation and shift of both ends from the network's epoch to each shot; None without motion
     """
 
     origin: np.ndarray
@@ -113,18 +119,21 @@ class _Sights:
         return _Sights(origin, target, a, b, distance, towards / distance[:, None], turns)
 
     @property
-    def seen(self) -> np.ndarray:
-        """(m, 3) where the ranger is, as a target that stands still sees it."""
+    def ranger_seen(self) -> np.ndarray:
+        """Ranger (m, 3) seen from a target at rest."""
         return self.towards if self.turns is None else np.einsum("mji,mj->mi", self.turns[2], self.towards)
 
     @property
     def sent(self) -> np.ndarray:
-        """(m, 3) m, from the scan point to the target, as a ranger that stands still sends its beam."""
+        """Vector (m, 3), m, from scan point to target at rest.
+
+        As a ranger that stands still sends its beam.
+        """
         return self.b - self.a if self.turns is None else np.einsum("mji,mj->mi", self.turns[0], self.b - self.a)
 
 
 def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[ShotGroup, ShotParts]:
-    """One ranger's shots as distances in optical metres, with everything that depends on where things are.
+    """One ranger's shots as distances in optical metres.
 
     Where the network moves, x are the points at its epoch, and each shot finds them where the telescope carried them.
     """
@@ -138,7 +147,7 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
     n = 1.0 + air.refractivity
     d0 = campaign.mirror_of(name).d0_mm * MILLIMETRE
     glass = np.array([places[t].constant for t in targets])
-    incidence, obliquity, normal_columns, normal_slopes = _obliquity(network, targets, sights.seen, x)
+    incidence, obliquity, normal_columns, normal_slopes = _obliquity(network, targets, sights.ranger_seen, x)
 
     half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz  # in vacuum: optical metres
     phase = fraction(phases.phase[rows], electronics.phase)
@@ -154,9 +163,9 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
         index=n,
     )
     zero = x[layout.at[Parameter(ParameterKind.ZERO, name)]]
-    expanding, grown = _expansion(network, name, targets, sights)
+    expanding, growth = _expansion(network, name, targets, sights)
     families = _families(network, name, n, distance)
-    expansion = np.sum(np.where(expanding < 0, 0.0, x[expanding]) * grown, axis=1)
+    expansion = np.sum(np.where(expanding < 0, 0.0, x[expanding]) * growth, axis=1)
     coarse = n * (distance + expansion - glass - obliquity - d0 - zero - head.at(x))
     cycles, margin = whole_cycles(coarse, phase, half)
     observed = unwrapped_length(cycles, phase, half)
@@ -181,7 +190,7 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
         variance=variance + jitter,
         lasting=(
             np.concatenate([expanding, families[0]], axis=1),
-            np.concatenate([n[:, None] * grown, families[1]], axis=1),
+            np.concatenate([n[:, None] * growth, families[1]], axis=1),
         ),
         shared=shared,
     )
@@ -202,7 +211,10 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
 
 
 def _jitter(network: CampaignNetwork, name: str, targets: tuple[str, ...]) -> np.ndarray:
-    """Variance (m,), m^2, of the distances by the telescope's shaking, as the campaign's table or the epoch has it."""
+    """Variance (m,), m^2, of the distances by the telescope's jitter.
+
+    By the campaign's table or the epoch's.
+    """
     table = network.campaign.jitter
     if table is None:
         return np.zeros(len(targets)) if network.motion is None else network.motion.jitter(name, targets)
@@ -211,7 +223,9 @@ def _jitter(network: CampaignNetwork, name: str, targets: tuple[str, ...]) -> np
 
 
 def _leakage_slope(per_radian: float, lit: np.ndarray, cube: np.ndarray) -> np.ndarray:
-    """(m, 2) m/V, of the optical length by the leakage left over, complex dL.
+    """Derivative of the optical length by residual leakage, (m, 2) m/V.
+
+    Residual leakage is complex, dL.
 
     A phasor A exp(i phi) turns by Im(dL exp(-i phi)) / A, reference and target alike.
     """
@@ -226,9 +240,11 @@ def _covariance(
     distance: np.ndarray,
     per_radian: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Covariance m^2 of the optical lengths, and its diagonal: noise, the electronics' walk, the path's fluctuation.
+    """Covariance of the optical lengths, m^2, and its diagonal.
 
-    (m, m), or of a large campaign the variances (m,) of what shots have by themselves.
+    Noise, the electronics' walk, the path's fluctuation.
+
+    (m, m), or for a large campaign the variances (m,) of the shots' independent errors.
     """
     electronics = network.electronics[name]
     noise = (per_radian * network.phases.u_phase[electronics.shots]) ** 2
@@ -237,18 +253,21 @@ def _covariance(
     noise = noise + eddies
     if electronics.walk is not None:
         alone = np.array([Parameter(ParameterKind.REPEATS, name, t) not in network.layout.at for t in targets])
-        own = noise + per_radian**2 * network.states[name].own + np.where(alone, path**2, 0.0)
-        return own, noise + per_radian**2 * electronics.covariance + path**2
+        independent = noise + per_radian**2 * network.states[name].own + np.where(alone, path**2, 0.0)
+        return independent, noise + per_radian**2 * electronics.covariance + path**2
     covariance = np.diag(noise) + per_radian**2 * electronics.covariance
-    same = np.array(targets)[:, None] == np.array(targets)
-    covariance += same * np.outer(path, path)
+    same_target = np.array(targets)[:, None] == np.array(targets)
+    covariance += same_target * np.outer(path, path)
     return covariance, np.diag(covariance).copy()
 
 
 def _shared(
     network: CampaignNetwork, name: str, targets: tuple[str, ...], *, distance: np.ndarray, per_radian: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Parameters (m, w), -1 for none, of what one ranger's shots share with others, and derivatives by them, m."""
+    """Parameters (m, w) of one ranger's shared errors, and derivatives.
+
+    -1 for none; derivatives in m.
+    """
     m = len(targets)
     if name not in network.states:
         return np.zeros((m, 0), dtype=int), np.zeros((m, 0))
@@ -267,26 +286,28 @@ def _nuisance(
     air: PathAir,
     normals: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Columns (m, q) of all parameters but the points, and the derivatives of the optical lengths by them.
+    """Columns (m, q) of all parameters but points, with derivatives.
+
+    Derivatives of the optical lengths.
 
     normals   columns (m, 2) of the faces' tilts, and slopes of dPc by them
     """
-    distance, lasting = sights.distance, air.slopes.shape[1]
+    distance, constant_count = sights.distance, air.slopes.shape[1]
     layout, targets, m = network.layout, parts.target, len(parts.target)
     n = 1.0 + parts.refractivity
     paths = np.array([[layout.at.get(Parameter(ParameterKind.PATH, parts.name, t), -1)] for t in targets])  # -1: none
     constants = [Parameter(ParameterKind.GLASS, t) for t in targets]
-    has_rest = np.array([c in layout.at for c in constants])
-    rest = np.array([layout.at.get(c, -1) for c in constants])
+    has_residual = np.array([c in layout.at for c in constants])
+    residuals = np.array([layout.at.get(c, -1) for c in constants])
     columns = [
         paths,
         np.full((m, 1), layout.at[Parameter(ParameterKind.ZERO, parts.name)]),
         np.broadcast_to(layout.columns(Parameter(ParameterKind.LEAKAGE, parts.name), 2), (m, 2)),
-        np.broadcast_to(layout.air[:lasting], (m, lasting)),
+        np.broadcast_to(layout.air[:constant_count], (m, constant_count)),
         layout.air[air.columns],
         parts.lasting[0],
         normals[0],
-        rest[:, None],
+        residuals[:, None],
         parts.head.columns,
         parts.shared[0],
     ]
@@ -298,7 +319,7 @@ def _nuisance(
         distance[:, None] * air.column_slopes,
         parts.lasting[1],
         -n[:, None] * normals[1],
-        (-n * has_rest)[:, None],
+        (-n * has_residual)[:, None],
         -n[:, None] * parts.head.slopes,
         parts.shared[1],
     ]
@@ -306,7 +327,10 @@ def _nuisance(
 
 
 def air_parameters(network: CampaignNetwork, air: PathAir, x: np.ndarray) -> np.ndarray:
-    """(m,) what the air's parameters x add to the index, by its slopes."""
+    """Change (m,) of the index by the air's parameters x.
+
+    By its slopes.
+    """
     values = x[network.layout.air]
     return np.asarray(
         air.slopes @ values[: air.slopes.shape[1]] + np.sum(values[air.columns] * air.column_slopes, axis=1)
@@ -316,7 +340,10 @@ def air_parameters(network: CampaignNetwork, air: PathAir, x: np.ndarray) -> np.
 def _families(
     network: CampaignNetwork, name: str, index: np.ndarray, distance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Parameters (m, f) of what bins of shots have in common beyond the model, -1 for none, and their derivatives."""
+    """Parameters (m, f) of bins' common errors, and their derivatives.
+
+    Errors beyond the model, -1 for none.
+    """
     m = len(distance)
     columns, slopes = np.full((m, len(network.sortings)), -1), np.zeros((m, len(network.sortings)))
     for i, sorting in enumerate(network.sortings):
@@ -330,7 +357,10 @@ def _families(
 def _expansion(
     network: CampaignNetwork, name: str, targets: tuple[str, ...], sights: _Sights
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Parameters (m, 2 parts) of how the telescope has moved at each shot, and derivatives of the distance by them."""
+    """Parameters (m, 2 parts) of the telescope's motion, with derivatives.
+
+    Derivatives of the distance by the motion at each shot.
+    """
     knots, m = network.processes.telescope, len(targets)
     if knots is None:
         return np.zeros((m, 0), dtype=int), np.zeros((m, 0))
@@ -344,26 +374,30 @@ def _expansion(
     return columns.reshape(m, -1), slopes.reshape(m, -1)
 
 
-def other_ends(group: ShotGroup, row: int, own: int, *, x: np.ndarray) -> np.ndarray:
-    """(3,) m, ground: from where a shot's other end looks at the point whose x is in column `own`, that point standing.
+def other_ends(group: ShotGroup, row: int, column: int, *, x: np.ndarray) -> np.ndarray:
+    """Other end of a shot relative to a point at rest, (3,) m, ground.
 
-    A moving point stands, and what it is ranged from moves the other way: |B p + b - a| = |p - B'(a - b)|.
+    The point's x is in `column`.
+
+    A moving point is at rest, and the other end moves the opposite way: |B p + b - a| = |p - B'(a - b)|.
     """
     origin, target = int(group.origin[row]), int(group.target[row])
-    other = x[(target if origin == own else origin) + np.arange(3)]
+    opposite = x[(target if origin == column else origin) + np.arange(3)]
     if isinstance(group, Distances):
-        return np.asarray(other)
+        return np.asarray(opposite)
     ends = (group.origin_turn[row], group.origin_shift[row]), (group.target_turn[row], group.target_shift[row])
-    (turn, shift), (own_turn, own_shift) = ends[::-1] if origin == own else ends
-    return np.asarray(own_turn.T @ (turn @ other + shift - own_shift))
+    (turn, shift), (own_turn, own_shift) = ends[::-1] if origin == column else ends
+    return np.asarray(own_turn.T @ (turn @ opposite + shift - own_shift))
 
 
 def _obliquity(
     network: CampaignNetwork, targets: Sequence[str], towards: np.ndarray, x: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Incidence and dPc at the estimated normals, and the derivatives of dPc by each normal's two tilts.
+    """Incidence and dPc at the estimated normals, with derivatives.
 
-    A shot on anything but a prism gets column -1, none, with a zero derivative.
+    Derivatives of dPc by each normal's two tilts.
+
+    A shot on another reflector than a prism gets column -1, none, with a zero derivative.
     """
     m = len(targets)
     ranging = network.campaign.site.ranging
@@ -381,7 +415,7 @@ def _obliquity(
     normal = np.array([p.normal for p in prisms]) + np.einsum("mi,mij->mj", x[columns[at]], across)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     angle = np.arccos(np.clip(np.sum(normal * towards[at], axis=1), -1.0, 1.0))
-    # From behind the face nothing returns: such a shot is judged as grazing, and fails on its range.
+    # No return from behind the face: such a shot counts as grazing, and fails on its range.
     cosine = np.cos(np.minimum(angle, 0.5 * np.pi))
     incidence[at] = angle
     correction[at] = obliquity_correction(height, ratio, cosine, phase=bends)

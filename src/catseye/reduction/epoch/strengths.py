@@ -1,8 +1,8 @@
-"""What is known beforehand of the processes of a campaign, and how strong they are, by the ranges themselves.
+"""Prior strengths of a campaign's processes, and estimates by the ranges.
 
-A process is a Gaussian of known shape and unknown strength. Its estimate from the ranges, as large as it came out and
-as uncertain, says how strong it was; a strength of experience counts as some observations more, so that a campaign of
-few shots keeps it.
+A process is a Gaussian of fixed shape and unknown strength. The size and uncertainty of its estimate from the
+ranges determine the strength; a strength of experience counts as some observations more, so that a campaign of few
+shots keeps it.
 
 Source: restricted maximum likelihood ([PATTERSON71]; variance components in [FOERSTNER16] chapter 4): of a component G
 of a prior C with estimate x and covariance Q the score by ln s^2 is (w'Gw - tr(G M)) / 2 and its information
@@ -27,14 +27,14 @@ AIR_ACROSS = "air across the site"
 ERRORS = "thermometers' lag and sunshine"
 EXPANSION = "telescope's expansion"
 PROCESSES = (AIR_BETWEEN, AIR_ACROSS, EXPANSION)  # of estimated strength
-EXPERIENCE = 6.0  # observations that the strength of experience is worth
-WIDE_PPM = 0.1  # of eddies, where nothing is known yet
-LITTLE_PPM, MOST_PPM = 0.05, 2.0  # of eddies: with less, little changes; more, no air holds
-SAME = 0.25  # relative change of a strength that is none
-LEAST_SHARE = 1e-3  # of sigma^2 in the variance of a test, below which it is rounding
+EXPERIENCE = 6.0  # equivalent observations of the strength of experience
+WIDE_PPM = 0.1  # of eddies, before any estimate
+LITTLE_PPM, MOST_PPM = 0.05, 2.0  # limits of eddies: below, little changes; above, no real air
+TOLERANCE = 0.25  # relative change of a strength that counts as none
+LEAST_SHARE = 1e-3  # of sigma^2 in the variance of a test: below is rounding
 BISECTIONS = 40
 LONGEST = 2.0  # step in the logarithm of a variance
-STEPS = 12  # cap of steps; it takes some five
+STEPS = 12  # cap of steps; usually five
 
 
 @dataclass(frozen=True)
@@ -43,30 +43,30 @@ class ProcessStrength:
 
     air         between stations and paths
     telescope   of each of `telescope_motion.PARTS`, in units of its `WALK`
-    eddies_ppm  of a path's index, anew at each shot: what is faster than the knots, or smaller than the site
+    eddies_ppm  of a path's index, independent at each shot: air faster than the knots, or smaller than the site
     """
 
     air: AirStrength = WIDE
     telescope: tuple[float, ...] = (1.0,) * len(PARTS)
     eddies_ppm: float = WIDE_PPM
 
-    def near(self, other: "ProcessStrength") -> bool:
-        """Whether no strength differs by more than a quarter."""
+    def near(self, strength: "ProcessStrength") -> bool:
+        """True if no strength differs by more than a quarter."""
         pairs = [
-            *zip(astuple(self.air), astuple(other.air), strict=True),
-            *zip(self.telescope, other.telescope, strict=True),
-            (self.eddies_ppm + LITTLE_PPM, other.eddies_ppm + LITTLE_PPM),
+            *zip(astuple(self.air), astuple(strength.air), strict=True),
+            *zip(self.telescope, strength.telescope, strict=True),
+            (self.eddies_ppm + LITTLE_PPM, strength.eddies_ppm + LITTLE_PPM),
         ]
-        return all(abs(a - b) <= SAME * max(a, b) for a, b in pairs)
+        return all(abs(a - b) <= TOLERANCE * max(a, b) for a, b in pairs)
 
 
 @dataclass(frozen=True, eq=False)
 class Processes:
-    """The processes of a campaign and where their parameters stand.
+    """Processes of a campaign, with their parameters' columns.
 
     air         of the field
     columns     of its levels and slopes, and of east and north (2, j)
-    telescope   None where it is taken to stand still, and
+    telescope   None where it is taken as at rest, and
     moving      (parts, k) columns of its knots
     errors      columns of lags, and of sunshine where there is any
     """
@@ -79,7 +79,7 @@ class Processes:
 
     @staticmethod
     def of(air: AirField, telescope: TelescopeKnots | None, at: dict[Parameter, int]) -> "Processes":
-        """Of the parameters of a layout."""
+        """Processes by the parameters of a layout."""
         knots = np.array([at[Parameter(ParameterKind.AIR, *label)] for label in air.knots.labels], dtype=int)
         k = len(air.knots.level) + len(air.knots.slope)
         errors = [at[Parameter(kind, station)] for kind in air.errors for station in air.stations]
@@ -94,7 +94,7 @@ class Processes:
         )
 
     def priors(self, strength: ProcessStrength) -> list[Linear]:
-        """What is known before a shot is fired."""
+        """Priors of the processes."""
         between, across = self.air.knots.covariances(strength.air)
         s = len(self.air.heights)
         u = np.repeat([U_LAG, U_RADIATION][: len(self.errors) // s], s)
@@ -114,21 +114,23 @@ class Processes:
     def estimated(
         self, solution: LeastSquaresSolution, before: ProcessStrength, lengths: list[np.ndarray]
     ) -> ProcessStrength:
-        """Strengths as the estimates of an adjustment have them, which took those before.
+        """Strengths by the estimates of an adjustment that used other strengths.
 
         lengths   (m,) m of each of the first groups' paths
         """
         knots, (*usual, usual_across) = self.air.knots, astuple(USUAL)
         between, across = knots.covariances(before.air)
         shapes, across_shape = knots.shapes()
-        *now, now_across = astuple(before.air)
-        own = _Shown.of(solution, self.columns[0], between, knots.known, shapes)
-        level = _climbed([own], np.array(now), np.array(usual), low=astuple(LEAST)[:4], high=astuple(MOST)[:4])
-        none = np.zeros_like(across)
-        ways = [_Shown.of(solution, c, across, none, [across_shape]) for c in self.columns[1]]
-        by_metre = _climbed(
-            ways,
-            np.array([now_across]),
+        *current, current_across = astuple(before.air)
+        evidence = _Evidence.of(solution, self.columns[0], between, knots.record_covariance, shapes)
+        level = _estimated_strengths(
+            [evidence], np.array(current), np.array(usual), low=astuple(LEAST)[:4], high=astuple(MOST)[:4]
+        )
+        nothing_fixed = np.zeros_like(across)
+        directions = [_Evidence.of(solution, c, across, nothing_fixed, [across_shape]) for c in self.columns[1]]
+        by_metre = _estimated_strengths(
+            directions,
+            np.array([current_across]),
             np.array([usual_across]),
             low=(LEAST.across_c_per_m,),
             high=(MOST.across_c_per_m,),
@@ -146,8 +148,8 @@ class Processes:
         shape = self.telescope.covariance
         for together in ALIKE:
             factor = before.telescope[together[0]]
-            own = [
-                _Shown.of(
+            evidence = [
+                _Evidence.of(
                     solution,
                     self.moving[i],
                     (factor * WALK[i]) ** 2 * shape,
@@ -156,12 +158,14 @@ class Processes:
                 )
                 for i in together
             ]
-            (found,) = _climbed(own, np.array([factor]), np.ones(1), low=(LEAST_WALK,), high=(MOST_WALK,))
-            yield from [found] * len(together)
+            (factor_new,) = _estimated_strengths(
+                evidence, np.array([factor]), np.ones(1), low=(LEAST_WALK,), high=(MOST_WALK,)
+            )
+            yield from [factor_new] * len(together)
 
 
 def with_processes(priors: list, processes: Processes, strength: ProcessStrength) -> list:
-    """Priors of a network with those of its processes at other strengths."""
+    """Priors of a network, with its processes at other strengths."""
     new = iter([prior for prior in processes.priors(strength) if prior.name in PROCESSES])
     return [next(new) if prior.name in PROCESSES else prior for prior in priors]
 
@@ -172,16 +176,18 @@ def _gaussian(name: str, columns: np.ndarray, covariance: np.ndarray) -> Linear:
 
 
 @dataclass(frozen=True, eq=False)
-class _Shown:
-    """What the ranges say of a process by themselves: F of its parameters, and F times their estimate.
+class _Evidence:
+    """Evidence of the ranges alone on a process.
 
-    known    (k, k) of the prior that no strength changes
+    F of its parameters, and F times their estimate.
+
+    fixed    (k, k) of the prior, the part independent of the strengths
     shapes   of each strength
     """
 
     information: np.ndarray
     force: np.ndarray
-    known: np.ndarray
+    fixed: np.ndarray
     shapes: list[np.ndarray]
 
     @staticmethod
@@ -189,35 +195,46 @@ class _Shown:
         solution: LeastSquaresSolution,
         columns: np.ndarray,
         prior: np.ndarray,
-        known: np.ndarray,
+        fixed: np.ndarray,
         shapes: list[np.ndarray],
-    ) -> "_Shown":
-        """From an adjustment that took a prior."""
+    ) -> "_Evidence":
+        """Evidence from an adjustment that took a prior."""
         precision = np.linalg.inv(solution.q.within(columns))
         information = precision - np.linalg.inv(prior)
-        return _Shown(0.5 * (information + information.T), precision @ solution.x[columns], known, shapes)
+        return _Evidence(0.5 * (information + information.T), precision @ solution.x[columns], fixed, shapes)
 
     def scores(self, strength: np.ndarray) -> np.ndarray:
-        """(3, s): w'Gw, tr(G M) and tr((G M)^2) of each strength's part G of the prior."""
+        """Scores (3, s) of each strength.
+
+        w'Gw, tr(G M) and tr((G M)^2) of its part G of the prior.
+        """
         parts = [s**2 * shape for s, shape in zip(strength, self.shapes, strict=True)]
-        inverse = np.linalg.inv(self.known + sum(parts))
+        inverse = np.linalg.inv(self.fixed + sum(parts))
         spread = np.linalg.inv(self.information + inverse)
         w = inverse @ (spread @ self.force)
         m = inverse - inverse @ spread @ inverse
-        found = []
+        rows = []
         for part in parts:
-            both = part @ m
-            found.append((w @ part @ w, np.trace(both), np.sum(both * both.T)))
-        return np.array(found).T
+            product = part @ m
+            rows.append((w @ part @ w, np.trace(product), np.sum(product * product.T)))
+        return np.array(rows).T
 
 
-def _climbed(
-    shown: list[_Shown], strength: np.ndarray, usual: np.ndarray, *, low: tuple[float, ...], high: tuple[float, ...]
+def _estimated_strengths(
+    evidence: list[_Evidence],
+    strength: np.ndarray,
+    usual: np.ndarray,
+    *,
+    low: tuple[float, ...],
+    high: tuple[float, ...],
 ) -> tuple[float, ...]:
-    """Strengths (s,) that processes of one kind have in common: Fisher's scoring in the logarithms of variances."""
+    """Common strengths (s,) of processes of one kind.
+
+    Fisher's scoring in the logarithms of variances.
+    """
     for _ in range(STEPS):
-        seen, expected, information = np.sum([each.scores(strength) for each in shown], axis=0)
-        step = seen - expected + EXPERIENCE * ((usual / strength) ** 2 - 1.0)
+        observed, expected, information = np.sum([item.scores(strength) for item in evidence], axis=0)
+        step = observed - expected + EXPERIENCE * ((usual / strength) ** 2 - 1.0)
         step = np.clip(step / (information + EXPERIENCE), -LONGEST, LONGEST)
         strength = np.clip(strength * np.exp(0.5 * step), low, high)
         if np.all(np.abs(step) < 0.1):
@@ -226,7 +243,7 @@ def _climbed(
 
 
 def _eddies(solution: LeastSquaresSolution, before_ppm: float, lengths: list[np.ndarray]) -> float:
-    """ppm by which each shot's index departs anew, from the shots' own tests.
+    """Random departure of each shot's index, ppm, from the shots' own tests.
 
     With a variance v more than the sigma^2 of a shot, its w^2 is expected as (sigma^2 + v) / sigma^2, as if all had so
     much more; the likeliest is sought. Shots that nothing checks have no test.

@@ -1,4 +1,7 @@
-"""The dish: which points are on it, the paraboloid that fits them, its pose against the nominal posture."""
+"""Dish points, their fitted paraboloid, and its pose.
+
+The pose is relative to the nominal posture.
+"""
 
 from dataclasses import dataclass
 from typing import TypedDict
@@ -18,7 +21,10 @@ UNOBSERVED = "rotation about the dish's own axis: a paraboloid does not show it"
 
 
 class DishPose(TypedDict):
-    """Where the dish stands, for JSON: metres and radians; `covariance` of the motion, in `covariance_order`."""
+    """Pose of the dish, for JSON: metres and radians.
+
+    `covariance` of the motion, in `covariance_order`.
+    """
 
     frame: str
     pivot: list[float]
@@ -34,11 +40,11 @@ class DishPose(TypedDict):
 
 @dataclass(frozen=True, eq=False)
 class DishFit:
-    """The dish prisms' fit.
+    """Fit of the dish prisms.
 
     names          of the prisms, in order
     fit            the paraboloid and the deviations
-    focal_length   m, as designed, held
+    focal_length   m, as designed, fixed
     pivot          (3,) m, ground frame: the nominal vertex, about which the rotation turns
     """
 
@@ -49,7 +55,7 @@ class DishFit:
 
     @property
     def rms(self) -> float:
-        """Of the normal deviations, m."""
+        """Root mean square of the normal deviations, m."""
         return float(np.sqrt(np.mean(self.fit.deviation**2)))
 
     @property
@@ -58,7 +64,10 @@ class DishFit:
         return np.sqrt(np.diag(self.fit.deviation_covariance))
 
     def pose(self) -> DishPose:
-        """Axis, vertex and focus in the ground frame, and the rigid motion from the nominal posture, SI units."""
+        """Pose of the dish, SI units.
+
+        Axis, vertex and focus in the ground frame, and the rigid motion from the nominal posture.
+        """
         axis = self.fit.frame.rotation[:, 2]
         vertex = self.fit.frame.translation
         return {
@@ -76,9 +85,11 @@ class DishFit:
 
 
 def fit_surface(campaign: ObservedSite, coordinates: AdjustedCoordinates) -> tuple[DishFit | None, str]:
-    """The dish from its prisms (single prisms of the reflector frame), and why there is none, "" where there is.
+    """Dish from its prisms, or the reason that there is none.
 
-    A prism takes part with three used shots or more; with fewer its place along the surface's normal is a guess.
+    Single prisms of the reflector frame; the reason is "" where there is a fit.
+
+    A prism takes part with three used shots or more; with fewer its place along the surface's normal is uncertain.
     """
     shots = dict(zip(coordinates.points, coordinates.shots.tolist(), strict=True))
     names = tuple(name for name in dish_prisms(campaign) if shots.get(name, 0) >= FEWEST_CHECKS)

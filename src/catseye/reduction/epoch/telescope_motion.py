@@ -1,12 +1,12 @@
-"""Motion of the telescope during a campaign: its points are those of the middle of it.
+"""Motion of the telescope relative to the middle of a campaign.
 
     place(t) = place + sum over parts of motion(t) shape(place)
 
 Everything on the telescope expands about the pintle bearing with the temperature of its steel (11.7 ppm/K: an hour of
-a clear night moves the rim by half a millimetre), the dish about its own middle and the arm away from that by shares of
-their own. The whole may turn about the pintle bearing and move on its foundation; dish and arm may tilt about the
-dish's middle, and the dish may bend to a saddle. Each is a random walk from zero in the middle of the campaign, with
-straight lines between knots, whose strength the ranges tell.
+a clear night moves the rim by half a millimetre), the dish about its own middle and the arm away from that by
+additional shares. The whole may turn about the pintle bearing and move on its foundation; dish and arm may tilt about
+the dish's middle, and the dish may bend to a saddle. Each is a random walk from zero in the middle of the campaign,
+with straight lines between knots; its strength follows from the ranges.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ from catseye.reduction.epoch.air.process import hats
 from catseye.reduction.site.places import RangedPoint
 
 STEP = 1800.0  # s between knots
-SHORTEST = 900.0  # s, of a campaign in which nothing expands that a range sees
+SHORTEST = 900.0  # s, of a campaign too short for a measurable expansion
 MICRORADIAN = 1e-6
 FEWEST = 6  # points of a dish that may bend
 ROUNDING = 1e-12  # of a displacement, in its part along the line
@@ -50,7 +50,7 @@ class TelescopeKnots:
     middle     (3,) m, of the dish
     axes       (3, 3) unit: two across the dish, and its normal
     radius     m, of the dish's farthest point; infinite of a dish of so few points that no bend shows
-    bodies     point: body that carries it
+    bodies     point: its body
     """
 
     knots: np.ndarray
@@ -61,9 +61,11 @@ class TelescopeKnots:
 
     @staticmethod
     def of(span: float, places: Mapping[str, RangedPoint]) -> "TelescopeKnots | None":
-        """Knots of a campaign of so many seconds; None of one that is short or sees no telescope.
+        """Knots of a campaign of so many seconds.
 
-        places   of the points that take part
+        None of a short campaign, or without a telescope.
+
+        places   of the points involved
         """
         bodies = {name: place.body for name, place in places.items() if place.body}
         dish = [place.start for place in places.values() if place.body == "dish"]
@@ -79,21 +81,27 @@ class TelescopeKnots:
 
     @property
     def covariance(self) -> np.ndarray:
-        """(k, k) h, of a walk of unit strength from zero in the middle."""
+        """Covariance (k, k), h, of a random walk of unit strength.
+
+        Zero in the middle.
+        """
         less = np.minimum(np.abs(self.knots[:, None]), np.abs(self.knots))
         return np.asarray(np.where(self.knots[:, None] * self.knots > 0.0, less, 0.0) / 3600.0)
 
     def columns(self, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Two knots (m, 2) on which each time hangs, -1 for the middle, and their shares (m, 2)."""
-        whole = np.sort(np.append(self.knots, 0.0))
-        first, share = hats(whole, seconds)
-        number = np.where(whole == 0.0, -1, np.cumsum(whole != 0.0) - 1)
+        """Two knots (m, 2) of each time, and their shares (m, 2).
+
+        -1 for the middle.
+        """
+        all_knots = np.sort(np.append(self.knots, 0.0))
+        first, share = hats(all_knots, seconds)
+        number = np.where(all_knots == 0.0, -1, np.cumsum(all_knots != 0.0) - 1)
         return np.stack([number[first], number[first + 1]], axis=1), np.stack([1.0 - share, share], axis=1)
 
     def slopes(
         self, ranger: str, targets: Sequence[str], a: np.ndarray, b: np.ndarray, towards: np.ndarray
     ) -> np.ndarray:
-        """(m, parts) m: derivatives of distances by each of `PARTS`, in its unit.
+        """Derivatives (m, parts), m, of distances by each of `PARTS`, in its unit.
 
         a, b      (m, 3) m, scan points and targets
         towards   (m, 3) unit, from target to ranger
@@ -106,7 +114,7 @@ class TelescopeKnots:
         return np.where(rigid, 0.0, slopes) * UNITS
 
     def _moved(self, bodies: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """(m, parts, 3) m: how points move by each part."""
+        """Displacement (m, parts, 3), m, of points by each part."""
         moved = np.zeros((len(points), len(PARTS), 3))
         dish, arm = (bodies == "dish")[:, None], (bodies == "arm")[:, None]
         away, axis = points - self.middle, np.eye(3)

@@ -1,4 +1,7 @@
-"""A campaign during which the telescope moved rigidly, as its postures say; its points are those of its middle."""
+"""Campaign during which the telescope moved rigidly.
+
+Motion by its postures; its points are those of its middle.
+"""
 
 from dataclasses import replace
 
@@ -12,7 +15,10 @@ from catseye.reduction.site.places import RangedPoint
 
 
 def motion_of(campaign: ObservedSite) -> CarriedMotion | None:
-    """How the telescope carried its points from the campaign's middle to each shot; None of one that stood still."""
+    """Motion of the telescope's points from the campaign's middle.
+
+    To each shot; None of a telescope at rest.
+    """
     if not campaign.postures:
         return None
     track = PostureTrack.of(campaign.postures)
@@ -20,7 +26,10 @@ def motion_of(campaign: ObservedSite) -> CarriedMotion | None:
 
 
 def as_in_the_middle(campaign: Campaign) -> Campaign:
-    """The campaign at the posture of its middle, for which its points hold; itself where the telescope stood still."""
+    """Campaign at the posture of its middle.
+
+    Its points hold for that; unchanged if the telescope was at rest.
+    """
     motion = motion_of(campaign)
     if motion is None:
         return campaign
@@ -31,7 +40,10 @@ def as_in_the_middle(campaign: Campaign) -> Campaign:
 
 
 def buffer_middles(campaign: ObservedSite, rows: np.ndarray) -> np.ndarray:
-    """MJD of the middles of some shots' buffers, where a moving target is; of an epoch the times are those already."""
+    """Middles of some shots' buffers, MJD.
+
+    A moving target is there at that time; for an epoch the times are these already.
+    """
     shots = campaign.shots
     if not campaign.postures:
         return np.asarray(shots.mjd_utc[rows])
@@ -42,7 +54,10 @@ def buffer_middles(campaign: ObservedSite, rows: np.ndarray) -> np.ndarray:
 def carried_ends(
     campaign: ObservedSite, row: int, ends: tuple[np.ndarray, np.ndarray], place: RangedPoint
 ) -> tuple[tuple[np.ndarray, np.ndarray], RangedPoint]:
-    """Scan point and target of one shot, and the target's face, from the campaign's middle to that shot."""
+    """Scan point and target of one shot at its time.
+
+    And the target's face; moved from the campaign's middle to that shot.
+    """
     motion = motion_of(campaign)
     if motion is None:
         return ends, place

@@ -1,4 +1,4 @@
-"""The network of a campaign: its unknowns, and what the records say of them before a shot is fired."""
+"""Network of a campaign: its unknowns and their priors."""
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
@@ -36,17 +36,17 @@ BENCHMARKS, MONUMENTS, OFFSETS = "benchmarks", "monuments", "mirror offsets"
 TRIPLET_BALLS, GLASS = "triplet balls", "glass constants"
 LIMITS = "instruments' limits"
 FAMILIES_PRIOR = "unexplained averages"
-UNJUDGED = (APPROXIMATE, LIMITS)  # priors that say little on purpose and count in no variance factor
+UNJUDGED = (APPROXIMATE, LIMITS)  # weak priors by intent, not counted in a variance factor
 HEADS = "head effects"
 PATHS = "lasting paths"
 POSTURE = "bodies off their posture"
 REPEATS = "repeated paths"
 ELECTRONICS = "electronics between references"
 MANY_OF_A_BODY = 150  # typed points from which a body's own place is a parameter
-APART = 600  # parameters known one by one from which each is a row of its own, not of a matrix
+APART = 600  # independent parameters from which each is a single row, not a matrix
 BLOCK_KINDS = (ParameterKind.POINT, ParameterKind.NORMAL, ParameterKind.GLASS)
-BUSY = 40  # shots on a target, beyond which it is no block
-U_BODY, U_BODY_TURN = 0.03, 5e-4  # m and rad: more than a telescope stands off, so that shots alone say it
+BUSY = 40  # shots on a target, beyond which it forms no block
+U_BODY, U_BODY_TURN = 0.03, 5e-4  # m and rad: wider than any real posture error, so that the shots alone decide
 WEAK = 0.2  # variance of a mode of the electronics over its shots' noise, below which it is left to these,
 SOME_MODES = 1000  # beyond so many
 WORST_THERMOMETER_C, WORST_ZERO = 3.0, 0.005  # °C and m: one sigma of what an instrument can have at the worst
@@ -55,7 +55,7 @@ LONGEST_TIE = 30  # parameters of one prior: those of a longer one are no block
 
 @dataclass
 class UnknownsLayout:
-    """Where each parameter stands in the vector of the adjustment.
+    """Position of each parameter in the vector of the adjustment.
 
     parameters   in the order of the vector
     start        their start values
@@ -74,7 +74,10 @@ class UnknownsLayout:
     def add(
         self, quantity: Parameter, parts: Sequence[str], start: Iterable[float], free: Sequence[bool] | None = None
     ) -> None:
-        """Append the parts of a quantity with their start values; False in `free` holds one."""
+        """Append the parts of a quantity with their start values.
+
+        False in `free` holds one at its value.
+        """
         self.at[quantity] = len(self.parameters)
         if quantity.kind in POINT_KINDS:
             self.points[str(quantity)] = len(self.parameters)
@@ -85,28 +88,28 @@ class UnknownsLayout:
         self.free.extend(free if free is not None else [True] * len(parts))
 
     def columns(self, quantity: Parameter | str, count: int = 3) -> np.ndarray:
-        """Indices of the first parts of a quantity, or of a point by its name."""
+        """Columns of the first parts of a quantity, or of a point by its name."""
         first = self.points[quantity] if isinstance(quantity, str) else self.at[quantity]
         return first + np.arange(count)
 
     @property
     def names(self) -> list[str]:
-        """What people call the parameters."""
+        """Texts of the parameters."""
         return [str(parameter) for parameter in self.parameters]
 
     @property
     def air(self) -> np.ndarray:
-        """Indices of the air's parameters, those of `AirField.parameters`."""
+        """Columns of the air's parameters, those of `AirField.parameters`."""
         return np.array(self.of_air, dtype=int)
 
 
 @dataclass(frozen=True, eq=False)
 class CampaignNetwork:
-    """The fixed part of the problem: what is unknown, what is known beforehand, which shots see what.
+    """Fixed part of the problem: unknowns, priors, and shots.
 
-    states      of a large campaign: ranger's errors between its reference shots as parameters
+    states      of a large campaign: ranger's errors between its reference shots, as parameters
     processes   of the air, and of the telescope where it is a campaign's, and
-    strength    of them, as the priors have it
+    strength    of them, used in the priors
     allowance   beyond the records
     sortings    of the families that it allows for
     """
@@ -128,7 +131,7 @@ class CampaignNetwork:
 
     @cached_property
     def border(self) -> Border | None:
-        """What the elimination of a large network leaves; None for one that is solved densely.
+        """Border of a large network's elimination; None for a dense solution.
 
         A target that was fired at with its normal, glass and repeated paths is a block, triplets as wholes; one that
         was fired at so often that it meets most of the border is part of that.
@@ -158,31 +161,37 @@ class CampaignNetwork:
 
     @property
     def rangers(self) -> list[str]:
-        """Those that fired a usable shot."""
+        """Rangers that fired a usable shot."""
         return [
             name for name in self.campaign.rangers if name in self.electronics and len(self.electronics[name].shots)
         ]
 
     def with_strength(self, strength: ProcessStrength) -> "CampaignNetwork":
-        """The network with other strengths of its processes."""
+        """Network with other strengths of its processes."""
         return replace(self, priors=with_processes(self.priors, self.processes, strength), strength=strength)
 
     @property
     def middle_mjd(self) -> float:
-        """Middle of the campaign, for which its points hold."""
+        """Middle of the campaign, MJD; its points hold for that."""
         return middle_of(self.campaign.shots.mjd_utc)
 
     def of_shots(self, shots: Collection[int]) -> "CampaignNetwork":
-        """The network with the same unknowns and some of the shots, by their index in the campaign."""
-        kept = {name: np.isin(e.shots, sorted(shots)) for name, e in self.electronics.items()}
+        """Network with the same unknowns and some of the shots.
+
+        By their index in the campaign.
+        """
+        selection = {name: np.isin(e.shots, sorted(shots)) for name, e in self.electronics.items()}
         return replace(
             self,
-            electronics={name: e.of(kept[name]) for name, e in self.electronics.items()},
-            states={name: states.of(kept[name]) for name, states in self.states.items()},
+            electronics={name: e.of(selection[name]) for name, e in self.electronics.items()},
+            states={name: states.of(selection[name]) for name, states in self.states.items()},
         )
 
     def seen_from(self, ranger: str) -> "CampaignNetwork":
-        """The network whose air knows the lines of one ranger's usable shots, in their order."""
+        """Network whose air knows the lines of one ranger's shots.
+
+        Usable shots, in their order.
+        """
         if not self.field.lines:
             return self
         shots, rows = self.campaign.shots, self.electronics[ranger].shots
@@ -201,26 +210,26 @@ def build_network(
     known: Collection[str] = (),
     allowance: Allowance = NOTHING,
 ) -> CampaignNetwork:
-    """The unknowns and priors of a campaign.
+    """Unknowns and priors of a campaign.
 
     motion   where the telescope moves between the shots; its points are then those of the motion's epoch
-    also     rangers and targets that take part as if they had fired or been fired at
-    known    points whose typed positions have been used before
+    also     rangers and targets that take part though not in the shots
+    known    points whose typed positions were used before
     allowance   beyond what the records say
 
     Unknown are the points that were fired at or from (all of a triplet when one of it was), the monuments' fixed
-    points, each firing ranger's zero and rest of leakage and what else its sheet knows of its head, the air's offsets
-    (thermometers, profile, sounded lines), two tilts of every prism face, and the rest of every glass constant.
+    points, each firing ranger's zero, residual leakage and other effects of its head by its sheet, the air's offsets
+    (thermometers, profile, sounded lines), two tilts of every prism face, and the error of every glass constant.
     """
     places = places_of(campaign)
     fired = {campaign.shots.target[k] for e in electronics.values() for k in e.shots} - {REFERENCE}
     fired |= set(also) & set(places)
     fired |= {t for triplet in campaign.triplets.values() if fired & set(triplet.targets) for t in triplet.targets}
     shooting = {name for name, e in electronics.items() if len(e.shots)} | (set(also) & set(campaign.rangers))
-    seen = {n: p for n, p in places.items() if n in fired or n in shooting or n in campaign.monuments}
+    involved = {n: p for n, p in places.items() if n in fired or n in shooting or n in campaign.monuments}
 
     layout = UnknownsLayout()
-    for name, place in sorted(seen.items()):
+    for name, place in sorted(involved.items()):
         layout.add(Parameter(ParameterKind.POINT, name), XYZ, place.start)
     for name, monument in campaign.monuments.items():
         u = (monument.u_x_mm, monument.u_y_mm, monument.u_z_mm)
@@ -231,7 +240,7 @@ def build_network(
         layout.add(Parameter(ParameterKind.LEAKAGE, name), ["real", "imaginary"], [0.0, 0.0])
         for unknown in head_unknowns(campaign, name):
             layout.add(unknown.quantity, unknown.parts, np.zeros(len(unknown.parts)))
-    typed = {n: p for n, p in seen.items() if p.typed and n not in known}
+    typed = {n: p for n, p in involved.items() if p.typed and n not in known}
     for body, count in sorted(Counter(p.body for p in typed.values() if p.body).items()):
         if count >= MANY_OF_A_BODY:
             layout.add(Parameter(ParameterKind.BODY, body), (*XYZ, *(f"about {a}" for a in XYZ)), np.zeros(6))
@@ -239,13 +248,13 @@ def build_network(
     for parameter in air.parameters:
         layout.add(parameter, [""], [0.0])
     telescope = None
-    if motion is None and any(p.body == "dish" for p in seen.values()):
+    if motion is None and any(p.body == "dish" for p in involved.values()):
         telescope = _telescope(campaign, places, layout)
     processes, strength = Processes.of(air, telescope, layout.at), ProcessStrength()
-    for group in sorted({p.group for n, p in seen.items() if p.group and n in fired}):
+    for group in sorted({p.group for n, p in involved.items() if p.group and n in fired}):
         layout.add(Parameter(ParameterKind.NORMAL, group), ["1", "2"], [0.0, 0.0])
     for name in sorted(fired):
-        if seen[name].u_constant > 0.0:
+        if involved[name].u_constant > 0.0:
             layout.add(Parameter(ParameterKind.GLASS, name), [""], [0.0])
     ours = {n: e.shots for n, e in electronics.items() if len(e.shots)}
     sorts = _sorted(campaign, places, ours, layout, allowance=allowance)
@@ -257,7 +266,7 @@ def build_network(
     for line in lines:
         layout.add(line, [""], [0.0])
     priors = [
-        *_priors(campaign, settings, seen, layout, air, allowance),
+        *_priors(campaign, settings, involved, layout, air, allowance),
         *_families(layout, sorts, allowance),
         *processes.priors(strength),
         *_typed(settings, typed, layout),
@@ -270,7 +279,7 @@ def build_network(
         settings,
         phases,
         electronics,
-        seen,
+        involved,
         layout,
         air,
         priors,
@@ -293,7 +302,10 @@ def middle_of(mjd_utc: np.ndarray) -> float:
 
 
 def _telescope(campaign: ObservedSite, places: dict[str, RangedPoint], layout: UnknownsLayout) -> TelescopeKnots | None:
-    """Knots of the telescope's expansion, their parameters added to the layout."""
+    """Knots of the telescope's expansion.
+
+    Their parameters are added to the layout.
+    """
     telescope = TelescopeKnots.of(float(np.ptp(campaign.shots.mjd_utc)) * SECONDS_PER_DAY, places)
     if telescope is not None:
         numbers = [str(i) for i in range(len(telescope.knots))]
@@ -310,7 +322,10 @@ def _sorted(
     *,
     allowance: Allowance,
 ) -> list[Sorting]:
-    """Bins of the families that are allowed for, their parameters added to the layout."""
+    """Bins of the families with an allowance.
+
+    Their parameters are added to the layout.
+    """
     if not allowance.families:
         return []
     sorts = [s for s in sortings(campaign, places, shots) if s.family in allowance.families]
@@ -321,33 +336,36 @@ def _sorted(
 
 
 def path_ppm(network: CampaignNetwork) -> float:
-    """ppm of a path's length by which its index fluctuates from one campaign, or epoch, to the next."""
-    lasting = 0.0 if network.motion is None else network.motion.lasting
-    return float(network.campaign.site.ranging.path_index_fluctuation_ppm * np.sqrt(1.0 - lasting**2))
+    """Fluctuation of a path's index between campaigns or epochs, ppm."""
+    constant_part = 0.0 if network.motion is None else network.motion.lasting
+    return float(network.campaign.site.ranging.path_index_fluctuation_ppm * np.sqrt(1.0 - constant_part**2))
 
 
 def _share_by_states(network: CampaignNetwork) -> None:
-    """Parameters for the errors that shots share: the electronics' walk, and the index of repeated lines; in place."""
+    """Add parameters for errors that shots share, in place.
+
+    The electronics' walk, and the index of repeated lines.
+    """
     layout, targets, settings = network.layout, network.campaign.shots.target, network.settings
     per_radian = 0.5 * SPEED_OF_LIGHT / network.campaign.site.ranging.modulation_hz / TWO_PI
     ppm = path_ppm(network)
-    every: dict[str, DriftStates] = {}
+    all_states: dict[str, DriftStates] = {}
     for name in network.rangers:
         electronics = network.electronics[name]
         assert electronics.walk is not None
         ends = np.array([network.places[targets[k]].start for k in electronics.shots])
         path = ppm * PPM * np.linalg.norm(ends - network.places[name].start, axis=1)
         noise = network.phases.u_phase[electronics.shots] ** 2 + (path / per_radian) ** 2
-        every[name] = electronics.walk.states(noise)
-    strongest = np.sort(np.concatenate([s.strength for s in every.values()]))[::-1]
-    room = max(settings.most_states - sum(s.count - len(s.strength) for s in every.values()), 0)
-    wanted = max(int(np.count_nonzero(strongest > WEAK)), SOME_MODES)
-    kept = min(room, wanted)
-    left = strongest[kept] if kept < len(strongest) else 0.0
+        all_states[name] = electronics.walk.states(noise)
+    strongest = np.sort(np.concatenate([s.strength for s in all_states.values()]))[::-1]
+    room = max(settings.most_states - sum(s.count - len(s.strength) for s in all_states.values()), 0)
+    required = max(int(np.count_nonzero(strongest > WEAK)), SOME_MODES)
+    limit = min(room, required)
+    largest_neglected = strongest[limit] if limit < len(strongest) else 0.0
     repeated = []
     for name in network.rangers:
         electronics = network.electronics[name]
-        states = every[name].without(float(left))
+        states = all_states[name].without(float(largest_neglected))
         network.states[name] = states
         layout.add(
             Parameter(ParameterKind.ELECTRONICS, name), [str(k) for k in range(states.count)], np.zeros(states.count)
@@ -368,7 +386,7 @@ def _share_by_states(network: CampaignNetwork) -> None:
 
 
 def _independent(name: str, columns: ArrayLike, observed: ArrayLike, sigma: ArrayLike) -> Linear:
-    """Parameters known beforehand, one by one."""
+    """Prior of independent parameters."""
     at, count = np.asarray(columns), np.size(columns)
     apart = count > APART
     return Linear(
@@ -381,7 +399,10 @@ def _independent(name: str, columns: ArrayLike, observed: ArrayLike, sigma: Arra
 
 
 def _apart(prior: ObservationGroup) -> ObservationGroup:
-    """A prior of independent single parameters with each a row of its own, so that it ties none together; or itself."""
+    """Prior with a row of its own per independent parameter.
+
+    It ties none together; unchanged if it is no such prior.
+    """
     if not isinstance(prior, Linear) or prior.columns.ndim == 2 or prior.covariance.ndim != 1:
         return prior
     m, k = prior.matrix.shape
@@ -393,7 +414,7 @@ def _apart(prior: ObservationGroup) -> ObservationGroup:
 def _priors(
     campaign: ObservedSite,
     settings: ReductionSettings,
-    seen: dict[str, RangedPoint],
+    involved: dict[str, RangedPoint],
     layout: UnknownsLayout,
     air: AirField,
     allowance: Allowance,
@@ -401,20 +422,20 @@ def _priors(
     count = len(air.stations)
     at, sigmas = layout.air, allowance.priors(air)
     priors = [
-        *_survey(campaign, seen, layout),
+        *_survey(campaign, involved, layout),
         *_heads(campaign, layout),
         _independent(THERMOMETERS, at[:count], np.zeros(count), sigmas[:count]),
         _independent(LIMITS, at[:count], np.zeros(count), np.full(count, WORST_THERMOMETER_C)),
         _independent("air profile", at[count : count + 1], [0.0], sigmas[count : count + 1]),
         *_sound(air, at[count + 1 : count + 1 + len(air.lines)]),
         *_directions(campaign, settings, layout),
-        *_glass(seen, layout),
+        *_glass(involved, layout),
     ]
     for triplet in campaign.triplets.values():
-        if triplet.ball.target in seen:
-            priors.extend(_triplet(triplet, seen, layout, settings))
+        if triplet.ball.target in involved:
+            priors.extend(_triplet(triplet, involved, layout, settings))
     for benchmark in campaign.benchmarks:
-        if benchmark.target in seen and benchmark.ranger in seen:
+        if benchmark.target in involved and benchmark.ranger in involved:
             u = _positive(benchmark.u_mm * MILLIMETRE, f"benchmarks.csv: {benchmark.target}, u_mm")
             length = benchmark.certified_distance_mm * MILLIMETRE
             priors.append(_length(BENCHMARKS, length, u, layout, benchmark.ranger, benchmark.target))
@@ -422,7 +443,7 @@ def _priors(
 
 
 def _families(layout: UnknownsLayout, sorts: Sequence[Sorting], allowance: Allowance) -> list[ObservationGroup]:
-    """Errors that each bin's shots share: as large as they showed."""
+    """Common errors of each bin's shots, by the spread they showed."""
     priors: list[ObservationGroup] = []
     for sorting in sorts:
         count = len(sorting.labels)
@@ -433,7 +454,10 @@ def _families(layout: UnknownsLayout, sorts: Sequence[Sorting], allowance: Allow
 
 
 def _sound(air: AirField, columns: np.ndarray) -> list[ObservationGroup]:
-    """How much too warm the sound of each line may read: a parameter a line, as its length errs in all rows alike."""
+    """Prior of each sounded line's bias.
+
+    One parameter a line, as its length errs in all rows alike.
+    """
     if not air.lines:
         return []
     return [_independent(SOUND, columns, np.zeros(len(columns)), [line.sigma for line in air.lines])]
@@ -442,11 +466,13 @@ def _sound(air: AirField, columns: np.ndarray) -> list[ObservationGroup]:
 def _typed(
     settings: ReductionSettings, places: dict[str, RangedPoint], layout: UnknownsLayout
 ) -> list[ObservationGroup]:
-    """Typed positions: against the ground, or against the body that carries the point, wherever that stands.
+    """Priors of typed positions.
 
-    Each is off by its own error; by how the dish stands off its nominal posture all on it are off together. Were they
-    taken as independent, two thousand would claim to know that to a fifth of a millimetre. Of few points the sum says
-    nothing beside the shots: night-01's points would move by 6 um.
+    Against the ground, or against the body that carries the point, wherever that stands.
+
+    Each has its own error; a departure of the dish from its nominal posture is common to all points on it. As
+    independent errors, two thousand would determine that to a fifth of a millimetre. With few points their sum is
+    negligible beside the shots: night-01's points would move by 6 um.
     """
     bodies = {q.of: layout.columns(q, 6) for q in layout.at if q.kind is ParameterKind.BODY}
     typed = sorted(places)
@@ -471,8 +497,11 @@ def _typed(
     ]
 
 
-def _survey(campaign: ObservedSite, seen: dict[str, RangedPoint], layout: UnknownsLayout) -> list[ObservationGroup]:
-    """Fixed points as surveyed (a zero u holds a coordinate, it defines the datum), mirrors above them as measured."""
+def _survey(campaign: ObservedSite, involved: dict[str, RangedPoint], layout: UnknownsLayout) -> list[ObservationGroup]:
+    """Priors of fixed points as surveyed, and mirrors above them.
+
+    A zero u holds a coordinate and defines the datum.
+    """
     priors: list[ObservationGroup] = []
     columns, observed, sigma = [], [], []
     for name, monument in campaign.monuments.items():
@@ -488,7 +517,7 @@ def _survey(campaign: ObservedSite, seen: dict[str, RangedPoint], layout: Unknow
         priors.append(
             Linear(
                 OFFSETS,
-                seen[name].start - np.array(layout.start)[fixed],
+                involved[name].start - np.array(layout.start)[fixed],
                 np.full(3, u_offset**2),
                 np.concatenate([layout.columns(name), fixed]),
                 np.hstack([np.eye(3), -np.eye(3)]),
@@ -500,7 +529,10 @@ def _survey(campaign: ObservedSite, seen: dict[str, RangedPoint], layout: Unknow
 
 
 def _heads(campaign: ObservedSite, layout: UnknownsLayout) -> list[ObservationGroup]:
-    """Zeros, leakage and other effects of the heads of the rangers that fired, as calibrated."""
+    """Priors of the heads of the rangers that fired.
+
+    Zeros, leakage and other effects, as calibrated.
+    """
     rangers = [n for n in campaign.rangers if Parameter(ParameterKind.ZERO, n) in layout.at]
     mirrors = [campaign.mirror_of(n) for n in rangers]
     zeros = [layout.at[Parameter(ParameterKind.ZERO, n)] for n in rangers]
@@ -516,7 +548,7 @@ def _heads(campaign: ObservedSite, layout: UnknownsLayout) -> list[ObservationGr
 
 
 def _head(campaign: ObservedSite, name: str, layout: UnknownsLayout) -> Linear:
-    """How far the effects of one ranger's head may be off its sheet."""
+    """Prior of the errors of one ranger's head sheet."""
     zp = campaign.mirror_of(name).zp
     columns: list[int] = []
     u: list[float] = []
@@ -527,7 +559,10 @@ def _head(campaign: ObservedSite, name: str, layout: UnknownsLayout) -> Linear:
 
 
 def _directions(campaign: ObservedSite, settings: ReductionSettings, layout: UnknownsLayout) -> list[ObservationGroup]:
-    """Tilts of the prisms' normals and of the triplets' plates against their typed directions."""
+    """Priors of normals' tilts.
+
+    Of prisms and triplets' plates, against their typed directions.
+    """
     normals = [quantity for quantity in layout.at if quantity.kind is ParameterKind.NORMAL]
     if not normals:
         return []
@@ -537,13 +572,16 @@ def _directions(campaign: ObservedSite, settings: ReductionSettings, layout: Unk
     return [_independent("normals", columns, np.zeros(len(columns)), u)]
 
 
-def _glass(seen: dict[str, RangedPoint], layout: UnknownsLayout) -> list[ObservationGroup]:
-    """The rests of the glass constants, each common to every shot on its target."""
-    names = [name for name in sorted(seen) if Parameter(ParameterKind.GLASS, name) in layout.at]
+def _glass(involved: dict[str, RangedPoint], layout: UnknownsLayout) -> list[ObservationGroup]:
+    """Priors of the glass constants' errors.
+
+    Each is common to every shot on its target.
+    """
+    names = [name for name in sorted(involved) if Parameter(ParameterKind.GLASS, name) in layout.at]
     if not names:
         return []
     columns = [layout.at[Parameter(ParameterKind.GLASS, name)] for name in names]
-    return [_independent(GLASS, columns, np.zeros(len(names)), [seen[n].u_constant for n in names])]
+    return [_independent(GLASS, columns, np.zeros(len(names)), [involved[n].u_constant for n in names])]
 
 
 def _positive(u: float, where: str) -> float:
@@ -568,15 +606,17 @@ def _length(name: str, length: float, u: float, layout: UnknownsLayout, origin: 
 
 
 def _triplet(
-    triplet: TripletRecord, seen: dict[str, RangedPoint], layout: UnknownsLayout, settings: ReductionSettings
+    triplet: TripletRecord, involved: dict[str, RangedPoint], layout: UnknownsLayout, settings: ReductionSettings
 ) -> list[ObservationGroup]:
-    """What a data sheet says of a unit: ball above the prisms' mid-point, prisms apart by d12 along the axis.
+    """Priors of a triplet's data sheet.
 
-    The axis is good to some tenths of a degree, 3 mm across the unit: it only helps where a prism was not ranged.
+    Ball above the prisms' mid-point, prisms apart by d12 along the axis.
+
+    The axis is good to some tenths of a degree, 3 mm across the unit: it helps only where a prism was not ranged.
     """
-    left, right, ball = triplet.left_prism.target, triplet.right_prism.target, triplet.ball.target
+    left_prism, right_prism, ball = triplet.left_prism.target, triplet.right_prism.target, triplet.ball.target
     where = f"triplets/{triplet.triplet}.toml"
-    normal = seen[left].normal
+    normal = involved[left_prism].normal
     assert normal is not None
     along = np.outer(normal, normal)
     u_h = _positive(triplet.u_h_corr_mm * MILLIMETRE, f"{where}: u_h_corr_mm")
@@ -584,22 +624,22 @@ def _triplet(
     u_d12 = _positive(triplet.u_d12_mm * MILLIMETRE, f"{where}: u_d12_mm")
     eye = np.eye(3)
     length = triplet.d12_mm * MILLIMETRE
-    axis = unit(seen[right].start - seen[left].start)
+    axis = unit(involved[right_prism].start - involved[left_prism].start)
     across = np.linalg.svd(axis[None])[2][1:]
     return [
         Linear(
             TRIPLET_BALLS,
             triplet.h_corr_mm * MILLIMETRE * normal,
             u_h**2 * along + u_lateral**2 * (eye - along),
-            np.concatenate([layout.columns(ball), layout.columns(left), layout.columns(right)]),
+            np.concatenate([layout.columns(ball), layout.columns(left_prism), layout.columns(right_prism)]),
             np.hstack([eye, -0.5 * eye, -0.5 * eye]),
         ),
-        _length("triplet spacings", length, u_d12, layout, left, right),
+        _length("triplet spacings", length, u_d12, layout, left_prism, right_prism),
         Linear(
             "triplet axes",
             np.zeros(2),
             (length * settings.u_plate_normal) ** 2 * np.eye(2),
-            np.concatenate([layout.columns(left), layout.columns(right)]),
+            np.concatenate([layout.columns(left_prism), layout.columns(right_prism)]),
             np.hstack([-across, across]),
         ),
     ]

@@ -1,1 +1,1 @@
-"""Beam and link: what light arrives, and what it does to a range."""
+"""Beam and link: arriving light, and its effect on a range."""

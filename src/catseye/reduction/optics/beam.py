@@ -1,9 +1,9 @@
-"""From a beam train's record to what the light does: sizes, clipping, power, and what each part does to a range.
+"""Beam train from its record: sizes, clipping, power, effects on a range.
 
-Outward the beam is Gaussian in two planes; an aperture takes its share and the rest goes on as if whole: rings behind
-an edge that takes much are not followed. From the reflector on the light is computed by diffraction, except where the
-reflector clips next to nothing: then it stays the Gaussian that it was as far as the detector, which is lit by what the
-tightest inward aperture let pass. Apertures in a row let through what the tightest of them does.
+Outward the beam is Gaussian in two planes; an aperture removes its share and the remainder stays Gaussian: diffraction
+rings behind a strongly clipping edge are not modelled. From the reflector on the light is computed by diffraction,
+except where the reflector clips almost nothing: then it stays Gaussian as far as the detector, which receives the light
+that the tightest inward aperture passes. Apertures in a row pass the light of the tightest of them.
 """
 
 import math
@@ -22,7 +22,7 @@ from catseye.records.site.beam import BeamElement, BeamTrain, Laser
 from catseye.signal.systematics.feedback import fringe_contrast
 
 Array = NDArray[np.float64]
-WIDE = 5.0  # beam radii: what a missing aperture stands for
+WIDE = 5.0  # beam radii: size of a missing aperture
 UNCLIPPED = 1e-5  # of the power lost: the beam then stays Gaussian, to 1e-3 of a share, 5e-3 through a pinhole
 ALL_LIGHT = 30.0  # rad of diffraction beyond the rays, see `gaussian_beam.SPREADS`
 HALF_MAXIMUM = math.sqrt(2.0 / math.log(2.0)) / 2.0  # full angle at half maximum to half angle at 1/e^2
@@ -31,7 +31,7 @@ MICROMETRE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class BeamPlace:
-    """The beam where it meets an element.
+    """Beam at an element.
 
     leg         "outward", "reflector", "inward", "detector"
     name        of the element, or its kind
@@ -39,8 +39,8 @@ class BeamPlace:
     radius      (2,) m at 1/e^2, in x and y; NaN behind a reflector that clips
     curvature   (2,) 1/m, of the wavefront, above zero where it spreads; NaN likewise
     aperture    m, radius; infinite without
-    clipped     share of the arriving power that passes beside it; NaN where diffraction could not be followed
-    power       W, behind the element; NaN where diffraction could not be followed
+    clipped     share of the arriving power that it blocks; NaN where diffraction could not be computed
+    power       W, behind the element; NaN where diffraction could not be computed
     """
 
     leg: str
@@ -55,14 +55,14 @@ class BeamPlace:
 
 @dataclass(frozen=True, eq=False)
 class Returned:
-    """What comes back from one distance.
+    """Return from one distance.
 
     distance    m
     radius      (2,) m, of the beam at the reflector
     hit         share of the beam that falls on the reflector
-    collected   share of what it sends back that passes all inward apertures
+    collected   share of the returned light that passes all inward apertures
     power       W on the detector
-    status      "ok", or why there is no number
+    status      "ok", or the reason for a missing number
     """
 
     distance: float
@@ -75,13 +75,13 @@ class Returned:
 
 @dataclass(frozen=True, eq=False)
 class BeamPath:
-    """A beam train, computed.
+    """Computed beam train.
 
     places         along the path at the train's own distance
-    status         "ok", or why there is no number there
+    status         "ok", or the reason for a missing number there
     returned       table by distance
-    smallest_waist m: waist at the head that would make the spot at that distance smallest, and the spot's radius
-    range_effects  name: m that the range reads too long by it; NaN where the light there is not a Gaussian
+    smallest_waist m: waist at the head for the smallest spot at that distance, and the spot's radius
+    range_effects  name: m, range error (positive: too long); NaN where the light there is not Gaussian
     u_image        m, standard uncertainty of the range from the image's place on the detector; NaN if not known
     laser          what comes back into the laser, by name; empty without an isolator or `back_reflection`
     """
@@ -97,17 +97,17 @@ class BeamPath:
 
 
 def reduce_beam(train: BeamTrain) -> BeamPath:
-    """Everything that the record of a beam train says about its light.
+    """Light of a beam train, computed from its record.
 
     train   the record
 
-    Raises InputError where a glass, a coating or the geometry has no meaning.
+    Raises InputError where a glass, a coating or the geometry is invalid.
 
-    Source: [SIEGMAN86] ch. 15, 17, 20; [COLLINS70] for what returns; see each formula.
+    Source: [SIEGMAN86] ch. 15, 17, 20; [COLLINS70] for the return; see each formula.
     """
     try:
         leaving, outward, power = _outward(train)
-        here, back = _returned(train, leaving, power, train.distance_m, sum(map(_length, train.outward)))
+        returned, back = _returned(train, leaving, power, train.distance_m, sum(map(_length, train.outward)))
         distances = train.distances_m or tuple(train.distance_m * 2.0**k for k in range(-3, 4))
         rows = tuple(_returned(train, leaving, power, distance, 0.0)[0] for distance in distances)
         wavelength = train.wavelength_um * MICROMETRE
@@ -116,7 +116,7 @@ def reduce_beam(train: BeamTrain) -> BeamPath:
         return BeamPath(
             train=train,
             places=(*outward, *back),
-            status=here.status,
+            status=returned.status,
             returned=rows,
             smallest_waist=(waist, waist * math.sqrt(2.0)),
             range_effects=range_effects(train, back),
@@ -128,13 +128,13 @@ def reduce_beam(train: BeamTrain) -> BeamPath:
 
 
 def range_effects(train: BeamTrain, back: tuple[BeamPlace, ...]) -> dict[str, float]:
-    """Metres that a range reads too long by mirror coatings, receiving lenses and the place of the image.
+    """Range errors (m) by mirror coatings, receiving lenses and the image's place.
 
     train   the record
     back    places from the reflector on
 
-    Constants that the internal reference and a zero take up, as long as nothing about them changes: the size of the
-    light on the lens, the angle on the mirror, the image's place do.
+    Constants that the internal reference and a zero absorb as long as they do not change; the size of the light on the
+    lens, the angle on the mirror and the image's place do change.
 
     Source: `coating.group_path`, `receiver.lens_group_range`, `detector.spot_range`.
     """
@@ -163,7 +163,7 @@ def _diode(train: BeamTrain) -> detector.Photodiode | None:
 
 
 def _image_effects(train: BeamTrain, image: BeamPlace) -> dict[str, float]:
-    """What the photodiode adds by the place of the image."""
+    """Range errors of the photodiode by the place of the image."""
     diode, plate = _diode(train), train.detector
     if diode is None:
         return {}
@@ -172,9 +172,11 @@ def _image_effects(train: BeamTrain, image: BeamPlace) -> dict[str, float]:
     if not math.isfinite(spot):
         return {middle: math.nan, off: math.nan}
     centre = float(detector.spot_range(0.0, spot, diode, modulation_hz=train.modulation_hz))
-    wandering = math.hypot(spot, 2.0 * plate.u_offset_um * MICROMETRE)  # a place that is not certain widens the mean
-    here = float(detector.spot_range(plate.offset_um * MICROMETRE, wandering, diode, modulation_hz=train.modulation_hz))
-    return {middle: centre, off: here - centre}
+    wandering = math.hypot(spot, 2.0 * plate.u_offset_um * MICROMETRE)  # an uncertain place widens the mean
+    centred = float(
+        detector.spot_range(plate.offset_um * MICROMETRE, wandering, diode, modulation_hz=train.modulation_hz)
+    )
+    return {middle: centre, off: centred - centre}
 
 
 def _u_image(train: BeamTrain) -> float:
@@ -186,15 +188,18 @@ def _u_image(train: BeamTrain) -> float:
 
 
 def _into_laser(train: BeamTrain) -> dict[str, float]:
-    """Isolation, what comes back into the laser, and the most that its fringes move a range."""
+    """Isolation, light returning into the laser, and the range error of its fringes.
+
+    The largest error.
+    """
     quantities: dict[str, float] = {}
-    share, as_it_left = 1.0, 1.0
+    share, actual_share = 1.0, 1.0
     for element in train.outward:
         if element.kind == "isolator":
             device = _isolator(element)
-            left = isolator.jones_out(device)[:, 0]
-            share, as_it_left = share * isolator.back_share(device), as_it_left * isolator.back_share(device, left)
-            quantities["isolation_db"], quantities["worst_isolation_db"] = _decibel(as_it_left), _decibel(share)
+            field = isolator.jones_out(device)[:, 0]
+            share, actual_share = share * isolator.back_share(device), actual_share * isolator.back_share(device, field)
+            quantities["isolation_db"], quantities["worst_isolation_db"] = _decibel(actual_share), _decibel(share)
     if train.laser.back_reflection is None:
         return quantities
     share *= train.laser.back_reflection
@@ -213,40 +218,46 @@ def _decibel(share: float) -> float:
 
 
 def _outward(train: BeamTrain) -> tuple[NDArray[np.complex128], tuple[BeamPlace, ...], float]:
-    """The beam (2,) behind the last outward element, the places, and the power."""
-    q, power, way, kept = _laser_beam(train), train.laser.power_mw * 1e-3, 0.0, 1.0
+    """Beam (2,) behind the last outward element, the places, and the power."""
+    q, power, path, passed_share = _laser_beam(train), train.laser.power_mw * 1e-3, 0.0, 1.0
     light, places = _light(train), []
     for element in train.outward:
         if element.kind == "space":
-            q, way = abcd.onward(q, _matrices(train, element)), way + _length(element)
+            q, path = abcd.onward(q, _matrices(train, element)), path + _length(element)
             power *= element.transmission
             continue
         w = abcd.radius(q, light)
         edge = _aperture(element)
-        passed = min(kept, float(gaussian_beam.share_within_ellipse(edge, *w))) if math.isfinite(edge) else kept
-        clipped, kept = 1.0 - passed / kept, passed
+        passed = (
+            min(passed_share, float(gaussian_beam.share_within_ellipse(edge, *w)))
+            if math.isfinite(edge)
+            else passed_share
+        )
+        clipped, passed_share = 1.0 - passed / passed_share, passed
         power *= (1.0 - clipped) * _transmission(train, element)
-        places.append(BeamPlace("outward", _called(element), way, w, abcd.wavefront_curvature(q), edge, clipped, power))
-        q, way = abcd.onward(q, _matrices(train, element)), way + _length(element)
+        places.append(
+            BeamPlace("outward", _called(element), path, w, abcd.wavefront_curvature(q), edge, clipped, power)
+        )
+        q, path = abcd.onward(q, _matrices(train, element)), path + _length(element)
     return q, tuple(places), power
 
 
 def _returned(
-    train: BeamTrain, leaving: NDArray[np.complex128], power: float, distance: float, way: float
+    train: BeamTrain, leaving: NDArray[np.complex128], power: float, distance: float, path: float
 ) -> tuple[Returned, tuple[BeamPlace, ...]]:
-    """What comes back from a distance, and the places from the reflector to the detector."""
+    """Return from a distance, and the places from reflector to detector."""
     light, space = _light(train), abcd.free_space(distance)
     q, face = abcd.onward(leaving, space), train.reflector.radius_mm * MILLIMETRE
-    w, way = abcd.radius(q, light), way + distance
+    w, path = abcd.radius(q, light), path + distance
     hit = float(gaussian_beam.share_within_ellipse(face, *w))
-    whole = 1.0 - hit < UNCLIPPED
+    unclipped = 1.0 - hit < UNCLIPPED
     power *= hit * train.reflector.reflectance
     places = [
         BeamPlace(
-            "reflector", train.reflector.name or "reflector", way, w, abcd.wavefront_curvature(q), face, 1 - hit, power
+            "reflector", train.reflector.name or "reflector", path, w, abcd.wavefront_curvature(q), face, 1 - hit, power
         )
     ]
-    system, way, kept = np.broadcast_to(space, (2, 2, 2)), way + distance, 1.0
+    system, path, passed_share = np.broadcast_to(space, (2, 2, 2)), path + distance, 1.0
     stop, past_stop, status = None, np.broadcast_to(np.eye(2), (2, 2, 2)), "ok"
     last = train.detector
     steps = [*train.inward, BeamElement(kind="aperture", name="detector", aperture_radius_mm=last.radius_mm)]
@@ -254,60 +265,62 @@ def _returned(
         edge, step = _aperture(element), _matrices(train, element)
         ending = number == len(steps) - 1
         if element.kind != "space":
-            now, clipped = abcd.onward(q, system), 0.0
+            beam, clipped = abcd.onward(q, system), 0.0
             if math.isfinite(edge) and status == "ok":
                 try:
-                    if whole:
-                        share = float(gaussian_beam.share_within_ellipse(edge, *abcd.radius(now, light)))
-                        passed = min(kept, share) if not ending else kept * share
+                    if unclipped:
+                        share = float(gaussian_beam.share_within_ellipse(edge, *abcd.radius(beam, light)))
+                        passed = min(passed_share, share) if not ending else passed_share * share
                         if ending and stop is not None and np.all(past_stop[:, 0, 1] != 0.0):
                             shares = _detected(abcd.onward(q, stop[1]), light, [stop[0], edge], [past_stop])
-                            passed = kept * float(shares[1] / shares[0])
+                            passed = passed_share * float(shares[1] / shares[0])
                     elif ending and stop is not None and np.all(past_stop[:, 0, 1] != 0.0):
                         shares = _detected(q, light, [face, stop[0], edge], [stop[1], past_stop])
-                        passed = kept * float(shares[2] / shares[1])
+                        passed = passed_share * float(shares[2] / shares[1])
                     else:
                         shares = _diffracted(q, light, [face, edge], [system])
-                        passed = min(kept, float(shares[1] / shares[0]))
-                    if kept - passed > (UNCLIPPED if whole else 0.0) and not ending:
+                        passed = min(passed_share, float(shares[1] / shares[0]))
+                    if passed_share - passed > (UNCLIPPED if unclipped else 0.0) and not ending:
                         stop, past_stop = (edge, system), np.broadcast_to(np.eye(2), (2, 2, 2))
-                    clipped, kept = 1.0 - passed / kept, passed
+                    clipped, passed_share = 1.0 - passed / passed_share, passed
                 except ValidityError as problem:
-                    status, kept, power = str(problem), math.nan, math.nan
+                    status, passed_share, power = str(problem), math.nan, math.nan
             clipped = clipped if status == "ok" else math.nan
             power *= (1.0 - clipped) * _transmission(train, element)
             size, bend = (
-                (abcd.radius(now, light), abcd.wavefront_curvature(now)) if whole else (np.full(2, np.nan),) * 2
+                (abcd.radius(beam, light), abcd.wavefront_curvature(beam)) if unclipped else (np.full(2, np.nan),) * 2
             )
             leg = "detector" if ending else "inward"
-            places.append(BeamPlace(leg, _called(element), way, size, bend, edge, clipped, power))
+            places.append(BeamPlace(leg, _called(element), path, size, bend, edge, clipped, power))
         power *= element.transmission if element.kind == "space" else 1.0
-        system, past_stop, way = step @ system, step @ past_stop, way + _length(element)
-    return Returned(distance, w, hit, float(kept), float(power), status), tuple(places)
+        system, past_stop, path = step @ system, step @ past_stop, path + _length(element)
+    return Returned(distance, w, hit, float(passed_share), float(power), status), tuple(places)
 
 
 def beam_profile(train: BeamTrain, points: int = 60) -> dict[str, tuple[Array, Array]]:
-    """Way (n,), m from the laser, and radii (n, 2), m, along the whole path, by leg: outward, range, back, inward.
+    """Path (n,), m from the laser, and radii (n, 2), m, by leg.
+
+    Legs outward, range, back, inward.
 
     train    the record
-    points   on each way through air
+    points   on each path through air
 
-    What the beam would be if nothing clipped it.
+    The unclipped beam.
 
     Source: `abcd.onward`.
     """
-    q, way = _laser_beam(train), 0.0
-    there = BeamElement(kind="space", length_mm=train.distance_m / MILLIMETRE)
-    legs = {"outward": train.outward, "range": (there,), "back": (there,), "inward": train.inward}
+    q, path = _laser_beam(train), 0.0
+    space = BeamElement(kind="space", length_mm=train.distance_m / MILLIMETRE)
+    legs = {"outward": train.outward, "range": (space,), "back": (space,), "inward": train.inward}
     profile = {}
     for leg, elements in legs.items():
-        ways, radii = [np.array([way])], [abcd.radius(q, _light(train))[None]]
+        ways, radii = [np.array([path])], [abcd.radius(q, _light(train))[None]]
         for element in elements:
             inside = np.linspace(0.0, _length(element), points) if element.kind == "space" else np.array([])
             for step in inside[1:]:
-                ways.append(np.array([way + step]))
+                ways.append(np.array([path + step]))
                 radii.append(abcd.radius(abcd.onward(q, abcd.free_space(step)), _light(train))[None])
-            q, way = abcd.onward(q, _matrices(train, element)), way + _length(element)
+            q, path = abcd.onward(q, _matrices(train, element)), path + _length(element)
         profile[leg] = np.concatenate(ways), np.concatenate(radii)
     return profile
 
@@ -317,15 +330,17 @@ def _diffracted(q: NDArray[np.complex128], light: Array, discs: list[float], sys
 
 
 def _detected(q: NDArray[np.complex128], light: Array, discs: list[float], systems: list[Array]) -> Array:
-    """Shares (d,) of the light within discs, the detector last; one that is wider than all light takes it all.
+    """Shares (d,) of the light within discs, the detector last.
+
+    A disc wider than all light receives it all.
 
     That is within the 2/(pi ALL_LIGHT), 2 %, that an evenly lit edge spreads beyond; within 0.5 % of usual beams.
     """
     try:
         return _diffracted(q, light, discs, systems)
     except ValidityError:
-        given: dict[str, Any] = {"wavelengths": light, "discs": discs, "systems": systems}
-        if gaussian_beam.lit_edges(q, **given, spread=ALL_LIGHT)[-1] >= discs[-1]:
+        arguments: dict[str, Any] = {"wavelengths": light, "discs": discs, "systems": systems}
+        if gaussian_beam.lit_edges(q, **arguments, spread=ALL_LIGHT)[-1] >= discs[-1]:
             raise
     shares = _diffracted(q, light, discs[:-1], systems[:-1])
     return np.append(shares, shares[-1])
@@ -345,7 +360,7 @@ def _laser_beam(train: BeamTrain) -> NDArray[np.complex128]:
 
 
 def _waist(laser: Laser, axis: str, light: float) -> float:
-    """Radius of the waist, m: given, or wavelength M^2/(pi tan half angle)."""
+    """Radius of the waist, m: typed, or wavelength M^2/(pi tan half angle)."""
     waist = getattr(laser, f"waist_{axis}_um")
     if waist is not None:
         return waist * MICROMETRE
@@ -375,7 +390,10 @@ def _matrices(train: BeamTrain, element: BeamElement) -> Array:
 
 
 def _transmission(train: BeamTrain, element: BeamElement) -> float:
-    """Of an element, the reflectance of its coating and an isolator's own angles in it."""
+    """Transmission of an element.
+
+    Reflectance of its coating and an isolator's angles included.
+    """
     if element.kind == "mirror" and element.coating is not None:
         return element.transmission * _reflected(train, element)[0]
     if element.kind == "isolator":
@@ -384,7 +402,7 @@ def _transmission(train: BeamTrain, element: BeamElement) -> float:
 
 
 def _isolator(element: BeamElement) -> isolator.Isolator:
-    """An isolator whose first polarizer lies along the laser's field."""
+    """Isolator with its first polarizer along the laser's field."""
     usual = isolator.Isolator()
     return isolator.Isolator(
         turn=usual.turn if element.turn_deg is None else element.turn_deg * DEGREE,
@@ -394,7 +412,10 @@ def _isolator(element: BeamElement) -> isolator.Isolator:
 
 
 def _reflected(train: BeamTrain, element: BeamElement) -> tuple[float, float]:
-    """Reflectance of a coated mirror, and the group path, m, that it adds, for the polarization that it meets."""
+    """Reflectance of a coated mirror, and its group path, m.
+
+    For the polarization that it meets.
+    """
     angle = (element.incidence_deg or 0.0) * DEGREE
     mirror_coating = coating.named(element.coating or "", train.wavelength_um, angle)
     power, path = 0.0, 0.0
@@ -407,14 +428,16 @@ def _reflected(train: BeamTrain, element: BeamElement) -> tuple[float, float]:
 
 
 def _polarization(train: BeamTrain, element: BeamElement) -> Mapping[coating.Polarization, float]:
-    """Shares of s and p on a mirror: each isolator on the way leaves the field turned by half a right angle.
+    """Shares of s and p polarization on a mirror.
 
-    A retroreflector is taken to keep the polarization.
+    Each isolator on the path turns the field by half a right angle.
+
+    A retroreflector is assumed to keep the polarization.
     """
     passed = sum(e.kind == "isolator" for e in takewhile(lambda e: e is not element, train.outward))
-    kept = math.cos(passed * isolator.DESIGN_TURN) ** 2
+    s_share = math.cos(passed * isolator.DESIGN_TURN) ** 2
     along = train.laser.polarization == (element.plane or "x")
-    return {"p": kept if along else 1.0 - kept, "s": 1.0 - kept if along else kept}
+    return {"p": s_share if along else 1.0 - s_share, "s": 1.0 - s_share if along else s_share}
 
 
 def _indices(train: BeamTrain, element: BeamElement) -> tuple[float, float]:
@@ -424,7 +447,7 @@ def _indices(train: BeamTrain, element: BeamElement) -> tuple[float, float]:
 
 
 def _length(element: BeamElement) -> float:
-    """Way, m, that an element adds to the path: its thickness, not its optical path."""
+    """Path length, m, of an element: its thickness, not its optical path."""
     return (element.length_mm or element.thickness_mm or 0.0) * MILLIMETRE
 
 

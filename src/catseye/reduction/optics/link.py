@@ -1,4 +1,4 @@
-"""A head, its optics and a retroreflector, as far as a link budget asks."""
+"""Head, optics and retroreflector for a link budget."""
 
 import math
 from dataclasses import dataclass, replace
@@ -8,9 +8,11 @@ from catseye.errors import ValidityError
 
 @dataclass(frozen=True)
 class Link:
-    """A head and its optics. The defaults are a plausible head of the 1990s, not a measured one: give your own.
+    """Head and its optics.
 
-    power                 W, mean, of the laser; the notes' reference [78] speaks of 10 mW
+    The defaults are a plausible head of the 1990s, not a measured one: set your own.
+
+    power                 W, mean, of the laser; the notes' reference [78] has 10 mW
     depth                 modulation depth of the light
     wavelength            m, of the light
     modulation_hz         Hz
@@ -20,13 +22,13 @@ class Link:
     responsivity          A/W at the modulation frequency
     amplifier             A/sqrt(Hz), input noise
     intensity_noise_db_hz dB/Hz, of the laser near the modulation
-    volts_per_ampere      V at the converter for each A of signal current; from a return that was measured, see `scaled`
-    blocked_noise_volt    V, rms of the samples with the beam blocked, what light does not explain: oscillators, mixer,
+    volts_per_ampere      V at the converter for each A of signal current; from a measured return, see `scaled`
+    blocked_noise_volt    V, rms of the samples with the beam blocked, noise not from light: oscillators, mixer,
                           amplifiers after it; night-01's heads show 0.17 to 0.25 V
-    full_scale_volt       V, largest that the converter takes
+    full_scale_volt       V, largest input of the converter
     samples_per_second    of the converter; with `bits` its rounding
     duration              s, of one range
-    crosstalk             amplitude of what leaks within the head over that of a 1 V return, uncorrected rest
+    crosstalk             amplitude of the residual leakage within the head relative to a 1 V return
     extinction_per_m      1/m, of the air
     """
 
@@ -50,7 +52,7 @@ class Link:
     extinction_per_m: float = 1e-5
 
     def scaled(self, computed_volt: float, measured_volt: float) -> "Link":
-        """This link with the gain that makes a computed amplitude the measured one."""
+        """Link with the gain that makes a computed amplitude the measured one."""
         if not 0.0 < measured_volt < math.inf:
             raise ValidityError(f"measured return {measured_volt} V is not above 0 and finite")
         return replace(self, volts_per_ampere=self.volts_per_ampere * measured_volt / computed_volt)
@@ -58,11 +60,11 @@ class Link:
 
 @dataclass(frozen=True)
 class LinkReflector:
-    """A retroreflector as the beam meets it.
+    """Retroreflector as the beam meets it.
 
     aperture     m, radius of the clear face; the GBT's prisms have 25.4 mm
     height       m, of the corner behind the face
-    index        phase index of what fills it: 1 for a hollow cube
+    index        phase index of its material: 1 for a hollow cube
     reflectance  of all its surfaces
     """
 

@@ -1,4 +1,4 @@
-"""What a return should be: from the laser's power over target and optics to volts and the range's noise."""
+"""Expected return: laser power to volts and the range's noise."""
 
 from dataclasses import dataclass
 
@@ -18,18 +18,18 @@ NOISY = 1e-3  # m, noise of a range beyond which a link is doubtful
 
 @dataclass(frozen=True)
 class LinkBudget:
-    """Each factor between the laser and the range.
+    """Factors between the laser and the range.
 
-    factors          name: share of the power that is left by it, in order
+    factors          name: share of the power behind it, in order
     received         W on the detector
     amplitude_volt   at the converter
     u_volt           V, standard uncertainty of each quadrature of the phasor
     u_phase          rad, from noise alone
     u_range          m, from noise alone
-    crosstalk_range  m, the largest error of the crosstalk that is left: a bias, not noise; a quarter of half a
+    crosstalk_range  m, largest error of the residual crosstalk: a bias, not noise; a quarter of half a
                      wavelength where it is as large as the return
     noise_shares     name: share of the noise's density
-    clipped          the amplitude exceeds the converter's range
+    clipped          True if the amplitude exceeds the converter's range
     """
 
     factors: dict[str, float]
@@ -64,16 +64,16 @@ def link_budget(
     """Expected amplitude and noise of the range to one retroreflector.
 
     link         head and optics
-    reflector    what sends the light back
+    reflector    the retroreflector
     distance     m, above 0
     incidence    rad, 0 to below a right angle, on the reflector's face
     offset       m, of the beam's axis from the reflector's centre
     background   W of daylight on the detector
 
-    What returns is computed by diffraction for a centred circular aperture as large as what is left of the clear one
-    at that incidence; a beam off centre is scaled by what it loses on the way out.
+    The return is computed by diffraction for a centred circular aperture as large as the effective clear one at that
+    incidence; a beam off centre is scaled by its loss on the outward path.
 
-    Raises ValidityError for values without meaning, for a near, wide aperture (see `returned_share`), and where no
+    Raises ValidityError for invalid values, for a near, wide aperture (see `returned_share`), and where no
     light comes back.
 
     Source: [SIEGMAN86] and [GOODMAN05] for the beam, [YARIV97] for the noise, [RIFE74] for the phase: see each.
@@ -83,7 +83,7 @@ def link_budget(
         raise ValidityError(f"incidence {incidence} rad is not within 0 and a right angle (expected below 1.5708)")
     clear = float(clear_share(incidence, aperture=reflector.aperture, height=reflector.height, index=reflector.index))
     if clear <= 0.0:
-        raise ValidityError(f"at an incidence of {np.degrees(incidence):.1f} deg nothing of the face sends light back")
+        raise ValidityError(f"at an incidence of {np.degrees(incidence):.1f} deg no part of the face returns light")
     effective = reflector.aperture * np.sqrt(clear)
     beam = float(radius(distance, waist=link.waist, wavelength=link.wavelength))
     hit = float(share_within(effective, beam, offset))
@@ -119,7 +119,10 @@ def link_budget(
 
 
 def _refuse_nonsense(link: Link, reflector: LinkReflector, offset: float, background: float) -> None:
-    """Factors of light lie above 0 and up to 1, what is divided by is above 0, noise and what is lost 0 or more."""
+    """Raise ValidityError for impossible factors.
+
+    Factors of light lie above 0 and up to 1, divisors above 0, noise and losses 0 or more.
+    """
     shares = {"depth": link.depth, "transmission": link.transmission, "reflectance": reflector.reflectance}
     for name, share in shares.items():
         if not 0.0 < share <= 1.0:
@@ -156,7 +159,7 @@ def _refuse_nonsense(link: Link, reflector: LinkReflector, offset: float, backgr
 
 
 def _noises(link: Link, received: float, background: float) -> dict[str, float]:
-    """One-sided densities at the converter, V^2/Hz."""
+    """One-sided noise densities at the converter, V^2/Hz."""
     gain = link.volts_per_ampere**2
     diode = {"responsivity": link.responsivity}
     light = gain * float(noise_density(received, **diode))

@@ -1,1 +1,1 @@
-"""The panel setting instrument: heights of corners, turns of screws, the crew's statistics."""
+"""Panel setting instrument: corner heights, screw turns, crew statistics."""

@@ -1,4 +1,7 @@
-"""A crew's work: how well corners lie as found and as left, how turns came out, who reads how well, day by day."""
+"""Statistics of a crew's work.
+
+Corners as found and as left, the result of turns, the quality of readings, day by day.
+"""
 
 from dataclasses import dataclass
 
@@ -7,17 +10,17 @@ from scipy.stats import chi2
 
 from catseye.reduction.panels.heights import PanelHeights, weighed_squares
 
-SURE = 0.95  # probability from which a corner counts as within, or (1 - it) as outside
-FEWEST = 2  # readings of a session that a control limit can be drawn for
+SURE = 0.95  # probability from which a corner counts as within; below 1 - SURE as outside
+FEWEST = 2  # least readings of a session for a control limit
 
 
 @dataclass(frozen=True)
 class CornerStanding:
-    """How corners lie about their neighbours' mean.
+    """Distribution of corners about their neighbours' mean.
 
     corners            panel corners with a relative height
     rms                m, of the relative heights as measured
-    rms_true           m, without what the measurement itself scatters: root of mean square less mean u², 0 if below
+    rms_true           m, without the measurement's scatter: root of mean square less mean u², 0 if below
     within             share with |relative| within the goal, as measured
     expected_within    share of truly conforming corners to be expected: mean of the conformity probabilities
     surely, surely_not, undecided   counts: probability above 0.95, below 0.05, between
@@ -36,13 +39,13 @@ class CornerStanding:
 
 
 def standing(heights: PanelHeights, chosen: np.ndarray | None = None) -> CornerStanding:
-    """The standing of corners (p, 4) bool, all that are known if None."""
-    known = heights.known if chosen is None else heights.known & chosen
-    h, u, p = heights.relative[known], heights.u_relative[known], heights.conforms[known]
+    """Statistics of corners (p, 4) bool; of all measured ones if None."""
+    selected = heights.known if chosen is None else heights.known & chosen
+    h, u, p = heights.relative[selected], heights.u_relative[selected], heights.conforms[selected]
     if not len(h):
         return CornerStanding(0, np.nan, np.nan, np.nan, np.nan, 0, 0, 0, np.nan)
     square = float(np.mean(h**2))
-    surely, not_so = int(np.sum(p >= SURE)), int(np.sum(p <= 1.0 - SURE))
+    surely, surely_not = int(np.sum(p >= SURE)), int(np.sum(p <= 1.0 - SURE))
     return CornerStanding(
         corners=len(h),
         rms=square**0.5,
@@ -50,23 +53,23 @@ def standing(heights: PanelHeights, chosen: np.ndarray | None = None) -> CornerS
         within=float(np.mean(np.abs(h) <= heights.sheet.goal_um * 1e-6)),
         expected_within=float(np.mean(p)),
         surely=surely,
-        surely_not=not_so,
-        undecided=len(h) - surely - not_so,
+        surely_not=surely_not,
+        undecided=len(h) - surely - surely_not,
         median_u=float(np.median(u)),
     )
 
 
 @dataclass(frozen=True)
 class Reader:
-    """How well the readings of one member, or of one session, agree with the rest.
+    """Agreement of one member's or one session's readings with the others.
 
-    name               whose
+    name               of member or session
     readings           used
     variance_factor    1 if they scatter as the sheet claims
     low, high          its limits: 99.7 % of good ones lie between
-    u_gauge            m, repeatability that their scatter speaks for: the sheet's, times the root of the factor
+    u_gauge            m, repeatability by their scatter: the sheet's, times the root of the factor
     doubts             readings in doubt
-    corners            relative heights that they read
+    corners            relative heights from their readings
     closure            (4,) m, mean change of each gauge's zero on the flat, last less first; nan without two
     """
 
@@ -82,18 +85,21 @@ class Reader:
 
     @property
     def in_control(self) -> bool:
-        """Whether the variance factor lies within its limits."""
+        """True if the variance factor lies within its limits."""
         return bool(self.low <= self.variance_factor <= self.high)
 
 
 def members(heights: PanelHeights) -> list[Reader]:
-    """How well each member of the crew reads, in order of names."""
+    """Agreement of each crew member's readings, by name."""
     who = np.array(heights.readings.member)
     return [_reader(heights, name, who == name) for name in sorted(set(heights.readings.member))]
 
 
 def sessions(heights: PanelHeights) -> list[Reader]:
-    """How well each session's readings agree, in the order of the table: the points of the control chart."""
+    """Agreement of each session's readings, in the table's order.
+
+    The points of the control chart.
+    """
     return [_reader(heights, name, heights.readings.session == k) for k, name in enumerate(heights.readings.sessions)]
 
 
@@ -118,7 +124,10 @@ def _reader(heights: PanelHeights, name: str, rows: np.ndarray) -> Reader:
 
 
 def _closure(heights: PanelHeights, rows: np.ndarray) -> tuple[float, float, float, float]:
-    """Last reading on the flat less the first, by gauge, mean over sessions."""
+    """Last reading on the flat minus the first.
+
+    By gauge, mean over sessions.
+    """
     readings = heights.readings
     changes = []
     for s in range(len(readings.sessions)):
@@ -131,13 +140,13 @@ def _closure(heights: PanelHeights, rows: np.ndarray) -> tuple[float, float, flo
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """What turning the screws did, corner by corner that both tables know.
+    """Result of turning the screws, by corners that both tables hold.
 
     names          (k,) panel and corner
-    wanted         (k,) m, change that was asked for: relative height as found, opposite
-    got            (k,) m, change that came
+    wanted         (k,) m, intended change: relative height as found, opposite sign
+    got            (k,) m, actual change
     gain, u_gain   got over wanted, a straight line through zero by weighted least squares; 1 is perfect
-    scatter        m, rms of got less gain times wanted: turning and reading together, not what maps have wrong
+    scatter        m, rms of got less gain times wanted: turning and reading together, without errors of maps
 
     Both changes hold the readings as found, which pulls the gain towards 1: by u²/rms² of them, 0.2 % at 10 µm of 200.
     """
@@ -151,7 +160,10 @@ class Setting:
 
 
 def setting(as_found: PanelHeights, as_left: PanelHeights) -> Setting | None:
-    """How the crew's turns came out, or None where the two tables have fewer than three corners in common."""
+    """Result of the crew's turns.
+
+    None where the two tables have fewer than three corners in common.
+    """
     where = {(p, c): (i, k) for i, k, p, c in _named(as_found)}
     names, a, b = [], [], []
     for i, k, p, c in _named(as_left):
@@ -162,19 +174,19 @@ def setting(as_found: PanelHeights, as_left: PanelHeights) -> Setting | None:
     if len(names) < 3:
         return None
     one, two = tuple(np.array(a).T), tuple(np.array(b).T)
-    wanted = -as_found.relative[one]
+    intended = -as_found.relative[one]
     got = as_left.relative[two] - as_found.relative[one]
     u = np.hypot(as_found.u_relative[one], as_left.u_relative[two])
     weight = 1.0 / (u**2 + (as_found.sheet.screw.u_turn * as_found.sheet.screw.pitch_mm * 1e-3) ** 2)
-    gain = float(np.sum(weight * wanted * got) / np.sum(weight * wanted**2))
-    rest = got - gain * wanted
+    gain = float(np.sum(weight * intended * got) / np.sum(weight * intended**2))
+    remainder = got - gain * intended
     return Setting(
         names=tuple(names),
-        wanted=wanted,
+        wanted=intended,
         got=got,
         gain=gain,
-        u_gain=float(np.sqrt(np.mean(weight * rest**2) / np.sum(weight * wanted**2))),
-        scatter=float(np.sqrt(np.mean(rest**2))),
+        u_gain=float(np.sqrt(np.mean(weight * remainder**2) / np.sum(weight * intended**2))),
+        scatter=float(np.sqrt(np.mean(remainder**2))),
     )
 
 
@@ -186,7 +198,7 @@ def _named(heights: PanelHeights) -> list[tuple[int, int, str, str]]:
 
 
 def zeros(heights: PanelHeights) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """Each session's name, (4,) zeros of the gauges and their u, m."""
+    """Zeros (4,) of each session's gauges and their u, m, with its name."""
     at = heights.model.columns
     gauge = np.arange(4)
     zeros_by_session = []

@@ -1,10 +1,10 @@
-"""Readings of the panel setting instrument to heights of panel corners, and to turns of their screws.
+"""Corner heights and screw turns from panel setting instrument readings.
 
-Two things are set at a corner. The screws set the panels' corners to each other: what counts is each height beside the
-mean of those that meet there, which the tool sees to some µm whatever the rest of the dish does. The actuator under
-them moves all alike: that mean over the design is seen through the shaft's height, as well as the lasers know it.
-A height here is a departure: of the panel's surface from design offset and map, so that zero at all corners lays the
-panel's best fit on the design.
+Two things are set at a corner. The screws set the panels' corners to each other: only each height relative to the
+mean of those that meet there counts, which the tool measures to some µm whatever the rest of the dish does. The
+actuator under them moves all alike: that mean over the design is measured through the shaft's height, only as
+accurately as the lasers determine it. A height here is a departure: of the panel's surface from design offset and map,
+so that zero at all corners lays the panel's best fit on the design.
 """
 
 from collections.abc import Mapping
@@ -24,20 +24,20 @@ from catseye.records.panels.readings import PanelReadings, PanelSurvey
 from catseye.reduction.panels.maps import FittedMap
 from catseye.reduction.panels.model import PanelModel, corner_places, panel_model, used_layout
 
-LEVEL = 0.05  # of the tests: chance of any false alarm among all readings
+LEVEL = 0.05  # of the tests: probability of a false alarm among all readings
 DECISIVE = 9.0  # difference of squared statistics below which two readings explain a conflict alike
-ROUNDS = 12  # of leaving out, one reading a corner at a time
+ROUNDS = 12  # of rejection, one reading a corner at a time
 
 
 @dataclass(frozen=True)
 class Doubt:
-    """A reading that its neighbours contradict.
+    """Reading contradicted by its neighbours.
 
-    corner, panel, gauge, member, where   which
-    error    m, that explains it best (observed minus expected)
+    corner, panel, gauge, member, where   of the reading
+    error    m, best explanation (observed minus expected)
     w        its test statistic
     rivals   other readings of the corner that explain the conflict as well: "line 9, c_mm"
-    out      left out of the answer
+    out      True if rejected
     """
 
     corner: str
@@ -53,20 +53,22 @@ class Doubt:
 
 @dataclass(frozen=True, eq=False)
 class PanelHeights:
-    """Heights of panel corners from a table of readings; arrays (p, 4) by panel and place of the layout used, m.
+    """Heights of panel corners from a table of readings.
+
+    Arrays (p, 4) by panel and place of the layout used, m.
 
     layout            panels that were read
-    readings, model, solution   how it came about
-    times             (p, 4) readings used at the corner; without one the rest is inferred, not read
+    readings, model, solution   of the adjustment
+    times             (p, 4) readings used at the corner; 0: the height is inferred, not read
     departure         of the corner from design and map; u_departure its standard uncertainty
     relative          departure less the mean of those read at the same corner, nan where fewer than two meet
     u_relative        of it
     conforms          probability that |relative| is within the goal
     turns             clockwise above zero, that brings relative to zero; u_turns of them
-    actuator          (c,) m, mean departure read at a corner, which the actuator takes away with the opposite; nan
+    actuator          (c,) m, mean departure read at a corner, corrected by the opposite travel of the actuator; nan
     u_actuator        (c,)
     fit               (p, 3) piston (m) and slopes (rad) of each panel's best fit along its x and y; u_fit
-    doubts            readings in doubt, of each corner the worst and what explains the conflict as well; worst first
+    doubts            readings in doubt: the worst of each corner and its rivals; worst first
     variance_factor, degrees_of_freedom
     """
 
@@ -94,7 +96,7 @@ class PanelHeights:
 
     @property
     def known(self) -> np.ndarray:
-        """(p, 4) bool: a relative height was found."""
+        """True (p, 4) where a relative height was measured."""
         return np.isfinite(self.relative)
 
     def value(self, parameter: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -114,9 +116,9 @@ def reduce_panels(
     """Heights and turns from a table of readings.
 
     readings, layout, sheet   as read
-    survey   heights of shafts; without it heights of the whole surface hang on `u_set_um` alone, relative ones do not
+    survey   heights of shafts; without it heights of the whole surface depend on `u_set_um` alone, relative ones do not
     maps     of panels by name
-    reject   leave out what the tests reject, both of two where nothing tells which is wrong
+    reject   leave out rejected readings, both of two where nothing decides which is wrong
 
     Raises InputError for readings that touch no panel, EstimationError where there is no answer.
     """
@@ -124,8 +126,8 @@ def reduce_panels(
     number = np.full(len(layout.corners), -1)
     number[corners] = np.arange(len(corners))
     used_readings = _renumbered(readings, number)
-    known = None if survey is None else _survey_of(survey, number)
-    model = panel_model(used_readings, used, sheet, survey=known, maps=maps)
+    shaft_heights = None if survey is None else _survey_of(survey, number)
+    model = panel_model(used_readings, used, sheet, survey=shaft_heights, maps=maps)
     active = [np.ones(len(g.observed), dtype=bool) for g in model.groups]
     solution = _solved(model, active)
     first = _doubts(model, used_readings, sheet, solution)
@@ -140,7 +142,13 @@ def reduce_panels(
         solution = _solved(model, active)
     named = [_left_out(d) for _, d in out] if reject else [d for _, d in _worst_of_corners(first)]
     return _heights(
-        used, sheet, used_readings, model, solution, tuple(sorted(named, key=lambda d: -abs(d.w))), known is not None
+        used,
+        sheet,
+        used_readings,
+        model,
+        solution,
+        tuple(sorted(named, key=lambda d: -abs(d.w))),
+        shaft_heights is not None,
     )
 
 
@@ -161,14 +169,17 @@ def _renumbered(readings: PanelReadings, number: np.ndarray) -> PanelReadings:
 
 
 def _survey_of(survey: PanelSurvey, number: np.ndarray) -> PanelSurvey:
-    here = number[survey.corner] >= 0
-    return PanelSurvey(number[survey.corner[here]], survey.height[here], survey.u[here], survey.digest)
+    on_layout = number[survey.corner] >= 0
+    return PanelSurvey(number[survey.corner[on_layout]], survey.height[on_layout], survey.u[on_layout], survey.digest)
 
 
 def _doubts(
     model: PanelModel, readings: PanelReadings, sheet: PanelInstrument, solution: LeastSquaresSolution
 ) -> list[tuple[tuple[int, int], Doubt, list[tuple[int, int]]]]:
-    """Readings that the tests reject: (group, row), what is said of each, and its rivals' (group, row)."""
+    """Readings that the tests reject, with their rivals.
+
+    (group, row), the doubt, and its rivals' (group, row).
+    """
     fits = solution.fits[: len(model.blocks)]
     tested = [f.active & checked(f) for f in fits]
     many = int(sum(t.sum() for t in tested))
@@ -181,26 +192,26 @@ def _doubts(
         corner = model.tips.corner[block]
         for k in np.flatnonzero(size > critical):
             alike = np.flatnonzero((corner == corner[k]) & test & (size[k] ** 2 - size**2 < DECISIVE))
-            others = [int(j) for j in alike if j != k]
+            rivals_of_row = [int(j) for j in alike if j != k]
             doubt = _doubt(model, readings, sheet, block[k], fit.estimated_error[k], fit.standardised[k])
-            rivals = tuple(_reading(model, readings, sheet, block[j]) for j in others)
-            doubts.append(((g, int(k)), Doubt(**{**doubt.__dict__, "rivals": rivals}), [(g, j) for j in others]))
+            rivals = tuple(_reading(model, readings, sheet, block[j]) for j in rivals_of_row)
+            doubts.append(((g, int(k)), Doubt(**{**doubt.__dict__, "rivals": rivals}), [(g, j) for j in rivals_of_row]))
     return sorted(doubts, key=lambda item: -abs(item[1].w))
 
 
 def _worst_of_corners(
     doubts: list[tuple[tuple[int, int], Doubt, list[tuple[int, int]]]],
 ) -> list[tuple[tuple[int, int], Doubt]]:
-    """Of each corner the worst reading with its rivals."""
+    """Worst reading of each corner with its rivals."""
     worst: dict[str, tuple[tuple[int, int], Doubt, list[tuple[int, int]]]] = {}
     doubt_at = {at: d for at, d, _ in doubts}
     for item in doubts:
         worst.setdefault(item[1].corner, item)
-    doubted = []
+    selection = []
     for at, doubt, rivals in worst.values():
-        doubted.append((at, doubt))
-        doubted += [(other, doubt_at.get(other, doubt)) for other in rivals if other in doubt_at]
-    return doubted
+        selection.append((at, doubt))
+        selection += [(rival, doubt_at.get(rival, doubt)) for rival in rivals if rival in doubt_at]
+    return selection
 
 
 def _reading(model: PanelModel, readings: PanelReadings, sheet: PanelInstrument, tip: int) -> str:
@@ -225,7 +236,7 @@ def _doubt(
 
 
 def times_read(model: PanelModel, solution: LeastSquaresSolution) -> np.ndarray:
-    """(p, 4) readings used that touched the panel at that corner of its own."""
+    """Number (p, 4) of used readings at each corner of a panel."""
     times = np.zeros(model.target.shape, dtype=int)
     for fit, block in zip(solution.fits, model.blocks, strict=False):
         tip = block[fit.active]
@@ -236,9 +247,12 @@ def times_read(model: PanelModel, solution: LeastSquaresSolution) -> np.ndarray:
     return times
 
 
-def meetings(layout: PanelLayout, taken: np.ndarray) -> np.ndarray:
-    """(c, 4) columns of the corner heights that meet at each corner and are taken (p, 4), -1 filling up."""
-    column = np.flatnonzero(taken.ravel())
+def meetings(layout: PanelLayout, selected: np.ndarray) -> np.ndarray:
+    """Columns (c, 4) of the selected heights that meet at each corner.
+
+    Selected by (p, 4) bool; -1 fills up.
+    """
+    column = np.flatnonzero(selected.ravel())
     corner = layout.quad.ravel()[column]
     order = np.argsort(corner, kind="stable")
     column, corner = column[order], corner[order]
@@ -250,9 +264,9 @@ def meetings(layout: PanelLayout, taken: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class CornerHeights:
-    """Heights at corners from those of the panels that were read there, m.
+    """Heights at corners from the panels that were read there, m.
 
-    relative, u_relative   (p, 4) beside the mean of those that meet, nan where fewer than two do
+    relative, u_relative   (p, 4) minus the mean of those that meet, nan where fewer than two do
     mean, u_mean           (c,) of those that meet, nan where none was read
     """
 
@@ -265,7 +279,10 @@ class CornerHeights:
 def _corner_heights(
     layout: PanelLayout, model: PanelModel, solution: LeastSquaresSolution, departure: np.ndarray, times: np.ndarray
 ) -> CornerHeights:
-    """What the panels' departures (p, 4) say at each corner, of those that were read there `times` above none."""
+    """Corner heights by the panels' departures (p, 4).
+
+    Of those with `times` above zero.
+    """
     meet = meetings(layout, times > 0)
     on = meet >= 0
     count = on.sum(axis=1)
@@ -275,19 +292,22 @@ def _corner_heights(
     maps = np.where(on, u_map[meet] ** 2, 0.0)
 
     def variance(weight: np.ndarray) -> np.ndarray:
-        """Of weighted sums of the corners that meet, (c,): the tool's and the maps'."""
+        """Variance (c,) of weighted sums of the corners that meet.
+
+        The tool's and the maps'.
+        """
         inside = solution.q.products(meet, weight)
         return np.sum(np.where(on, inside * weight, 0.0), axis=1) + np.sum(maps * weight**2, axis=1)
 
-    beside, u_beside = np.full(len(flat), np.nan), np.full(len(flat), np.nan)
+    difference, u_difference = np.full(len(flat), np.nan), np.full(len(flat), np.nan)
     several = count > 1
     for k in range(meet.shape[1]):
-        here = several & on[:, k]
+        rows = several & on[:, k]
         weight = np.where(on, (np.arange(meet.shape[1]) == k) - share, 0.0)
-        beside[meet[here, k]] = flat[meet[here, k]] - mean[here]
-        u_beside[meet[here, k]] = np.sqrt(variance(weight)[here])
+        difference[meet[rows, k]] = flat[meet[rows, k]] - mean[rows]
+        u_difference[meet[rows, k]] = np.sqrt(variance(weight)[rows])
     u_mean = np.where(count > 0, np.sqrt(variance(share)), np.nan)
-    return CornerHeights(beside.reshape(departure.shape), u_beside.reshape(departure.shape), mean, u_mean)
+    return CornerHeights(difference.reshape(departure.shape), u_difference.reshape(departure.shape), mean, u_mean)
 
 
 def _heights(
@@ -335,7 +355,9 @@ def _heights(
 
 
 def conformity(value: np.ndarray, u: np.ndarray, goal: float) -> np.ndarray:
-    """Probability that the true value is within ± goal, after it was measured; nan where it was not.
+    """Probability that the true value is within ± goal.
+
+    After the measurement; nan without one.
 
     value, u   (...) m
     goal       m
@@ -351,7 +373,10 @@ def conformity(value: np.ndarray, u: np.ndarray, goal: float) -> np.ndarray:
 def panel_fits(
     layout: PanelLayout, solution: LeastSquaresSolution, departure: np.ndarray, *, u_target: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Piston and slopes (p, 3) of the plane through each panel's four corners, and their u; m and rad."""
+    """Plane through each panel's corners, and its u; m and rad.
+
+    Piston and slopes (p, 3).
+    """
     place = corner_places(layout)
     design = np.concatenate([np.ones((*place.shape[:2], 1)), place], axis=2)
     gain = np.linalg.pinv(design)  # (p, 3, 4)
@@ -364,19 +389,23 @@ def panel_fits(
 
 
 def surface_rms(heights: PanelHeights, departure: np.ndarray) -> tuple[float, np.ndarray]:
-    """Rms (m) of departures (p, 4) about the rigid motion of the whole dish that fits them best, and what is left.
+    """Rms (m) of departures (p, 4) about the dish's rigid motion.
+
+    And the remaining departures.
 
     Shift and tilts only, five columns: normals, and arms × normals about x and y; a turn about the axis does nothing.
     """
     at = axes(heights.layout.xy[heights.layout.quad].reshape(-1, 2), heights.layout.focal_length)
     arm = np.cross(at.origin, at.z)
     design = np.column_stack([at.z, arm[:, :2] / 50.0])
-    rest = departure.ravel() - design @ np.linalg.lstsq(design, departure.ravel(), rcond=1e-9)[0]
-    return float(np.sqrt(np.mean(rest**2))), rest.reshape(departure.shape)
+    remainder = departure.ravel() - design @ np.linalg.lstsq(design, departure.ravel(), rcond=1e-9)[0]
+    return float(np.sqrt(np.mean(remainder**2))), remainder.reshape(departure.shape)
 
 
 def weighed_squares(heights: PanelHeights) -> tuple[np.ndarray, np.ndarray]:
-    """Of each tip: its part of v' C^-1 v and its redundancy; they add up to a variance factor of any set of readings.
+    """Weighted square and redundancy of each tip.
+
+    Its part of v' C^-1 v; they add up to a variance factor of any set of readings.
 
     Part is v (C^-1 v), exact in sum also with correlations; nan of readings left out.
     """

@@ -1,4 +1,4 @@
-"""From the files of a crew to heights as found and as left, what turning the screws did, and notes for its report."""
+"""Recipe for a crew's files: heights as found and as left, turns, notes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,7 +22,10 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class PanelFiles:
-    """What to read: readings, sheet, and where given survey, maps and the readings as left."""
+    """Files to read.
+
+    Readings and sheet; optionally survey, maps and the readings as left.
+    """
 
     readings: Path
     sheet: Path
@@ -33,20 +36,20 @@ class PanelFiles:
 
     @property
     def all(self) -> tuple[Path, ...]:
-        given = (self.readings, self.sheet, self.survey, self.maps, self.as_left, self.survey_left)
-        return tuple(path for path in given if path is not None)
+        files = (self.readings, self.sheet, self.survey, self.maps, self.as_left, self.survey_left)
+        return tuple(path for path in files if path is not None)
 
 
 @dataclass(frozen=True, eq=False)
 class PanelWork:
-    """Heights as found and, if the crew read again, as left, with what turning the screws did between.
+    """Heights as found and as left, with the result of turning.
 
-    layout    the whole one
+    layout    of the whole dish
     found, left   heights as found and as left
-    setting   what turning did
+    setting   result of turning
     maps      by panel
     inputs    SHA-256 of each file read, by its name
-    notes     what a reader must know
+    notes     for the reader
     """
 
     layout: PanelLayout
@@ -60,19 +63,21 @@ class PanelWork:
 
     @property
     def latest(self) -> PanelHeights:
-        """As left where known, else as found: what screws are turned from."""
+        """Heights as left if available, else as found: input of the screw turns."""
         return self.found if self.left is None else self.left
 
 
 def panel_work(
     files: PanelFiles, layout: PanelLayout, *, reject: bool = False, progress: Progress | None = None
 ) -> PanelWork:
-    """Everything from the files; InputError or EstimationError in one line.
+    """Reduction of a crew's files.
+
+    Raises InputError or EstimationError in one line.
 
     files      paths
     layout     all panels of the dish
     reject     leave out readings that the tests reject
-    progress   told of each step
+    progress   called at each step
     """
 
     def say(what: str, turning: int) -> None:
@@ -84,7 +89,7 @@ def panel_work(
     names = [path.name for path in files.all]
     if len(set(names)) != len(names):
         double = next(n for n in names if names.count(n) > 1)
-        raise InputError(f"{double}: two inputs have this name (expected each its own, for the provenance)")
+        raise InputError(f"{double}: two inputs have this name (expected different names, for the provenance)")
     inputs = dict(layout.hashes) | {files.sheet.name: sha256(files.sheet.read_bytes()).hexdigest()}
     survey = None if files.survey is None else read_survey(files.survey, layout)
     later = survey if files.survey_left is None else read_survey(files.survey_left, layout)
@@ -103,10 +108,10 @@ def panel_work(
     as_found = reduce_panels(readings, layout, sheet, survey=survey, maps=maps, reject=reject)
     as_left = None
     if files.as_left is not None:
-        again = read_panel_readings(files.as_left, layout, sheet)
-        inputs[again.file] = again.digest
+        later_readings = read_panel_readings(files.as_left, layout, sheet)
+        inputs[later_readings.file] = later_readings.digest
         say("solving as left", 3)
-        as_left = reduce_panels(again, layout, sheet, survey=later, maps=maps, reject=reject)
+        as_left = reduce_panels(later_readings, layout, sheet, survey=later, maps=maps, reject=reject)
     turning = None if as_left is None else setting(as_found, as_left)
     return PanelWork(
         layout,
@@ -121,10 +126,12 @@ def panel_work(
 
 
 def verdicts(heights: PanelHeights) -> np.ndarray:
-    """(p, 4) words: "leave", "turn", "read" where no reading is used, "alone" where no other panel is beside it.
+    """Advice (p, 4): "leave", "turn", "read" or "alone".
 
-    Left alone is what is within the goal with a probability of 0.95, and what a turn would not bring nearer to that by
-    0.05: after it a corner is known as well as now, and as well as a turn is made.
+    "read" where no reading is used, "alone" without an adjacent panel.
+
+    "leave": within the goal with a probability of 0.95, or not improved by 0.05 by a turn: after it a corner has the
+    present uncertainty and that of the turn.
     """
     screw = heights.sheet.screw
     after = np.hypot(heights.u_relative, screw.u_turn * screw.pitch_mm * MILLIMETRE)
@@ -134,7 +141,7 @@ def verdicts(heights: PanelHeights) -> np.ndarray:
 
 
 def beyond_lean(heights: PanelHeights) -> list[str]:
-    """Placements whose lean is over the sheet's limit."""
+    """Placements with a lean over the sheet's limit."""
     lean = np.hypot(*heights.readings.lean.T) / ARCSECOND / 60.0
     far = np.flatnonzero(np.nan_to_num(lean) > heights.sheet.lean_limit_arcmin)
     return [f"{heights.readings.where[k]} ({lean[k]:.1f}′)" for k in far]
@@ -150,7 +157,7 @@ def _notes(
     notes = []
     if not as_found.surveyed:
         notes.append(
-            "No survey of the actuators: heights of the whole surface hang on u_set_um alone, only relative heights "
+            "No survey of the actuators: heights of the whole surface depend on u_set_um alone, only relative heights "
             "at a corner are measured; the gauges touch panels beside the corner, so that even these carry the "
             "unknown slopes of panels."
         )
@@ -161,7 +168,7 @@ def _notes(
         notes.append(f"{len(bare)} of {len(as_found.layout.panels)} panels read have no map ({bare[0]} among them).")
     if len(as_found.layout.panels) < len(layout.panels):
         notes.append(
-            f"{len(as_found.layout.panels)} of {len(layout.panels)} panels were read; the rest is not told of."
+            f"{len(as_found.layout.panels)} of {len(layout.panels)} panels were read; the others are not reported."
         )
     if np.isnan(as_found.readings.lean[as_found.readings.corner >= 0, 0]).any():
         notes.append("Where no lean was read, the shaft counts as upright within the sheet's limit over root three.")
@@ -171,12 +178,12 @@ def _notes(
         far = beyond_lean(one)
         if far:
             notes.append(f"{name}: the shaft leans beyond the limit in {len(far)} placements, first {far[0]}.")
-        again = sorted({d.corner for d in one.doubts if d.rivals})
-        if again:
+        repeated = sorted({d.corner for d in one.doubts if d.rivals})
+        if repeated:
             notes.append(
-                f"{name}: at {', '.join(again[:6])}{' ...' if len(again) > 6 else ''} nothing tells which of two "
-                "readings is wrong; a placement in another turn would."
+                f"{name}: at {', '.join(repeated[:6])}{' ...' if len(repeated) > 6 else ''} undecided which of two "
+                "readings is wrong; a placement in another turn would decide."
             )
     if as_left is not None and turning is None:
-        notes.append("As found and as left have fewer than three corners in common: nothing is said of the turns.")
+        notes.append("As found and as left have fewer than three corners in common: the turns are not judged.")
     return notes

@@ -1,4 +1,4 @@
-"""Maps of a coordinate measuring machine: the panel's best fit to its design, and its shape beside that."""
+"""Coordinate measuring machine maps: best fit of a panel, and its shape."""
 
 from dataclasses import dataclass
 
@@ -10,18 +10,18 @@ from catseye.records.panels.readings import PanelMap
 
 ROUNDS = 50
 SETTLED = 1e-9  # m: a nanometre
-NEIGHBOURS = 8  # points of the map that speak for a place
+NEIGHBOURS = 8  # points of the map used for a place
 FARTHEST = 0.5  # m from a place to the nearest point of the map
 
 
 @dataclass(frozen=True, eq=False)
 class FittedMap:
-    """A panel's map about its best fit.
+    """Panel map about its best fit.
 
     panel      name
     xy         (k, 2) m, panel's axes
     shape      (k,) m, deviation beside the best fit
-    fit        (3,) piston (m) and slopes along x and y of the best fit: how the panel lay on the machine
+    fit        (3,) piston (m) and slopes along x and y of the best fit: the panel's position on the machine
     u_fit      (3,) from the scatter of the shape, as if it were noise
     rms        m, of the shape
     outlying   (k,) bool, weight below a half
@@ -36,9 +36,11 @@ class FittedMap:
     outlying: np.ndarray
 
     def at(self, xy: np.ndarray) -> np.ndarray:
-        """The shape at places (m, 2) of the panel's axes, m: plane through the nearest points, nearer ones heavier.
+        """Shape at places (m, 2) of the panel's axes, m.
 
-        Raises InputError for a place that the map does not come near.
+        Plane through the nearest points, nearer ones with larger weight.
+
+        Raises InputError for a place far from the map.
         """
         from scipy.spatial import cKDTree
 
@@ -59,9 +61,9 @@ class FittedMap:
 
 
 def fitted_map(panel_map: PanelMap) -> FittedMap:
-    """Piston and two tilts that fit a map best, robustly, and the shape that is left.
+    """Robust best fit of a map (piston and two tilts), and its shape.
 
-    panel_map   a map; its own tilt is how the panel lay on the machine and says nothing of the panel
+    panel_map   a map; its tilt is the panel's position on the machine, no property of the panel
 
     Huber's weights with the scale from the median absolute residual.
 
@@ -74,22 +76,22 @@ def fitted_map(panel_map: PanelMap) -> FittedMap:
     for _ in range(ROUNDS):
         root = np.sqrt(weight)
         refitted = np.linalg.lstsq(design / size * root[:, None], panel_map.deviation * root, rcond=None)[0] / size
-        rest = panel_map.deviation - design @ refitted
+        residual = panel_map.deviation - design @ refitted
         moved = float(np.max(np.abs(design @ (refitted - fit))))
         fit = refitted
-        scale = MAD_TO_SIGMA * float(np.median(np.abs(rest)))
+        scale = MAD_TO_SIGMA * float(np.median(np.abs(residual)))
         if moved < SETTLED or scale == 0.0:
             break
-        weight = huber(rest / scale)
-    rest = panel_map.deviation - design @ fit
-    s = float(np.sqrt(np.sum(weight * rest**2) / max(k - 3, 1)))
+        weight = huber(residual / scale)
+    residual = panel_map.deviation - design @ fit
+    s = float(np.sqrt(np.sum(weight * residual**2) / max(k - 3, 1)))
     q = np.linalg.inv(design.T @ (design * weight[:, None]))
     return FittedMap(
         panel_map.panel,
         panel_map.xy,
-        rest,
+        residual,
         fit,
         s * np.sqrt(np.diag(q)),
-        float(np.sqrt(np.mean(rest**2))),
+        float(np.sqrt(np.mean(residual**2))),
         weight < 0.5,
     )

@@ -1,16 +1,16 @@
-"""Readings of the panel setting instrument as observations of corner heights.
+"""Panel setting instrument readings as observations of corner heights.
 
 reading = H(place) + D(place) - s + lean · place + zero + offset
 
 H   deviation of the panel's surface from the paraboloid at the gauge's tip: heights e of its four corners shared
-    bilinearly, and what a map knows of the surface between them
+    bilinearly, and the map's shape between them
 D   rise of the paraboloid itself over the tangent plane at the corner: 28 to 47 µm at 106 mm
-s   where the shaft's shoulder stands; the same for all placements at the corner
+s   height of the shaft's shoulder; the same for all placements at the corner
 lean    of the tool's axis from the design normal, towards the tool's x and y: the base plane falls that way
 zero    of a gauge in a session; offset: sheet's corrections
 
-All is linear. What placements of one corner share without being a parameter (the lean where none was read, the local
-slope of each panel) makes their readings correlated: a block a corner.
+All is linear. Errors that placements of one corner share without a parameter (the lean where none was read, the local
+slope of each panel) make their readings correlated: one block per corner.
 """
 
 from collections.abc import Mapping
@@ -35,8 +35,10 @@ GAUGES = 4
 
 
 @dataclass(frozen=True, eq=False)
-class OwnColumns(ObservationKind):
-    """observed = sum of coefficients times parameters, a few of each row's own; -1 stands for none.
+class RowColumns(ObservationKind):
+    """Linear observations, each of a few parameters.
+
+    observed = sum of coefficients times parameters, per row; -1 stands for none.
 
     coefficient   (m, w)
     """
@@ -57,7 +59,10 @@ class OwnColumns(ObservationKind):
 
 @dataclass(frozen=True, eq=False)
 class PanelColumns:
-    """Where parameters stand: corner heights (p, 4), shafts (c,), zeros (s, 4), levels (s, 2)."""
+    """Positions of the parameters.
+
+    Corner heights (p, 4), shafts (c,), zeros (s, 4), levels (s, 2).
+    """
 
     panels: int
     corners: int
@@ -65,11 +70,11 @@ class PanelColumns:
 
     @property
     def size(self) -> int:
-        """How many parameters there are."""
+        """Number of all parameters."""
         return 4 * self.panels + self.corners + 6 * self.sessions
 
     def height(self, panel: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """Columns of the heights of panels' corners, by panel and place 0 to 3."""
+        """Columns of panels' corner heights, by panel and place 0 to 3."""
         return 4 * panel + place
 
     def shaft(self, corner: np.ndarray) -> np.ndarray:
@@ -87,7 +92,7 @@ class PanelColumns:
 
 @dataclass(frozen=True, eq=False)
 class Tips:
-    """Readings one by one: (n,) each, those of a corner together.
+    """Individual readings, (n,) each, grouped by corner.
 
     row, gauge    of the table
     corner        number
@@ -110,7 +115,10 @@ class Tips:
 
 
 def tips_of(readings: PanelReadings, layout: PanelLayout, sheet: PanelInstrument) -> Tips:
-    """What each reading touched; InputError for one where no panel is."""
+    """Positions touched by the readings.
+
+    InputError for one where no panel is.
+    """
     on = np.isfinite(readings.reading) & (readings.corner >= 0)[:, None]
     row, gauge = np.nonzero(on)
     order = np.argsort(readings.corner[row], kind="stable")
@@ -131,10 +139,10 @@ def tips_of(readings: PanelReadings, layout: PanelLayout, sheet: PanelInstrument
 
 
 def corrected(readings: PanelReadings, layout: PanelLayout, sheet: PanelInstrument, *, tips: Tips) -> np.ndarray:
-    """(n,) m, readings without what the sheet knows of the gauges.
+    """Readings (n,), m, corrected by the gauges' sheet.
 
     r + linearity, over 1 + scale, less zero per °C; a tip sags by sag · cos(slope) on the dish and by sag on the flat,
-    so that it reads sag (1 - cos) too low. Raises InputError where a correction needs a column that is not there.
+    so that it reads sag (1 - cos) too low. Raises InputError where a correction needs a missing column.
     """
     raw = readings.reading[tips.row, tips.gauge]
     result = gauge_corrected(raw, tips.gauge, sheet)
@@ -155,7 +163,7 @@ def corrected(readings: PanelReadings, layout: PanelLayout, sheet: PanelInstrume
 
 
 def gauge_corrected(raw: np.ndarray, gauge: np.ndarray, sheet: PanelInstrument) -> np.ndarray:
-    """Readings (n,) m of gauges (n,) with linearity and scale taken out."""
+    """Readings (n,), m, of gauges (n,), corrected for linearity and scale."""
     result = np.array(raw)
     for k, g in enumerate(sheet.gauge):
         of_gauge = gauge == k
@@ -168,7 +176,7 @@ def gauge_corrected(raw: np.ndarray, gauge: np.ndarray, sheet: PanelInstrument) 
 
 @dataclass(frozen=True, eq=False)
 class PanelModel:
-    """Everything that is solved: observations, where parameters stand, what each row was.
+    """Observations, parameters and rows of the adjustment.
 
     groups     readings by block size first, then flat, priors, warps, survey
     blocks     for each group of readings, (m,) numbers of its tips
@@ -179,7 +187,7 @@ class PanelModel:
     layout: PanelLayout
     columns: PanelColumns
     tips: Tips
-    groups: tuple[OwnColumns, ...]
+    groups: tuple[RowColumns, ...]
     blocks: tuple[np.ndarray, ...]
     target: np.ndarray
     u_target: np.ndarray
@@ -187,15 +195,18 @@ class PanelModel:
 
 
 def panel_axes(layout: PanelLayout, panel: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Places (n, 3) on panels (n,) in the panels' own axes (n, 2), m: from the mean of the corners, x outwards."""
+    """Places (n, 2), m, in the axes of panels (n,).
+
+    From places (n, 3); the origin is the mean of the corners, x outwards.
+    """
     middle = layout.xy[layout.quad].mean(axis=1)[panel]
-    own = axes(middle, layout.focal_length)
-    arm = at - own.origin
-    return np.stack([np.sum(arm * own.x, axis=1), np.sum(arm * own.y, axis=1)], axis=1)
+    frame = axes(middle, layout.focal_length)
+    arm = at - frame.origin
+    return np.stack([np.sum(arm * frame.x, axis=1), np.sum(arm * frame.y, axis=1)], axis=1)
 
 
 def corner_places(layout: PanelLayout) -> np.ndarray:
-    """(p, 4, 2) m, the corners in their panels' axes."""
+    """Corners (p, 4, 2), m, in their panels' axes."""
     at = axes(layout.xy[layout.quad], layout.focal_length).origin
     panel = np.repeat(np.arange(len(layout.panels)), 4)
     return panel_axes(layout, panel, at.reshape(-1, 3)).reshape(-1, 4, 2)
@@ -209,10 +220,10 @@ def panel_model(
     survey: PanelSurvey | None = None,
     maps: Mapping[str, FittedMap] | None = None,
 ) -> PanelModel:
-    """The observations of a table of readings.
+    """Observations of a table of readings.
 
     readings   as read
-    layout     every panel of it becomes a parameter: `used_layout` leaves those that a gauge touched
+    layout     every panel of it becomes a parameter: `used_layout` selects those that a gauge touched
     sheet      of the instrument
     survey     heights of shafts
     maps       by panel
@@ -249,15 +260,18 @@ def panel_model(
 def _mapped(
     layout: PanelLayout, tips: Tips, places: np.ndarray, maps: Mapping[str, FittedMap]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Shape of panels at their corners (p, 4), and at tips (n,) beside what the corners share out, m."""
+    """Shape of panels at corners (p, 4) and at tips (n,), m.
+
+    At tips minus the bilinear part of the corners.
+    """
     shape, between = np.zeros((len(layout.panels), 4)), np.zeros(len(tips.row))
-    own = panel_axes(layout, tips.panel, tips.at)
+    local = panel_axes(layout, tips.panel, tips.at)
     for p, name in enumerate(layout.panels):
         if name in maps:
             shape[p] = maps[name].at(places[p])
             on_panel = np.flatnonzero(tips.panel == p)
             if len(on_panel):
-                between[on_panel] = maps[name].at(own[on_panel]) - tips.share[on_panel] @ shape[p]
+                between[on_panel] = maps[name].at(local[on_panel]) - tips.share[on_panel] @ shape[p]
     return shape, between
 
 
@@ -267,8 +281,8 @@ def _reading_groups(
     tips: Tips,
     mapped: np.ndarray,
     rows: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
-) -> tuple[list[OwnColumns], tuple[np.ndarray, ...]]:
-    """Blocks of one corner each, those of one size in a group."""
+) -> tuple[list[RowColumns], tuple[np.ndarray, ...]]:
+    """Blocks of one corner each, grouped by size."""
     observed, at, factor, read = rows
     prior = sheet.panel
     single = (sheet.u_gauge_um**2 + sheet.resolution_um**2 / 12.0) * MICROMETRE**2
@@ -277,32 +291,35 @@ def _reading_groups(
     slope = np.where(mapped, prior.u_map_slope_urad, prior.u_slope_urad)[tips.panel] * 1e-6
     shape = np.where(mapped, prior.u_map_um, prior.u_shape_um)[tips.panel] * MICROMETRE
     at_home = np.any(layout.quad[tips.panel] == tips.corner[:, None], axis=1)
-    shape = np.where(at_home, 0.0, shape)  # a panel without a corner here: its edge may lie off its corners' line
+    shape = np.where(at_home, 0.0, shape)  # a panel without a corner here: its edge may be off its corners' line
     _, start, count = np.unique(tips.corner, return_index=True, return_counts=True)
     groups, blocks = [], []
     for size in np.unique(count):
         which = (start[count == size][:, None] + np.arange(size)).astype(int)  # (b, r)
 
         def pairs(values: np.ndarray, which: np.ndarray = which) -> np.ndarray:
-            """(b, r, r) scalar products of the rows of a block."""
+            """Scalar products (b, r, r) of the rows of a block."""
             inside = values[which]
             return inside @ np.swapaxes(inside, 1, 2) if values.ndim == 2 else inside[:, :, None] * inside[:, None, :]
 
-        def same(values: np.ndarray, which: np.ndarray = which) -> np.ndarray:
+        def equal(values: np.ndarray, which: np.ndarray = which) -> np.ndarray:
             return values[which][:, :, None] == values[which][:, None, :]
 
         weight = read.astype(float)
-        c = single * np.eye(size) + np.where(same(tips.row), pairs(tips.tool), 0.0) * pairs(weight) * lean
+        c = single * np.eye(size) + np.where(equal(tips.row), pairs(tips.tool), 0.0) * pairs(weight) * lean
         c = c + pairs(tips.place) * pairs(1.0 - weight) * free
-        c = c + np.where(same(tips.panel), pairs(tips.place) * pairs(slope) + pairs(shape), 0.0)
+        c = c + np.where(equal(tips.panel), pairs(tips.place) * pairs(slope) + pairs(shape), 0.0)
         flat = which.ravel()
-        groups.append(OwnColumns(f"readings of {size}", observed[flat], c, at[flat], factor[flat]))
+        groups.append(RowColumns(f"readings of {size}", observed[flat], c, at[flat], factor[flat]))
         blocks.append(flat)
     return groups, tuple(blocks)
 
 
 def flat_means(readings: PanelReadings, sheet: PanelInstrument) -> tuple[np.ndarray, np.ndarray]:
-    """(s, 4) m mean reading of each gauge on the flat by session, and (s, 4) how many; nan where none."""
+    """Mean reading (s, 4), m, of each gauge on the flat, and number.
+
+    By session; nan where none.
+    """
     sessions = len(readings.sessions)
     mean, many = np.full((sessions, GAUGES), np.nan), np.zeros((sessions, GAUGES), dtype=int)
     warm = np.nan_to_num(readings.temperature_c - sheet.flat_temperature_c)
@@ -318,8 +335,11 @@ def flat_means(readings: PanelReadings, sheet: PanelInstrument) -> tuple[np.ndar
     return mean, many
 
 
-def _flat(readings: PanelReadings, sheet: PanelInstrument, columns: PanelColumns) -> list[OwnColumns]:
-    """Means on the flat observe the gauges' zeros; the flat's own unevenness is the same in all sessions."""
+def _flat(readings: PanelReadings, sheet: PanelInstrument, columns: PanelColumns) -> list[RowColumns]:
+    """Flat means as observations of the gauges' zeros.
+
+    The flat's own unevenness is the same in all sessions.
+    """
     mean, many = flat_means(readings, sheet)
     session, gauge = np.nonzero(many)
     if not len(session):
@@ -328,11 +348,11 @@ def _flat(readings: PanelReadings, sheet: PanelInstrument, columns: PanelColumns
     c = np.diag(single / many[session, gauge])
     c = c + np.where(gauge[:, None] == gauge, (sheet.u_flat_um * MICROMETRE) ** 2, 0.0)
     at = columns.zero(session, gauge)[:, None]
-    return [OwnColumns("flat", mean[session, gauge], c, at, np.ones((len(at), 1)))]
+    return [RowColumns("flat", mean[session, gauge], c, at, np.ones((len(at), 1)))]
 
 
-def _priors(sheet: PanelInstrument, columns: PanelColumns, target: np.ndarray) -> OwnColumns:
-    """What is known before: heights near their targets, zeros and levels near zero."""
+def _priors(sheet: PanelInstrument, columns: PanelColumns, target: np.ndarray) -> RowColumns:
+    """Priors: heights near their targets, zeros and levels near zero."""
     many = np.arange(columns.size)
     first, last = 4 * columns.panels, columns.size - 6 * columns.sessions
     at = np.concatenate([many[:first], many[last:]])
@@ -341,38 +361,46 @@ def _priors(sheet: PanelInstrument, columns: PanelColumns, target: np.ndarray) -
          np.tile([*[sheet.u_zero_um * MICROMETRE] * 4, *[sheet.u_level_arcsec * ARCSECOND] * 2], columns.sessions)]
     )  # fmt: skip
     observed = np.concatenate([target.ravel(), np.zeros(6 * columns.sessions)])
-    return OwnColumns("priors", observed, u**2, at[:, None], np.ones((len(at), 1)))
+    return RowColumns("priors", observed, u**2, at[:, None], np.ones((len(at), 1)))
 
 
 def _warps(
     layout: PanelLayout, sheet: PanelInstrument, places: np.ndarray, target: np.ndarray, mapped: np.ndarray
-) -> OwnColumns:
-    """A panel is stiff: its four corners lie as it was made, but for the twist that four screws force on it."""
+) -> RowColumns:
+    """Priors of panels' stiffness.
+
+    The four corners lie as made, except for the twist that four screws force on the panel.
+    """
     null = warps(places)
     prior = sheet.panel
     u_shape = np.where(mapped, prior.u_map_um, prior.u_shape_um)
     u = np.sqrt(prior.u_twist_um**2 + u_shape**2 * np.sum(null**2, axis=1)) * MICROMETRE
     at = np.arange(4 * len(layout.panels)).reshape(-1, 4)
-    return OwnColumns("warps", np.sum(null * target, axis=1), u**2, at, null)
+    return RowColumns("warps", np.sum(null * target, axis=1), u**2, at, null)
 
 
 def _shafts(
     layout: PanelLayout, sheet: PanelInstrument, columns: PanelColumns, survey: PanelSurvey | None
-) -> OwnColumns:
-    """Where shafts stand: as the lasers found their prisms; those that they did not, as roughly as a panel is set."""
+) -> RowColumns:
+    """Priors of shafts.
+
+    From the lasers' prism positions; others with the wide uncertainty of a panel's setting.
+    """
     corners = np.arange(len(layout.corners))
     height, u = np.zeros(len(corners)), np.full(len(corners), sheet.panel.u_set_um * MICROMETRE)
     if survey is not None:
         height[survey.corner] = survey.height
         u[survey.corner] = np.hypot(survey.u, sheet.u_stand_um * MICROMETRE)
     at = columns.shaft(corners)[:, None]
-    return OwnColumns("shafts", height, u**2, at, np.ones((len(at), 1)))
+    return RowColumns("shafts", height, u**2, at, np.ones((len(at), 1)))
 
 
 def used_layout(
     readings: PanelReadings, layout: PanelLayout, sheet: PanelInstrument
 ) -> tuple[PanelLayout, np.ndarray, np.ndarray]:
-    """The panels that a gauge touched, and the numbers of panels and corners in the whole layout.
+    """Panels that a gauge touched.
+
+    And the numbers of their panels and corners in the whole layout.
 
     Raises InputError where nothing was read but the flat.
     """
@@ -381,9 +409,9 @@ def used_layout(
     if not len(panels):
         raise InputError(f"{readings.file}: holds no reading at a corner (expected placements beside {'FLAT'})")
     corners = np.unique(layout.quad[panels])
-    lost = np.setdiff1d(tips.corner, corners)
-    if len(lost):
+    uncovered = np.setdiff1d(tips.corner, corners)
+    if len(uncovered):
         raise InputError(
-            f"{readings.file}: at {layout.corners[lost[0]]} no panel with a corner there was read (expected one)"
+            f"{readings.file}: at {layout.corners[uncovered[0]]} no panel with a corner there was read (expected one)"
         )
     return layout.only(panels), panels, corners

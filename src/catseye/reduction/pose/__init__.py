@@ -1,1 +1,1 @@
-"""Six degrees of freedom and pointing: from a pose or from stars."""
+"""Six-degree-of-freedom pose and pointing, from points or stars."""

@@ -1,7 +1,8 @@
-"""Where the dish is, in the ways that catseye says it, beside each other: what is fitted makes the difference.
+"""Comparison of catseye's estimates of the dish's pose.
 
-All in ground axes about the nominal vertex. What a paraboloid and a rigid body say in common is the direction of the
-dish's axis; a turn about that axis only points show, and a free focal length takes part of an offset dish's turn.
+They differ by the fitted model. All are in ground axes about the nominal vertex. A paraboloid and a rigid body
+share the direction of the dish's axis; only points determine a turn about that axis, and a free focal length
+absorbs part of an offset dish's turn.
 """
 
 from dataclasses import dataclass
@@ -18,15 +19,15 @@ from catseye.reduction.surface.shape import LitAperture, Prisms, ShapeSettings, 
 
 
 @dataclass(frozen=True, eq=False)
-class DishWay:
-    """One answer to where the dish is.
+class DishEstimate:
+    """One estimate of the dish's pose.
 
-    command       that gives it
-    fitted        to what, with what free
+    command       that prints it
+    fitted        to which data, with which free parameters
     translation   (3,) m, of the nominal vertex, ground axes
     rotation      (3,) rad, rotation vector, ground axes
     u             (6,) their standard uncertainties; zero for a turn that is not observed
-    axis          (2,) rad, how far the dish's axis leans: across elevation, towards larger azimuth, and in elevation
+    axis          (2,) rad, tilt of the dish's axis: across elevation, towards larger azimuth, and in elevation
     u_axis        (2,) rad
     """
 
@@ -39,8 +40,8 @@ class DishWay:
     u_axis: np.ndarray
 
 
-def dish_ways(reduction: Reduction) -> tuple[DishWay, ...]:
-    """Every way that the night's points allow; none where no dish was seen."""
+def dish_ways(reduction: Reduction) -> tuple[DishEstimate, ...]:
+    """All estimates from the night's points; none without a dish."""
     surface, campaign = reduction.surface, reduction.campaign
     if surface is None:
         return ()
@@ -57,9 +58,11 @@ def dish_ways(reduction: Reduction) -> tuple[DishWay, ...]:
     aperture = LitAperture.of(campaign.site.paraboloid)
     many = f"paraboloid through {len(names)} prisms"
     fit = surface.fit
-    ways = [_way("catseye reduce", f"{many}, focal length held", fit.translation, fit.rotation, fit.covariance, lean)]
+    ways = [
+        _estimate("catseye reduce", f"{many}, focal length held", fit.translation, fit.rotation, fit.covariance, lean)
+    ]
     for free, text in (
-        (("vertex", "axis"), f"{many}, focal length held, each weighed by the aperture it stands for"),
+        (("vertex", "axis"), f"{many}, focal length held, each weighted by its share of the aperture"),
         (("vertex", "axis", "focal-length"), f"{many}, focal length free"),
     ):
         try:
@@ -67,18 +70,21 @@ def dish_ways(reduction: Reduction) -> tuple[DishWay, ...]:
         except EstimationError:
             continue
         command = "catseye surface" + ("" if "focal-length" in free else " --free vertex,axis")
-        ways.append(_way(command, text, shape.translation, shape.rotation, shape.covariance[:6, :6], lean))
+        ways.append(_estimate(command, text, shape.translation, shape.rotation, shape.covariance[:6, :6], lean))
     try:
         group = pose_of_group(solved_points(reduction), None, campaign, group="dish")
     except (InputError, EstimationError):
         return tuple(ways)
     body = group.pose
     text = f"{len(body.names)} points as one body against their design"
-    return (*ways, _way("catseye pose", text, body.translation, body.rotation, body.covariance, lean))
+    return (*ways, _estimate("catseye pose", text, body.translation, body.rotation, body.covariance, lean))
 
 
 def solved_points(reduction: Reduction) -> SolvedPoints:
-    """The points of a reduced night, as `catseye reduce --out` writes them and `catseye pose` reads them."""
+    """Points of a reduced night for a pose.
+
+    As `catseye reduce --out` writes them and `catseye pose` reads them.
+    """
     coordinates, posture = reduction.coordinates, reduction.campaign.site.campaign
     angles = (float(np.radians(posture.azimuth_deg)), float(np.radians(posture.elevation_deg)))
     names = tuple(coordinates.points)
@@ -87,9 +93,9 @@ def solved_points(reduction: Reduction) -> SolvedPoints:
     )
 
 
-def _way(
+def _estimate(
     command: str, fitted: str, translation: np.ndarray, rotation: np.ndarray, covariance: np.ndarray, lean: np.ndarray
-) -> DishWay:
+) -> DishEstimate:
     u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     u_axis = np.sqrt(np.einsum("ai,ij,aj->a", lean, covariance[3:6, 3:6], lean))
-    return DishWay(command, fitted, translation, rotation, u, lean @ rotation, u_axis)
+    return DishEstimate(command, fitted, translation, rotation, u, lean @ rotation, u_axis)

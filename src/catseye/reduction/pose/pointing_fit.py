@@ -1,8 +1,9 @@
-"""The eight-term series fitted to star offsets or to metrology, what it leaves unknown, and two fits compared.
+"""Fit and comparison of the eight-term pointing series.
 
-IE, HZCZ and HZSZ are nearly one and the same: 1, sin E and cos E over the elevations of a night differ little. The fit
-does not fail there, it says so: their covariance is large, the weak combination is named with its uncertainty, and what
-the combination does to the sky where stars were seen is small. Predictions use the covariance and stay good.
+Fitted to star offsets or to metrology. IE, HZCZ and HZSZ are nearly the same: 1, sin E and cos E over the
+elevations of a night differ little. The fit does not fail there but reports it: their covariance is large, the weak
+combination is named with its uncertainty, and the effect of the combination on the sky where stars were seen is
+small. Predictions use the covariance and stay good.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,11 +24,11 @@ FAMILIES = (("IA", "CA", "NPAE"), ("IE", "HZCZ", "HZSZ"))  # 1, sin E, cos E in 
 
 @dataclass(frozen=True, eq=False)
 class WeakDirection:
-    """The combination of terms of one family that is known worst.
+    """Least certain combination of terms of one family.
 
     parts         term: its part of the combination, squares adding to one
     u             rad, standard uncertainty of the combination
-    u_on_the_sky  rad, root mean square over the observed directions of what that uncertainty does to the beam
+    u_on_the_sky  rad, effect of that uncertainty on the beam, root mean square over the observed directions
     """
 
     parts: dict[str, float]
@@ -39,27 +40,27 @@ class WeakDirection:
         largest = max(abs(v) for v in self.parts.values())
         named = [f"{v:+.2f} {t}" for t, v in self.parts.items() if abs(v) > PART * largest]
         return (
-            f"{' '.join(named)} is known to {self.u / ARCSECOND:.2g} arcsec only; over the observed directions that "
+            f"{' '.join(named)} has u = {self.u / ARCSECOND:.2g} arcsec; over the observed directions that "
             f"moves the beam by {self.u_on_the_sky / ARCSECOND:.2g} arcsec rms"
         )
 
 
 @dataclass(frozen=True, eq=False)
 class PointingFit:
-    """A fit of the eight-term pointing series.
+    """Fit of the eight-term pointing series.
 
     series              terms, values and covariance, rad
     azimuth, elevation  (n,) rad, on the sky, of all observations
     observed            (n, 2) rad, azimuth times cos E and elevation: encoders less sky
     residual            (n, 2) rad, observed minus fitted, of all
-    w                   (n, 2) standardised residuals; of an observation left out nan
+    w                   (n, 2) standardised residuals; nan for a rejected observation
     used                (n,) bool
     variance_factor     of the claimed uncertainties; nan without redundancy
     scaled              the covariance is multiplied by it, because no uncertainty was claimed
     pvv, degrees_of_freedom
     condition           of the design with unit columns
-    weak                the worst known combination of each family of terms that resemble each other
-    stars               of stars, independent of each other; else of metrology
+    weak                least certain combination of each family of similar terms
+    stars               True for stars, independent of each other; else metrology
     sources             verdicts of the results that were read, by their names
     """
 
@@ -81,12 +82,12 @@ class PointingFit:
 
     @property
     def sky_rms(self) -> float:
-        """rad, root mean square of the residuals' lengths of the observations used."""
+        """Root mean square length of the used residuals, rad."""
         return float(np.sqrt(np.mean(np.sum(self.residual[self.used] ** 2, axis=1))))
 
     @property
     def correlation(self) -> np.ndarray:
-        """(k, k) of the coefficients."""
+        """Correlation (k, k) of the coefficients."""
         u = np.sqrt(np.diag(self.series.covariance))
         return np.asarray(self.series.covariance / np.outer(u, u))
 
@@ -102,13 +103,13 @@ def fit_pointing(
     reject: bool = False,
     where: Sequence[str] | None = None,
 ) -> PointingFit:
-    """The eight-term pointing series by least squares.
+    """Fit the eight-term pointing series by least squares.
 
     azimuth, elevation   (n,) rad, on the sky
     observed             (n, 2) rad, azimuth times cos E and elevation: encoders less sky
     covariance           (2n, 2n) rad^2, of the observed, row by row; or
-    u                    rad, of each coordinate; neither: equal weights, and the scatter says how large
-    terms                which to fit, a selection of TERMS
+    u                    rad, of each coordinate; neither: equal weights, scaled by the scatter
+    terms                to fit, a selection of TERMS
     reject               leave out observations, the worst first, while a coordinate's |w| is beyond 4
     where                n places for errors, such as "line 12"
 
@@ -133,8 +134,8 @@ def fit_pointing(
         used[worst] = False
     if scaled and not solution.degrees_of_freedom:
         raise EstimationError(
-            f"{int(used.sum())} observations just hold {len(terms)} terms and no uncertainty is claimed: nothing says "
-            "how sure they are (expected more observations, or u)"
+            f"{int(used.sum())} observations only just determine {len(terms)} terms and no uncertainty is claimed: "
+            "their uncertainty is unknown (expected more observations, or u)"
         )
     spread = solution.covariance * (factor if scaled else 1.0)
     unit = full[used].reshape(-1, len(chosen))
@@ -165,24 +166,27 @@ def _solved(
     flat = full.reshape(-1, full.shape[-1])[rows]
     if len(rows) < full.shape[-1]:
         raise EstimationError(
-            f"{int(used.sum())} observations cannot hold {len(terms)} terms (expected {len(terms)} numbers or more)"
+            f"{int(used.sum())} observations cannot determine {len(terms)} terms (expected {len(terms)} or more)"
         )
     return best_linear_estimate(flat, values, q[np.ix_(rows, rows)], parameters=list(terms), rows=called)
 
 
 def _standardised(solution: LinearEstimate, used: np.ndarray, factor: float) -> np.ndarray:
-    """(n, 2) w = (P v)_i / sqrt(P_ii), over the root of the variance factor; nan where left out or unchecked."""
+    """Standardised residuals (n, 2), w = (P v)_i / sqrt(P_ii).
+
+    Over the root of the variance factor; nan where left out or unchecked.
+    """
     weight = solution.weight_diagonal
     good = weight > 1e-12 * max(float(weight.max(initial=0.0)), 1e-300)
     w = np.full((len(used), 2), np.nan)
     scale = np.sqrt(factor) if np.isfinite(factor) and factor > 0.0 else np.nan
-    own = solution.weighted_residual / np.sqrt(np.where(good, weight, 1.0)) / scale
-    w[used] = np.where(good, own, np.nan).reshape(-1, 2)
+    statistic = solution.weighted_residual / np.sqrt(np.where(good, weight, 1.0)) / scale
+    w[used] = np.where(good, statistic, np.nan).reshape(-1, 2)
     return w
 
 
 def _weak(terms: tuple[str, ...], covariance: np.ndarray, unit: np.ndarray) -> tuple[WeakDirection, ...]:
-    """The weakest combination within each family, the other terms being free."""
+    """Weakest combination within each family, the other terms being free."""
     directions = []
     for family in FAMILIES:
         at = [terms.index(t) for t in family if t in terms]
@@ -197,7 +201,7 @@ def _weak(terms: tuple[str, ...], covariance: np.ndarray, unit: np.ndarray) -> t
 
 @dataclass(frozen=True, eq=False)
 class SeriesComparison:
-    """Two series of the same telescope, the second less the first.
+    """Difference of two series of one telescope, second minus first.
 
     terms             common to both
     difference        (k,) rad
@@ -220,15 +224,17 @@ class SeriesComparison:
 
     @property
     def rms_on_the_sky(self) -> float:
-        """Root mean square error over the grid, rad."""
+        """Root mean square over the grid, rad."""
         return float(np.sqrt(np.mean(np.sum(self.on_the_sky**2, axis=1))))
 
 
 def compare_series(first: PointingSeries, second: PointingSeries) -> SeriesComparison:
-    """What a second series says differently, term by term and on the sky between 10 and 80 degrees of elevation.
+    """Compare two series, term by term and on the sky.
 
-    The terms agree with chi2 = d' (C1 + C2)^-1 d: nearly degenerate terms may differ much and mean the same, and both
-    this and the difference on the sky know it. Raises EstimationError where no term is common.
+    On the sky between 10 and 80 degrees of elevation.
+
+    The terms agree with chi2 = d' (C1 + C2)^-1 d: nearly degenerate terms may differ much and mean the same, which both
+    this and the difference on the sky include. Raises EstimationError where no term is common.
     """
     from scipy import special
 
@@ -245,7 +251,7 @@ def compare_series(first: PointingSeries, second: PointingSeries) -> SeriesCompa
         chi2 = float(difference / scale @ np.linalg.solve(unit, difference / scale))
         p = float(special.chdtrc(len(terms), chi2))
     a, e = (v.ravel() for v in np.meshgrid(np.arange(0, 360, 15) * DEGREE, np.arange(10, 81, 5) * DEGREE))
-    both = first.covariance_of_correction(a, e) + second.covariance_of_correction(a, e)
-    u = np.sqrt(np.maximum(np.diagonal(both, axis1=-2, axis2=-1), 0.0))
+    covariances = first.covariance_of_correction(a, e) + second.covariance_of_correction(a, e)
+    u = np.sqrt(np.maximum(np.diagonal(covariances, axis1=-2, axis2=-1), 0.0))
     delta = second.correction(a, e) - first.correction(a, e)
     return SeriesComparison(terms, difference, spread, chi2, p, a, e, delta, u)

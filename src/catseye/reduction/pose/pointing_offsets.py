@@ -1,13 +1,12 @@
-"""From poses to where the beam points and how far the feed is out of focus, term by term, with covariance.
+"""Pointing and focus errors from poses, term by term, with covariance.
 
 Poses are in the reflector frame: x along rising azimuth, z along the beam, y downwards at low elevation. A small turn w
-of the dish moves the beam by w x z: azimuth times cos E by w_y, elevation by w_x. What then moves against the dish adds
-by the tilt of its wavefront (`geometry.antenna.beam_deviation`): azimuth by the slope towards x, elevation by minus
-that towards y. For a feed at the prime focus the shallow dish's -d/f is the plate scale; the beam deviation factor is
-what an aperture of this depth and offset makes of it, 0.77 across and 0.55 in the plane of symmetry of 100 m at f = 60
-m.
+of the dish moves the beam by w x z: azimuth times cos E by w_y, elevation by w_x. A motion against the dish adds the
+tilt of its wavefront (`geometry.antenna.beam_deviation`): azimuth by the slope towards x, elevation by minus that
+towards y. For a feed at the prime focus the shallow dish's -d/f is the plate scale; the beam deviation factor corrects
+it for an aperture of this depth and offset, 0.77 across and 0.55 in the plane of symmetry of 100 m at f = 60 m.
 
-`reduction.live.pose` gives the same offsets for the carried state of the coordinator; this is their form for any poses.
+`reduction.live.pose` gives the same offsets for the coordinator's filter state; this is their form for any poses.
 """
 
 from dataclasses import dataclass
@@ -35,16 +34,16 @@ COMPONENTS = ("azimuth times cos E", "elevation", "focus")
 
 @dataclass(frozen=True, eq=False)
 class PointingOffset:
-    """Where the beam is against where dish and feed at rest would send it.
+    """Beam direction and focus against dish and feed at rest.
 
     optics       "prime" or "gregorian"
-    offset       (3,) rad, rad, m: azimuth times cos E and elevation of the beam, and how much further from the dish
+    offset       (3,) rad, rad, m: azimuth times cos E and elevation of the beam, and how much farther from the dish
                  than at rest feed or subreflector are, along the beam
     covariance   (3, 3)
     terms        name: its part (3,) of the offset
     slopes       (2, 3) rad/m, azimuth and elevation of the beam by a shift of feed or subreflector against the dish
     plate_scale  rad/m, of a shallow dish about its vertex: 1/f
-    relative     (6,) m and rad, motion of feed or subreflector as the dish sees it, about the prime focus
+    relative     (6,) m and rad, motion of feed or subreflector relative to the dish, about the prime focus
     relative_covariance  (6, 6)
     """
 
@@ -59,34 +58,42 @@ class PointingOffset:
 
     @property
     def correction(self) -> np.ndarray:
-        """(3,) what takes the offset away, its opposite; angles as in `geometry.antenna.pointing_series`."""
+        """Correction (3,) of the offset, its opposite.
+
+        Angles as in `geometry.antenna.pointing_series`.
+        """
         return -self.offset
 
     @property
     def beam_deviation(self) -> np.ndarray:
-        """(2,) share of the plate scale that a shift across, and one in the plane of symmetry, comes to."""
+        """Beam deviation factor (2,), as a share of the plate scale.
+
+        For a shift across, and one in the plane of symmetry.
+        """
         return np.array([-self.slopes[0, 0], self.slopes[1, 1]]) / self.plate_scale
 
 
 def pointing_offset(
     dish: Pose, carried: Pose, site: SiteFolder, *, cross: np.ndarray | None = None, optics: str = "prime"
 ) -> PointingOffset:
-    """Beam and focus from the dish's pose and that of what it looks at.
+    """Beam and focus from the poses of dish and feed.
+
+    Or of the dish and its subreflector.
 
     dish      reflector frame
     carried   the feed's (arm's), or the subreflector's with optics "gregorian"; reflector frame
     site      its paraboloid
     cross     (6, 6) covariance of the carried six numbers (rows) with the dish's; None: independent
-    optics    "prime" or "gregorian" (`Gregorian`'s chosen parameters; the receiver stands still against the dish)
+    optics    "prime" or "gregorian" (`Gregorian`'s chosen parameters; the receiver is fixed to the dish)
 
     First order in the turns. Raises FrameError for poses in other frames. Source: [RUZE65] for the beam deviation; the
     derivation above and in `geometry.antenna.beam_deviation`.
     """
     if optics not in OPTICS:
-        raise InputError(f"optics {optics!r} is none of {', '.join(OPTICS)}")
+        raise InputError(f"optics {optics!r} is not one of {', '.join(OPTICS)}")
     for pose in (dish, carried):
         if pose.frame != "reflector":
-            raise FrameError(f"pose in the frame '{pose.frame}', expected 'reflector', in which the beam is known")
+            raise FrameError(f"pose in the frame '{pose.frame}', expected 'reflector', the frame of the beam")
     of = site_aperture(site)
     at_focus = carried.about(of.focus)
     mixed = _about(cross, carried, at_focus)
@@ -109,8 +116,10 @@ def pointing_offset(
     }
     if optics == "gregorian":
         terms["turn of the subreflector"] = by_relative[:, 3:] @ relative[3:]
-    both = by_relative @ to_dish @ by_dish.T
-    covariance = by_relative @ spread @ by_relative.T + by_dish @ dish.covariance @ by_dish.T + both + both.T
+    cross_term = by_relative @ to_dish @ by_dish.T
+    covariance = (
+        by_relative @ spread @ by_relative.T + by_dish @ dish.covariance @ by_dish.T + cross_term + cross_term.T
+    )
     return PointingOffset(
         optics=optics,
         offset=np.asarray(sum(terms.values())),
@@ -124,28 +133,30 @@ def pointing_offset(
 
 
 def site_aperture(site: SiteFolder) -> ApertureNodes:
-    """The site's paraboloid and aperture."""
+    """Paraboloid and aperture of the site."""
     p = site.site.paraboloid
     centre = np.array(p.aperture_centre_mm) * MILLIMETRE
     return aperture(p.focal_length_mm * MILLIMETRE, centre, p.aperture_radius_mm * MILLIMETRE)
 
 
 def _about(cross: np.ndarray | None, carried: Pose, moved: Pose) -> np.ndarray:
-    """The cross covariance after the carried pose was told about another pivot."""
+    """Cross covariance after a change of the carried pose's pivot."""
     if cross is None:
         return np.zeros((6, 6))
     return np.asarray(pivot_change(moved.pivot - carried.pivot, carried.motion.matrix) @ cross)
 
 
 def _cross_with_dish(carried: Pose, dish: Pose, mixed: np.ndarray) -> np.ndarray:
-    """(6, 6) covariance of the relative motion with the dish's six numbers."""
+    """Covariance (6, 6) of the relative motion with the dish's pose."""
     return np.asarray(mixed - pivot_change(carried.pivot - dish.pivot, dish.motion.matrix) @ dish.covariance)
 
 
 def cross_covariance(
     carried: GroupPose, dish: GroupPose, site: SiteFolder, *, earlier: SolvedPoints | None
 ) -> np.ndarray:
-    """(6, 6) of the carried six numbers (rows) with the dish's, from the coordinates' covariance of both epochs.
+    """Cross covariance (6, 6) of the carried pose (rows) and the dish's.
+
+    From the coordinates' covariance of both epochs.
 
     carried, dish   poses in the reflector frame
     site            at the later epoch's posture

@@ -1,13 +1,14 @@
-"""Poses of the antenna's parts from solved points: between two epochs, or against the design in a site's records.
+"""Poses of the antenna's parts from solved points.
 
-Groups by name are what `reduction.site.bodies` says moves together: "dish" (prisms, triplets at the rim), "feed-arm"
-(its rangers, targets at the arm), "alidade"; "subreflector" are targets whose names begin with SUB. Any other group
-is a list of points. Every epoch is first brought into the axes that carry the group by its told posture, so that two
-epochs at different postures compare: what is left is how the real antenna departs from [PARKER04] eq. 2.44.
+Between two epochs, or against the design in a site's records. Groups by name are the bodies of `reduction.site.bodies`:
+"dish" (prisms, triplets at the rim), "feed-arm" (its rangers, targets at the arm), "alidade"; "subreflector" are
+targets whose names begin with SUB. Any other group is a list of points. Every epoch is first brought into the axes
+that carry the group by its commanded posture, so that two epochs at different postures compare: the remainder is the
+departure of the real antenna from [PARKER04] eq. 2.44.
 
-Against the design a prism of the dish is known well along its normal alone, within the surface's own u, and only as
-well as it was mounted or typed across it: its design place goes in with that covariance, its foot on the paraboloid
-for a mean. Other points come with u_position of their records in every direction.
+Against the design, a prism of the dish is certain only along its normal, within the surface's own u; across it, only to
+its mounting or typing: its design place has that covariance, with its foot on the paraboloid as the mean. Other points
+have u_position of their records in every direction.
 """
 
 from collections.abc import Sequence
@@ -35,21 +36,21 @@ CARRIES = {"dish": "reflector", "feed-arm": "reflector", "alidade": "alidade", "
 BODY = {"dish": "dish", "feed-arm": "arm", "alidade": "alidade"}
 SUBREFLECTOR = "SUB"  # how names of targets on the subreflector begin
 FEWEST = 3
-U_SURFACE = 0.3 * MILLIMETRE  # chosen: of a prism off the best paraboloid, along the normal, of a surface as set
+U_SURFACE = 0.3 * MILLIMETRE  # chosen: of a prism off the best paraboloid, along the normal, for an adjusted surface
 
 
 @dataclass(frozen=True, eq=False)
 class GroupPose:
-    """A pose with what it was made of.
+    """Pose with its input.
 
     group     "dish" and so on, or "points"
-    pose      in the frame asked for, about the pivot asked for
+    pose      in the requested frame, about the requested pivot
     against   "design", or the name of the first epoch
-    places    (n, 3) m, first places of the points that count, in the pose's frame
-    missing   names of the group that one side does not have
+    places    (n, 3) m, first places of the used points, in the pose's frame
+    missing   names of the group absent on one side
     epoch     the later one
     earlier   the earlier one; None against the design
-    posture   direction of a part that the telescope carries less the told posture; None of others
+    posture   direction of a part carried by the telescope, minus the commanded posture; None for others
     """
 
     group: str
@@ -63,7 +64,7 @@ class GroupPose:
 
 
 def at_posture(site: SiteFolder, azimuth: float, elevation: float) -> SiteFolder:
-    """The same site with the telescope at another posture, rad."""
+    """Site with the telescope at another posture, rad."""
     campaign = site.site.campaign.model_copy(
         update={"azimuth_deg": azimuth / DEGREE, "elevation_deg": elevation / DEGREE}
     )
@@ -71,9 +72,12 @@ def at_posture(site: SiteFolder, azimuth: float, elevation: float) -> SiteFolder
 
 
 def group_names(group: str, site: SiteFolder) -> tuple[str, ...]:
-    """Names of the points that a group may have; InputError for an unknown or an empty one."""
+    """Names of a group's possible points.
+
+    InputError for an unknown or an empty group.
+    """
     if group not in GROUPS:
-        raise InputError(f"group {group!r} is none of {', '.join(GROUPS)} (expected one, or points by name)")
+        raise InputError(f"group {group!r} is not one of {', '.join(GROUPS)} (expected one, or points by name)")
     if group == "subreflector":
         names = [n for n in site.targets if n.startswith(SUBREFLECTOR)]
     else:
@@ -86,18 +90,21 @@ def group_names(group: str, site: SiteFolder) -> tuple[str, ...]:
 
 
 def frame_transform(frame: str, site: SiteFolder) -> Transform:
-    """Ground from one of FRAMES, at the site's posture."""
+    """Transform to ground from one of FRAMES, at the site's posture."""
     if frame == "reflector":
         return nominal_frame(site)
     if frame == "alidade":
         return ground_from_alidade(site.site.campaign.azimuth_deg * DEGREE)
     if frame == "ground":
         return Transform("ground", "ground", np.eye(3), np.zeros(3))
-    raise InputError(f"frame {frame!r} is none of {', '.join(FRAMES)}")
+    raise InputError(f"frame {frame!r} is not one of {', '.join(FRAMES)}")
 
 
 def default_pivot(group: str, frame: str, site: SiteFolder) -> np.ndarray | None:
-    """(3,) m in the frame: the vertex for the dish, the focus for arm and subreflector; None: the points' mean."""
+    """Default pivot (3,), m in the frame.
+
+    The vertex for the dish, the focus for arm and subreflector; None: the points' mean.
+    """
     focal = site.site.paraboloid.focal_length_mm * MILLIMETRE
     inside = {"dish": (0.0, 0.0, 0.0), "feed-arm": (0.0, 0.0, focal), "subreflector": (0.0, 0.0, focal)}
     if group == "alidade":  # where its axis of azimuth meets the ground's z = 0
@@ -119,7 +126,7 @@ def pose_of_group(
     pivot: np.ndarray | None = None,
     robust: str | None = None,
 ) -> GroupPose:
-    """How a group of points moved from an earlier epoch, or from its design, to a later one.
+    """Motion of a group between epochs, or from its design.
 
     later     epoch
     earlier   epoch, or None: against the site's design
@@ -130,14 +137,14 @@ def pose_of_group(
     pivot     (3,) m, in that frame; by default that of the group, or the points' mean
     robust    as `estimation.shapes.pose.fit_pose`
 
-    Two epochs count as independent: what they share, such as the monuments' survey and a ranger's zero, makes a change
-    better known than this says. Raises InputError where points or postures are missing, EstimationError as `fit_pose`.
+    Two epochs count as independent: shared errors, such as of the monuments' survey and a ranger's zero, make a change
+    more certain than stated. Raises InputError where points or postures are missing, EstimationError as `fit_pose`.
     """
     if (group is None) == (points is None):
-        raise InputError("a pose is of a group or of points by name (expected one of the two)")
+        raise InputError("a pose needs a group or points by name (expected one of the two)")
     names = tuple(points) if points is not None else group_names(str(group), site)
-    known = places_of(site)
-    have = [n for n in names if n in later.names and (n in known if earlier is None else n in earlier.names)]
+    site_places = places_of(site)
+    have = [n for n in names if n in later.names and (n in site_places if earlier is None else n in earlier.names)]
     missing = tuple(n for n in names if n not in have)
     if points is not None and missing:
         where = "the epoch and the design" if earlier is None else "both epochs"
@@ -145,42 +152,45 @@ def pose_of_group(
     if len(have) < FEWEST:
         raise InputError(f"{len(have)} points of {group or 'the list'} are in both (expected {FEWEST} or more)")
     carrier = CARRIES[group] if group is not None else "ground"
-    there = frame_transform(carrier, site).inverse()
-    second, q_second = _into(there, later, have)
+    carrier_from_ground = frame_transform(carrier, site).inverse()
+    second, q_second = _into(carrier_from_ground, later, have)
     q_first: Known
     if earlier is None:
-        first, q_first = _design(have, known, site, there)
+        first, q_first = _design(have, site_places, site, carrier_from_ground)
     else:
         before = frame_transform(carrier, _posture_of(earlier, site, carrier)).inverse()
         first, q_first = _into(before, earlier, have)
     pose = fit_pose(
         have, first, second, frame=carrier, covariance=PlaceCovariances(first=q_first, second=q_second), robust=robust
     )
-    kept = np.isin(have, pose.names)
+    used = np.isin(have, pose.names)
     to_frame = frame_transform(frame, site).inverse() @ frame_transform(carrier, site)
-    shown = pose if to_frame.to == to_frame.from_ else pose.in_frame(to_frame)
-    wanted = pivot if pivot is not None else default_pivot(group or "", frame, site)
-    shown = shown if wanted is None else shown.about(wanted)
+    result = pose if to_frame.to == to_frame.from_ else pose.in_frame(to_frame)
+    new_pivot = pivot if pivot is not None else default_pivot(group or "", frame, site)
+    result = result if new_pivot is None else result.about(new_pivot)
     against = "design" if earlier is None else earlier.campaign or earlier.file
-    places = first[kept] if to_frame.to == to_frame.from_ else to_frame.points(first[kept])
-    off = _posture_offset(group, pose, there, later, earlier) if carrier == "reflector" else None
-    return GroupPose(group or "points", shown, against, places, missing, later, earlier, off)
+    places = first[used] if to_frame.to == to_frame.from_ else to_frame.points(first[used])
+    off = _posture_offset(group, pose, carrier_from_ground, later, earlier) if carrier == "reflector" else None
+    return GroupPose(group or "points", result, against, places, missing, later, earlier, off)
 
 
 def _posture_offset(
     group: str | None, pose: Pose, reflector_from_ground: Transform, later: SolvedPoints, earlier: SolvedPoints | None
 ) -> PostureOffset | None:
-    """The group's direction against the told posture; None where the epoch tells none."""
+    """Direction of a group against the commanded posture.
+
+    None where the epoch has no posture.
+    """
     if later.posture is None:
         return None
     turn = reflector_from_ground.rotation.T
     spread = turn @ pose.covariance[3:, 3:] @ turn.T
-    found = offset_of(str(group), turn @ pose.rotation, spread, later.posture)
-    return found if earlier is None else replace(found, postures=2)
+    offset = offset_of(str(group), turn @ pose.rotation, spread, later.posture)
+    return offset if earlier is None else replace(offset, postures=2)
 
 
 def _posture_of(epoch: SolvedPoints, site: SiteFolder, carrier: str) -> SiteFolder:
-    """The site at an epoch's own posture; the ground needs none."""
+    """Site at an epoch's posture; the ground needs none."""
     if carrier == "ground":
         return site
     if epoch.posture is None:
@@ -191,7 +201,7 @@ def _posture_of(epoch: SolvedPoints, site: SiteFolder, carrier: str) -> SiteFold
 
 
 def _into(to_from: Transform, epoch: SolvedPoints, names: Sequence[str]) -> tuple[np.ndarray, Known]:
-    """Places (n, 3) of an epoch's points in another frame, and their covariance."""
+    """Places (n, 3) of an epoch's points in another frame, with covariance."""
     x = to_from.points(epoch.places(names))
     if isinstance(epoch.covariance, JointPoints):
         return x, TurnedPoints(epoch.covariance.of_points(epoch.rows(names)), to_from.rotation)
@@ -199,16 +209,19 @@ def _into(to_from: Transform, epoch: SolvedPoints, names: Sequence[str]) -> tupl
 
 
 def _design(
-    names: Sequence[str], known: dict[str, RangedPoint], site: SiteFolder, to_from: Transform
+    names: Sequence[str], site_places: dict[str, RangedPoint], site: SiteFolder, to_from: Transform
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Design places (n, 3) and covariances (n, 3, 3), independent from point to point, in the frame `to_from.to`."""
+    """Design places (n, 3) and covariances (n, 3, 3), in `to_from.to`.
+
+    Independent from point to point.
+    """
     settings = ReductionSettings()
     focal = site.site.paraboloid.focal_length_mm * MILLIMETRE
     on_dish = {n for n, t in site.targets.items() if t.type == "prism" and t.frame == "reflector"}
     inside = nominal_frame(site)
     x, q = np.zeros((len(names), 3)), np.zeros((len(names), 3, 3))
     for k, name in enumerate(names):
-        place = known[name]
+        place = site_places[name]
         u = place.u_typed(settings.u_position) if place.typed else settings.u_position
         spread, where = np.eye(3) * u**2, place.start
         if name in on_dish:

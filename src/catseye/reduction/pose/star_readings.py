@@ -1,12 +1,13 @@
-"""Other readings of a table of star offsets, each tried on a copy: exchanged columns, zenith distances, other units.
+"""Alternative interpretations of a table of star offsets.
 
-A reading is a change of the four angles of every row. All have as many unknowns and one unknown scatter, the same for
-both coordinates on the sky, so that their likelihoods compare directly: of n rows with the residuals' squares S
+Each is tried on a copy: exchanged columns, zenith distances, other units. A reading is a change of the four angles of
+every row. All have as many unknowns and one unknown scatter, the same for both coordinates on the sky, so that their
+likelihoods compare directly: of n rows with the residuals' squares S
 
     log L = -n log S + sum of log cos E + (numbers changed in scale) log scale,
 
-cos E because azimuth times cos E, not azimuth, scatters alike. A wrong reading of honest rows reaches k times the
-right one's likelihood with a chance of 1/k at most, whatever it is.
+cos E because azimuth times cos E, not azimuth, scatters alike. A wrong reading of correct rows reaches k times the
+right one's likelihood with a chance of 1/k at most.
 """
 
 from collections.abc import Callable
@@ -18,7 +19,7 @@ from catseye.constants import ARCSECOND, DEGREE
 from catseye.geometry.antenna.pointing_series import columns, design
 from catseye.reduction.pose.pointing_fit import PointingFit
 
-DECISIVE = float(np.log(1e4))  # a wrong reading of an honest table passes it once in 10 000
+DECISIVE = float(np.log(1e4))  # a wrong reading of a correct table passes it once in 10 000
 FARTHEST = 5.0 * DEGREE  # between sky and encoders: as `records.laboratory.star_offsets` reads a table
 RADIANS, HOURS = 1.0 / DEGREE, 15.0
 
@@ -28,9 +29,9 @@ Reading = Callable[[Angles], tuple[Angles, float]]
 
 @dataclass(frozen=True)
 class BetterReading:
-    """A reading that fits better.
+    """Interpretation that fits better.
 
-    text      which, with what it leaves
+    text      its name, with the remaining scatter
     sky_rms   rad
     gain      log likelihood above the table's as it stands
     """
@@ -41,7 +42,10 @@ class BetterReading:
 
 
 def _scaled(azimuth: float, elevation: float) -> Reading:
-    """Angles that are read as degrees and are in units of so many degrees."""
+    """Interpretation of angles typed in other units.
+
+    Read as degrees, they are in units of so many degrees.
+    """
 
     def reading(angles: Angles) -> tuple[Angles, float]:
         a, e, b, f = angles
@@ -66,30 +70,35 @@ READINGS: dict[str, Reading] = {
 
 
 def better_readings(fit: PointingFit) -> tuple[BetterReading, ...]:
-    """Readings that fit decisively better than the table as it stands, the best and those that nearly equal it.
+    """Interpretations that fit decisively better.
 
-    fit   of stars; those that it leaves out stay out
+    The best and those that nearly equal it.
+
+    fit   of stars; those that it rejects stay rejected
     """
     used = fit.used
     a, e = fit.azimuth[used], fit.elevation[used]
     across, up = fit.observed[used].T
     as_read: Angles = (a, e, a + across / np.cos(e), e + up)
     chosen = columns(fit.series.terms)
-    own, _ = _likelihood(as_read, chosen)
-    found = []
+    as_typed, _ = _likelihood(as_read, chosen)
+    result = []
     for text, reading in READINGS.items():
         angles, jacobian = reading(as_read)
         if _possible(angles):
             likelihood, rms = _likelihood(angles, chosen)
-            gain = likelihood + jacobian - own
+            gain = likelihood + jacobian - as_typed
             if gain > DECISIVE:
-                found.append(BetterReading(f"{text} ({rms / ARCSECOND:.2f} arc seconds rms)", rms, gain))
-    best = max((each.gain for each in found), default=0.0)
-    return tuple(sorted((r for r in found if r.gain > best - DECISIVE), key=lambda r: -r.gain))
+                result.append(BetterReading(f"{text} ({rms / ARCSECOND:.2f} arc seconds rms)", rms, gain))
+    best = max((interpretation.gain for interpretation in result), default=0.0)
+    return tuple(sorted((r for r in result if r.gain > best - DECISIVE), key=lambda r: -r.gain))
 
 
 def _possible(angles: Angles) -> bool:
-    """Angles that a table may hold: elevations above the horizon, azimuths of one turn or so, pairs close together."""
+    """True for angles that a table may hold.
+
+    Elevations above the horizon, azimuths of one turn or so, pairs close together.
+    """
     a, e, b, f = angles
     elevations = np.concatenate([e, f])
     within = (
@@ -104,7 +113,7 @@ def _across(angles: Angles) -> np.ndarray:
 
 
 def _likelihood(angles: Angles, chosen: list[int]) -> tuple[float, float]:
-    """Log likelihood up to a constant, and the residuals' rms on the sky, rad."""
+    """Log likelihood up to a constant, and rms on the sky, rad."""
     a, e, _, f = angles
     rows = design(a, e)[:, :, chosen].reshape(2 * len(a), -1)
     observed = np.column_stack([_across(angles), f - e]).ravel()

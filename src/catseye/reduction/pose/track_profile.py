@@ -1,13 +1,14 @@
-"""How the alidade tilts as it goes round: track and azimuth bearing as a Fourier series of azimuth, with covariance.
+"""Tilt of the alidade by azimuth, as a Fourier series with covariance.
 
-The tilt is told in the ground frame, as the turn of the alidade about east and north, from its nominal place:
+The cause is track and azimuth bearing. The tilt is in the ground frame, as the turn of the alidade about east and
+north, from its nominal place:
 
     tilt(A) = mean + sum over k of c_k cos kA + s_k sin kA,    each of mean, c_k, s_k with two components.
 
-Ranges see it in poses of the alidade, r = R tilt with R from the ground's axes to the alidade's; an inclinometer on the
-alidade sees r + zero. Its zero goes round with the telescope: it is a tilt with one wave a turn, so that inclinometers
-alone cannot tell it from the part (c_1, s_1) that does the same; all other waves they can. Ranges can tell that, too,
-coarsely; the inclinometers then give the shape. Both go into one least squares. The mean is the azimuth axis's lean: AN
+Ranges give poses of the alidade, r = R tilt with R from the ground's axes to the alidade's; an inclinometer on the
+alidade reads r + zero. Its zero rotates with the telescope: it is a tilt with one wave a turn, so that inclinometers
+alone cannot separate it from the same part of (c_1, s_1); all other waves they determine. Ranges separate both,
+coarsely; the inclinometers then give the shape. Both enter one least squares. The mean is the azimuth axis's lean: AN
 and AW of the pointing series.
 """
 
@@ -31,11 +32,11 @@ WAVE_1 = slice(2, 6)  # of the coefficients: cos 1A and sin 1A, about east and n
 
 @dataclass(frozen=True, eq=False)
 class TiltSeries:
-    """The tilt by azimuth.
+    """Tilt by azimuth as a series.
 
     harmonics    K
     names        (4 K + 2) coefficients: "mean east", "mean north", "cos 1A east", ...
-    values       (4 K + 2,) rad, turns about east and north; nan where an inclinometer alone cannot tell
+    values       (4 K + 2,) rad, turns about east and north; nan where an inclinometer alone cannot determine it
     covariance   (4 K + 2, 4 K + 2) rad^2, nan likewise
     """
 
@@ -45,17 +46,21 @@ class TiltSeries:
     covariance: np.ndarray
 
     def at(self, azimuth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Tilt (..., 2) rad about east and north at azimuths (...), and its covariance (..., 2, 2) rad^2.
+        """Tilt (..., 2), rad, about east and north, and its covariance.
+
+        At azimuths (...); covariance (..., 2, 2) rad^2.
 
         Coefficients that are not determined are left out: see `undetermined`.
         """
-        known = np.isfinite(self.values)
-        rows = _rows(np.asarray(azimuth, dtype=float), self.harmonics)[..., known]
-        return rows @ self.values[known], rows @ self.covariance[np.ix_(known, known)] @ np.swapaxes(rows, -1, -2)
+        determined = np.isfinite(self.values)
+        rows = _rows(np.asarray(azimuth, dtype=float), self.harmonics)[..., determined]
+        return rows @ self.values[determined], rows @ self.covariance[np.ix_(determined, determined)] @ np.swapaxes(
+            rows, -1, -2
+        )
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """Names of the coefficients that the observations do not determine."""
+        """Names of coefficients that the observations do not determine."""
         return tuple(name for name, value in zip(self.names, self.values, strict=True) if not np.isfinite(value))
 
     @property
@@ -67,15 +72,15 @@ class TiltSeries:
 
 @dataclass(frozen=True, eq=False)
 class TrackProfile:
-    """A tilt series fitted to poses and inclinometers.
+    """Tilt series fitted to poses and inclinometers.
 
-    series       see there
+    series       fitted
     zero         (2,) rad, of the inclinometer about the alidade's x and y, with covariance (2, 2); None without one
                  or where nothing determines it
     azimuth      (n,) rad, of all observations, poses first
     residual     (n, 2) rad, observed minus fitted, alidade's axes
     w            (n, 2) standardised residuals; nan where nothing checks one
-    poses        how many of the n are poses
+    poses        number of poses among the n
     pvv, degrees_of_freedom, p   of the fit
     sources      verdicts of the poses, by their files
     """
@@ -93,7 +98,10 @@ class TrackProfile:
 
 
 def _rows(azimuth: np.ndarray, harmonics: int) -> np.ndarray:
-    """Derivatives (..., 2, 4 K + 2) of the tilt about east and north by the coefficients."""
+    """Derivatives (..., 2, 4 K + 2) of the tilt by the coefficients.
+
+    Tilt about east and north.
+    """
     waves = [np.ones_like(azimuth)]
     for k in range(1, harmonics + 1):
         waves += [np.cos(k * azimuth), np.sin(k * azimuth)]
@@ -117,7 +125,9 @@ def track_profile(
     names: Sequence[str] | None = None,
     partial: bool = False,
 ) -> TrackProfile:
-    """The tilt of the alidade by azimuth, from poses and inclinometers in one least squares.
+    """Fit the alidade's tilt by azimuth.
+
+    Poses and inclinometers in one least squares.
 
     azimuth      (m,) rad, of the poses; m may be 0 with tilts
     turn         (m, 2) rad, rotation of the alidade about its own x and y axes, from design or a reference
@@ -125,25 +135,25 @@ def track_profile(
     tilts        readings of an inclinometer, or None
     harmonics    K, waves a turn, 0 to 36
     names        m, of the poses, for errors
-    partial      an inclinometer alone gives all waves but the first, which its zero does like; else it is refused
+    partial      True: an inclinometer alone gives all waves but the first, which its zero resembles; False: refused
 
-    Raises EstimationError naming the coefficients that nothing holds: too few azimuths, or an inclinometer alone.
+    Raises EstimationError naming the coefficients that nothing determines: too few azimuths, or an inclinometer alone.
     """
     if not 0 <= harmonics <= MOST_HARMONICS:
         raise EstimationError(f"{harmonics} harmonics of a track profile (expected 0 to {MOST_HARMONICS})")
     m, n = len(azimuth), 0 if tilts is None else len(tilts)
     called = [*(names or [f"pose {k + 1}" for k in range(m)]), *(f"reading {k + 1}" for k in range(n))]
-    every = np.concatenate([np.asarray(azimuth, dtype=float), np.zeros(0) if tilts is None else tilts.azimuth])
-    if not len(every):
-        raise EstimationError("a track profile needs poses or inclinometer readings, none given")
+    azimuths = np.concatenate([np.asarray(azimuth, dtype=float), np.zeros(0) if tilts is None else tilts.azimuth])
+    if not len(azimuths):
+        raise EstimationError("a track profile needs poses or inclinometer readings (none present)")
     alone = partial and not m and harmonics > 0
-    own = np.swapaxes(rz(every)[..., :2, :2], -1, -2) @ _rows(every, harmonics)  # rz: ground from alidade
-    # a zero makes two of the four coefficients of one wave: with all four free it may as well stay 0
+    tilt_rows = np.swapaxes(rz(azimuths)[..., :2, :2], -1, -2) @ _rows(azimuths, harmonics)  # rz: ground from alidade
+    # a zero acts like two of the four coefficients of one wave: with all four free it may stay 0
     free_zero = n > 0 and not alone
     zero = np.zeros((m + n, 2, 2 if free_zero else 0))
     if free_zero:
         zero[m:] = np.eye(2)
-    design = np.concatenate([own, zero], axis=-1).reshape(2 * (m + n), -1)
+    design = np.concatenate([tilt_rows, zero], axis=-1).reshape(2 * (m + n), -1)
     read = np.zeros((0, 2)) if tilts is None else tilts.tilt
     values = np.concatenate([np.asarray(turn, dtype=float).reshape(m, 2), read])
     q = np.zeros((2 * (m + n), 2 * (m + n)))
@@ -170,7 +180,7 @@ def track_profile(
     return TrackProfile(
         series=series,
         zero=(solution.estimate[size:], solution.covariance[size:, size:]) if free_zero else None,
-        azimuth=every,
+        azimuth=azimuths,
         residual=(values.ravel() - design @ solution.estimate).reshape(-1, 2),
         w=w.reshape(-1, 2),
         poses=m,
@@ -183,7 +193,9 @@ def track_profile(
 def joined_tilt(
     rotation: np.ndarray, covariance: np.ndarray, tilt: np.ndarray, *, u: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Six numbers of an alidade's pose (6,) with an inclinometer's reading joined, and their covariance (6, 6).
+    """Pose of an alidade combined with an inclinometer's reading.
+
+    The pose's six numbers (6,) and their covariance (6, 6).
 
     rotation     (6,) m and rad: translation and rotation in the alidade's axes, about its pivot, from the ranges
     covariance   (6, 6)
@@ -197,20 +209,22 @@ def joined_tilt(
     pick = np.zeros((2, 6))
     pick[0, 3] = pick[1, 4] = 1.0
     gain = covariance @ pick.T @ np.linalg.inv(pick @ covariance @ pick.T + u**2 * np.eye(2))
-    left = np.eye(6) - gain @ pick
-    spread = left @ covariance @ left.T + u**2 * gain @ gain.T
+    complement = np.eye(6) - gain @ pick
+    spread = complement @ covariance @ complement.T + u**2 * gain @ gain.T
     return rotation + gain @ (np.asarray(tilt) - pick @ rotation), spread
 
 
 def pose_with_tilt(group_pose: GroupPose, tilt: np.ndarray, u: float) -> GroupPose:
-    """An alidade's pose in its own frame with an inclinometer's reading joined, see `joined_tilt`.
+    """Alidade pose combined with an inclinometer's reading.
+
+    In its own frame; see `joined_tilt`.
 
     The residuals of the points, their sum of squares and `gain` stay those of the ranges alone.
     """
     pose = group_pose.pose
     motion = pose.motion
     if pose.frame != "alidade":
-        raise FrameError(f"pose in the frame '{pose.frame}', expected 'alidade', in which the inclinometer turns")
+        raise FrameError(f"pose in the frame '{pose.frame}', expected 'alidade', the inclinometer's frame")
     six = np.concatenate([motion.translation, motion.rotation])
     six, covariance = joined_tilt(six, motion.covariance, tilt, u=u)
     joined = replace(motion, translation=six[:3], matrix=from_vector(six[3:]), covariance=covariance)

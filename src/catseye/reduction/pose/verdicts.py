@@ -1,4 +1,7 @@
-"""Verdicts of poses and of pointing fits: their own tests, the instrument's plausible sizes, what they rest on."""
+"""Verdicts of poses and of pointing fits.
+
+By their own tests, the instrument's plausible sizes, and their inputs' verdicts.
+"""
 
 from typing import NamedTuple
 
@@ -13,36 +16,44 @@ from catseye.reduction.pose.star_readings import better_readings
 from catseye.verdict import Verdict
 
 UNLIKELY = 1e-4  # chance, on either side, below which a stated uncertainty does not fit the scatter
-LOWEST_FREQUENCY = 1.15e9  # Hz, of the Gregorian receivers: its beam is the widest that a fit has to find
+LOWEST_FREQUENCY = 1.15e9  # Hz, lowest of the Gregorian receivers: their widest beam
 APERTURE = 100.0  # m across: [GBTPM01]'s telescope
 TENTH = 0.1  # of the beam's width: a pointing error of it costs 3 % of the gain, exp(-4 ln 2 / 100)
-SECTOR = 24.0 * DEGREE  # a turn written in hours; in radians it is 6.3. In less azimuth the axis's lean is not held
+SECTOR = 24.0 * DEGREE  # a turn written in hours; in radians it is 6.3. In less azimuth the axis's lean is undetermined
 LOWEST = 6.0 * DEGREE  # a right angle written in hours; in radians it is 1.6. No telescope sees stars below it only
 
 
 class PoseFindings(NamedTuple):
-    """What `catseye pose` found: the group's pose, and the beam where it was asked for."""
+    """Result of `catseye pose`: the group's pose, and on request the beam."""
 
     pose: GroupPose
     beam: PointingOffset | None
 
 
 def pose_status(result: PoseFindings) -> str:
-    """ "converged", or what speaks against the pose: of the fit, or of its own test, in words."""
+    """Status "converged", or the evidence against the pose.
+
+    From the fit, or from its own test, in words.
+    """
     pose = result.pose.pose
     if pose.motion.status != "converged":
         return pose.motion.status
     if pose.motion.degrees_of_freedom and pose.p < RIGID:
         what = "the pose, and the beam that follows from it," if result.beam is not None else "the pose"
-        return f"the group does not move as one (p {pose.p:.2g}): {what} is a mean of what its points do; see residuals"
+        return (
+            f"the group does not move as one (p {pose.p:.2g}): {what} is a mean of its points' motions; see residuals"
+        )
     return "converged"
 
 
 def pose_verdict(result: PoseFindings) -> Verdict:
-    """Rigidity of the group, its place against the posture, and the verdicts of both epochs."""
+    """Verdict on a pose.
+
+    Rigidity of the group, its place against the posture, and the verdicts of both epochs.
+    """
     group = result.pose
-    epochs = [each for each in (group.epoch, group.earlier) if each is not None]
-    return _own_verdict(result).resting_on({each.campaign or each.file: each.verdict for each in epochs})
+    epochs = [epoch for epoch in (group.epoch, group.earlier) if epoch is not None]
+    return _own_verdict(result).resting_on({epoch.campaign or epoch.file: epoch.verdict for epoch in epochs})
 
 
 def _own_verdict(result: PoseFindings) -> Verdict:
@@ -53,12 +64,12 @@ def _own_verdict(result: PoseFindings) -> Verdict:
         return Verdict("doubtful", "as many coordinates as unknowns: nothing checks that the group moved as one")
     if result.pose.posture is not None and result.pose.posture.doubt:
         return Verdict("doubtful", result.pose.posture.doubt)
-    left = f", {len(pose.left_out)} left out" if pose.left_out else ""
-    return Verdict("good", f"{len(pose.names)} points move as one{left} (p {pose.p:.2g})")
+    removed = f", {len(pose.left_out)} left out" if pose.left_out else ""
+    return Verdict("good", f"{len(pose.names)} points move as one{removed} (p {pose.p:.2g})")
 
 
 def largest_sky_rms() -> float:
-    """Residuals beyond which a series points no receiver, rad: a tenth of the widest beam.
+    """Largest residual of a usable series, rad: a tenth of the widest beam.
 
     The beam of an aperture D at the wavelength l is 1.2 l / D wide at half power. The published series leaves 7.39
     arc seconds.
@@ -72,7 +83,10 @@ def largest_sky_rms() -> float:
 
 
 def fit_verdict(fit: PointingFit) -> Verdict:
-    """Terms held apart, scatter against what is claimed or plausible, columns that read better in another way."""
+    """Verdict on a pointing fit.
+
+    Separation of terms, scatter against claimed or plausible values, columns that fit better in another reading.
+    """
     return _fit_verdict(fit).resting_on(fit.sources)
 
 
@@ -80,8 +94,8 @@ def _fit_verdict(fit: PointingFit) -> Verdict:
     if fit.degrees_of_freedom < 1:
         return Verdict("doubtful", "as many observations as terms: nothing checks the series")
     rms = fit.sky_rms / ARCSECOND
-    if fit.stars and (other := better_readings(fit)):
-        named = ", or as well if ".join(each.text for each in other)
+    if fit.stars and (alternatives := better_readings(fit)):
+        named = ", or as well if ".join(reading.text for reading in alternatives)
         return Verdict("doubtful", f"{rms:.2f} arc seconds rms on the sky; it fits better if {named}")
     if fit.stars and (doubt := _implausible_sky(fit)):
         return Verdict("doubtful", doubt)
@@ -94,14 +108,16 @@ def _fit_verdict(fit: PointingFit) -> Verdict:
         )
     if not fit.scaled and (doubt := _contradicted(fit)):
         return Verdict("doubtful", doubt)
-    lost = [w for w in fit.weak if w.u_on_the_sky > fit.sky_rms]
-    if lost:
-        return Verdict("doubtful", f"the observations do not tell {', '.join(lost[0].parts)} apart")
-    return Verdict("good", f"{int(fit.used.sum())} observations hold the terms, {rms:.2f} arc seconds rms on the sky")
+    undetermined = [w for w in fit.weak if w.u_on_the_sky > fit.sky_rms]
+    if undetermined:
+        return Verdict("doubtful", f"the observations do not separate {', '.join(undetermined[0].parts)}")
+    return Verdict(
+        "good", f"{int(fit.used.sum())} observations determine the terms, {rms:.2f} arc seconds rms on the sky"
+    )
 
 
 def _implausible_sky(fit: PointingFit) -> str:
-    """What is odd about where the stars stood; "" of a usual sky."""
+    """Implausible star positions as a text; "" for a usual sky."""
     a, e = fit.azimuth[fit.used], fit.elevation[fit.used]
     if np.all(e < LOWEST):
         return f"every elevation is below {LOWEST / DEGREE:.0f} degrees: radians or hours for degrees?"
@@ -113,7 +129,7 @@ def _implausible_sky(fit: PointingFit) -> str:
 
 
 def _contradicted(fit: PointingFit) -> str:
-    """How the scatter contradicts the uncertainty that was stated; "" where it does not."""
+    """Contradiction of scatter and stated uncertainty; "" for none."""
     from scipy import special
 
     degrees, factor = fit.degrees_of_freedom, fit.variance_factor

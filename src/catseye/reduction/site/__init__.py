@@ -1,1 +1,1 @@
-"""What a site is at one moment: places, bodies, stations, motion, the Earth's turn."""
+"""State of a site at one moment: places, bodies, stations, motion, Earth rotation."""

@@ -1,7 +1,8 @@
-"""Two records of one thing, compared: barometers, hygrometers, a typed distance and the coordinates of its ends.
+"""Comparison of two records of one quantity.
 
-Pure: numbers in, disagreements out. A disagreement accuses one of the two only where something decides between them:
-a pressure that, reduced to sea level by the standard air, weather has never reached.
+Barometers, hygrometers, a typed distance and the coordinates of its ends. Pure functions: numbers in, disagreements
+out. A disagreement accuses one of the two only where something decides between them: a pressure that, reduced to
+sea level by the standard air, weather has never reached.
 """
 
 from collections.abc import Sequence
@@ -21,14 +22,14 @@ U_AIR_C, U_LAPSE_C_PER_M = 1.0, 0.02  # chosen: of the layer between two station
 U_WAVE_HPA = 0.5  # amplitude of pressure waves that cross a site, the largest usual: Stull (1988) chapter 12
 U_DEW_POINT_C = 1.0  # chosen: of the air at one station against another's, some 6.5 % of its vapour
 VAPOUR_PER_C = 0.065  # relative change of saturation pressure a degree, near 15 °C
-SEA_LEVEL_HPA = (870.0, 1085.0)  # lowest and highest pressure that weather made, at sea level: [WMOARC25]
-UNITS, NEAR = {"millimetres": 1e-3, "feet": 0.3048, "centimetres": 1e-2}, 0.01  # m; how near a ratio has to come
+SEA_LEVEL_HPA = (870.0, 1085.0)  # lowest and highest observed pressure at sea level: [WMOARC25]
+UNITS, NEAR = {"millimetres": 1e-3, "feet": 0.3048, "centimetres": 1e-2}, 0.01  # m; tolerance of a ratio
 STANDARD_C, STANDARD_LAPSE = 15.0, 0.0065  # °C at sea level, °C/m: [ICAO93]
 
 
 @dataclass(frozen=True, eq=False)
 class StationSeries:
-    """A weather station's readings.
+    """Readings of a weather station.
 
     elevation_m   above the sea, with u_elevation_m
     mjd           (n,) UTC, rising
@@ -56,7 +57,7 @@ class Disagreement:
     difference, u   first less second, in the unit
     unit          of both
     accused       the one that is wrong; "" where nothing decides
-    reason        why that one, or what does not decide
+    reason        of the accusation, or of its absence
     """
 
     what: str
@@ -80,19 +81,24 @@ class Disagreement:
 
 
 def weather_disagreements(stations: Sequence[StationSeries]) -> tuple[Disagreement, ...]:
-    """Barometers and hygrometers of each two stations that cannot both be right, over the time that both cover."""
-    found = []
+    """Contradictory barometers and hygrometers of each two stations.
+
+    Over the time that both cover.
+    """
+    result = []
     for first, second in combinations(stations, 2):
-        pair = _together(first, second)
+        pair = _simultaneous(first, second)
         if pair is not None:
-            found += [each for each in (_barometers(*pair), _hygrometers(*pair)) if each is not None]
-    return tuple(found)
+            result += [conflict for conflict in (_barometers(*pair), _hygrometers(*pair)) if conflict is not None]
+    return tuple(result)
 
 
 def distance_disagreement(
     names: tuple[str, str], typed: float, u_typed: float, *, ends: np.ndarray, covariance: np.ndarray
 ) -> Disagreement | None:
-    """A typed distance against the coordinates of its ends; None where both may be right.
+    """Contradiction of a typed distance and its ends' coordinates.
+
+    None where both may be right.
 
     names        of the ends
     typed        m, with u_typed
@@ -119,48 +125,54 @@ def distance_disagreement(
 
 
 def _factor(ratio: float) -> str:
-    """What a ratio of two lengths looks like."""
+    """Likely cause of a ratio of two lengths, as a text."""
     for text, value in UNITS.items():
         if min(abs(ratio / value - 1.0), abs(ratio * value - 1.0)) < NEAR:
             return f"one looks like {text}, the other like metres"
-    return "nothing here says which is wrong"
+    return "undecided which is wrong"
 
 
-def _together(first: StationSeries, second: StationSeries) -> tuple[StationSeries, StationSeries] | None:
-    """Both at the times of the first that lie within the second's; None where there are none."""
+def _simultaneous(first: StationSeries, second: StationSeries) -> tuple[StationSeries, StationSeries] | None:
+    """Both series at the times of the first within the second's.
+
+    None without such times.
+    """
     inside = (first.mjd >= second.mjd.min()) & (first.mjd <= second.mjd.max())
     if not inside.any():
         return None
     when = first.mjd[inside]
     columns = ("temperature_c", "pressure_hpa", "humidity_percent")
-    own = {name: getattr(first, name)[inside] for name in columns}
-    other = {name: np.interp(when, second.mjd, getattr(second, name)) for name in columns}
-    return replace(first, mjd=when, **own), replace(second, mjd=when, **other)
+    first_columns = {name: getattr(first, name)[inside] for name in columns}
+    second_columns = {name: np.interp(when, second.mjd, getattr(second, name)) for name in columns}
+    return replace(first, mjd=when, **first_columns), replace(second, mjd=when, **second_columns)
 
 
 def _barometers(first: StationSeries, second: StationSeries) -> Disagreement | None:
-    """The first's pressure carried to the second's elevation, against what is read there."""
-    carried = carried_pressure(
+    """Contradiction of two barometers.
+
+    The first's pressure reduced to the second's elevation, against its reading there.
+    """
+    reduced_pressure = carried_pressure(
         first.pressure_hpa, first.temperature_c, first.elevation_m, z_to=second.elevation_m,
         lapse_c_per_m=STANDARD_LAPSE,
     )  # fmt: skip
     u_rise = float(np.hypot(first.u_elevation_m, second.u_elevation_m))
-    spread = carried.standard_uncertainty_hpa(
+    spread = reduced_pressure.standard_uncertainty_hpa(
         first.u_pressure_hpa, u_temperature_c=U_AIR_C, u_lapse=U_LAPSE_C_PER_M, u_rise=u_rise
     )
     u = float(np.sqrt(np.mean(spread**2) + second.u_pressure_hpa**2 + U_WAVE_HPA**2))
-    difference = float(np.mean(carried.pressure_hpa - second.pressure_hpa))
+    difference = float(np.mean(reduced_pressure.pressure_hpa - second.pressure_hpa))
     if not abs(difference) > SURE * u:
         return None
-    reduced = {each.name: _at_sea_level(each) for each in (first, second)}
-    beyond = [name for name, p in reduced.items() if not SEA_LEVEL_HPA[0] <= p <= SEA_LEVEL_HPA[1]]
-    if len(beyond) == 1:
+    reduced = {station.name: _at_sea_level(station) for station in (first, second)}
+    impossible = [name for name, p in reduced.items() if not SEA_LEVEL_HPA[0] <= p <= SEA_LEVEL_HPA[1]]
+    if len(impossible) == 1:
         reason = (
-            f"{beyond[0]}'s is wrong, or its elevation: reduced to sea level it is {reduced[beyond[0]]:.0f} hPa, where "
-            f"weather makes {SEA_LEVEL_HPA[0]:.0f} to {SEA_LEVEL_HPA[1]:.0f}"
+            f"{impossible[0]}'s is wrong, or its elevation: reduced to sea level it is "
+            f"{reduced[impossible[0]]:.0f} hPa, outside the observed {SEA_LEVEL_HPA[0]:.0f} to {SEA_LEVEL_HPA[1]:.0f}"
         )
-        return Disagreement("barometers", first.name, second.name, difference, u, "hPa", beyond[0], reason)
-    reason = "their heights and standard air do not say which of them is wrong"
+        return Disagreement("barometers", first.name, second.name, difference, u, "hPa", impossible[0], reason)
+    reason = "their heights and standard air do not decide which is wrong"
     return Disagreement("barometers", first.name, second.name, difference, u, "hPa", "", reason)
 
 
@@ -172,17 +184,22 @@ def _at_sea_level(station: StationSeries) -> float:
 
 
 def _hygrometers(first: StationSeries, second: StationSeries) -> Disagreement | None:
-    """The first's vapour, its share of the air held, as relative humidity in the second's air."""
+    """Contradiction of two hygrometers.
+
+    The first's vapour, its share of the air kept, as relative humidity in the second's air.
+    """
     vapour = vapour_pressure_hpa(first.temperature_c, first.pressure_hpa, first.humidity_percent)
-    # by the standard air's rise, not the barometers: they may be what is wrong
-    carried = carried_pressure(first.pressure_hpa, first.temperature_c, first.elevation_m, z_to=second.elevation_m)
-    there = vapour * carried.pressure_hpa / first.pressure_hpa
-    expected = relative_humidity_percent(there, second.temperature_c, carried.pressure_hpa)
+    # by the standard air, not the barometers: they may be wrong themselves
+    reduced_pressure = carried_pressure(
+        first.pressure_hpa, first.temperature_c, first.elevation_m, z_to=second.elevation_m
+    )
+    vapour_at_second = vapour * reduced_pressure.pressure_hpa / first.pressure_hpa
+    expected = relative_humidity_percent(vapour_at_second, second.temperature_c, reduced_pressure.pressure_hpa)
     gain = expected / np.maximum(first.humidity_percent, 1.0)
     natural = VAPOUR_PER_C * U_DEW_POINT_C * np.maximum(expected, second.humidity_percent)
     u = float(np.sqrt(np.mean((gain * first.u_humidity_percent) ** 2 + natural**2) + second.u_humidity_percent**2))
     difference = float(np.mean(expected - second.humidity_percent))
     if not abs(difference) > SURE * u:
         return None
-    reason = "in one air both cannot be right, and nothing here says which is wrong"
+    reason = "in the same air both cannot be right; undecided which is wrong"
     return Disagreement("hygrometers", first.name, second.name, difference, u, "%", "", reason)

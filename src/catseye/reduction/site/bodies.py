@@ -1,4 +1,7 @@
-"""Which points of a site move together: dish, feed arm, alidade; and which last from epoch to epoch."""
+"""Bodies of a site's points, and the points tracked between epochs.
+
+Bodies are dish, feed arm and alidade.
+"""
 
 from collections.abc import Mapping
 
@@ -7,14 +10,16 @@ import numpy as np
 from catseye.constants import MILLIMETRE
 from catseye.records.site.folder import SiteFolder
 
-ABOVE_THE_DISH = 5.0  # m over the paraboloid: what is higher is on the arm
-ABOVE_THE_GROUND = 10.0  # m over the highest monument: what is higher stands on no pillar
+ABOVE_THE_DISH = 5.0  # m over the paraboloid: higher points are on the arm
+ABOVE_THE_GROUND = 10.0  # m over the highest monument: higher points stand on no pillar
 
 
 def bodies_of(site: SiteFolder, frames: Mapping[str, str]) -> dict[str, str]:
-    """Point: "dish", "arm" or "alidade"; what stands on the ground is not in it.
+    """Body of each point: "dish", "arm" or "alidade".
 
-    Of the reflector's frame the rangers are on the arm, and so are single targets far above the paraboloid or outside
+    Points on the ground are absent.
+
+    Rangers of the reflector's frame are on the arm, and so are single targets far above the paraboloid or outside
     the aperture.
     """
     bodies = {name: "alidade" for name, frame in frames.items() if frame == "alidade"}
@@ -36,7 +41,9 @@ def bodies_of(site: SiteFolder, frames: Mapping[str, str]) -> dict[str, str]:
 
 
 def high_of_ground(site: SiteFolder) -> dict[str, str]:
-    """Point: "alidade", of single targets whose places are typed in the ground's frame and that cannot stand there.
+    """Points typed in the ground's frame that are on the "alidade".
+
+    Single targets that cannot stand on the ground.
 
     They are higher than any pillar and nearer the pintle bearing than half of the monuments' ring: cubes at the
     elevation bearings, 47 m up. At one posture they are the alidade's, and its steel moves them.
@@ -51,7 +58,10 @@ def high_of_ground(site: SiteFolder) -> dict[str, str]:
 
 
 def lasting_names(site: SiteFolder) -> tuple[str, ...]:
-    """Rangers, triplets and single targets but the prisms of the dish, of which there are too many to carry along."""
+    """Rangers, triplets and single targets except dish prisms.
+
+    The dish has too many prisms to track.
+    """
     single = [n for n, t in site.targets.items() if not (t.type == "prism" and t.frame == "reflector")]
     triplets = [name for triplet in site.triplets.values() for name in triplet.targets]
     return tuple(sorted([*site.rangers, *single, *triplets]))

@@ -1,9 +1,9 @@
-"""The turn of the Earth by the clock: UT1 - UTC from the tables that astropy brings along, and the Sun with it.
+"""Earth rotation: UT1 - UTC from astropy's tables, and the Sun.
 
-Nothing is downloaded. The tables are as old as the installed package astropy-iers-data: measured until it was made,
-predicted for a year from then. Outside them UT1 = UTC is taken, and the status says so. By definition the two differ by
-at most 0.9 s, 13.5" of the Sun's hour angle, as long as leap seconds keep them together (to 2035, it is decided; past
-that some 1" a year more).
+Nothing is downloaded. The tables are as old as the installed package astropy-iers-data: measured until then, predicted
+for a year after. Outside them UT1 = UTC is assumed, and the status says so. By definition the two differ by at most
+0.9 s, 13.5" of the Sun's hour angle, as long as leap seconds keep them together (decided up to 2035; after that some 1"
+a year more).
 """
 
 import math
@@ -21,12 +21,12 @@ from catseye.geometry.sky.sun import EARLIEST_MJD, LATEST_MJD, refracted, sun_di
 from catseye.records.site.site import Location
 
 KNOT = 300.0 / SECONDS_PER_DAY  # days
-EARLY_ROWS = 5000  # of the table that begins in 1962: until long after the newer one begins, in 1973
-WORTH_KNOTS = 16  # times, from which on interpolation may pay
+EARLY_ROWS = 5000  # of the table that begins in 1962: well beyond the start of the newer one in 1973
+WORTH_KNOTS = 16  # times from which interpolation may be faster
 
 
 class RotationStatus(StrEnum):
-    """Where a UT1 - UTC comes from."""
+    """Source of a UT1 - UTC value."""
 
     MEASURED = "measured"
     PREDICTED = "predicted: within 0.05 s"
@@ -35,14 +35,14 @@ class RotationStatus(StrEnum):
 
 @dataclass(frozen=True)
 class Rotation:
-    """UT1 - UTC (...), s, and for each the code of `STATUSES`, (...) int."""
+    """UT1 - UTC (...), s, with the code of `STATUSES`, (...) int."""
 
     ut1_minus_utc: NDArray[np.float64]
     code: NDArray[np.int8]
 
     @property
     def status(self) -> RotationStatus:
-        """The worst status of all instants."""
+        """Worst status of all instants."""
         return STATUSES[int(np.max(self.code, initial=0))]
 
 
@@ -51,7 +51,10 @@ STATUSES = (RotationStatus.MEASURED, RotationStatus.PREDICTED, RotationStatus.UN
 
 @dataclass(frozen=True)
 class SunSeen:
-    """The Sun's direction (..., 3) in the ground frame, and how well the turn of the Earth is known."""
+    """Direction (..., 3) of the Sun in the ground frame, with its status.
+
+    The status says how certain the Earth's rotation is.
+    """
 
     direction: NDArray[np.float64]
     status: RotationStatus
@@ -59,7 +62,7 @@ class SunSeen:
 
 @dataclass(frozen=True)
 class FramePlace:
-    """Where a ground frame is, and its air if refraction is to be counted.
+    """Place of a ground frame, and its air if refraction counts.
 
     latitude, longitude    rad, geodetic, east positive
     height                 m
@@ -75,11 +78,11 @@ class FramePlace:
 
 
 def rotation_at(mjd: ArrayLike) -> Rotation:
-    """UT1 - UTC at some times, from the IERS tables shipped with astropy.
+    """UT1 - UTC at some times, from astropy's IERS tables.
 
     mjd    (...), UTC
 
-    Linear between the daily values, leap seconds taken out first. Raises ValidityError for a mjd that is no number.
+    Linear between the daily values, leap seconds taken out first. Raises ValidityError for a mjd that is not finite.
 
     Source: [IERS10] chapter 5; bulletins A and B of the International Earth Rotation and Reference Systems Service.
 
@@ -91,20 +94,22 @@ def rotation_at(mjd: ArrayLike) -> Rotation:
     if not np.all(np.isfinite(days)):
         raise ValidityError("mjd holds a number that is not finite (expected UTC as Modified Julian Day)")
     table = _table()
-    known = (days >= table.mjd[0]) & (days <= table.mjd[-1])
+    covered = (days >= table.mjd[0]) & (days <= table.mjd[-1])
     ut1_minus_tai = np.interp(days, table.mjd, table.ut1_minus_tai)
     leaps = table.steps[np.searchsorted(table.starts, days, side="right")]
-    code = np.where(known, np.where(days > table.last_measured, 1, 0), 2).astype(np.int8)
-    return Rotation(np.where(known, ut1_minus_tai - leaps, 0.0), code)
+    code = np.where(covered, np.where(days > table.last_measured, 1, 0), 2).astype(np.int8)
+    return Rotation(np.where(covered, ut1_minus_tai - leaps, 0.0), code)
 
 
 def sun_at(mjd: ArrayLike, place: FramePlace | Location) -> SunSeen:
-    """Where the Sun stands over a site, in its ground frame: `sun_direction` with UT1 - UTC by the tables.
+    """Direction of the Sun over a site, in its ground frame.
+
+    `sun_direction` with UT1 - UTC by the tables.
 
     mjd      (...), UTC, 41317 to 88069
     place    a FramePlace, or [site] of a site record: the origin of the ground frame, for all rangers of it
 
-    A Place with a pressure gives the Sun as it is seen through the air. Many times that lie close together are
+    A Place with a pressure gives the Sun's apparent direction through the air. Many times that lie close together are
     interpolated between knots 5 minutes apart, within 0.002". Raises ValidityError as `sun_direction` does.
 
     >>> green_bank = FramePlace(38.433 * DEGREE, -79.840 * DEGREE, 807.0)
@@ -115,16 +120,18 @@ def sun_at(mjd: ArrayLike, place: FramePlace | Location) -> SunSeen:
         place = place_of(place)
     days = np.asarray(mjd, dtype=float)
     rotation = rotation_at(days)
-    direction = _many(days, place) if days.size > WORTH_KNOTS else _each(days, place)
+    direction = _interpolated(days, place) if days.size > WORTH_KNOTS else _directly(days, place)
     if place.pressure_hpa is not None:
         direction = refracted(direction, place.pressure_hpa, place.temperature_c)
     return SunSeen(direction, rotation.status)
 
 
 def place_of(site: Location, pressure_hpa: float | None = None, temperature_c: float = 10.0) -> FramePlace:
-    """The place of a site record's table [site]; the elevation of z = 0 is taken as height, for parallax enough.
+    """Place of a site record's table [site].
 
-    pressure_hpa    0 is no air; None takes that of the standard atmosphere at its height
+    The elevation of z = 0 is taken as height, accurate enough for parallax.
+
+    pressure_hpa    0 means no air; None the standard atmosphere at its height
     """
     longitude = math.remainder(site.longitude_deg, 360.0) * DEGREE
     height = site.elevation_of_z0_m
@@ -133,7 +140,9 @@ def place_of(site: Location, pressure_hpa: float | None = None, temperature_c: f
 
 
 def standard_pressure_hpa(height: float) -> float:
-    """Pressure, hPa, of the standard atmosphere at a height, m, -1000 to 11 000: for the Sun's refraction enough.
+    """Pressure of the standard atmosphere at a height, hPa.
+
+    For heights -1000 to 11 000 m; accurate enough for the Sun's refraction.
 
     Source: [ISO75] section 2, 6.5 K/km from 288.15 K and 1013.25 hPa. Weather differs by 4 %, 1' at the horizon.
 
@@ -143,24 +152,26 @@ def standard_pressure_hpa(height: float) -> float:
     return 1013.25 * (1.0 - 0.0065 * height / 288.15) ** 5.2559
 
 
-def _each(mjd: NDArray[np.float64], place: FramePlace) -> NDArray[np.float64]:
+def _directly(mjd: NDArray[np.float64], place: FramePlace) -> NDArray[np.float64]:
     """`sun_direction` at each time: a tenth of a millisecond."""
     turn = rotation_at(mjd).ut1_minus_utc
     return sun_direction(mjd, place.latitude, place.longitude, place.height, ut1_minus_utc=turn)
 
 
-def _many(mjd: NDArray[np.float64], place: FramePlace) -> NDArray[np.float64]:
-    """The same through four knots about each time; directly where that takes fewer looks.
+def _interpolated(mjd: NDArray[np.float64], place: FramePlace) -> NDArray[np.float64]:
+    """`sun_direction` interpolated through four knots about each time.
+
+    Directly where that takes fewer evaluations.
 
     The cubic's error is (w h)^4 0.5625/24 = 5e-9 rad for h = 300 s.
     """
     if not np.all((mjd >= EARLIEST_MJD + KNOT) & (mjd <= LATEST_MJD - 3.0 * KNOT)):
-        return _each(mjd, place)  # which refuses what is outside
+        return _directly(mjd, place)  # which raises outside its range
     cells, which = np.unique(np.floor(mjd / KNOT), return_inverse=True)
     knots, where = np.unique(cells[:, None] + np.arange(-1.0, 3.0), return_inverse=True)
     if len(knots) > mjd.size:
-        return _each(mjd, place)
-    at = _each(knots * KNOT, place)[where.reshape(-1, 4)][which.reshape(mjd.shape)]
+        return _directly(mjd, place)
+    at = _directly(knots * KNOT, place)[where.reshape(-1, 4)][which.reshape(mjd.shape)]
     s = mjd / KNOT - cells[which.reshape(mjd.shape)]
     weights = np.stack(
         [
@@ -177,7 +188,7 @@ def _many(mjd: NDArray[np.float64], place: FramePlace) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class _RotationTable:
-    """The turn of the Earth by day.
+    """Earth rotation by day.
 
     mjd             (n,) UTC
     ut1_minus_tai   (n,) s, free of steps
@@ -195,7 +206,7 @@ class _RotationTable:
 
 @cache
 def _table() -> _RotationTable:
-    """What astropy-iers-data has: the older table until the newer begins."""
+    """Table of astropy-iers-data, the older until the newer begins."""
     from astropy_iers_data import IERS_A_FILE, IERS_B_FILE
 
     newer_mjd, newer_ut1, flag = _newer(IERS_A_FILE)
@@ -220,7 +231,9 @@ def _table() -> _RotationTable:
 
 
 def _newer(path: str) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.str_]]:
-    """MJD, UT1 - UTC (final where it is known, NaN past the predictions), and B final, I measured, P predicted.
+    """MJD, UT1 - UTC, and type of each row of the newer table.
+
+    UT1 - UTC final where available, NaN past the predictions; types B final, I measured, P predicted.
 
     Source: the readme of finals2000A.all, by columns. astropy's reader takes a second for the same, which a
     coordinator that starts again does not have.

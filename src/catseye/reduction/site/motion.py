@@ -1,7 +1,7 @@
-"""Where a telescope that is told in postures carries its points: between two readings, and from an epoch to a shot.
+"""Motion of a telescope's points by its postures.
 
-A rigid telescope on a perfect track, [PARKER04] eq. 2.44; what the real one does besides is the solution's to find, and
-its rate of change an uncertainty of the carried state.
+Between two readings, and from an epoch to a shot: a rigid telescope on a perfect track, [PARKER04] eq. 2.44. Departures
+of the real one are left to the solution; their rate of change is an uncertainty of the filter state.
 """
 
 import math
@@ -20,102 +20,111 @@ from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
 from catseye.records.site.folder import SiteFolder
 
 Array = NDArray[np.float64]
-KEPT = 3600.0  # s of postures that are kept
-WHOLE = 300.0  # s of which all are kept: a shot comes within two minutes
-THINNED = 1.0  # s between those that are older: only the age of a reference shot's posture is asked of them
-LONGEST_GAP = 2.0  # s between readings, or after the last, over which rates are trusted
+RETENTION = 3600.0  # s, retention of postures
+UNTHINNED = 300.0  # s with all readings: a shot comes within two minutes
+THINNED = 1.0  # s between older readings: used only for the age of a reference shot's posture
+LONGEST_GAP = 2.0  # s between readings, or after the last, for which rates hold
 GROUND, ALIDADE, REFLECTOR = "ground", "alidade", "reflector"
 
 
 class PostureTrack:
-    """Azimuth and elevation of the telescope in time, from readings that may come late or out of order."""
+    """Azimuth and elevation of the telescope in time.
+
+    From readings that may come late or out of order.
+    """
 
     def __init__(self) -> None:
         self._ticks: list[int] = []
         self._reads: dict[int, LivePosture] = {}
-        self._table = np.empty((5, 0))  # s from the first, angles, rates; columns beyond the readings are room
-        self._turns, self._filled = 0, 0  # of azimuth before the last column; columns
+        self._table = np.empty((5, 0))  # s from the first, angles, rates; spare columns beyond the readings
+        self._turns, self._filled = 0, 0  # turns of azimuth before the last column; filled columns
         self._thin = 0  # readings before this one are thinned out
 
     def add(self, read: LivePosture) -> None:
-        """One more reading; a second one of an instant replaces the first. Old ones are thinned out and forgotten."""
+        """Add a reading; a second one of an instant replaces the first.
+
+        Old ones are thinned out and forgotten.
+        """
         if self._ticks and read.ticks <= self._ticks[-1]:
             self._filled, self._thin = 0, 0
         if read.ticks not in self._reads:
             insort(self._ticks, read.ticks)
         self._reads[read.ticks] = read
-        if len(self._ticks) > 2 and self._ticks[-1] - self._ticks[0] > 1.25 * KEPT / TICK_SECONDS:
-            first = bisect_right(self._ticks, self._ticks[-1] - round(KEPT / TICK_SECONDS))
-            for gone in self._ticks[:first]:
-                del self._reads[gone]
+        if len(self._ticks) > 2 and self._ticks[-1] - self._ticks[0] > 1.25 * RETENTION / TICK_SECONDS:
+            first = bisect_right(self._ticks, self._ticks[-1] - round(RETENTION / TICK_SECONDS))
+            for dropped in self._ticks[:first]:
+                del self._reads[dropped]
             del self._ticks[:first]
             self._filled, self._thin = 0, 0
         self._thin_out()
 
     def _thin_out(self) -> None:
-        """Forget most of the readings that are older than `WHOLE`, a block at a time."""
-        if not self._ticks or self._ticks[-1] - self._ticks[self._thin] < 1.25 * WHOLE / TICK_SECONDS:
+        """Forget most readings older than `UNTHINNED`, a block at a time."""
+        if not self._ticks or self._ticks[-1] - self._ticks[self._thin] < 1.25 * UNTHINNED / TICK_SECONDS:
             return
-        end = bisect_right(self._ticks, self._ticks[-1] - round(WHOLE / TICK_SECONDS))
-        kept = [self._ticks[self._thin]]
+        end = bisect_right(self._ticks, self._ticks[-1] - round(UNTHINNED / TICK_SECONDS))
+        retained = [self._ticks[self._thin]]
         for ticks in self._ticks[self._thin + 1 : end]:
-            if ticks - kept[-1] < round(THINNED / TICK_SECONDS) and ticks != self._ticks[end - 1]:
+            if ticks - retained[-1] < round(THINNED / TICK_SECONDS) and ticks != self._ticks[end - 1]:
                 del self._reads[ticks]
             else:
-                kept.append(ticks)
-        self._ticks[self._thin : end] = kept
-        self._thin, self._filled = self._thin + len(kept) - 1, 0
+                retained.append(ticks)
+        self._ticks[self._thin : end] = retained
+        self._thin, self._filled = self._thin + len(retained) - 1, 0
 
     def forget_after(self, ticks: int) -> None:
-        """Forget what was stamped later: the clock was set back."""
+        """Forget readings with a later stamp: the clock was set back."""
         first = bisect_right(self._ticks, ticks)
-        for gone in self._ticks[first:]:
-            del self._reads[gone]
+        for dropped in self._ticks[first:]:
+            del self._reads[dropped]
         del self._ticks[first:]
         self._filled, self._thin = 0, 0
 
     @classmethod
     def of(cls, reads: Sequence[LivePosture]) -> "PostureTrack":
-        """All of some readings, in order of time, to which nothing is added."""
+        """Fixed track of some readings, in order of time."""
         track = cls()
         track._ticks, track._reads = [read.ticks for read in reads], {read.ticks: read for read in reads}
         return track
 
     def between(self, first: float, last: float) -> "PostureTrack":
-        """The readings of now that matter from MJD to MJD, to which nothing is added: those within, and a gap more."""
+        """Fixed track of the current readings from MJD to MJD.
+
+        Those within, and up to a gap beyond.
+        """
         gap = LONGEST_GAP / SECONDS_PER_DAY
         i = max(bisect_right(self._ticks, (first - gap) * TICKS_PER_DAY) - 1, 0)
         j = bisect_right(self._ticks, (last + gap) * TICKS_PER_DAY) + 1
-        same = PostureTrack()
-        same._ticks = self._ticks[min(i, max(len(self._ticks) - 2, 0)) : j]
-        same._reads = {k: self._reads[k] for k in same._ticks}
-        return same
+        track = PostureTrack()
+        track._ticks = self._ticks[min(i, max(len(self._ticks) - 2, 0)) : j]
+        track._reads = {k: self._reads[k] for k in track._ticks}
+        return track
 
     def __len__(self) -> int:
         return len(self._ticks)
 
     @property
     def latest(self) -> LivePosture | None:
-        """The reading of the latest instant."""
+        """Reading of the latest instant."""
         return self._reads[self._ticks[-1]] if self._ticks else None
 
     def at(self, mjd: ArrayLike) -> tuple[Array, Array]:
-        """Azimuth and elevation (...), rad, at times (...): cubic between readings, by the last rates beyond.
+        """Azimuth and elevation (...), rad, at times (...).
+
+        Cubic between readings, by the last rates beyond.
 
         Raises InputError: no reading at all. Between readings the cubic has their angles and rates; for an acceleration
         of 0.2 deg/s^2 that begins half-way between two readings 0.1 s apart it is off by 0.01". Azimuth is unwrapped.
         """
         if not self._ticks:
-            raise InputError(
-                "the telescope has told no posture (expected at least one before anything on it is solved)"
-            )
+            raise InputError("no telescope position received (expected at least one before anything on it is solved)")
         table = self._columns()
         t = (np.asarray(mjd, dtype=float) * TICKS_PER_DAY - self._ticks[0]) * SECONDS_PER_DAY / TICKS_PER_DAY
         i = np.clip(np.searchsorted(table[0], t, side="right") - 1, 0, max(len(self._ticks) - 2, 0))
         return self._angle(table, i, t, 1, 3), self._angle(table, i, t, 2, 4)
 
     def angles(self, mjd: float) -> tuple[float, float]:
-        """`at` for one time, without arrays.
+        """Azimuth and elevation at one time, without arrays.
 
         Raises InputError: no reading at all.
         """
@@ -129,14 +138,14 @@ class PostureTrack:
         t = (ticks - a.ticks) * TICK_SECONDS
         u = min(max(t / h, 0.0), 1.0)
         w = (1 + 2 * u) * (1 - u) ** 2, u**2 * (3 - 2 * u), h * u * (1 - u) ** 2, -h * u**2 * (1 - u)
-        beyond = max(t - h, 0.0), min(t, 0.0)
+        outside = max(t - h, 0.0), min(t, 0.0)
         return (
-            _cubic(w, beyond, a.azimuth, _near(b.azimuth, a.azimuth), a.azimuth_rate, b.azimuth_rate),
-            _cubic(w, beyond, a.elevation, b.elevation, a.elevation_rate, b.elevation_rate),
+            _cubic(w, outside, a.azimuth, _near(b.azimuth, a.azimuth), a.azimuth_rate, b.azimuth_rate),
+            _cubic(w, outside, a.elevation, b.elevation, a.elevation_rate, b.elevation_rate),
         )
 
     def age(self, mjd: ArrayLike) -> Array:
-        """s from the nearest reading (...)."""
+        """Time from the nearest reading (...), s."""
         if not self._ticks:
             return np.full(np.shape(mjd), np.inf)
         times = self._columns()[0]
@@ -146,7 +155,10 @@ class PostureTrack:
         return np.asarray(near)
 
     def _columns(self) -> Array:
-        """(5, n): all readings; only those that are new are filled in, whatever was asked between them."""
+        """All readings as columns, (5, n).
+
+        Only new ones are filled in.
+        """
         if self._filled < len(self._ticks):
             if len(self._ticks) > self._table.shape[1]:
                 self._table = np.concatenate([self._table, np.empty((5, len(self._ticks) + 64))], axis=1)
@@ -162,7 +174,10 @@ class PostureTrack:
         return self._table[:, : self._filled]
 
     def _angle(self, table: Array, i: NDArray[np.int64], t: Array, angle: int, rate: int) -> Array:
-        """[Hermite] cubic in each interval, straight with the end's rate outside of all."""
+        """[Hermite] cubic in each interval, linear outside of all.
+
+        Outside with the end's rate.
+        """
         if table.shape[1] == 1:
             return np.asarray(table[angle, 0] + table[rate, 0] * (t - table[0, 0]))
         t0, t1 = table[0, i], table[0, i + 1]
@@ -178,26 +193,26 @@ class PostureTrack:
 
 
 def _cubic(
-    w: tuple[float, float, float, float], beyond: tuple[float, float], y0: float, y1: float, v0: float, v1: float
+    w: tuple[float, float, float, float], outside: tuple[float, float], y0: float, y1: float, v0: float, v1: float
 ) -> float:
-    return w[0] * y0 + w[1] * y1 + w[2] * v0 + w[3] * v1 + beyond[0] * v1 + beyond[1] * v0
+    return w[0] * y0 + w[1] * y1 + w[2] * v0 + w[3] * v1 + outside[0] * v1 + outside[1] * v0
 
 
-def _near(angle: float, other: float) -> float:
-    """The angle on the turn nearest to another."""
-    return angle + TWO_PI * round((other - angle) / TWO_PI)
+def _near(angle: float, reference: float) -> float:
+    """Angle plus full turns, nearest to a reference."""
+    return angle + TWO_PI * round((reference - angle) / TWO_PI)
 
 
 def carried_point(
-    site: SiteFolder, frame: str, own: Array, azimuth: float, elevation: float
+    site: SiteFolder, frame: str, point: Array, azimuth: float, elevation: float
 ) -> tuple[float, float, float]:
-    """One point of a frame in the ground frame, m, without arrays.
+    """Point of a frame in the ground frame, m, without arrays.
 
-    own    (3,) m, in the frame
+    point  (3,) m, in the frame
 
     Source: [PARKER04] eq. 2.40-2.44, multiplied out.
     """
-    x, y, z = own.tolist()
+    x, y, z = point.tolist()
     if frame == GROUND:
         return x, y, z
     if frame == REFLECTOR:
@@ -211,7 +226,9 @@ def carried_point(
 
 
 def ground_from(site: SiteFolder, frame: str, azimuth: ArrayLike, elevation: ArrayLike) -> Transforms:
-    """Ground from a frame at postures (...), rad; the ground itself stands.
+    """Transform to ground from a frame at postures (...), rad.
+
+    Identity for the ground itself.
 
     Source: [PARKER04] eq. 2.40-2.44 with the site's constants.
     """
@@ -229,7 +246,7 @@ def ground_from(site: SiteFolder, frame: str, azimuth: ArrayLike, elevation: Arr
 
 
 def frames_of(site: SiteFolder) -> dict[str, str]:
-    """The frame in which each point of a site stands: rangers, fixed points, targets."""
+    """Frame of each point of a site: rangers, fixed points, targets."""
     on_ground = [*site.monuments, *(f"{name}-F" for name in site.monuments)]
     return {
         **dict.fromkeys(on_ground, GROUND),
@@ -239,31 +256,33 @@ def frames_of(site: SiteFolder) -> dict[str, str]:
     }
 
 
-def shaken(body: str, others: Sequence[str], jitter_mm: Mapping[str, ArrayLike]) -> Array:
-    """Variance (m,), m^2, of ranges between a point of one body and one of each other by what shakes.
+def shaken(body: str, other_bodies: Sequence[str], jitter_mm: Mapping[str, ArrayLike]) -> Array:
+    """Variance (m,), m^2, of ranges between bodies by their jitter.
+
+    Between a point of one body and one of each of the others.
 
     jitter_mm   of each body, () or (m,); none of the ground's ""
 
-    Points of one body shake together: their ranges do not change.
+    Points of one body move together: their ranges do not change.
     """
-    far = np.array(others, dtype=str)
+    far = np.array(other_bodies, dtype=str)
     near_mm, far_mm = np.broadcast_to(jitter_mm.get(body, 0.0), len(far)), np.zeros(len(far))
-    for other, mm in jitter_mm.items():
-        far_mm = np.where(far == other, mm, far_mm)
+    for jittering, mm in jitter_mm.items():
+        far_mm = np.where(far == jittering, mm, far_mm)
     return np.asarray(np.where(far == body, 0.0, np.hypot(near_mm, far_mm) * MILLIMETRE) ** 2)
 
 
 @dataclass(frozen=True, eq=False)
 class CarriedMotion:
-    """How the telescope carries points from an epoch to other instants.
+    """Motion of the telescope's points from an epoch to other instants.
 
     site        its constants
     track       postures
     frames      name: frame
     epoch       MJD
-    bodies      name: what it moves with, where that is not the ground
-    jitter_mm   body: how far its points are at a shot from where they are on average
-    lasting     share of the standard deviation of a path's index that lasts: a parameter of the line
+    bodies      name: its body, where that is not the ground
+    jitter_mm   body: deviation of its points at a shot from their mean place
+    lasting     constant share of the standard deviation of a path's index: a parameter of the line
     """
 
     site: SiteFolder
@@ -275,19 +294,27 @@ class CarriedMotion:
     lasting: float = 0.0
 
     def jitter(self, ranger: str, targets: tuple[str, ...]) -> Array:
-        """Variance (m,), m^2, of ranges to targets by what shakes; none where both ends shake together."""
+        """Variance (m,), m^2, of ranges to targets by jitter.
+
+        Zero where both ends move together.
+        """
         return shaken(self.bodies.get(ranger, ""), [self.bodies.get(target, "") for target in targets], self.jitter_mm)
 
     def distances(self, a: str, b: str, places: Mapping[str, Array], mjd: Array) -> Array:
-        """(m,) m between two points of given places (3,), each in its own frame, at times (m,)."""
+        """Distances (m,), m, between two points at times (m,).
+
+        Of given places (3,), each in its own frame.
+        """
         if self.frames[a] == self.frames[b]:
             return np.full(len(mjd), np.linalg.norm(places[b] - places[a]))
         azimuth, elevation = self.track.at(mjd)
-        there = [ground_from(self.site, self.frames[n], azimuth, elevation).points(places[n]) for n in (a, b)]
-        return np.asarray(np.linalg.norm(there[1] - there[0], axis=-1))
+        ground_places = [ground_from(self.site, self.frames[n], azimuth, elevation).points(places[n]) for n in (a, b)]
+        return np.asarray(np.linalg.norm(ground_places[1] - ground_places[0], axis=-1))
 
     def carried(self, names: tuple[str, ...], mjd: Array) -> tuple[Array, Array]:
-        """Turn (m, 3, 3) and shift (m, 3), m, of each named point, ground axes, from the epoch to its time (m,).
+        """Rotation and shift of each named point from the epoch.
+
+        Turn (m, 3, 3) and shift (m, 3), m, ground axes, from the epoch to its time (m,).
 
         Source: x(t) = M(t) M(epoch)^-1 x(epoch), M ground from the point's frame.
         """
@@ -298,7 +325,7 @@ class CarriedMotion:
             if not len(rows):
                 continue
             azimuth, elevation = self.track.at(np.append(mjd[rows], self.epoch))
-            there = ground_from(self.site, moving, azimuth, elevation)
-            turn[rows] = there.rotation[:-1] @ there.rotation[-1].T
-            shift[rows] = there.translation[:-1] - turn[rows] @ there.translation[-1]
+            ground_frames = ground_from(self.site, moving, azimuth, elevation)
+            turn[rows] = ground_frames.rotation[:-1] @ ground_frames.rotation[-1].T
+            shift[rows] = ground_frames.translation[:-1] - turn[rows] @ ground_frames.translation[-1]
         return turn, shift

@@ -1,4 +1,7 @@
-"""What can be ranged to or from, at its approximate place in the ground frame."""
+"""Points that can be ranged to or from, at approximate places.
+
+In the ground frame.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -16,12 +19,12 @@ from catseye.records.site.target import TargetRow
 from catseye.records.site.triplet import TripletRecord
 from catseye.reduction.site.bodies import bodies_of, high_of_ground
 
-MISTYPED_MM = 0.02  # ten times what rounding and the dimensions' uncertainty explain
+MISTYPED_MM = 0.02  # ten times the effect of rounding and the dimensions' uncertainty
 
 
 @dataclass(frozen=True, eq=False)
 class RangedPoint:
-    """A point of the network that can be ranged to.
+    """Point of the network that can be ranged to.
 
     name       of the point
     kind       "ranger", "prism", "ball" or "hollow"
@@ -30,10 +33,10 @@ class RangedPoint:
     height     m, of a prism
     constant   m, range constant Pc of its glass; 0 for hollow cubes
     u_constant m, its standard uncertainty from that of the glass's dimensions, shared by all shots on it
-    group      what its normal's error is shared with: its own name, or its triplet's; "" for none
-    typed      its start is an approximate position that somebody typed
+    group      points that share its normal's error: its own name, or its triplet's; "" for none
+    typed      True if its start is a typed approximate position
     u_start    m, each coordinate of the start, as its record says; None: `ReductionSettings.u_position` counts
-    body       "dish", "arm" or "alidade", with which it moves; "" on the ground
+    body       "dish", "arm" or "alidade"; "" on the ground
     """
 
     name: str
@@ -50,17 +53,23 @@ class RangedPoint:
 
     @cached_property
     def across(self) -> np.ndarray:
-        """Two unit vectors (2, 3) across the normal, by which it may tilt."""
+        """Two unit vectors (2, 3) across the normal: its tilt axes."""
         assert self.normal is not None
         return np.asarray(np.linalg.svd(self.normal[None])[2][1:])
 
     def u_typed(self, usual: float) -> float:
-        """Standard uncertainty of each coordinate of the start, m: the record's, else the usual one."""
+        """Standard uncertainty of each start coordinate, m.
+
+        The record's, else the usual one.
+        """
         return usual if self.u_start is None else self.u_start
 
 
 def nominal_frame(campaign: SiteFolder) -> Transform:
-    """Reflector to ground at the campaign's posture, if the telescope were rigid and perfectly placed."""
+    """Transform reflector to ground at the campaign's posture.
+
+    For a rigid, perfectly placed telescope.
+    """
     reflector = campaign.site.frames.reflector
     return ground_from_reflector(
         np.radians(campaign.site.campaign.azimuth_deg),
@@ -71,7 +80,9 @@ def nominal_frame(campaign: SiteFolder) -> Transform:
 
 
 def places_of(campaign: SiteFolder) -> dict[str, RangedPoint]:
-    """Everything that can be ranged to, by name, at its approximate position in the ground frame.
+    """All points that can be ranged to, by name.
+
+    At their approximate positions in the ground frame.
 
     Source: README of the campaign layout; [PARKER04] eqs. 2.3-2.7 for scan points, 2.44 for the reflector frame;
     [GOLDMAN00] figure 10 for the triplet: ball = mid-point + h_corr * normal, normal towards the prism side. The
@@ -110,7 +121,10 @@ def places_of(campaign: SiteFolder) -> dict[str, RangedPoint]:
 
 
 def _target(target: TargetRow, frame: Transform, n: float) -> RangedPoint:
-    """A prism or a hollow cube by itself; n is the glass's group index over the air's."""
+    """A single prism or hollow cube.
+
+    n is the glass's group index over the air's.
+    """
     where = frame.points(np.array(target.position_mm) * MILLIMETRE)
     if target.type == "prism" and target.normal is not None and target.height_mm and target.pc_mm is not None:
         return RangedPoint(
@@ -128,7 +142,10 @@ def _target(target: TargetRow, frame: Transform, n: float) -> RangedPoint:
 
 
 def _triplet(triplet: TripletRecord, frame: Transform, n: float) -> Iterator[RangedPoint]:
-    """A triplet's left and right prism and its ball; n is the glass's group index over the air's."""
+    """Left prism, right prism and ball of a triplet.
+
+    n is the glass's group index over the air's.
+    """
     ball = frame.points(np.array(triplet.nominal_position_mm) * MILLIMETRE)
     normal, axis = unit(frame.directions(triplet.normal)), unit(frame.directions(triplet.axis))
     middle = ball - triplet.h_corr_mm * MILLIMETRE * normal
@@ -160,7 +177,7 @@ def _metres(value_mm: float | None) -> float | None:
 
 
 def sheet_notes(campaign: SiteFolder) -> list[str]:
-    """Glass constants that do not follow from the dimensions beside them, one line each.
+    """Glass constants that contradict their dimensions, one line each.
 
     Every shot on a target shares its constant, so that no residual shows a typing error in it.
 
@@ -186,5 +203,5 @@ def sheet_notes(campaign: SiteFolder) -> list[str]:
 
 
 def unit(v: np.ndarray) -> np.ndarray:
-    """The vector (3,) at length 1."""
+    """Vector (3,) at length 1."""
     return v / np.linalg.norm(v)

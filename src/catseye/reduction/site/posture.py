@@ -1,4 +1,7 @@
-"""The told posture against where a part of the antenna points by its own ranges: two records of one thing."""
+"""Comparison of the commanded posture with a part's measured direction.
+
+Two records of one quantity.
+"""
 
 from dataclasses import dataclass
 from functools import cache
@@ -8,17 +11,17 @@ import numpy as np
 from catseye.constants import DEGREE
 from catseye.geometry.antenna.pointing_series import published
 
-SURE = 5.0  # standard uncertainties of the pose beyond which it and the posture disagree
+SURE = 5.0  # standard uncertainties of the pose that a real disagreement exceeds
 
 
 @dataclass(frozen=True, eq=False)
 class PostureOffset:
-    """Direction of a part's axis less the told posture's.
+    """Direction of a part's axis minus the commanded posture's.
 
     what       the part
     offset     (2,) rad, azimuth times cos E and elevation
     u          (2,) rad
-    postures   told ones that went in: 2 where two epochs are compared
+    postures   number of commanded ones used: 2 where two epochs are compared
     """
 
     what: str
@@ -28,22 +31,24 @@ class PostureOffset:
 
     @property
     def doubt(self) -> str:
-        """How posture and part disagree; "" where they do not."""
+        """Disagreement of posture and part, as a text; "" for none."""
         limit = self.postures * largest_correction()
-        beyond = (np.abs(self.offset) - limit) / self.u
-        worst = int(np.argmax(beyond))
-        if not beyond[worst] > SURE:
+        excess = (np.abs(self.offset) - limit) / self.u
+        worst = int(np.argmax(excess))
+        if not excess[worst] > SURE:
             return ""
         along = ("across the elevation axis", "in elevation")[worst]
-        told = "the told posture and the design" if self.postures == 1 else "the told postures of the two epochs"
+        source = (
+            "the commanded posture and the design" if self.postures == 1 else "the commanded postures of the two epochs"
+        )
         return (
-            f"{told} disagree with the {self.what} by {self.offset[worst] / DEGREE:+.3f} degrees {along} (u "
-            f"{self.u[worst] / DEGREE:.4f}, expected up to {limit / DEGREE:.3f}); nothing here says which is wrong"
+            f"{source} disagree with the {self.what} by {self.offset[worst] / DEGREE:+.3f} degrees {along} (u "
+            f"{self.u[worst] / DEGREE:.4f}, expected up to {limit / DEGREE:.3f}); undecided which is wrong"
         )
 
 
 def offset_of(what: str, rotation: np.ndarray, covariance: np.ndarray, posture: tuple[float, float]) -> PostureOffset:
-    """How far a part turns away from the posture.
+    """Rotation of a part's axis away from the posture.
 
     what         the part
     rotation     (3,) rad, from its design, ground axes
@@ -55,7 +60,10 @@ def offset_of(what: str, rotation: np.ndarray, covariance: np.ndarray, posture: 
 
 
 def axis_lean(azimuth: float, elevation: float) -> np.ndarray:
-    """(2, 3): how a small turn w of the dish moves its axis a, as w x a along larger azimuth and elevation."""
+    """Matrix (2, 3) from a small turn w of the dish to its axis' motion.
+
+    w x a along larger azimuth and elevation.
+    """
     along = np.array([np.sin(azimuth) * np.cos(elevation), np.cos(azimuth) * np.cos(elevation), np.sin(elevation)])
     across = np.array([np.cos(azimuth), -np.sin(azimuth), 0.0])
     up = np.array([-np.sin(azimuth) * np.sin(elevation), -np.cos(azimuth) * np.sin(elevation), np.cos(elevation)])
@@ -64,7 +72,9 @@ def axis_lean(azimuth: float, elevation: float) -> np.ndarray:
 
 @cache
 def largest_correction() -> float:
-    """Largest correction of the published pointing series above 5 degrees, rad: encoders and beam differ by it.
+    """Largest correction of the published pointing series, rad.
+
+    Above 5 degrees of elevation; encoders and beam differ by it.
 
     Source: [GBTPM01].
 

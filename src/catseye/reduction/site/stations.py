@@ -1,4 +1,4 @@
-"""From records to stations, and to the counts of one mirror for given points: CAL.EQ."""
+"""Mirror stations from records, and mirror counts for points: CAL.EQ."""
 
 from dataclasses import dataclass, replace
 
@@ -29,14 +29,14 @@ from catseye.reduction.site.places import nominal_frame
 
 FARTHEST = 2e4  # m between two points of a site whose coordinates lie within 10 km (`records.files.record.Coordinate`)
 UNUSUAL = 1e3  # m, six times the longest line of the Green Bank site: more likely typed in millimetres
-ANY_TURN = COUNTS_PER_TURN / np.sqrt(12.0)  # counts: nothing is known of an azimuth, uniform over a turn
+ANY_TURN = COUNTS_PER_TURN / np.sqrt(12.0)  # counts: unknown azimuth, uniform over a turn
 STEPS = {"axes": 1e-6, "tilts": 1e-7}  # m, rad, for derivatives
 AXES = ("axis_offset_mm", "mirror_offset_mm", "beam_x_mm", "beam_y_mm")
 TILTS = ("face_tilt_rad", "beam_tilt_x_rad", "beam_tilt_y_rad")
 
 
 def station_of(monument: MonumentGeometry, mirror: MirrorGeometry) -> MirrorStation:
-    """The mirror on that monument.
+    """Station of a mirror on a monument.
 
     Source: [PARKER04] Figures 2.2 and 2.4, transformations 1 to 6.
     """
@@ -50,18 +50,18 @@ def station_of(monument: MonumentGeometry, mirror: MirrorGeometry) -> MirrorStat
 
 
 def feed_arm_station(ranger: FeedArmRanger, mirror: MirrorGeometry, ground_from_reflector: Transform) -> MirrorStation:
-    """The mirror of a ranger on the feed arm, as the telescope stands.
+    """Station of a feed-arm ranger's mirror at the telescope's posture.
 
-    ground_from_reflector    of that posture
+    ground_from_reflector    at that posture
 
-    Raises InputError where the record does not say how its mount is turned.
+    Raises InputError where the record does not give the orientation of its mount.
 
     Source: [PARKER04] section 2.6.1: R_i and gamma are functions of the posture.
     """
     if ranger.mount_z is None or ranger.mount_y is None:
         raise InputError(
             f"feedarm.toml: ranger {ranger.name!r} has no mount_z, mount_y (expected unit vectors, reflector frame), "
-            "so that nothing says where its mirror points"
+            "so that its mirror's orientation is unknown"
         )
     z = np.array(ranger.mount_z) / np.linalg.norm(ranger.mount_z)
     y = np.array(ranger.mount_y) - z * (z @ np.array(ranger.mount_y))
@@ -77,7 +77,10 @@ def feed_arm_station(ranger: FeedArmRanger, mirror: MirrorGeometry, ground_from_
 
 
 def station_in(campaign: SiteFolder, name: str) -> MirrorStation | None:
-    """A campaign's ranger, the telescope in its nominal posture; None where no record says how its mount is turned."""
+    """Station of a campaign's ranger, at the nominal posture.
+
+    None where no record gives the orientation of its mount.
+    """
     mirror = campaign.mirror_of(name)
     if name in campaign.monuments:
         return station_of(campaign.monuments[name], mirror)
@@ -86,12 +89,12 @@ def station_in(campaign: SiteFolder, name: str) -> MirrorStation | None:
 
 
 def offset_of(mirror: MirrorGeometry) -> np.ndarray:
-    """(3,) m, mount axes: from the fixed point to the scan point."""
+    """Offset (3,), m, mount axes, from the fixed point to the scan point."""
     return np.array([mirror.dx_mm, mirror.dy_mm, mirror.dz_mm]) * MILLIMETRE
 
 
 def imperfections_of(mirror: MirrorGeometry) -> Imperfections | None:
-    """What the record says of offsets, tilts and encoder errors; None where it knows of none."""
+    """Offsets, tilts and encoder errors of a record; None without any."""
     imperfections = _imperfections(mirror)
     return imperfections if imperfections.matter else None
 
@@ -106,32 +109,36 @@ def _imperfections(mirror: MirrorGeometry) -> Imperfections:
 
 
 def imperfections_variance(station: MirrorStation, mirror: MirrorGeometry, to: np.ndarray) -> np.ndarray:
-    """(n, 2), counts^2, of the direct pointing's counts for points (n, 3), m, by what the record says it does not know
-    of offsets, tilts and encoder errors; zero where it says nothing.
+    """Variance of the direct counts by the record's uncertainties.
 
-    Each term is independent. A cosine and a sine term of one order, known to u each, give u^2 at any angle.
+    (n, 2), counts^2, for points (n, 3), m: uncertainties of offsets, tilts and encoder errors; zero where the
+    record has none.
+
+    Each term is independent. A cosine and a sine term of one order, of u each, give u^2 at any angle.
 
     Source: [JCGM100] eq. 10; derivatives by central differences of the traced ray.
     """
-    whole = _imperfections(mirror)
+    complete = _imperfections(mirror)
     variance = np.zeros((len(to), 2))
     for part, u in (("axes", (mirror.u_axis_mm or 0.0) * MILLIMETRE), ("tilts", mirror.u_tilt_rad or 0.0)):
         if u == 0.0:
             continue
-        values, step = getattr(whole, part), STEPS[part]
+        values, step = getattr(complete, part), STEPS[part]
         for away in step * np.eye(len(values)):
-            ahead, behind = (
-                imperfect_counts(station, replace(whole, **{part: values + sign * away}), to) for sign in (1, -1)
+            forward, backward = (
+                imperfect_counts(station, replace(complete, **{part: values + sign * away}), to) for sign in (1, -1)
             )
-            apart = ahead - behind
+            apart = forward - backward
             apart[:, 0] -= COUNTS_PER_TURN * np.round(apart[:, 0] / COUNTS_PER_TURN)  # Theta's cut between them
             variance += np.square(u * apart / (2.0 * step))
-    orders = np.array([whole.azimuth_waves.shape[1], whole.elevation_waves.shape[1]])
+    orders = np.array([complete.azimuth_waves.shape[1], complete.elevation_waves.shape[1]])
     return variance + np.square(mirror.u_encoder_counts or 0.0) * orders
 
 
 def station_covariance(monument: MonumentGeometry, mirror: MirrorGeometry) -> tuple[np.ndarray, tuple[str, ...]]:
-    """(13, 13), of the station's parameters in their units, and the keys that the records lack: counted as known.
+    """Covariance (13, 13) of the station's parameters in their units.
+
+    Also the keys that the records lack: their parameters count as exact.
 
     The records give one u each and no correlations.
     """
@@ -154,7 +161,9 @@ def station_covariance(monument: MonumentGeometry, mirror: MirrorGeometry) -> tu
 
 @dataclass(frozen=True, eq=False)
 class Pointings:
-    """Where one mirror looks for n points, everything (n,) unless said otherwise; CAL.EQ's answer and more.
+    """Counts of one mirror for n points.
+
+    Everything (n,) unless stated otherwise; CAL.EQ's answer and more.
 
     to                   (n, 3), m, ground
     aim                  range, Theta, Phi and counts of the six transformations
@@ -162,7 +171,7 @@ class Pointings:
     prime                (n, 2) of the prime pointing: half a turn up or down, whichever is allowed, up where neither is
     autocollimation, back_retro   elevation counts at which the face, or the retroreflector behind it, looks there
     allowed, prime_allowed        azimuth within the limits
-    u                    (n, 2), counts, of the direct pointing by the records; NaN where they do not say it all; of an
+    u                    (n, 2), counts, of the direct pointing by the records; NaN where they are incomplete; of an
                          azimuth at most that of any turn; of an elevation on the azimuth axis itself NaN
     lacking              keys of uncertainties that the records lack
     """
@@ -179,7 +188,7 @@ class Pointings:
     lacking: tuple[str, ...]
 
     def unusual(self, k: int) -> str:
-        """Both readings of a point that is farther than any target of a site; "" of a usual one."""
+        """Alternative reading of an unusually distant point; "" otherwise."""
         if self.aim.range[k] <= UNUSUAL:
             return ""
         less = ", ".join(f"{v:g}" for v in self.to[k] * MILLIMETRE)
@@ -189,8 +198,8 @@ class Pointings:
 def point(monument: MonumentGeometry, mirror: MirrorGeometry, to: np.ndarray) -> Pointings:
     """Encoder counts of one mirror for points (n, 3), m, ground.
 
-    Raises InputError for a point that has no direction, is farther than FARTHEST, or that the beam of this mirror does
-    not meet.
+    Raises InputError for a point that has no direction, is farther than FARTHEST, or that the beam of this mirror
+    cannot reach.
 
     Source: [PARKER04] Figure 2.5 (CAL.EQ), eq. 2.12 to 2.26.
     """
@@ -213,8 +222,8 @@ def point(monument: MonumentGeometry, mirror: MirrorGeometry, to: np.ndarray) ->
     else:
         prime = imperfect_counts(station, imperfections, to, prime=True)
         direct = imperfect_counts(station, imperfections, to)
-        both = imperfect_face_counts(station, imperfections, to)
-        face, back = both[:, 1], imperfect_back_counts(station, imperfections, both)
+        faces = imperfect_face_counts(station, imperfections, to)
+        face, back = faces[:, 1], imperfect_back_counts(station, imperfections, faces)
     for k in np.flatnonzero(~np.isfinite(np.column_stack([direct, prime, face, back])).all(axis=1)):
         raise InputError(
             f"point {', '.join(f'{v:.10g}' for v in to[k])} m, {aimed.range[k]:.4g} m from the scan point of "

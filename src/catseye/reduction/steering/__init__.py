@@ -1,1 +1,1 @@
-"""Where a mirror may look and what it finds: guard, way round, tracking, search, visibility."""
+"""Mirror pointing: guard, routing, tracking, search, visibility."""

@@ -1,10 +1,10 @@
-"""Finding a target by its return: search until there is light, scan around it, fit the spot, say where it is.
+"""Target search by its return: spiral, scan, fitted spot.
 
-    find               the whole of it, from a predicted pointing and something that measures; the spot by `spot_fit`
-    found_point        the target's place, from the counts found and a known range
-    search_results     a table of what was found; adjustment_readings the one by which zeros and angles are adjusted
+    find               the whole search, from a predicted pointing and a measuring function; the spot by `spot_fit`
+    found_point        the target's place, from its counts and a known range
+    search_results     a table of the results; adjustment_readings the one for the adjustment of zeros and angles
 
-A target that is not found is a status with what was searched, never an exception.
+A target that is not found is a status with the searched area, never an exception.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +21,7 @@ from catseye.optics.spot import reach
 from catseye.reduction.steering.spot_fit import SearchHead, Spot, fit_spot
 
 Array = NDArray[np.float64]
-Measure = Callable[[Array], float]  # amplitude, V, at (2,) counts; NaN where there is no reading
+Measure = Callable[[Array], float]  # amplitude, V, at (2,) counts; NaN without a reading
 Allowed = Callable[[Array, Array], bool]  # from counts (2,) to counts (2,), now
 
 WIDER = 1.6  # half a scan's width over the spot's radius
@@ -46,35 +46,35 @@ def find(
     allowed: Allowed | None = None,
     standing: ArrayLike | None = None,
 ) -> Spot:
-    """The pointing at which a target returns most, searched for about a predicted one.
+    """Pointing of a target's largest return, near a predicted one.
 
     predicted       (2,) counts (Na, Ne), real, direct or prime
     head            the ranger
     measure         amplitude at (2,) whole counts
     search_radius   rad on the sky, 0 or more
-    allowed         whether the mirror may go from counts to counts now (Sun, structure: `Guard.slew`); asked before
-                    every look, so that a long search meets no Sun that has come meanwhile; always if None
-    standing        (2,) counts where the mirror stands at first; at the first look if None
+    allowed         True if the mirror may go from counts to counts now (Sun, structure: `Guard.slew`); called before
+                    every look, so that a long search avoids the moving Sun; always True if None
+    standing        (2,) counts of the mirror at the start; those of the first look if None
 
     A spiral of looks, without gaps for a spot that falls to the threshold no sooner than to half its peak (a status
-    says so where whole counts are too coarse for that), until one is above the threshold; a raster about it, moved
-    until the spot's centre is well inside; then `fit_spot`. Light that turns out to be no spot (a spike, a reflection)
-    does not end the search: the spiral goes on.
+    reports it where whole counts are too coarse for that), until one is above the threshold; a raster about it, moved
+    until the spot's centre is well inside; then `fit_spot`. Light that is no spot (a spike, a reflection) does not end
+    the search: the spiral continues.
 
     Source: the notes' practice of searching at predicted counts; patterns in `geometry.mirror.search_pattern`.
     """
     looked: dict[tuple[float, ...], float] = {}
     refused: set[tuple[float, ...]] = set()
-    here = None if standing is None else np.asarray(standing, dtype=float)
+    position = None if standing is None else np.asarray(standing, dtype=float)
 
     def look(at: Array) -> float:
-        nonlocal here
+        nonlocal position
         if tuple(at) in looked:
             return looked[tuple(at)]
-        if allowed is not None and not allowed(at if here is None else here, at):
+        if allowed is not None and not allowed(at if position is None else position, at):
             refused.add(tuple(at))
             return np.nan
-        here = at
+        position = at
         looked[tuple(at)] = float(measure(at))
         return looked[tuple(at)]
 
@@ -90,7 +90,7 @@ def find(
     amplitudes = list(looked.values())
     status = spot.status
     if light is None:
-        status = _nothing(pattern, len(refused), amplitudes, predicted, head, search_radius)
+        status = _dark_status(pattern, len(refused), amplitudes, predicted, head, search_radius)
     elif not spot.found:
         status = f"{status} (light of {np.nanmax(amplitudes):.2f} V near {light[0]:.0f}, {light[1]:.0f})"
     return replace(spot, status=status, looked_at=np.array(list(looked)).reshape(-1, 2), seen=np.array(amplitudes))
@@ -102,7 +102,10 @@ def _centred(
     look: Measure,
     looked: Mapping[tuple[float, ...], float],
 ) -> Spot:
-    """The spot about a place with light: scanned, and scanned again until its centre is well inside."""
+    """Spot about a place with light.
+
+    Scanned again until its centre is well inside.
+    """
     fine = float(max(0.5 * np.hypot(*count_size(hit, head.zeros)) * 1.001, 0.25 * head.radius))
     centre, half = hit, WIDER * head.radius
     spot = Spot("")
@@ -127,12 +130,14 @@ def _centred(
 def found_point(
     station: MirrorStation, spot: Spot, distance: float, *, u_distance: float, of_station: ArrayLike | None = None
 ) -> tuple[Array, Array]:
-    """Where a target stands, (3,) m, ground, and its covariance (3, 3): the counts found, at a known distance.
+    """Place of a target by its counts at a known distance.
+
+    (3,) m, ground, and its covariance (3, 3).
 
     station       the ranger
-    spot          that was found
+    spot          of the target
     distance      m from the scan point, above 0; u_distance m
-    of_station    (13, 13) covariance of the station's parameters; none if None
+    of_station    (13, 13) covariance of the station's parameters; zero if None
 
     Raises ValidityError for a spot that was not found.
 
@@ -147,14 +152,14 @@ def found_point(
     slope = distance * by_counts
     covariance = slope @ spot.covariance @ slope.T + u_distance**2 * np.outer(direction, direction)
     if of_station is not None:
-        whole = moved + distance * turned
-        covariance = covariance + whole @ np.asarray(of_station, dtype=float) @ whole.T
+        combined = moved + distance * turned
+        covariance = covariance + combined @ np.asarray(of_station, dtype=float) @ combined.T
     return origin + distance * direction, covariance
 
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """What the search for one target came to: its name, the spot (which says whether it was found), and when."""
+    """Result of the search for one target: name, spot with status, time."""
 
     target: str
     spot: Spot
@@ -162,9 +167,11 @@ class SearchResult:
 
 
 def search_results(results: Sequence[SearchResult]) -> str:
-    """CSV text of targets found: real counts with their standard uncertainties, V, and an MJD to the microsecond.
+    """CSV text of found targets.
 
-    Those that were not found have no row: what has no counts adjusts nothing. Raises ValidityError where none was.
+    Real counts with their standard uncertainties, V, and an MJD to the microsecond.
+
+    Targets that were not found have no row. Raises ValidityError where none was found.
     """
     hits = [result for result in results if result.spot.found]
     if not hits:
@@ -179,19 +186,21 @@ def search_results(results: Sequence[SearchResult]) -> str:
 
 
 def adjustment_readings(results: Sequence[SearchResult], places: Mapping[str, ArrayLike], ne0: float) -> str:
-    """CSV text of targets found, with where they are, as the calibration kind `search-results` reads it.
+    """CSV text of found targets with their places.
+
+    In the format of the calibration kind `search-results`.
 
     results    of one ranger; those not found have no row
     places     target: (3,) m, ground
     ne0        counts, elevation at Phi = 0: below it is the prime pointing
 
-    Raises ValidityError where none was found, or where a target that was has no place.
+    Raises ValidityError where none was found, or where a found target has no place.
     """
     hits = [result for result in results if result.spot.found]
     missing = [result.target for result in hits if result.target not in places]
     if missing or not hits:
-        what = f"{missing[0]} was found and has no place" if missing else f"none of {len(results)} targets was found"
-        raise ValidityError(f"{what}: there is nothing to adjust by")
+        what = f"{missing[0]} was found but has no place" if missing else f"none of {len(results)} targets was found"
+        raise ValidityError(f"{what}: no readings for an adjustment")
     _refuse_commas(hits)
     lines = ["target,x_m,y_m,z_m,azimuth_counts,elevation_counts,u_azimuth_counts,u_elevation_counts,pointing,mjd_utc"]
     for result in hits:
@@ -206,13 +215,15 @@ def adjustment_readings(results: Sequence[SearchResult], places: Mapping[str, Ar
 def _refuse_commas(results: Sequence[SearchResult]) -> None:
     for result in results:
         if not result.target or any(mark in result.target for mark in ',"\r\n'):
-            raise ValidityError(f"target {result.target!r} is no name for a table (expected no comma, quote, line end)")
+            raise ValidityError(
+                f"target {result.target!r} is not a valid name for a table (expected no comma, quote, line end)"
+            )
 
 
-def _nothing(
+def _dark_status(
     pattern: Pattern, forbidden: int, amplitudes: list[float], predicted: ArrayLike, head: SearchHead, radius: float
 ) -> str:
-    """The status of a search that saw no light."""
+    """Status of a search without light."""
     na, ne = np.asarray(predicted, dtype=float)
     readings = [value for value in amplitudes if np.isfinite(value)]
     gaps = {
@@ -220,10 +231,10 @@ def _nothing(
         "forbidden": forbidden,
         "without a reading": len(amplitudes) - len(readings),
     }
-    left = ", ".join(f"{number} {what}" for what, number in gaps.items() if number)
-    narrow = "; the spot is narrower than whole counts surely meet" if reach(head.radius, 0.5) < LEAST_REACH else ""
+    omitted = ", ".join(f"{number} {what}" for what, number in gaps.items() if number)
+    narrow = "; the spot is narrower than the step of whole counts" if reach(head.radius, 0.5) < LEAST_REACH else ""
     most = f"; the largest was {max(readings):.3f} V" if readings else ""
     return (
         f"not found: nothing above {head.threshold_volt:g} V at {len(readings)} places within {1e3 * radius:.3g} mrad "
-        f"of {na:.1f}, {ne:.1f}{f' ({left})' if left else ''}{most}{narrow}"
+        f"of {na:.1f}, {ne:.1f}{f' ({omitted})' if omitted else ''}{most}{narrow}"
     )

@@ -1,18 +1,20 @@
-"""What keeps a ranger's mirror out of the Sun, off the structure and off people: each move is asked for, and answered.
+"""Guard of a ranger's mirror against the Sun, the structure and people.
+
+Every move is checked before it is made.
 
     Guard(name, station, pace, azimuth_limits, place)   one ranger
         pointing(mjd, counts)           may the mirror stand there?
-        slew(mjd, start, end)           may it go there, along the way that its two axes take?
+        slew(mjd, start, end)           may it go there, along the path of its two axes?
         route(mjd, waypoints)           ... from point to point: a search pattern, a scan
         track(mjd, counts)              ... at time-tagged counts, straight between them (eq. 2.45, 2.46)
         until(mjd, counts)              how long may it stand there?
 
-A refusal is a value, a Verdict with one line of text. The Sun's cone counts while the Sun is above `horizon`: its
+A refusal is a value, a GuardAnswer with one line of text. The Sun's cone counts while the Sun is above `horizon`: its
 middle may be seen 0.6 degrees below by refraction, its limb 0.3 more, and from 130 m above the ground the horizon lies
 0.4 lower.
 
-Between the Sun's directions at both ends of a move it is taken to run evenly along the chord. Its acceleration, at most
-w^2 and `BENDING` times that where refraction bends it most, bounds how wrong that is: w^2 T^2 / 8, added to the cone.
+Between the Sun's directions at both ends of a move, uniform motion along the chord is assumed. Its acceleration, at
+most w^2 and `BENDING` times that where refraction bends it most, bounds the error: w^2 T^2 / 8, added to the cone.
 """
 
 from dataclasses import dataclass, field, replace
@@ -44,26 +46,26 @@ from catseye.reduction.site.earth_rotation import FramePlace, sun_at
 
 LOOK_AHEAD = 1.0  # days
 SCAN = 60.0 / SECONDS_PER_DAY  # days, in which the Sun moves by a quarter of a degree
-FIRST_LOOKS = 32  # at a standing beam, SCAN apart; twice as many whenever they find no change
-PLACES = 33  # of a move, where it is looked for the deepest in the Sun's cone
-MOST_STARTS = 1000  # of a way that waits for the Sun
-BENDING = 36.0  # of the Sun's way by refraction, per w^2; 20 at 1010 hPa, 10 C and an altitude of -1.9 degrees
+FIRST_LOOKS = 32  # at a fixed beam, SCAN apart; twice as many whenever they find no change
+PLACES = 33  # samples of a move in the search for the deepest place in the Sun's cone
+MOST_STARTS = 1000  # of a path that waits for the Sun
+BENDING = 36.0  # of the Sun's path by refraction, per w^2; 20 at 1010 hPa, 10 C and an altitude of -1.9 degrees
 BENDING_HIGH = 2.0  # above 5 degrees, where it is 1.4
 HIGH = 5.0 * DEGREE
-WIDEST = 0.99 * np.pi  # a cone that leaves no way
-LONGEST = 60.0  # s, of the pieces into which a halt or a track is cut: the Sun moves on between them
-SETTLED = 1e-3  # s, of the time when a beam becomes free
+WIDEST = 0.99 * np.pi  # a cone that leaves no path
+LONGEST = 60.0  # s, pieces of a halt or a track: the Sun moves between them
+SETTLED = 1e-3  # s, resolution of the time when a beam becomes free
 
 
 @dataclass(frozen=True)
 class GuardAnswer:
-    """The answer to a request.
+    """Answer to a request.
 
-    allowed     whether the mirror may
-    reason      one line: why not; empty if it may
-    clearance   rad, from the nearest zone where the path was asked about, at its start or its entry; inf without zones
+    allowed     True if the mirror may
+    reason      one line: reason of a refusal; else empty
+    clearance   rad, from the nearest zone at the path's start or its entry; inf without zones
     at          s from the start of the path to the entry; None where there is none
-    free_at_mjd when the Sun will let the mirror stand there, or begin its way; None where waiting does not help
+    free_at_mjd time when the Sun permits the pointing, or the start of the path; None where waiting does not help
     """
 
     allowed: bool
@@ -75,7 +77,7 @@ class GuardAnswer:
 
 @dataclass(frozen=True)
 class Guard:
-    """One ranger and what it must keep out of.
+    """One ranger and its forbidden zones.
 
     name              of the ranger, for the answers
     station           its mirror on its monument
@@ -84,10 +86,10 @@ class Guard:
     place             origin of the ground frame, or None: the Sun is not watched
     boxes             structure and people
     half_angle        rad, of the Sun's cone about its middle
-    margin_counts     how far each axis may be off its profile: following, overshoot, settling, and one axis starting
-                      after the other (10 ms at 10 000 counts/s are 100 counts)
-    horizon           rad: below this altitude the Sun is set; -pi/2 keeps its cone for ever
-    off_beam          rad: how far the real mirror's beam may be off the perfect one's, by tilts and encoder errors
+    margin_counts     largest error of each axis against its profile: following, overshoot, settling, and one axis
+                      starting after the other (10 ms at 10 000 counts/s are 100 counts)
+    horizon           rad: below this altitude the Sun is set; -pi/2 keeps its cone always
+    off_beam          rad: largest error of the mirror's beam, by tilts and encoder errors
     """
 
     name: str
@@ -118,20 +120,25 @@ class Guard:
         object.__setattr__(self, "margin", servo_margin(np.add(self.margin_counts, late)) + self.off_beam)
 
     def clearance(self, mjd: ArrayLike, counts: ArrayLike, *, exact_below: float = np.inf) -> NDArray[np.float64]:
-        """Angle (..., 1 + boxes), rad, from standing beams to the Sun's cone, then the boxes; margin taken off.
+        """Angle (..., 1 + boxes), rad, from fixed beams to the zones.
+
+        The Sun's cone, then the boxes; margin subtracted.
 
         mjd       (...), UTC
         counts    (..., 2), azimuth and elevation
-        exact_below  rad: above it a box may answer less
+        exact_below  rad: above it a box's angle may be underestimated
 
-        A mirror may stand where all are above TOUCH; `pointing` says it in words.
+        A mirror may stand where all are above TOUCH; `pointing` gives this as an answer.
         """
         shape = np.broadcast_shapes(np.shape(mjd), np.shape(counts)[:-1])
         n = np.broadcast_to(np.asarray(counts, dtype=float), (*shape, 2))
         return self.around(mjd, ray(self.station, n).direction, exact_below + self.margin) - self.margin
 
     def around(self, mjd: ArrayLike, direction: ArrayLike, exact_below: float = np.inf) -> NDArray[np.float64]:
-        """Angle (..., 1 + boxes), rad, from directions (..., 3), unit, ground, to the Sun's cone and the boxes."""
+        """Angle (..., 1 + boxes), rad, from directions to the zones.
+
+        Directions (..., 3), unit, ground; the Sun's cone, then the boxes.
+        """
         days = np.asarray(mjd, dtype=float)
         zones: list[Zone] = [self._cone(days, np.zeros(days.shape)), *self.boxes]
         return clearances(zones, self.station.scan_point, direction, exact_below=exact_below)
@@ -139,7 +146,9 @@ class Guard:
     def entries(
         self, mjd: ArrayLike, slews: MirrorSlew, *, widened: float = 0.0, compiled: bool | None = None
     ) -> Entries:
-        """What becomes of moves (n,), each beginning at its mjd, (n,) or one; zone 0 is the Sun, then the boxes.
+        """Entries of moves (n,) into the zones; zone 0 is the Sun.
+
+        Each move begins at its mjd, (n,) or one; then the boxes.
 
         widened    rad, added to the Sun's cone
         compiled   as for `first_entry`
@@ -150,25 +159,34 @@ class Guard:
         return first_entry(self.station, slews, (sun, *self.boxes), margin=self.margin, compiled=compiled)
 
     def pointing(self, mjd: float, counts: ArrayLike) -> GuardAnswer:
-        """Whether the mirror may stand at counts (2,) at a time, and if not for the Sun, when it may."""
+        """Answer for a mirror at counts (2,) at a time.
+
+        If the Sun forbids it, with the time when it is permitted.
+        """
         n = _pair(counts)
         gap = self.clearance(mjd, n)
-        left = float(np.min(gap))
-        beyond = self._beyond(n)
-        if beyond:
-            return GuardAnswer(False, f"{self.name}: pointing at {_shown(n)}: {beyond}", left)
-        if left > TOUCH:
-            return GuardAnswer(True, "", left)
+        remaining = float(np.min(gap))
+        stops_text = self._stops_violation(n)
+        if stops_text:
+            return GuardAnswer(False, f"{self.name}: pointing at {_counts_text(n)}: {stops_text}", remaining)
+        if remaining > TOUCH:
+            return GuardAnswer(True, "", remaining)
         zone = int(np.argmin(gap))
-        text = f"{self.name}: pointing at {_shown(n)} {self._nearness(zone, left)}"
-        return self._refused(text, zone, left, self._change(mjd, n) if zone == 0 else None, None)
+        text = f"{self.name}: pointing at {_counts_text(n)} {self._nearness(zone, remaining)}"
+        return self._refused(text, zone, remaining, self._change(mjd, n) if zone == 0 else None, None)
 
     def slew(self, mjd: float, start: ArrayLike, end: ArrayLike) -> GuardAnswer:
-        """Whether the mirror may go from counts to counts (2,), along the profiles of its axes, beginning at mjd."""
+        """Answer for a slew from counts to counts (2,), beginning at mjd.
+
+        Along the profiles of its axes.
+        """
         return self.route(mjd, [_pair(start), _pair(end)])
 
     def route(self, mjd: float, waypoints: ArrayLike, dwell: float = 0.0) -> GuardAnswer:
-        """Whether the mirror may go through counts (n, 2), halting at each for a dwell, s; n at least 2."""
+        """Answer for a path through counts (n, 2), n at least 2.
+
+        Halting at each for a dwell, s.
+        """
         points = np.asarray(waypoints, dtype=float)
         if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not 0.0 <= dwell < np.inf:
             raise ValidityError(
@@ -184,7 +202,10 @@ class Guard:
         return self._along(mjd, before, moves, word="slew", waits=True)
 
     def track(self, mjd: ArrayLike, counts: ArrayLike) -> GuardAnswer:
-        """Whether the mirror may follow counts (n, 2) at rising times mjd (n,), straight between them; n at least 2."""
+        """Answer for a track of counts (n, 2) at rising times mjd (n,).
+
+        Straight between them; n at least 2.
+        """
         times, points = np.asarray(mjd, dtype=float), np.asarray(counts, dtype=float)
         if times.ndim != 1 or points.shape != (len(times), 2) or len(times) < 2 or not np.all(np.diff(times) > 0.0):
             raise ValidityError(f"{self.name}: a track needs rising times (n,) and counts (n, 2), n at least 2")
@@ -194,34 +215,43 @@ class Guard:
         return self._along(float(times[0]), before, moves, word="track", waits=False)
 
     def until(self, mjd: float, counts: ArrayLike) -> float | None:
-        """When the Sun's cone comes to a mirror that stands at counts (2,); mjd if it is there; None within a day."""
+        """Time when the Sun's cone reaches a mirror at counts (2,).
+
+        mjd if it is there already; None within a day.
+        """
         return self._change(mjd, _pair(counts), comes=True)
 
     def _along(
         self, mjd: float, before: NDArray[np.float64], moves: MirrorSlew, *, word: str, waits: bool
     ) -> GuardAnswer:
-        """The verdict on moves that follow each other, each `before` s after mjd; `waits`: all may begin later."""
+        """Answer for consecutive moves, each `before` s after mjd.
+
+        `waits`: all may begin later.
+        """
         for n in (*moves.start, moves.end[-1]):
-            beyond = self._beyond(n)
-            if beyond:
-                return GuardAnswer(False, f"{self.name}: {word} by {_shown(n)}: {beyond}", np.nan)
+            stops_text = self._stops_violation(n)
+            if stops_text:
+                return GuardAnswer(False, f"{self.name}: {word} by {_counts_text(n)}: {stops_text}", np.nan)
         before, moves = _cut(before, moves)
         bad = self._first_bad(mjd, before, moves)
         if bad is None:
             return GuardAnswer(True, "", float(np.min(self.clearance(mjd, moves.start[0]))))
         at, n, zone, inside = bad
         when = mjd + at / SECONDS_PER_DAY
-        # A cone that counts for some of a move counts for all of it, also where the Sun is not up yet.
-        left = float(replace(self, horizon=-0.5 * np.pi).clearance(when, n)[zone])
-        place = f"starts at {_shown(n)}, which" if inside else f"after {at:.3f} s at {_shown(n)}"
-        text = f"{self.name}: {word} to {_shown(moves.end[-1])} {place} {self._nearness(zone, left)}"
+        # A cone that counts for part of a move counts for all of it, also before sunrise.
+        remaining = float(replace(self, horizon=-0.5 * np.pi).clearance(when, n)[zone])
+        place = f"starts at {_counts_text(n)}, which" if inside else f"after {at:.3f} s at {_counts_text(n)}"
+        text = f"{self.name}: {word} to {_counts_text(moves.end[-1])} {place} {self._nearness(zone, remaining)}"
         free = (self._free_start(mjd, before, moves) if waits else self._change(when, n)) if zone == 0 else None
-        return self._refused(text, zone, left, free, at)
+        return self._refused(text, zone, remaining, free, at)
 
     def _first_bad(
         self, mjd: float, before: NDArray[np.float64], moves: MirrorSlew
     ) -> tuple[float, NDArray[np.float64], int, bool] | None:
-        """Time, s after mjd, counts, zone of the first entry of moves in a row, and whether it is their start."""
+        """First entry of consecutive moves.
+
+        Time, s after mjd, counts, zone, and True if it is their start.
+        """
         entries = self.entries(mjd + before / SECONDS_PER_DAY, moves)
         bad = np.flatnonzero(entries.status)
         if len(bad) == 0:
@@ -232,9 +262,11 @@ class Guard:
         return float(before[first] + time), moves[first].position(time), int(entries.zone[first]), inside
 
     def _free_start(self, mjd: float, before: NDArray[np.float64], moves: MirrorSlew) -> float | None:
-        """The first start from which the whole way keeps out of the Sun; None if none is within a day, or a box is hit.
+        """First start from which the whole path avoids the Sun.
 
-        The deepest place of the way stays in the cone until `_change` says: no start that comes there before succeeds.
+        None if none is within a day, or a box is hit.
+
+        The deepest place of the path stays in the cone until `_change`: no start that reaches it earlier succeeds.
         """
         start = mjd
         for _ in range(MOST_STARTS):
@@ -252,7 +284,10 @@ class Guard:
         return None
 
     def _deepest(self, mjd: float, before: NDArray[np.float64], moves: MirrorSlew) -> tuple[float, NDArray[np.float64]]:
-        """Time, s after mjd, and counts where moves in a row come deepest into the Sun's cone, of some looked at."""
+        """Time, s after mjd, and counts of the deepest sample in the Sun's cone.
+
+        Of consecutive moves.
+        """
         times = moves.total[:, None] * np.linspace(0.0, 1.0, PLACES)
         n = moves[:, None].position(times)
         after = before[:, None] + times
@@ -260,32 +295,35 @@ class Guard:
         return float(after[deepest]), n[deepest]
 
     def _from_sun(self, mjd: ArrayLike, counts: ArrayLike) -> NDArray[np.float64]:
-        """The first column of `clearance`."""
+        """First column of `clearance`."""
         days, n = np.asarray(mjd, dtype=float), np.asarray(counts, dtype=float)
         direction = ray(self.station, n).direction
         return self._cone(days, np.zeros(days.shape)).clearance(direction) - self.margin
 
-    def _refused(self, text: str, zone: int, left: float, free: float | None, at: float | None) -> GuardAnswer:
+    def _refused(self, text: str, zone: int, remaining: float, free: float | None, at: float | None) -> GuardAnswer:
         if zone > 0:
             why = self.boxes[zone - 1].why
-            ending = f"a box does not go away{f' ({why})' if why else ''}: choose another way or target"
+            ending = f"a box is permanent{f' ({why})' if why else ''}: choose another path or target"
         elif free is None:
-            ending = f"not free within {LOOK_AHEAD:g} day: choose another way or target"
+            ending = f"not free within {LOOK_AHEAD:g} day: choose another path or target"
         else:
             ending = f"free at {utc_text(free)}"
-        return GuardAnswer(False, f"{text}; {ending}", left, at, free)
+        return GuardAnswer(False, f"{text}; {ending}", remaining, at, free)
 
-    def _nearness(self, zone: int, left: float) -> str:
-        """How near a beam is to a zone of which `left` (rad, margin off) remains."""
+    def _nearness(self, zone: int, remaining: float) -> str:
+        """Distance of a beam to a zone as a text.
+
+        `remaining` (rad, margin subtracted) is the free angle.
+        """
         margin = f"{self.margin / DEGREE:.2f} deg for {'servo, tilts and encoders' if self.off_beam else 'the servo'}"
         if zone == 0:
-            angle = (left + self.margin + self.half_angle) / DEGREE
+            angle = (remaining + self.margin + self.half_angle) / DEGREE
             return f"is {angle:.1f} deg from the Sun (limit {self.half_angle / DEGREE:.1f} deg and {margin})"
-        angle = (left + self.margin) / DEGREE
+        angle = (remaining + self.margin) / DEGREE
         box = self.boxes[zone - 1].name
         return f"hits {box}" if angle <= 0.0 else f"is {angle:.2f} deg from {box} (limit {margin})"
 
-    def _beyond(self, n: NDArray[np.float64]) -> str:
+    def _stops_violation(self, n: NDArray[np.float64]) -> str:
         low, high = self.azimuth_limits
         if not within(n[0], low, high):
             return f"azimuth count {n[0]:.1f} is outside {low:g} to {high:g}"
@@ -295,7 +333,10 @@ class Guard:
         return ""
 
     def _cone(self, mjd: NDArray[np.float64], total: NDArray[np.float64]) -> ConeZone:
-        """The Sun's cone for paths that begin at mjd (...) and take a total (...) s; not counting while it is set."""
+        """Sun's cone for paths from mjd (...) with a total (...) s.
+
+        None while the Sun is set.
+        """
         if self.place is None:
             return ConeZone(np.array([0.0, 0.0, 1.0]), np.array(-np.inf))
         sun = sun_at(np.stack([mjd, mjd + total / SECONDS_PER_DAY]), self.place).direction
@@ -308,47 +349,52 @@ class Guard:
         return ConeZone(sun[0], half, sun[1])
 
     def _change(self, mjd: float, n: NDArray[np.float64], *, comes: bool = False) -> float | None:
-        """The first time from mjd on when the Sun's cone has left a standing beam, or come to it; None within a day.
+        """First time from mjd on when the Sun's cone leaves, or reaches, a beam.
 
-        Looked for once a minute, then halved down to a millisecond: a coming or going that lasts less than a minute may
-        be missed, and then the next is told. None too where a box holds the beam.
+        None within a day.
+
+        Sampled once a minute, then halved down to a millisecond: a change of less than a minute may be missed, and the
+        next is returned. None too where a box blocks the beam.
         """
         if self.place is None or np.any(self.clearance(mjd, n)[1:] <= TOUCH):
             return None
 
-        def done(days: ArrayLike) -> NDArray[np.bool_]:
+        def changed(days: ArrayLike) -> NDArray[np.bool_]:
             return (self._from_sun(days, n) <= TOUCH) == comes
 
         start, looks = mjd, FIRST_LOOKS
         while start <= mjd + LOOK_AHEAD:
             grid = start + SCAN * np.arange(looks)
             grid = grid[grid <= mjd + LOOK_AHEAD]
-            hit = np.flatnonzero(done(grid))
+            hit = np.flatnonzero(changed(grid))
             if len(hit):
                 before, after = grid[hit[0]] - SCAN, grid[hit[0]]
                 if after == mjd:
                     return float(mjd)
                 while (after - before) * SECONDS_PER_DAY > SETTLED:
                     middle = 0.5 * (before + after)
-                    before, after = (before, middle) if done(middle) else (middle, after)
+                    before, after = (before, middle) if changed(middle) else (middle, after)
                 return float(after)
             start, looks = grid[-1] + SCAN, 2 * looks
         return None
 
 
 def _cut(before: NDArray[np.float64], moves: MirrorSlew) -> tuple[NDArray[np.float64], MirrorSlew]:
-    """Moves in a row, each `before` s after the start, with those of even speed cut into pieces of at most LONGEST."""
+    """Consecutive moves with those of even speed cut into pieces.
+
+    Each `before` s after the start; pieces of at most LONGEST.
+    """
     even = np.all(moves.ramp == 0.0, axis=-1)
     pieces = np.where(even, np.maximum(np.ceil(moves.total / LONGEST), 1.0), 1.0).astype(int)
     if np.all(pieces == 1):
         return before, moves
     which = np.repeat(np.arange(len(pieces)), pieces)
     share = (np.arange(len(which)) - np.repeat(np.cumsum(pieces) - pieces, pieces)) / pieces[which]
-    whole, way = moves[which], (moves.end - moves.start)[which]
-    start = whole.start + share[:, None] * way
-    end = whole.start + (share + 1.0 / pieces[which])[:, None] * way
-    cut = MirrorSlew(start, end, whole.ramp, whole.duration / pieces[which, None])
-    return before[which] + share * whole.total, cut
+    long_moves, displacement = moves[which], (moves.end - moves.start)[which]
+    start = long_moves.start + share[:, None] * displacement
+    end = long_moves.start + (share + 1.0 / pieces[which])[:, None] * displacement
+    cut = MirrorSlew(start, end, long_moves.ramp, long_moves.duration / pieces[which, None])
+    return before[which] + share * long_moves.total, cut
 
 
 def guard_of(
@@ -360,20 +406,20 @@ def guard_of(
     place: FramePlace | None,
     pace: Pace,
 ) -> Guard:
-    """The guard of a ranger by its records.
+    """Guard of a ranger by its records.
 
     name        of the ranger
-    station     of its monument and mirror (`pointing.station_of`), or on the feed arm as the telescope stands
+    station     of its monument and mirror (`pointing.station_of`), or on the feed arm at the telescope's posture
     mirror      its stops, and its tilts and encoder errors, whose sizes together widen every zone
     keep_out    boxes, cone, horizon, margin
-    place       of the ground frame's origin (`reduction.site.earth_rotation.place_of`); None does not watch the Sun
+    place       of the ground frame's origin (`reduction.site.earth_rotation.place_of`); None ignores the Sun
     pace        of its axes
     """
     encoder = [
         sum(abs(c) for side in ("cosine", "sine") for c in getattr(mirror, f"{axis}_encoder_{side}_counts"))
         for axis in ("azimuth", "elevation")
     ]
-    # A face turns the beam twice as far as itself.
+    # The beam turns by twice the face's angle.
     tilt = 2.0 * abs(mirror.face_tilt_rad) + float(np.hypot(mirror.beam_tilt_x_rad, mirror.beam_tilt_y_rad))
     return Guard(
         name,
@@ -396,5 +442,5 @@ def _pair(counts: ArrayLike) -> NDArray[np.float64]:
     return n
 
 
-def _shown(n: NDArray[np.float64]) -> str:
+def _counts_text(n: NDArray[np.float64]) -> str:
     return f"counts {n[0]:.1f}, {n[1]:.1f}"

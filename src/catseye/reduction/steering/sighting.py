@@ -1,4 +1,7 @@
-"""What stands in a beam's way: the Sun, boxes that must stay dark, solids; and whether a retroreflector looks back."""
+"""Visibility of a beam and its retroreflector.
+
+The Sun, boxes that must stay dark, solids; and the retroreflector's incidence.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -19,18 +22,18 @@ from catseye.reduction.site.stations import imperfections_of
 from catseye.reduction.steering.guard import GuardAnswer, guard_of
 from catseye.reduction.steering.visibility import Retroreflectors, Visibility, frames_at, visibility
 
-STANDING = Pace((1.0, 1.0), (1.0, 1.0))  # a pointing asks nothing of the axes' speeds
+ANY_PACE = Pace((1.0, 1.0), (1.0, 1.0))  # the axes' speeds do not matter for a pointing
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """One beam at one time; None for what was not asked.
+    """One beam at one time; None for omitted checks.
 
     mjd                UTC
     sun, keep_out      verdicts on the Sun's cone, and on the boxes
     separation         rad, of the beam from the middle of the Sun
     altitude, azimuth  rad, of the Sun; the azimuth clockwise from north
-    earth_rotation     where UT1 - UTC came from
+    earth_rotation     source of UT1 - UTC
     """
 
     mjd: float = np.nan
@@ -45,19 +48,21 @@ class Sighting:
 def place_of_monument(
     monument: MonumentGeometry, longitude_deg: float | None, latitude_deg: float | None
 ) -> FramePlace:
-    """Where on Earth the site is: the options, else the monument's record; with standard air, which lifts the Sun.
+    """Place of the site on Earth, by options or the monument's record.
 
-    Raises InputError where neither says it, and for one that is no place.
+    With standard air, for the Sun's refraction.
+
+    Raises InputError where neither has it, and for an invalid place.
     """
-    given = {"latitude_deg": latitude_deg, "longitude_deg": longitude_deg}
-    angles = {key: getattr(monument, key) if value is None else value for key, value in given.items()}
+    options = {"latitude_deg": latitude_deg, "longitude_deg": longitude_deg}
+    angles = {key: getattr(monument, key) if value is None else value for key, value in options.items()}
     for key, limits in (("latitude_deg", (-90.0, 90.0)), ("longitude_deg", (-180.0, 360.0))):
         value = angles[key]
         if value is not None and not limits[0] <= value <= limits[1]:
             raise InputError(f"--{key.replace('_', '-')} {value:g} is outside {limits[0]:g} to {limits[1]:g} (degrees)")
         if value is None:
             raise InputError(
-                f"the Sun's place needs {key}, which the record of {monument.monument} does not have (expected it "
+                f"the Sun's place needs {key}, which the record of {monument.monument} lacks (expected it "
                 f"there, or --{key.replace('_', '-')})"
             )
     height = monument.elevation_m or 0.0
@@ -75,14 +80,16 @@ def sightings(
     place: FramePlace | None,
     keep_out: KeepOut,
 ) -> list[Sighting]:
-    """The Sun and the keep-out boxes for beams at counts (n, 2); the azimuth stops are not asked here.
+    """Sun and keep-out boxes for beams at counts (n, 2).
+
+    The azimuth stops are not checked here.
 
     mirror  its tilts and encoder errors widen every zone
     name    of the ranger, for the answers
-    mjd     UTC; None: the Sun is not asked for, nor is `place`
+    mjd     UTC; None: the Sun is not checked, `place` unused
     """
-    whole = guard_of(name, station, mirror, keep_out=keep_out, place=place, pace=STANDING)
-    free = replace(whole, azimuth_limits=(-np.inf, np.inf))
+    guard = guard_of(name, station, mirror, keep_out=keep_out, place=place, pace=ANY_PACE)
+    free = replace(guard, azimuth_limits=(-np.inf, np.inf))
     under_sun = None if mjd is None else replace(free, boxes=())
     boxed = replace(free, place=None) if keep_out.box else None
     imperfections = imperfections_of(mirror)
@@ -118,12 +125,14 @@ def seen_from(
     posture: tuple[float, float] | None,
     reachable: np.ndarray | None = None,
 ) -> Visibility:
-    """Whether retroreflectors at points (n, 3), m, ground, serve one ranger.
+    """Visibility of retroreflectors at points (n, 3), m, for one ranger.
+
+    Points in the ground frame.
 
     kind      of retroreflector, a key of ACCEPTANCE
     facing    (3,) of all of them, ground: outward normal; None: incidence is not judged
-    solids    that may stand in the way
-    posture   azimuth, elevation, rad, of the telescope that carries some of them
+    solids    possible obstructions
+    posture   azimuth, elevation, rad, of the telescope if it carries some of them
     reachable (n,) bool: within the azimuth stops in one of the pointings
 
     Raises InputError for a solid on the telescope without a posture.
@@ -131,7 +140,7 @@ def seen_from(
     aboard = next((solid for solid in solids.all if solid.frame != "ground"), None)
     if posture is None and aboard is not None:
         raise InputError(
-            f"solid {aboard.name!r} stands in the frame {aboard.frame}: nothing says where that is (expected --posture)"
+            f"solid {aboard.name!r} stands in the frame {aboard.frame}: its position is unknown (expected --posture)"
         )
     axis = np.full(3, np.nan) if facing is None else facing
     return visibility(

@@ -1,4 +1,7 @@
-"""The spot that a scan over a retroreflector shows: where its centre is, in counts, and how well that is known."""
+"""Fit of the spot in a scan over a retroreflector.
+
+Its centre, in counts, with uncertainty.
+"""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,7 +16,7 @@ from catseye.optics.spot import gaussian_spot
 Array = NDArray[np.float64]
 
 FOUND = "found"
-UNIFORM = 1.0 / np.sqrt(12.0)  # standard uncertainty of what is known to a whole count
+UNIFORM = 1.0 / np.sqrt(12.0)  # standard uncertainty of a value rounded to a whole count
 FEWEST = 8  # readings for six parameters, with some to test them
 FLAT_PRIOR = 1.5  # of the root of flatness - 1: real spots have 0 to 2
 SINGULAR = 1e-10  # least eigenvalue of the parameters' correlations
@@ -27,17 +30,17 @@ NODES = 4  # of each axis within a count
 
 @dataclass(frozen=True)
 class SearchHead:
-    """What a search must know of a ranger and its spot.
+    """Parameters of a ranger and its spot for a search.
 
     zeros             (na0, ne0) counts
     azimuth_limits    counts, low and high
-    radius            rad: of the spot expected, where its Gaussian has fallen to 1/e^2
+    radius            rad: of the expected spot, at 1/e^2 of its Gaussian
     threshold_volt    V: a return above it is light from the target
     noise_volt        V, standard uncertainty of one amplitude
     full_scale_volt   V: an amplitude not below it is clipped
-    scintillation     standard uncertainty of an amplitude over itself, of air and laser
-    u_counts          of a shaft's place when it reads a whole count, spread evenly
-    misfit            standard deviation of a real spot's shape from the model's, over its peak
+    scintillation     relative standard uncertainty of an amplitude, of air and laser
+    u_counts          of a shaft's place at a reading of a whole count, uniform
+    misfit            standard deviation of a real spot's shape from the model's, relative to the peak
     """
 
     zeros: tuple[float, float]
@@ -64,17 +67,17 @@ class SearchHead:
 
 @dataclass(frozen=True, eq=False)
 class Spot:
-    """A fitted spot; NaN where the status is not "found".
+    """Fitted spot; NaN where the status is not "found".
 
-    status            "found", or one line that says what was searched and what to do
+    status            "found", or one line: the searched area and what to do
     counts            (2,) of its centre, real
     covariance        (2, 2) counts^2
     amplitude         V of the centre, above the background
     radius            rad, at 1/e^2
     background        V
     flatness          1 a Gaussian, more a flat top
-    variance_factor   of the readings that hold the centre, expectation 1; where above 1 the covariance is multiplied
-    readings          that took part
+    variance_factor   of the readings that determine the centre, expectation 1; above 1 it multiplies the covariance
+    readings          number used
     looked_at         (n, 2) counts in order, of the whole search
     seen              (n,) V there
     """
@@ -97,23 +100,25 @@ class Spot:
 
     @property
     def u_counts(self) -> Array:
-        """(2,) standard uncertainties."""
+        """Standard uncertainties (2,) of the counts."""
         return np.sqrt(np.diag(self.covariance))
 
 
 def fit_spot(counts: ArrayLike, amplitude: ArrayLike, head: SearchHead) -> Spot:
-    """A round spot on a background, Gaussian or flatter, fitted to amplitudes at counts by least squares.
+    """Least-squares fit of a round spot on a background.
+
+    Gaussian or flatter, to amplitudes at counts.
 
     counts       (n, 2) counts (Na, Ne), all in one pointing
     amplitude    (n,) V; NaN is missing, not below full scale is clipped
     head         the ranger: noise, expected radius, full scale
 
-    The prediction is the spot's mean over where the shafts may stand within a count; a reading's variance is that of
-    the noise, the scintillation, what the spot varies over these places, and the misfit of shape. A clipped reading
-    counts only while the spot is below full scale there. The start is the centroid of what stands above the lower half.
-    A retroreflector wider than the beam makes a spot with a flat top: its flatness is a parameter with a prior that
-    begins at the Gaussian. Residuals beyond three standard deviations count less, as at steep sides and where a bird
-    flies by. Misfit beyond all this is in the variance factor, by which the covariance grows.
+    The prediction is the spot's mean over the shafts' possible places within a count; a reading's variance is that of
+    the noise, the scintillation, the spot's variation over these places, and the misfit of shape. A clipped reading
+    counts only while the spot is below full scale there. The start is the centroid of the readings above the lower
+    half. A retroreflector wider than the beam makes a spot with a flat top: its flatness is a parameter with a prior
+    that begins at the Gaussian. Residuals beyond three standard deviations count less, as at steep sides and where a
+    bird flies by. Any further misfit is in the variance factor, which multiplies the covariance.
 
     Source: least squares with the weights of [HUBER09] on the model of `optics.spot.gaussian_spot`; covariance
     [JCGM100] 5.2 of independent readings. Against scatter, on spots made by diffraction, the mean of e' C^-1 e is 2.3
@@ -126,18 +131,20 @@ def fit_spot(counts: ArrayLike, amplitude: ArrayLike, head: SearchHead) -> Spot:
     n, a = n[good], a[good]
     clipped = a >= head.full_scale_volt
     if np.sum(~clipped) < FEWEST:
-        return Spot(f"not found: {np.sum(~clipped)} readings that are not clipped are too few (expected {FEWEST})")
+        return Spot(f"not found: {np.sum(~clipped)} readings without clipping are too few (expected {FEWEST})")
     dark = float(np.median(np.sort(a)[: max(1, len(a) // 4)]))
     lit = int(np.sum(a > dark + TIMES_NOISE * head.noise_volt))
     if lit < FEWEST_LIT:
-        return Spot(f"not found: no spot stands out, {lit} of {len(a)} readings are lit (expected {FEWEST_LIT})")
+        return Spot(f"not found: no significant spot, {lit} of {len(a)} readings are lit (expected {FEWEST_LIT})")
     middle = n[int(np.argmax(a))]
     xy = offsets_of_counts(middle, head.zeros, n) / head.radius
     size = count_size(middle, head.zeros) / head.radius * head.u_counts
-    sheet = _Sheet(xy, a, clipped, head, size)
+    sheet = _SpotModel(xy, a, clipped, head, size)
     p, q, factor = sheet.fitted()
     if not np.isfinite(p).all() or not np.isfinite(q).all():
-        return Spot("not found: the readings do not hold a spot's centre, radius and height (expected a wider scan)")
+        return Spot(
+            "not found: the readings do not determine a spot's centre, radius and height (expected a wider scan)"
+        )
     background, peak = p[4], p[3]
     if not _surrounded(xy, p[:2]):
         edge = counts_of_offsets(middle, head.zeros, p[None, :2] * head.radius)[0]
@@ -157,9 +164,10 @@ def fit_spot(counts: ArrayLike, amplitude: ArrayLike, head: SearchHead) -> Spot:
 
 
 @dataclass(frozen=True, eq=False)
-class _Sheet:
-    """Readings in units of the expected radius, and their fit; parameters x, y, ln radius, peak, background, g;
-    flatness is 1 + g^2.
+class _SpotModel:
+    """Readings in units of the expected radius, and their fit.
+
+    Parameters x, y, ln radius, peak, background, g; flatness is 1 + g^2.
     """
 
     xy: Array
@@ -170,19 +178,22 @@ class _Sheet:
 
     @cached_property
     def around(self) -> tuple[Array, Array]:
-        """Offsets (n, k, 2) of the readings with the shafts anywhere within what is known, and their weights (k)."""
+        """Offsets (n, k, 2) of the shafts within a count, and weights (k).
+
+        Anywhere within their uncertainty.
+        """
         node, weight = np.polynomial.legendre.leggauss(NODES)
         dx, dy = np.meshgrid(node * np.sqrt(3.0) * self.size[0], node * np.sqrt(3.0) * self.size[1])
         return self.xy[:, None] + np.stack([dx.ravel(), dy.ravel()], axis=-1), 0.25 * np.outer(weight, weight).ravel()
 
     def shapes(self, p: Array) -> Array:
-        """(n, k) of the spot at height 1, without background."""
+        """Spot (n, k) at height 1, without background."""
         d = self.around[0] - p[:2]
         size = {"radius": np.exp(p[2]), "flatness": 1.0 + p[5] ** 2}
         return gaussian_spot(d[..., 0], d[..., 1], peak=1.0, background=0.0, **size)
 
     def model(self, p: Array) -> Array:
-        """(n,) V, mean over where the shafts may stand."""
+        """Mean (n,), V, over the shafts' possible places."""
         return np.asarray(p[4] + p[3] * (self.shapes(p) @ self.around[1]))
 
     def jacobian(self, p: Array) -> Array:
@@ -207,7 +218,10 @@ class _Sheet:
         return np.asarray(np.sqrt(self.head.noise_volt**2 + p[3] ** 2 * shares))
 
     def residual(self, p: Array) -> Array:
-        """Observed minus predicted; of a clipped reading none where the prediction is above full scale too."""
+        """Observed minus predicted.
+
+        Zero for a clipped reading if the prediction is above full scale too.
+        """
         v = self.a - self.model(p)
         return np.where(self.clipped, np.maximum(self.head.full_scale_volt - self.model(p), 0.0), v)
 
@@ -256,25 +270,31 @@ class _Sheet:
             return np.full(6, np.nan), np.full((6, 6), np.nan), np.nan
         q = np.asarray(np.linalg.inv(normal))
         leverage = np.minimum(np.einsum("ni,ij,nj,n->n", rows, q, rows, weight), 0.9)
-        # of the readings that hold the centre, not of the dark ones around: each as it would be without itself
+        # of the readings that determine the centre, not of the dark ones around: leave-one-out values
         factor = float(np.sum(leverage * (v / (1.0 - leverage)) ** 2 * (1.0 - leverage)) / np.sum(leverage))
         return p, q * max(factor, 1.0), factor
 
 
 def _singular(correlations: Array) -> bool:
-    """Parameters that the readings cannot tell apart."""
+    """True for parameters that the readings cannot separate."""
     return not bool(np.linalg.eigvalsh(correlations)[0] > SINGULAR)
 
 
 def _surrounded(xy: Array, centre: Array) -> bool:
-    """Readings lie on all sides of the centre: no half of directions is empty."""
+    """True if readings lie on all sides of the centre.
+
+    No half of directions is empty.
+    """
     around = np.sort(np.arctan2(*(xy - centre).T[::-1]))
     gaps = np.diff(np.append(around, around[0] + 2.0 * np.pi))
     return bool(gaps.max() < np.pi)
 
 
 def _in_counts(middle: Array, head: SearchHead, at: Array) -> tuple[Array, Array]:
-    """The place as counts, and the derivatives (2, 2) of counts by the place in units of the radius."""
+    """Place as counts, and derivatives (2, 2) by the place.
+
+    The place is in units of the radius.
+    """
     step = 1e-4
     probes = at + step * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
     n = counts_of_offsets(middle, head.zeros, probes * head.radius)

@@ -1,9 +1,9 @@
-"""Following the moving antenna: where it will be, the counts that each ranger runs along, and how well they hold.
+"""Tracking of the moving antenna: predicted places, counts, and errors.
 
-Drive, AntennaPath      how the telescope's axes move
-mounted, carried        rangers on the ground, and rangers that ride on the reflector's frame
+Drive, AntennaPath      motion of the telescope's axes
+mounted, carried        rangers on the ground, and rangers on the reflector's frame
 follow                  counts at the ends of every interval, on one turn and in one pointing
-misses                  how far the beams really pass their targets in between
+misses                  distances of the beams from their targets in between
 """
 
 from collections.abc import Callable
@@ -26,14 +26,16 @@ Array = NDArray[np.float64]
 
 AZIMUTH_SLEW = 35.2 * DEGREE / 60.0  # rad/s, the GBT's, site facts
 ELEVATION_SLEW = 17.6 * DEGREE / 60.0  # rad/s
-SLEW_ACCELERATION = 0.2 * DEGREE  # rad/s^2: ours, chosen; on the quick side of what such a telescope does
+SLEW_ACCELERATION = 0.2 * DEGREE  # rad/s^2: chosen; on the fast side for such a telescope
 BUFFER = 0.128  # s, [PARKER04] section 2.6.1
-SHARES = np.arange(1, 16) / 16.0  # of an interval, where beams are looked at
+SHARES = np.arange(1, 16) / 16.0  # of an interval, where beams are evaluated
 
 
 @dataclass(frozen=True)
 class Drive:
-    """One axis of the telescope: at rest, then off with a steady acceleration, a steady rate, and to rest again.
+    """One axis of the telescope, from rest to rest.
+
+    A steady acceleration, a steady rate, and a steady deceleration.
 
     start, end      rad
     rate            rad/s, above 0: not exceeded
@@ -60,33 +62,37 @@ class Drive:
 
     @property
     def peak(self) -> float:
-        """rad/s that is reached: less than the rate on a short way."""
+        """Largest rate, rad/s: below `rate` on a short path."""
         return min(self.rate, float(np.sqrt(abs(self.end - self.start) * self.acceleration)))
 
     @property
     def duration(self) -> float:
         """Time from rest to rest, s."""
-        way = abs(self.end - self.start)
-        return way / self.peak + self.peak / self.acceleration if way > 0.0 else 0.0
+        distance = abs(self.end - self.start)
+        return distance / self.peak + self.peak / self.acceleration if distance > 0.0 else 0.0
 
     def at(self, t: ArrayLike) -> tuple[Array, Array, Array]:
         """Angle (...), rad, rate and acceleration at times (...), s."""
         since = np.clip(np.asarray(t, dtype=float) - self.begin, 0.0, self.duration)
         ramp = self.peak / self.acceleration
-        left = self.duration - since
+        remaining = self.duration - since
         sign = float(np.sign(self.end - self.start))
-        early, late = since < ramp, left < ramp
-        way = np.where(early, 0.5 * self.acceleration * since**2, self.peak * (since - 0.5 * ramp))
-        angle = np.where(late, self.end - sign * 0.5 * self.acceleration * left**2, self.start + sign * way)
-        rate = sign * np.where(late, self.acceleration * left, np.where(early, self.acceleration * since, self.peak))
-        moving = (since > 0.0) & (left > 0.0)
+        early, late = since < ramp, remaining < ramp
+        travelled = np.where(early, 0.5 * self.acceleration * since**2, self.peak * (since - 0.5 * ramp))
+        angle = np.where(late, self.end - sign * 0.5 * self.acceleration * remaining**2, self.start + sign * travelled)
+        rate = sign * np.where(
+            late, self.acceleration * remaining, np.where(early, self.acceleration * since, self.peak)
+        )
+        moving = (since > 0.0) & (remaining > 0.0)
         bend = sign * self.acceleration * np.where(early, 1.0, np.where(late, -1.0, 0.0))
         return angle, np.where(moving, rate, 0.0), np.where(moving, bend, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class AntennaPath:
-    """The telescope's way: azimuth clockwise from north, elevation; a rigid telescope on a perfect track.
+    """Path of a rigid telescope on a perfect track.
+
+    Azimuth clockwise from north, elevation.
 
     azimuth, elevation       drives
     elevation_axis_height    m
@@ -99,7 +105,9 @@ class AntennaPath:
     reflector_to_elevation: tuple[float, float, float] = REFLECTOR_TO_ELEVATION
 
     def motion(self, points: ArrayLike, frame: str, t: ArrayLike) -> tuple[Array, Array, Array]:
-        """Place, velocity and acceleration (t..., n, 3), m and s, ground, of points fixed in a frame.
+        """Place, velocity and acceleration of points fixed in a frame.
+
+        (t..., n, 3), m and s, ground.
 
         points    (n, 3), m, in the frame
         frame     "ground", "alidade", "elevation" or "reflector"
@@ -110,8 +118,8 @@ class AntennaPath:
         at, still = np.asarray(points, dtype=float), np.zeros(3)
         t = np.asarray(t, dtype=float)
         if frame == "ground":
-            whole = np.broadcast_to(at, (*t.shape, *at.shape))
-            return whole, np.zeros(whole.shape), np.zeros(whole.shape)
+            position = np.broadcast_to(at, (*t.shape, *at.shape))
+            return position, np.zeros(position.shape), np.zeros(position.shape)
         azimuth, azimuth_rate, azimuth_bend = (x[..., None, None] for x in self.azimuth.at(t))
         v, a = np.broadcast_to(still, at.shape), np.broadcast_to(still, at.shape)
         if frame in ("elevation", "reflector"):
@@ -123,7 +131,7 @@ class AntennaPath:
             v, a = rate * swing, bend * swing + rate**2 * np.cross(x_axis, swing)
             at = arm + np.array([0.0, 0.0, self.elevation_axis_height])
         elif frame != "alidade":
-            raise InputError(f"frame {frame!r} is not known (expected ground, alidade, elevation or reflector)")
+            raise InputError(f"frame {frame!r} is unknown (expected ground, alidade, elevation or reflector)")
         turn = rz(azimuth[..., 0])
         place, v, a = (np.einsum("...ij,...j->...i", turn, vector) for vector in (at, v, a))
         spin = np.array([0.0, 0.0, -1.0])
@@ -134,12 +142,14 @@ class AntennaPath:
         return place, azimuth_rate * swing + v, acceleration
 
     def most_acceleration(self, points: ArrayLike, frame: str) -> Array:
-        """What the acceleration (n,), m/s^2, of points fixed in a frame never exceeds, wherever the drives are.
+        """Upper limit (n,), m/s^2, of the acceleration of points fixed in a frame.
+
+        Wherever the drives are.
 
         points, frame    as for `motion`
 
-        Of rates w and accelerations b of azimuth and elevation, the distance R from the elevation axis and the most
-        that a point comes to from the azimuth axis, r: b_a r + w_a^2 r + 2 w_a w_e R + b_e R + w_e^2 R.
+        Of rates w and accelerations b of azimuth and elevation, the distance R from the elevation axis and its
+        largest distance from the azimuth axis, r: b_a r + w_a^2 r + 2 w_a w_e R + b_e R + w_e^2 R.
         """
         at = np.asarray(points, dtype=float)
         w_a, b_a = self.azimuth.peak, self.azimuth.acceleration * (self.azimuth.peak > 0.0)
@@ -148,18 +158,21 @@ class AntennaPath:
         if frame == "alidade":
             return (b_a + w_a**2) * np.hypot(at[..., 0], at[..., 1])
         if frame not in ("elevation", "reflector"):
-            raise InputError(f"frame {frame!r} is not known (expected ground, alidade, elevation or reflector)")
+            raise InputError(f"frame {frame!r} is unknown (expected ground, alidade, elevation or reflector)")
         shifted = at + (np.asarray(self.reflector_to_elevation) if frame == "reflector" else 0.0)
         arm = np.hypot(shifted[..., 1], shifted[..., 2])
         w_e, b_e = self.elevation.peak, self.elevation.acceleration * (self.elevation.peak > 0.0)
         return (b_a + w_a**2) * np.hypot(shifted[..., 0], arm) + (2.0 * w_a * w_e + b_e + w_e**2) * arm
 
     def rotation(self, t: ArrayLike) -> Array:
-        """Axes of the reflector in the ground frame (t..., 3, 3), one a column."""
+        """Axes of the reflector in the ground frame (t..., 3, 3), as columns."""
         return rz(self.azimuth.at(t)[0]) @ rx(0.5 * np.pi - self.elevation.at(t)[0])
 
     def spin(self, t: ArrayLike) -> tuple[Array, Array]:
-        """Turning of the reflector (t..., 3), rad/s, and its change, rad/s^2, ground axes."""
+        """Angular velocity of the reflector (t..., 3), rad/s, and its change.
+
+        rad/s^2, ground axes.
+        """
         azimuth, azimuth_rate, azimuth_bend = (x[..., None] for x in self.azimuth.at(t))
         _, rate, bend = (x[..., None] for x in self.elevation.at(t))
         x_axis = rz(azimuth[..., 0])[..., :, 0]  # of the alidade
@@ -173,12 +186,14 @@ Targets = Callable[[Array], Array]
 
 
 def mounted(stations: MirrorStation) -> Stations:
-    """Rangers (r,) on the ground, the same at all times, ready for `follow`."""
+    """Rangers (r,) fixed to the ground, for `follow`."""
     return lambda t: stations[None, :, None]
 
 
 def carried(stations: MirrorStation, path: AntennaPath, when: float) -> Stations:
-    """Rangers (r,) that ride on the reflector's frame, given as they stand at one time, ready for `follow`.
+    """Rangers (r,) on the reflector's frame, for `follow`.
+
+    Their stations are at one time.
 
     stations    (r,), in the ground frame at `when`
     path        of the telescope
@@ -191,22 +206,24 @@ def carried(stations: MirrorStation, path: AntennaPath, when: float) -> Stations
     own_gamma = stations.gamma @ first
 
     def at(t: Array) -> MirrorStation:
-        here, _, _ = path.motion(own_point, "reflector", t)
+        own_places, _, _ = path.motion(own_point, "reflector", t)
         gamma = own_gamma[None] @ np.swapaxes(path.rotation(t), -1, -2)[:, None]
-        moved = MirrorStation.from_matrix(here, gamma, offset=stations.offset, beta=stations.beta, zeros=stations.zeros)
+        moved = MirrorStation.from_matrix(
+            own_places, gamma, offset=stations.offset, beta=stations.beta, zeros=stations.zeros
+        )
         return moved[:, :, None]
 
     return at
 
 
 def fixed(points: ArrayLike, frame: str, path: AntennaPath) -> Targets:
-    """Targets (n, 3), m, fixed in a frame of the telescope, ready for `follow`."""
-    own = np.asarray(points, dtype=float)
-    return lambda t: path.motion(own, frame, t)[0][:, None]
+    """Targets (n, 3), m, fixed in a frame of the telescope, for `follow`."""
+    local = np.asarray(points, dtype=float)
+    return lambda t: path.motion(local, frame, t)[0][:, None]
 
 
 class Following(IntEnum):
-    """What becomes of a target that a ranger is to follow."""
+    """Status of a target that a ranger is to follow."""
 
     FOLLOWED = 0
     BEYOND_STOPS = 1
@@ -217,8 +234,8 @@ class Following(IntEnum):
 REASONS = {
     Following.FOLLOWED: "followed",
     Following.BEYOND_STOPS: "leaves the azimuth stops in either pointing (expected a shorter track, or another ranger)",
-    Following.TOO_FAST: "asks more than the axes' rate: it passes near the azimuth axis",
-    Following.NOWHERE: "has no direction: it comes to the scan point",
+    Following.TOO_FAST: "exceeds the axes' rate: it passes near the azimuth axis",
+    Following.NOWHERE: "has no direction: it meets the scan point",
 }
 
 
@@ -227,8 +244,8 @@ class CountTrack:
     """Counts along which rangers follow targets, interval by interval.
 
     begin      (s,) instants t0
-    since      (s + 1,) s from the first t0: where the intervals begin and end
-    lines      (s, r, p): real counts; those of what is not followed mean nothing
+    since      (s + 1,) s from the first t0: limits of the intervals
+    lines      (s, r, p): real counts; meaningless for pairs not followed
     prime      (r, p) bool: in the prime pointing, throughout
     status     (r, p) of Following
     """
@@ -240,7 +257,7 @@ class CountTrack:
     status: NDArray[np.int64]
 
     def reason(self, ranger: int, target: int) -> str:
-        """Why a ranger can or cannot follow a target, one line."""
+        """Status of a ranger and a target as one line."""
         return REASONS[Following(int(self.status[ranger, target]))]
 
 
@@ -254,12 +271,14 @@ def follow(
     limits: ArrayLike = (-np.inf, np.inf),
     most_rate: float = np.inf,
 ) -> CountTrack:
-    """Counts of every ranger for every target at the ends of each interval, and whether they can be run.
+    """Counts of every ranger for every target, with status.
+
+    At the ends of each interval; the status says if they can be run.
 
     stations    times (s,) -> Station (s or 1, r, 1); times count from `begin`
     targets     times (s,) -> points (s, 1 or r, p, 3), m, ground
     begin       the first t0
-    intervals   how many, 1 or more
+    intervals   number, 1 or more
     interval    s, a whole number of nanoseconds
     limits      azimuth stops (2,) or (r, 2), counts
     most_rate   counts/s, of either axis
@@ -270,10 +289,10 @@ def follow(
     Source: [PARKER04] eqs. 2.12-2.26, 2.45, 2.46.
     """
     if intervals < 1 or not 0.0 < interval < np.inf:
-        raise ValidityError(f"{intervals} intervals of {interval} s are nothing to follow (expected 1 or more above 0)")
+        raise ValidityError(f"{intervals} intervals of {interval} s are an empty track (expected 1 or more, above 0)")
     step = round(interval * PER_SECOND)
     if abs(interval * PER_SECOND - step) > 1e-6 * max(1.0, 1e-6 * step):
-        raise ValidityError(f"interval {interval!r} s is no whole number of nanoseconds, as time tags are")
+        raise ValidityError(f"interval {interval!r} s is not a whole number of nanoseconds, as time tags are")
     steps = step * np.arange(intervals + 1)
     since = steps / PER_SECOND
     station = stations(since)
@@ -285,8 +304,8 @@ def follow(
     low, high = (np.broadcast_to(x, station.shape[1:2])[:, None] for x in (low, high))
     direct, allowed = _on_one_turn(nodes, low, high)
     zero = np.broadcast_to(station.zeros, (*station.shape, 2))
-    other = np.stack([nodes[..., 0] + HALF_TURN, 2.0 * zero[..., 1] - nodes[..., 1]], axis=-1)
-    prime, allowed_prime = _on_one_turn(other, low, high)
+    prime_nodes = np.stack([nodes[..., 0] + HALF_TURN, 2.0 * zero[..., 1] - nodes[..., 1]], axis=-1)
+    prime, allowed_prime = _on_one_turn(prime_nodes, low, high)
     second = ~allowed & allowed_prime
     chosen = np.where(second[None, :, :, None], prime, direct)
     lines = CountLine(chosen[:-1], chosen[1:], np.full(chosen.shape[:-1], interval)[:-1])
@@ -308,7 +327,9 @@ def safe_intervals(
     limit_angle: float | None = None,
     longest: float = 10.0,
 ) -> Array:
-    """How long (t, r, n), s, an interval may be for the line surely to hold a limit, for rangers on the ground.
+    """Interval lengths (t, r, n), s, for which the line surely keeps a limit.
+
+    For rangers on the ground.
 
     stations       (r,), on the ground
     points         (n, 3), m, fixed in the frame
@@ -317,7 +338,7 @@ def safe_intervals(
     limit_counts, limit_angle, longest   as for `track.longest_interval`
 
     The minimum over pairs, as `follow` takes one interval for all, is for the caller: pairs near a mirror's azimuth
-    axis ask for a short one.
+    axis need a short one.
 
     Source: `track.longest_interval` with the path's own speed and the most of its acceleration.
     """
@@ -332,10 +353,12 @@ def safe_intervals(
 def misses(
     track: CountTrack, stations: Stations, targets: Targets, *, whole_counts: bool = False, shares: ArrayLike = SHARES
 ) -> Array:
-    """By how much (s, k, r, p), m, the beams pass their targets at shares of each interval.
+    """Distances (s, k, r, p), m, of the beams from their targets.
+
+    At shares of each interval.
 
     track, stations, targets   as followed
-    whole_counts               the mirrors stand on the nearest whole count
+    whole_counts               round the mirrors to the nearest whole count
     shares                     (k,) 0 to 1 of the interval
 
     Source: exact rays, `track.miss`.
@@ -343,20 +366,22 @@ def misses(
     passed = []
     for share in np.asarray(shares, dtype=float):
         t = track.since[:-1] + share * np.diff(track.since)
-        there = track.lines.at(share * track.lines.interval)
-        passed.append(miss(stations(t), np.rint(there) if whole_counts else there, targets(t)))
+        counts = track.lines.at(share * track.lines.interval)
+        passed.append(miss(stations(t), np.rint(counts) if whole_counts else counts, targets(t)))
     return np.stack(passed, axis=1)
 
 
 def smear(range_rate: ArrayLike, *, wavelength: float, duration: float = BUFFER) -> tuple[Array, Array]:
-    """What a range that changes during a buffer does to it: run of the phase (...), rad, and share of the amplitude.
+    """Phase run and amplitude share of a range that changes during a buffer.
+
+    Run of the phase (...), rad.
 
     range_rate    (...) m/s, of the distance
     wavelength    m, above 0: of the modulation in air
     duration      s, above 0, of the buffer
 
-    The phase runs by -4 pi v T / wavelength; the sum over the buffer is left with sin(x)/x of it, x half that run. It
-    is nothing where the range changes by half a wavelength.
+    The phase runs by -4 pi v T / wavelength; the sum over the buffer keeps sin(x)/x of it, x half that run. It
+    vanishes where the range changes by half a wavelength.
 
     Source: [PARKER04] eqs. 5.1-5.3 and 5.9 for a phase that runs evenly. Exact.
 
@@ -371,7 +396,10 @@ def smear(range_rate: ArrayLike, *, wavelength: float, duration: float = BUFFER)
 
 
 def _on_one_turn(nodes: Array, low: Array, high: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Counts (s, r, p, 2) moved by whole turns so that all lie within the stops, and whether they do (r, p)."""
+    """Counts (s, r, p, 2) moved by whole turns to lie within the stops.
+
+    And True (r, p) where that is possible.
+    """
     least, most = nodes[..., 0].min(axis=0), nodes[..., 0].max(axis=0)
     with np.errstate(invalid="ignore"):
         bounded = np.isfinite(low) & (least < low)

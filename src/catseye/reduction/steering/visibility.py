@@ -1,9 +1,10 @@
-"""Which ranger can range to which retroreflector in a posture, and where it cannot, why not.
+"""Visibility of retroreflectors from rangers in a posture, with reasons.
 
-How far off its axis each kind of retroreflector still serves stands in one table, `ACCEPTANCE`. A cube corner is used
-as long as `least_share` of its face sends light back (`optics.retroreflector.prism.clear_share`); what the polished
-faces of an uncoated prism let through beyond 20 deg on the side of an edge (`optics.retroreflector.solid_prism`) is not
-counted there.
+The acceptance of each kind of retroreflector is in one table, `ACCEPTANCE`. A cube corner is used as long as
+`least_share` of its face returns light (`optics.retroreflector.prism.clear_share`); the light that the polished faces
+of an uncoated prism transmit beyond 20 deg on the side of an edge (`optics.retroreflector.solid_prism`) is not counted
+there.
+
 """
 
 from collections.abc import Mapping
@@ -35,12 +36,12 @@ BEAM_RADIUS = 0.0125  # m: the GBT's beam at 120 to 230 m, 1/e^2, and a little
 
 @dataclass(frozen=True)
 class Acceptance:
-    """How far off its axis a kind of retroreflector serves.
+    """Largest incidence of a kind of retroreflector.
 
-    why            where the numbers come from
-    cone           rad: said outright; None where it follows from the face
-    aperture       m, radius of a cube corner's face; height m; index, phase, of what fills it
-    least_share    of its face that must send light back
+    why            source of the numbers
+    cone           rad: explicit; None where it follows from the face
+    aperture       m, radius of a cube corner's face; height m; index, phase, of its material
+    least_share    of its face that must return light
     """
 
     why: str
@@ -52,7 +53,7 @@ class Acceptance:
 
     @property
     def limit(self) -> float:
-        """rad: the largest incidence that serves."""
+        """Largest usable incidence, rad."""
         if self.cone is not None:
             return self.cone
         from scipy.optimize import brentq
@@ -72,7 +73,7 @@ ACCEPTANCE: Mapping[str, Acceptance] = {
 
 
 class Sight(IntEnum):
-    """Whether a ranger sees a target, or the first reason why not."""
+    """Visibility of a target from a ranger, or the first reason against it."""
 
     SEEN = 0
     TOO_NEAR = 1
@@ -84,7 +85,7 @@ class Sight(IntEnum):
 
 @dataclass(frozen=True)
 class RangeLimits:
-    """Ranges that a ranger can use, m; the far one is twice what the GBT asks."""
+    """Usable ranges, m; the far one is twice the GBT's need."""
 
     near: float = 2.0
     far: float = 500.0
@@ -97,7 +98,7 @@ class Retroreflectors:
     names    (t)
     kinds    (t) keys of ACCEPTANCE
     points   (t, 3) m
-    axes     (t, 3) outward axes; NaN where no record says: then incidence is not judged
+    axes     (t, 3) outward axes; NaN without a record: then incidence is not judged
     """
 
     names: tuple[str, ...]
@@ -108,12 +109,12 @@ class Retroreflectors:
 
 @dataclass(frozen=True, eq=False)
 class Visibility:
-    """The answer for r rangers and t retroreflectors.
+    """Visibility for r rangers and t retroreflectors.
 
     rangers, targets   names
     code               (r, t) of Sight
     range              (r, t) m
-    incidence          (r, t) rad, NaN where no axis is known
+    incidence          (r, t) rad, NaN without an axis
     limit              (t,) rad
     obstacle           (r, t) index into `solids`, -1 where clear
     obstacle_at        (r, t) m from the ranger
@@ -134,11 +135,11 @@ class Visibility:
 
     @property
     def seen(self) -> NDArray[np.bool_]:
-        """Whether each ranger sees each target, (r, t)."""
+        """True (r, t) where a ranger sees a target."""
         return self.code == Sight.SEEN
 
     def reason(self, ranger: int, target: int) -> str:
-        """Why a ranger sees a target or not, one line."""
+        """Reason for a ranger's seeing a target or not, one line."""
         code, distance = Sight(int(self.code[ranger, target])), self.range[ranger, target]
         if code is Sight.TOO_NEAR:
             return f"too near: {distance:.1f} m under {self.limits.near:g}"
@@ -164,14 +165,16 @@ def visibility(
     acceptance: Mapping[str, Acceptance] = ACCEPTANCE,
     beam_radius: float = BEAM_RADIUS,
 ) -> Visibility:
-    """Every pair of ranger and retroreflector: seen, or the first reason why not.
+    """Visibility of every pair of ranger and retroreflector.
+
+    Seen, or the first reason against it.
 
     rangers       name: scan point (3,) m, ground
     targets       t of them
-    solids        what may stand in the way
+    solids        possible obstructions
     frames        name: ground from that frame, for each frame of a solid, see `frames_at`
     limits        of ranges
-    reachable     (r, t) bool: within the azimuth stops, where that is known
+    reachable     (r, t) bool: within the azimuth stops; None: unknown
     acceptance    of each kind of retroreflector
     beam_radius   m, by which solids are grown
 
@@ -188,23 +191,23 @@ def visibility(
     code = np.full(distance.shape, Sight.SEEN, dtype=np.int64)
     with np.errstate(invalid="ignore"):
         oblique = angle > limit
-    beyond = np.zeros(distance.shape, dtype=bool) if reachable is None else ~np.asarray(reachable, dtype=bool)
-    for reason, there in (
-        (Sight.BEYOND_STOPS, beyond),
+    past_stops = np.zeros(distance.shape, dtype=bool) if reachable is None else ~np.asarray(reachable, dtype=bool)
+    for reason, failing in (
+        (Sight.BEYOND_STOPS, past_stops),
         (Sight.OBSTRUCTED, which >= 0),
         (Sight.INCIDENCE, oblique),
         (Sight.TOO_FAR, distance > limits.far),
         (Sight.TOO_NEAR, distance < limits.near),
     ):
-        code[there] = reason
+        code[failing] = reason
     return Visibility(tuple(rangers), targets.names, code, distance, angle, limit, which, at, names, limits)
 
 
 def frames_at(azimuth: float, elevation: float, reflector: Transform | None = None) -> dict[str, Transform]:
-    """Ground from each frame in which solids stand, at a posture.
+    """Transform to ground from each frame of the solids, at a posture.
 
     azimuth      rad, clockwise from north; elevation rad
-    reflector    ground from reflector where it is better known than nominal
+    reflector    ground from reflector if measured, else nominal
 
     Source: [PARKER04] eqs. 2.40-2.44.
     """
@@ -218,10 +221,12 @@ def frames_at(azimuth: float, elevation: float, reflector: Transform | None = No
 
 
 def retroreflectors_of(campaign: Campaign) -> Retroreflectors:
-    """Prisms, hollow cubes and balls of a campaign, where they nominally stand in its posture.
+    """Prisms, hollow cubes and balls of a campaign, at nominal places.
 
-    A ball looks the other way than its triplet's normal, which points to the prisms' side. No record says how a hollow
-    cube is turned: its incidence is not judged.
+    In its posture.
+
+    A ball faces opposite to its triplet's normal, which points to the prisms' side. No record has the orientation of a
+    hollow cube: its incidence is not judged.
 
     Source: `places_of`; [GOLDMAN00] figure 10.
     """
@@ -243,18 +248,18 @@ def retroreflectors_of(campaign: Campaign) -> Retroreflectors:
 def _obstructions(
     stand: Array, points: Array, solids: Solids, frames: Mapping[str, Transform], beam_radius: float
 ) -> tuple[NDArray[np.int64], Array, tuple[str, ...]]:
-    """First solid in each path, where, and the names of all solids."""
+    """First solid in each path, its place, and the names of all solids."""
     names: list[str] = []
     best = np.full((len(stand), len(points)), np.inf)
     which = np.full(best.shape, -1, dtype=np.int64)
     for frame in dict.fromkeys(solid.frame for solid in solids.all):
-        own = [solid for solid in solids.all if solid.frame == frame]
+        in_frame = [solid for solid in solids.all if solid.frame == frame]
         to_frame = frames[frame].inverse()
-        grown = [solid.solid().grown(beam_radius) for solid in own]
+        enlarged = [solid.solid().grown(beam_radius) for solid in in_frame]
         index, at = first_obstruction(
-            to_frame.points(stand), to_frame.points(points), grown, clear_start=CLEAR_START, clear_end=CLEAR_END
+            to_frame.points(stand), to_frame.points(points), enlarged, clear_start=CLEAR_START, clear_end=CLEAR_END
         )
         nearer = at < best
         best, which = np.where(nearer, at, best), np.where(nearer, index + len(names), which)
-        names += [solid.name for solid in own]
+        names += [solid.name for solid in in_frame]
     return which, best, tuple(names)

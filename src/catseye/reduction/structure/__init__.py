@@ -1,1 +1,1 @@
-"""A flexible telescope: its model, its fit to many epochs, its vibration."""
+"""Flexible telescope: structural model, fit to many epochs, vibration."""

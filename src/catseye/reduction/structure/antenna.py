@@ -1,8 +1,10 @@
-"""The antenna as a structural model has it: where its frames and points are in any posture, and how well known.
+"""Antenna by a structural model: frames and points in any posture.
+
+With their uncertainties.
 
 Each frame f stands on its parent. A point x of it (in its own nominal axes) is first carried by the frame's motion,
 then by the nominal transform into the parent's axes: x_parent = N_f(M_f(x)). N is the first order of the notes, M the
-second; what is measured, or what vibrates, is added to the shift and turn inside M (the third).
+second; a measured correction or a vibration is added to the shift and turn inside M (the third).
 """
 
 from collections.abc import Mapping, Sequence
@@ -47,8 +49,8 @@ class RestPoints:
     """Points of a group at rest.
 
     names      n
-    frame      in whose axes
-    group      that moves them
+    frame      of the coordinates
+    group      of the points
     position   (n, 3) m
     u          (n,) m, of each coordinate
     """
@@ -62,7 +64,9 @@ class RestPoints:
 
 @dataclass(frozen=True, eq=False)
 class SubreflectorPosition:
-    """Commanded position of the subreflector's drives: see geometry.subreflector.
+    """Commanded position of the subreflector's drives.
+
+    See `geometry.antenna.subreflector`.
 
     shift    (..., 3) m
     angles   (..., 3) rad, about x, then y, then z
@@ -76,12 +80,12 @@ class SubreflectorPosition:
 
 @dataclass(frozen=True, eq=False)
 class Antenna:
-    """A structural model ready for use.
+    """Structural model ready for use.
 
     record     the model as read
-    parents    frame: the frame it stands on
-    motions    frame or group: its motion; those without one are left out
-    validity   postures in which the model may be used
+    parents    frame: its parent frame
+    motions    frame or group: its motion; those without one are absent
+    validity   postures for which the model is valid
     """
 
     record: StructuralModel
@@ -99,7 +103,10 @@ class Antenna:
         return {frame.name: frame for frame in self.record.frame}
 
     def chain(self, frame: str) -> list[str]:
-        """The frames from the alidade to this one; InputError where the model has none of that name."""
+        """Frames from the alidade to this one.
+
+        InputError where the model has none of that name.
+        """
         if frame not in self.parents:
             raise InputError(f"frame {frame!r} is not in the structural model (it has {', '.join(self.parents)})")
         names = [frame]
@@ -110,9 +117,11 @@ class Antenna:
     def nominal(
         self, frame: str, posture: TelescopePosture, subreflector: SubreflectorPosition | None = None
     ) -> Transforms:
-        """The frame's parent from the frame at rest: first order, and the subreflector as commanded.
+        """Transform to the parent from the frame at rest.
 
-        frame, posture   which, and how the telescope stands
+        First order, and the subreflector as commanded.
+
+        frame, posture   of the transform
         subreflector     its position, for the frame of that name
 
         Source: [PARKER04] eq. 2.40-2.43.
@@ -134,22 +143,31 @@ class Antenna:
         return Transforms(self.parents[frame], frame, matrix, place)
 
     def six(self, name: str, posture: TelescopePosture, added: Added | None = None) -> np.ndarray:
-        """Shift and turn (..., 6), m and rad, of a frame or group, with what is added; zero without a motion."""
+        """Shift and turn (..., 6), m and rad, of a frame or group.
+
+        With additions; zero without a motion.
+        """
         six = self.motions[name].six(posture) if name in self.motions else np.zeros((*posture.shape, 6))
         return six + np.asarray(added[name], dtype=float) if added and name in added else six
 
-    def refuse_strangers(self, added: Added | None) -> None:
-        """Raises InputError where something is added to what does not move as a whole: it would be lost in silence."""
-        own = {group.name for group in self.record.group if group.shifts is None}
+    def check_additions(self, added: Added | None) -> None:
+        """Raise InputError for an addition to a frame or group without rigid motion.
+
+        It would be lost silently.
+        """
+        point_groups = {group.name for group in self.record.group if group.shifts is None}
         for name in added or {}:
-            if name not in self.parents and name not in own:
+            if name not in self.parents and name not in point_groups:
                 raise InputError(
-                    f"{name!r} cannot be shifted and turned: it is no frame of the structural model and no group that "
-                    f"moves as a whole (these are {', '.join([*self.parents, *sorted(own)])})"
+                    f"{name!r} cannot be shifted and turned: it is no frame of the structural model nor a group that "
+                    f"moves as a whole (these are {', '.join([*self.parents, *sorted(point_groups)])})"
                 )
 
     def pivot(self, name: str) -> np.ndarray:
-        """(3,) m, own nominal axes, about which a frame or group turns; its origin without a motion."""
+        """Pivot (3,), m, of a frame's or group's turns.
+
+        Own nominal axes; its origin without a motion.
+        """
         return self.motions[name].pivot if name in self.motions else np.zeros(3)
 
     def ground_from(
@@ -164,14 +182,14 @@ class Antenna:
         """Transforms (...) of points of a frame into the ground frame.
 
         frame          "alidade", "reflector", "feed_arm" or another of the model
-        posture        (...) how the telescope stands
+        posture        (...) of the telescope
         added          frame: (..., 6) m and rad, added to its shift and turn: a correction, a vibration
         subreflector   its commanded position
-        deformed       False gives the first order only, and refuses nothing
+        deformed       False gives the first order only, and checks nothing
 
-        Raises ValidityError outside the model's range, InputError for an unknown frame, also among what is added.
+        Raises ValidityError outside the model's range, InputError for an unknown frame, also among the additions.
         """
-        self.refuse_strangers(added)
+        self.check_additions(added)
         if deformed:
             self.validity.refuse_outside(posture)
         transforms = Transforms(ROOT, ROOT, np.eye(3), np.zeros(3))
@@ -192,29 +210,36 @@ class Antenna:
     ) -> np.ndarray:
         """Points of a group in the ground frame (..., n, 3), m.
 
-        group, posture, added, subreflector   as for `ground_from`; the group's own motion may be added to as well
+        group, posture, added, subreflector   as for `ground_from`; additions to the group's own motion are allowed as
+                                              well
 
         Raises as `ground_from`.
         """
-        rest = self.groups[_known(group, self.groups)]
-        transform = self.ground_from(rest.frame, posture, added=added, subreflector=subreflector)
+        points_at_rest = self.groups[_existing(group, self.groups)]
+        transform = self.ground_from(points_at_rest.frame, posture, added=added, subreflector=subreflector)
         return transform[..., None].points(self.in_frame(group, posture, added=added))
 
     def in_frame(self, group: str, posture: TelescopePosture, *, added: Added | None = None) -> np.ndarray:
-        """Points of a group in the axes of their frame (..., n, 3), m, as the group's own motion leaves them."""
-        rest = self.groups[_known(group, self.groups)]
+        """Points of a group in the axes of their frame (..., n, 3), m.
+
+        Moved by the group's own motion.
+        """
+        points_at_rest = self.groups[_existing(group, self.groups)]
         record = next(g for g in self.record.group if g.name == group)
         if record.shifts is not None:
             rows = _basis(record.shifts, self.record.reference_temperature_c).rows(posture)
-            return rest.position + np.einsum("...k,ndk->...nd", rows, _shifts(record))
+            return points_at_rest.position + np.einsum("...k,ndk->...nd", rows, _shifts(record))
         rotation, translation = carried(self.six(group, posture, added), self.pivot(group))
-        return Transforms(group, group, rotation, translation)[..., None].points(rest.position)
+        return Transforms(group, group, rotation, translation)[..., None].points(points_at_rest.position)
 
     def u_points(self, group: str) -> np.ndarray:
-        """(n,) m, standard uncertainty of each coordinate in the frame, of the sheet and of tables of points."""
-        rest = self.groups[_known(group, self.groups)]
+        """Standard uncertainty (n,), m, of each coordinate in the frame.
+
+        Of the sheet and of tables of points.
+        """
+        points_at_rest = self.groups[_existing(group, self.groups)]
         record = next(g for g in self.record.group if g.name == group)
-        return np.hypot(rest.u, (record.u_shift_mm or 0.0) * MILLIMETRE)
+        return np.hypot(points_at_rest.u, (record.u_shift_mm or 0.0) * MILLIMETRE)
 
     def derivatives(
         self,
@@ -225,7 +250,9 @@ class Antenna:
         added: Added | None = None,
         subreflector: SubreflectorPosition | None = None,
     ) -> dict[str, np.ndarray]:
-        """Derivatives (..., 3, 6) of points in the ground frame by the shift and turn of each frame they stand on.
+        """Derivatives (..., 3, 6) of ground points by each parent frame's motion.
+
+        By shift and turn.
 
         frame, posture, added, subreflector   as for `ground_from`
         points   (..., 3), m, in the frame, whose batch axes broadcast against the posture's
@@ -244,11 +271,14 @@ class Antenna:
     def _outward(
         self, frame: str, posture: TelescopePosture, added: Added | None, subreflector: SubreflectorPosition | None
     ) -> np.ndarray:
-        """Rotation (..., 3, 3) from a frame's nominal axes, in which it moves, to the ground."""
-        own, parent = self.nominal(frame, posture, subreflector).rotation, self.parents[frame]
+        """Rotation (..., 3, 3) from a frame's nominal axes to the ground.
+
+        The frame moves in these axes.
+        """
+        local, parent = self.nominal(frame, posture, subreflector).rotation, self.parents[frame]
         if parent == ROOT:
-            return own
-        return self.ground_from(parent, posture, added=added, subreflector=subreflector).rotation @ own
+            return local
+        return self.ground_from(parent, posture, added=added, subreflector=subreflector).rotation @ local
 
     def group_derivatives(
         self,
@@ -258,25 +288,31 @@ class Antenna:
         added: Added | None = None,
         subreflector: SubreflectorPosition | None = None,
     ) -> dict[str, np.ndarray]:
-        """Derivatives (..., n, 3, 6) of a group's points in the ground frame by shifts and turns of frames and group.
+        """Derivatives (..., n, 3, 6) of a group's ground points by its frames' motions.
 
-        group, posture, added, subreflector   as for `points`; one posture, or (..., 1) of them to leave room for n
+        By shifts and turns of frames and group.
+
+        group, posture, added, subreflector   as for `points`; one posture, or (..., 1) of them, an axis for n
         """
-        rest = self.groups[_known(group, self.groups)]
+        points_at_rest = self.groups[_existing(group, self.groups)]
         at = self.in_frame(group, posture, added=added)
-        slopes = self.derivatives(rest.frame, at, posture, added=added, subreflector=subreflector)
+        slopes = self.derivatives(points_at_rest.frame, at, posture, added=added, subreflector=subreflector)
         if group in self.motions:
-            out = self.ground_from(rest.frame, posture, added=added, subreflector=subreflector).rotation
-            slopes[group] = out @ carried_jacobian(self.six(group, posture, added), self.pivot(group), rest.position)
+            out = self.ground_from(points_at_rest.frame, posture, added=added, subreflector=subreflector).rotation
+            slopes[group] = out @ carried_jacobian(
+                self.six(group, posture, added), self.pivot(group), points_at_rest.position
+            )
         return slopes
 
     def axis_derivatives(self, points: ArrayLike, posture: TelescopePosture) -> np.ndarray:
-        """Derivatives (..., 3, 2), m/rad, of ground points above the elevation axis by azimuth and elevation.
+        """Derivatives (..., 3, 2), m/rad, of ground points by azimuth and elevation.
+
+        For points above the elevation axis.
 
         points    (..., 3), m, ground frame
         posture   (...)
 
-        Of the nominal turns: the deformations' own slopes, some 0.3 m/rad at most, are left out beside 100 m/rad.
+        Of the nominal turns: the deformations' own slopes, some 0.3 m/rad at most, are neglected beside 100 m/rad.
         """
         x = np.asarray(points, dtype=float)
         turn = ground_from_alidade_at(posture.azimuth).rotation
@@ -286,7 +322,10 @@ class Antenna:
         return np.stack(np.broadcast_arrays(by_azimuth, by_elevation), axis=-1)
 
     def turns(self, frame: str, posture: TelescopePosture, added: Added | None = None) -> dict[str, np.ndarray]:
-        """Derivatives (..., 3, 6) of the frame's small turn about ground axes by shifts and turns on the way to it."""
+        """Derivatives (..., 3, 6) of a frame's small turn about ground axes.
+
+        By shifts and turns of its parent frames and itself.
+        """
         by_frame: dict[str, np.ndarray] = {}
         for name in self.chain(frame)[::-1]:
             turn = self._outward(name, posture, added, None) @ left_jacobian(self.six(name, posture, added)[..., 3:])
@@ -295,9 +334,9 @@ class Antenna:
 
 
 def antenna_of(record: StructuralModel) -> Antenna:
-    """The antenna that a structural model describes.
+    """Antenna of a structural model's record.
 
-    record    as `read_structural_model` gives it
+    record    from `read_structural_model`
     """
     motions = {
         entry.name: motion_of(entry.motion, record.reference_temperature_c)
@@ -310,7 +349,7 @@ def antenna_of(record: StructuralModel) -> Antenna:
 
 
 def motion_of(record: MotionRecord, reference_c: float) -> PostureMotion:
-    """A motion in metres and radians.
+    """Motion in metres and radians.
 
     record        mm and arc seconds
     reference_c   degrees C at which t is 0
@@ -350,7 +389,7 @@ def _shifts(group: GroupRecord) -> np.ndarray:
     return np.array(values) * MILLIMETRE
 
 
-def _known(group: str, groups: Sequence[str] | Mapping[str, RestPoints]) -> str:
+def _existing(group: str, groups: Sequence[str] | Mapping[str, RestPoints]) -> str:
     if group not in groups:
         raise InputError(f"group {group!r} is not in the structural model (it has {', '.join(groups)})")
     return group

@@ -1,4 +1,7 @@
-"""Whether a structure's model foretells what it was not shown: epochs left out, predicted less measured."""
+"""Cross-validation of a structure's model.
+
+Epochs left out, measured minus predicted.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,12 +26,12 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class LeaveOut:
-    """What was foretold of epochs that a fit did not see.
+    """Predictions of epochs that a fit did not use.
 
-    residual       (T, n, 3) m, measured less foretold; NaN where not measured
-    covariance     (T, n, 3, 3) m^2, claimed: of the foretelling, of what is new in an epoch, of the measurement
-    fold           (T,) in which each epoch was left out
-    extrapolated   (T,) whether its elevation or temperature lay outside the epochs that were fitted
+    residual       (T, n, 3) m, measured minus predicted; NaN where not measured
+    covariance     (T, n, 3, 3) m^2, claimed: of the prediction, of the epoch's own scatter, of the measurement
+    fold           (T,) fold of each epoch
+    extrapolated   (T,) True where elevation or temperature was outside the fitted epochs
     """
 
     residual: Array
@@ -38,13 +41,19 @@ class LeaveOut:
 
     @property
     def normalised(self) -> Array:
-        """(T, n) squares of residuals over their covariance, expectation 3; NaN where not measured."""
+        """Squared residuals over their covariance, (T, n), expectation 3.
+
+        NaN where not measured.
+        """
         weighted = np.linalg.solve(self.covariance, self.residual[..., None])[..., 0]
         return np.einsum("tni,tni->tn", self.residual, weighted)
 
     @property
     def ratio(self) -> float:
-        """Rms of the residuals over the claimed uncertainty, expectation 1: above it too little was claimed."""
+        """Rms of the residuals over the claimed uncertainty.
+
+        Expectation 1; above it too little was claimed.
+        """
         return float(np.sqrt(np.nanmean(self.normalised) / 3.0))
 
     @property
@@ -56,14 +65,16 @@ class LeaveOut:
 def left_out(
     series: GroupSeries, model: SeriesModel | None = None, *, folds: int = FOLDS, progress: Progress | None = None
 ) -> LeaveOut:
-    """Each epoch foretold by a fit that did not see it: the series in `folds` stretches of time, one left out in turn.
+    """Prediction of each epoch by a fit without it.
+
+    The series in `folds` stretches of time, one left out in turn.
 
     series     epochs, in order of time
     model      as for `fit_structure`
     folds      2 up, at most as many as epochs
 
-    Stretches, not single epochs: what neighbours in time share would else foretell itself. Raises EstimationError
-    where the rest of the epochs no longer carries the model, with the stretch.
+    Stretches, not single epochs: errors that neighbours in time share would otherwise predict themselves. Raises
+    EstimationError with the stretch where the other epochs no longer determine the model.
     """
     what = model or SeriesModel()
     if not 2 <= folds <= len(series):
@@ -82,20 +93,20 @@ def left_out(
             first, last = (series.labels[i] if series.labels else str(i) for i in (out[0], out[-1]))
             raise EstimationError(f"without epochs {first} to {last}: {problem}") from problem
         at = np.array([series.names.index(name) for name in fit.series.names])
-        _foretell(fit, series, out, at, residual, covariance, extrapolated)
+        _fill_predictions(fit, series, out, at, residual, covariance, extrapolated)
     return LeaveOut(residual, covariance, fold, extrapolated)
 
 
-def _foretell(
+def _fill_predictions(
     fit: StructureFit,
     series: GroupSeries,
     out: NDArray[np.intp],
     at: NDArray[np.intp],
     residual: Array,
     covariance: Array,
-    beyond: NDArray[np.bool_],
+    extrapolated: NDArray[np.bool_],
 ) -> None:
-    """Residuals and claimed covariances of the epochs left out, into their places."""
+    """Fill in residuals and claimed covariances of the epochs left out."""
     e = np.asarray(series.posture.elevation)[out]
     warm = np.asarray(series.posture.temperature_c)[out] if fit.model.temperature else None
     prediction = fit.predict(e, temperature_c=warm, way=series.way[out])
@@ -103,11 +114,14 @@ def _foretell(
     covariance[np.ix_(out, at)] = prediction.covariance + of_points(series)[np.ix_(out, at)]
     for i, epoch in enumerate(out):
         single = fit.predict(e[i : i + 1], temperature_c=None if warm is None else warm[i : i + 1])
-        beyond[epoch] = bool(single.outside)
+        extrapolated[epoch] = bool(single.outside)
 
 
 def of_points(series: GroupSeries, scatter: EpochScatter | None = None) -> Array:
-    """Covariance (T, n, 3, 3) m^2 of each place by itself, with what is new in an epoch where it is given."""
+    """Covariance (T, n, 3, 3), m^2, of each place.
+
+    With the scatter of an epoch if present.
+    """
     arms = np.nanmean(series.places, axis=0) - series.pivot
     spread = series.spread if scatter is None else widened(series.spread, arms, scatter)
     shape = (*series.places.shape, 3)
@@ -115,7 +129,7 @@ def of_points(series: GroupSeries, scatter: EpochScatter | None = None) -> Array
         n = shape[1]
         blocks = spread.full.reshape(-1, n, 3, n, 3)[:, np.arange(n), :, np.arange(n)]  # (n, T, 3, 3)
         return np.broadcast_to(np.swapaxes(blocks, 0, 1), shape)
-    assert spread.points is not None  # a spread has one of both
+    assert spread.points is not None  # a spread has one of the two
     covariance = np.broadcast_to(spread.points, shape)
     if spread.shared is not None:
         covariance = covariance + np.einsum("tniq,tnlq->tnil", spread.shared, spread.shared)

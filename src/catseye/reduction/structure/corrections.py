@@ -1,9 +1,11 @@
-"""The third order in one posture: what measured targets say on top of the structural model.
+"""Third order in one posture: corrections by measured targets.
 
-    frame_motion      shift and turn of one frame from three targets or more, without regard to the model's own
-    correct_posture   corrections to all frames that carry measured targets, the model's uncertainty as their prior
+Added to the structural model.
 
-Measured coordinates come with their full covariance, as `coordinates.json` has it; targets' places in their frames
+    frame_motion      shift and turn of one frame from three targets or more, independent of the model's own
+    correct_posture   corrections to all frames with measured targets, the model's uncertainty as their prior
+
+Measured coordinates have their full covariance, as in `coordinates.json`; targets' places in their frames
 (the sheet) are uncertain too. Many postures together change the model itself: `fit`.
 """
 
@@ -20,13 +22,13 @@ from catseye.geometry.frames.frame import Transforms
 from catseye.geometry.frames.rotation import to_vector
 from catseye.reduction.structure.antenna import Added, Antenna, SubreflectorPosition
 
-ITERATIONS = 20  # of Gauss and Newton; two or three are taken
+ITERATIONS = 20  # of Gauss-Newton; two or three suffice
 SETTLED = 1e-9  # m: largest change of a predicted coordinate in the last step
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPosture:
-    """Targets as measured in one posture.
+    """Targets measured in one posture.
 
     names         n, points of the model's groups
     coordinates   (n, 3) m, ground frame
@@ -44,15 +46,17 @@ class MeasuredPosture:
 
 @dataclass(frozen=True, eq=False)
 class FrameMotion:
-    """Shift and turn of one frame, in its own nominal axes, about its motion's pivot.
+    """Shift and turn of one frame in its own nominal axes.
+
+    About its motion's pivot.
 
     frame        its name
     names        targets
-    six          (6,) m and rad, of the frame altogether
+    six          (6,) m and rad, total of the frame
     correction   (6,) m and rad: six less the model's
-    covariance   (6, 6) of either, by targets and sheet alone: the frames it stands on are taken to be where they are
-                 told; its turn is a further small one: apart by half the turn itself, 1e-3 or less
-    residual     (n, 3) m, frame axes: measured less where the frame's motion takes the sheet's place
+    covariance   (6, 6) of either, by targets and sheet alone: its parent frames are taken as exact;
+                 its turn is a further small one: different by half the turn itself, 1e-3 or less
+    residual     (n, 3) m, frame axes: measured minus the sheet's place moved by the frame's motion
     pvv          weighted sum of squares
     degrees_of_freedom
     """
@@ -69,7 +73,7 @@ class FrameMotion:
 
 @dataclass(frozen=True, eq=False)
 class Corrections:
-    """What one posture's targets say on top of the model.
+    """Corrections to the model by one posture's targets.
 
     frames               F frames and groups, in the order of the covariance
     six                  frame: (6,) m and rad, to be added to the model's shift and turn
@@ -92,9 +96,9 @@ class Corrections:
 
 
 class CoordinatesDocument(TypedDict):
-    """What of a `coordinates.json` a comparison with the structural model needs.
+    """Keys of a `coordinates.json` for a comparison with the model.
 
-    points             name: x, y, z (m) among what else is said of each
+    points             name: x, y, z (m) and other keys
     covariance_order   "ZEG10001 x" and so on, of each row
     covariance         m^2
     """
@@ -111,14 +115,16 @@ def measured_of(
     *,
     subreflector: SubreflectorPosition | None = None,
 ) -> MeasuredPosture:
-    """The model's targets among the points of a `coordinates.json`, with their covariance.
+    """Model's targets among the points of a `coordinates.json`.
+
+    With their covariance.
 
     document       the file as read: points, covariance_order, covariance
     antenna        the structural model
-    posture        in which they were measured; a coordinates.json does not say the temperature
+    posture        of the measurement; a coordinates.json has no temperature
     subreflector   its commanded position
 
-    Raises InputError where keys or numbers are missing, or no point is the model's.
+    Raises InputError where keys or numbers are missing, or no point is in the model.
     """
     for key in ("points", "covariance_order", "covariance"):
         if key not in document:
@@ -128,14 +134,14 @@ def measured_of(
         raise InputError("coordinates: none of their points is in a group of the structural model")
     order = {label: i for i, label in enumerate(document["covariance_order"])}
     labels = [f"{name} {axis}" for name in names for axis in "xyz"]
-    lost = [label for label in labels if label not in order]
-    if lost:
-        raise InputError(f"coordinates: covariance_order has no {lost[0]!r} (expected x, y, z of each point)")
+    missing_labels = [label for label in labels if label not in order]
+    if missing_labels:
+        raise InputError(f"coordinates: covariance_order has no {missing_labels[0]!r} (expected x, y, z of each point)")
     at = [order[label] for label in labels]
-    whole = np.array(document["covariance"], dtype=float)
-    if whole.shape != (len(order), len(order)):
-        raise InputError(f"coordinates: covariance has shape {whole.shape} (expected {len(order)} by {len(order)})")
-    covariance = whole[np.ix_(at, at)]
+    full = np.array(document["covariance"], dtype=float)
+    if full.shape != (len(order), len(order)):
+        raise InputError(f"coordinates: covariance has shape {full.shape} (expected {len(order)} by {len(order)})")
+    covariance = full[np.ix_(at, at)]
     coordinates = np.array([[document["points"][name].get(axis) for axis in "xyz"] for name in names], dtype=float)
     for name, row in zip(names, np.isfinite(coordinates).all(axis=1), strict=True):
         if not row:
@@ -144,12 +150,14 @@ def measured_of(
 
 
 def frame_motion(antenna: Antenna, measured: MeasuredPosture, frame: str, *, added: Added | None = None) -> FrameMotion:
-    """Shift and turn of one frame from the targets it carries, its parents where the model and `added` have them.
+    """Shift and turn of one frame from its targets.
+
+    Its parents are where the model and `added` have them.
 
     antenna    the structural model
     measured   three targets or more in the groups of this frame, not on one line
     frame      its name
-    added      frame: (6,) m and rad on top of the model's, of the frames that this one stands on
+    added      frame: (6,) m and rad on top of the model's, of this frame's parents
 
     Raises EstimationError with fewer targets, or on one line.
 
@@ -181,18 +189,20 @@ def frame_motion(antenna: Antenna, measured: MeasuredPosture, frame: str, *, add
 
 
 def correct_posture(antenna: Antenna, measured: MeasuredPosture) -> Corrections:
-    """Corrections to all frames on which measured targets stand, from one posture, the model's u as their prior.
+    """Corrections to all frames with measured targets, from one posture.
+
+    The model's u is their prior.
 
     antenna    the structural model
     measured   one target or more
 
-    Frames that few targets hold stay near the model, and their uncertainty says so. Least squares with priors, derived
-    in closed form; repeated until the predictions stand still. Raises EstimationError where they do not.
+    Frames with few targets stay near the model, and their uncertainty shows it. Least squares with priors, derived
+    in closed form; iterated until the predictions no longer change. Raises EstimationError where they do not settle.
 
     Source: [JCGM102] section 6.2 (propagation), least squares with the corrections as observed unknowns.
     """
     if not measured.names:
-        raise EstimationError("no target was measured: there is nothing to correct by")
+        raise EstimationError("no target was measured: no corrections possible")
     frames = _frames_of(antenna, measured.names)
     prior = np.zeros((6 * len(frames), 6 * len(frames)))
     for i, name in enumerate(frames):
@@ -213,8 +223,8 @@ def correct_posture(antenna: Antenna, measured: MeasuredPosture) -> Corrections:
             break
     else:
         raise EstimationError(f"corrections did not settle in {ITERATIONS} steps: a target is measured far off")
-    left = np.eye(len(theta)) - gain @ design
-    covariance = left @ prior @ left.T + gain @ noise @ gain.T
+    reduction = np.eye(len(theta)) - gain @ design
+    covariance = reduction @ prior @ reduction.T + gain @ noise @ gain.T
     residual = misfit - design @ theta
     standardised = residual / np.sqrt(np.diag(noise @ np.linalg.solve(spread, noise)))
     pvv = float(misfit @ np.linalg.solve(spread, misfit))
@@ -233,7 +243,7 @@ def group_of(antenna: Antenna, target: str) -> str:
 
 
 def u_sheet(antenna: Antenna, target: str) -> float:
-    """m, standard uncertainty of each coordinate of a target's place in its frame."""
+    """Standard uncertainty of a target's coordinates in its frame, m."""
     group = antenna.groups[group_of(antenna, target)]
     return float(group.u[group.names.index(target)])
 
@@ -241,7 +251,10 @@ def u_sheet(antenna: Antenna, target: str) -> float:
 def _places(
     antenna: Antenna, names: Sequence[str], posture: TelescopePosture, added: Added
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Places (n, 3) in the axes of the targets' frames, and their u (n,) in one posture."""
+    """Places (n, 3) in the axes of the targets' frames, and u (n,).
+
+    In one posture.
+    """
     place, u = [], []
     for name in names:
         group = group_of(antenna, name)
@@ -252,7 +265,10 @@ def _places(
 
 
 def _frames_of(antenna: Antenna, names: Sequence[str]) -> tuple[str, ...]:
-    """Frames with a motion on which the targets stand, from the ground up, then groups with one."""
+    """Parent frames with a motion, from the ground up.
+
+    Of the targets; then groups with a motion.
+    """
     groups = list(dict.fromkeys(group_of(antenna, name) for name in names))
     frames = {frame: None for group in groups for frame in antenna.chain(antenna.groups[group].frame)}
     return tuple(name for name in [*frames, *groups] if name in antenna.motions)
@@ -261,7 +277,10 @@ def _frames_of(antenna: Antenna, names: Sequence[str]) -> tuple[str, ...]:
 def predicted_points(
     antenna: Antenna, measured: MeasuredPosture, added: Added, *, places: Mapping[str, np.ndarray] | None = None
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Coordinates (n, 3) of the targets, and derivatives (3n, 6) by the shift and turn of each frame and group."""
+    """Target coordinates (n, 3), and derivatives (3n, 6).
+
+    By the shift and turn of each frame and group.
+    """
     n = len(measured.names)
     predicted = np.zeros((n, 3))
     by_frame: dict[str, np.ndarray] = {}

@@ -1,8 +1,8 @@
-"""The structural model's coefficients from targets measured in many postures, and its new file.
+"""Fit of a structural model to targets in many postures.
 
 Four things make the measured targets differ from the model: its free coefficients, the same in all postures; the
-coefficients that stay as they are but have a covariance, the same in all postures too, hence parameters with a prior
-that is not improved; the targets' places in their frames (the sheet), likewise with a prior; and what the model leaves
+coefficients that stay fixed but have a covariance, the same in all postures too, hence parameters with a prior
+that is not improved; the targets' places in their frames (the sheet), likewise with a prior; and the model's residual
 in each posture anew (u of a motion), which is noise there, correlated between the targets of a posture.
 """
 
@@ -29,12 +29,12 @@ from catseye.reduction.structure.corrections import (
 
 Owner = TypeVar("Owner", FrameRecord, GroupRecord)
 
-FLOATING = 1e-12  # of the normal matrix scaled to ones: an eigenvalue below it is a direction that nothing holds
+FLOATING = 1e-12  # of the normal matrix scaled to ones: an eigenvalue below it is an undetermined direction
 
 
 @dataclass(frozen=True, eq=False)
 class ModelFit:
-    """The model's coefficients from many postures.
+    """Model coefficients from many postures.
 
     free                 (frame, component) in the order of the covariance, k coefficients each
     coefficients         frame: (6, k) m and rad, all of them
@@ -54,7 +54,7 @@ class ModelFit:
 
     @property
     def variance_factor(self) -> float:
-        """[pvv] / degrees of freedom, expectation 1."""
+        """Ratio [pvv] / degrees of freedom, expectation 1."""
         return self.pvv / self.degrees_of_freedom
 
 
@@ -64,15 +64,16 @@ def fit_model(
     *,
     free: Mapping[str, Sequence[str]],
 ) -> ModelFit:
-    """The model's coefficients from targets measured in many postures.
+    """Fit model coefficients to targets in many postures.
 
     antenna   the structural model to begin with
     epochs    postures with their targets
-    free      frame or group: which of shift_x, ..., turn_z to estimate; the others stay as they are
+    free      frame or group: estimated components of shift_x, ..., turn_z; the others stay fixed
 
     A motion with a covariance brings it as the prior of its free coefficients; one without leaves them free. Each
-    posture's scatter about the model (u of the motions on the way) and each target's place are modelled, see the top.
-    Raises EstimationError where coefficients float, naming them, and InputError for an unknown frame or component.
+    posture's scatter about the model (u of the motions on the way) and each target's place are modelled, see the
+    module. Raises EstimationError where coefficients float, naming them, and InputError for an unknown frame or
+    component.
 
     Source: [RAO73] section 4a (least squares with a full covariance); [JCGM102] for the covariance.
     """
@@ -82,12 +83,12 @@ def fit_model(
     start, prior_normal = _priors(antenna, layout, size)
     theta, place = start.copy(), np.zeros(3 * len(targets))
     u = np.array([u_sheet(antenna, name) for name in targets])
-    held, known = _held(antenna, layout), size + len(place)
+    fixed, fixed_start = _fixed_coefficients(antenna, layout), size + len(place)
     for _ in range(ITERATIONS):
-        normal = np.zeros((known + held.count, known + held.count))
+        normal = np.zeros((fixed_start + fixed.count, fixed_start + fixed.count))
         right, pvv, residuals, before = np.zeros(len(normal)), 0.0, [], []
         for epoch in epochs:
-            design, misfit, spread = _rows(antenna, epoch, layout, targets, theta - start, place, held)
+            design, misfit, spread = _rows(antenna, epoch, layout, targets, theta - start, place, fixed)
             weighted = np.linalg.solve(spread, np.column_stack([design, misfit]))
             normal += design.T @ weighted[:, :-1]
             right += design.T @ weighted[:, -1]
@@ -95,19 +96,19 @@ def fit_model(
             residuals.append(misfit.reshape(-1, 3))
             before.append(design)
         normal[:size, :size] += prior_normal
-        normal[size:known, size:known] += np.diag(np.repeat(u**-2, 3))
-        normal[known:, known:] += np.eye(held.count)
+        normal[size:fixed_start, size:fixed_start] += np.diag(np.repeat(u**-2, 3))
+        normal[fixed_start:, fixed_start:] += np.eye(fixed.count)
         right[:size] -= prior_normal @ (theta - start)
-        right[size:known] -= place * np.repeat(u**-2, 3)
+        right[size:fixed_start] -= place * np.repeat(u**-2, 3)
         pvv += float((theta - start) @ prior_normal @ (theta - start) + place @ (place * np.repeat(u**-2, 3)))
         labels = [*_labels(antenna, layout), *(f"place of {n} {a}" for n in targets for a in "xyz")]
-        inverse = _inverse(normal, [*labels, *(f"held {k}" for k in range(held.count))])
+        inverse = _inverse(normal, [*labels, *(f"held {k}" for k in range(fixed.count))])
         step = inverse @ right
-        theta, place = theta + step[:size], place + step[size:known]
+        theta, place = theta + step[:size], place + step[size:fixed_start]
         pvv -= float(
-            right[known:] @ np.linalg.solve(normal[known:, known:], right[known:])
-        )  # what the held ones explain
-        if max(float(np.max(np.abs(design[:, :known] @ step[:known]))) for design in before) < SETTLED:
+            right[fixed_start:] @ np.linalg.solve(normal[fixed_start:, fixed_start:], right[fixed_start:])
+        )  # by the fixed ones
+        if max(float(np.max(np.abs(design[:, :fixed_start] @ step[:fixed_start]))) for design in before) < SETTLED:
             break
     else:
         raise EstimationError(f"coefficients did not settle in {ITERATIONS} steps: a target is measured far off")
@@ -127,19 +128,21 @@ def fit_model(
 def updated_model(
     record: StructuralModel, antenna: Antenna, fit: ModelFit, *, by: str, measured_on: date, report: str
 ) -> StructuralModel:
-    """The structural model with the fitted coefficients and their covariance, ready for `structural_model_toml`.
+    """Structural model with fitted coefficients and their covariance.
 
-    record        that the fit began with
+    Ready for `structural_model_toml`.
+
+    record        at the start of the fit
     antenna       of it
     fit           its new coefficients
     by            who measured
-    measured_on   when
-    report        where it is written up
+    measured_on   date
+    report        its report
 
     Each motion keeps the covariance of its own coefficients; that between frames, and that with the targets' places
-    (the sheet), has no place in the file. A second fit that begins with it on the same targets takes the sheet as
-    fresh: with the example's, two campaigns of 14 postures, its chi-squares are 1.2 where 1 is expected (u 10 % too
-    small). Fit all postures at once instead.
+    (the sheet), is not in the file. A second fit from it on the same targets takes the sheet as
+    independent: with the example's, two campaigns of 14 postures, its chi-squares are 1.2 where 1 is expected (u 10 %
+    too small). Fit all postures at once instead.
     """
     named = sorted({name for name, _ in fit.free})
     changed = {name: _motion_record(_owner(record, name), antenna, fit, name) for name in named}
@@ -157,7 +160,7 @@ def updated_model(
 
 
 def _motion_record(motion: MotionRecord, antenna: Antenna, fit: ModelFit, name: str) -> MotionRecord:
-    """A motion with new values and covariance, in the units of the file."""
+    """Motion with new values and covariance, in the file's units."""
     k = len(antenna.motions[name].basis)
     values = fit.coefficients[name] / UNITS[:, None]
     shaped: dict[str, tuple[float, ...] | tuple[tuple[float, ...], ...]] = {}
@@ -171,9 +174,9 @@ def _motion_record(motion: MotionRecord, antenna: Antenna, fit: ModelFit, name: 
         if frame == name:
             break
         before += len(_indices(antenna, fit.free, frame))
-    own = slice(before, before + len(at))
+    columns = slice(before, before + len(at))
     covariance[at, :], covariance[:, at] = 0.0, 0.0
-    covariance[np.ix_(at, at)] = fit.covariance[own, own]
+    covariance[np.ix_(at, at)] = fit.covariance[columns, columns]
     units = np.repeat(UNITS, k)
     rows = covariance / np.outer(units, units)
     rows = 0.5 * (rows + rows.T)
@@ -194,9 +197,12 @@ def _rows(
     targets: list[str],
     change: np.ndarray,
     place: np.ndarray,
-    held: "_Held",
+    fixed: "_FixedCoefficients",
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Design (3n, coefficients, places and held ones), misfit (3n,) and covariance of one posture."""
+    """Design, misfit (3n,) and covariance of one posture.
+
+    Design (3n, coefficients, places and fixed ones).
+    """
     added: dict[str, np.ndarray] = {}
     row_of = {name: antenna.motions[name].basis.rows(epoch.posture) for name in {name for name, _ in layout}}
     first = 0
@@ -223,22 +229,24 @@ def _rows(
         by_place[at, column : column + 3] = out[group]
         fresh = antenna.u_points(group)[antenna.groups[group].names.index(name)] ** 2 - u_sheet(antenna, name) ** 2
         spread[at, at] += max(fresh, 0.0) * np.eye(3)
-    by_held = np.zeros((rows, held.count))
+    by_fixed = np.zeros((rows, fixed.count))
     for name, slope in slopes.items():
         if name in antenna.motions:
             motion = antenna.motions[name]
             spread += slope @ np.diag(motion.u**2) @ slope.T
-            if name in held.factors:
-                begin, factor = held.factors[name]
-                whole = np.kron(np.eye(len(COMPONENTS)), motion.basis.rows(epoch.posture)[None])  # (6, 6 k)
-                by_held[:, begin : begin + factor.shape[1]] = slope @ whole @ factor
+            if name in fixed.factors:
+                begin, factor = fixed.factors[name]
+                full = np.kron(np.eye(len(COMPONENTS)), motion.basis.rows(epoch.posture)[None])  # (6, 6 k)
+                by_fixed[:, begin : begin + factor.shape[1]] = slope @ full @ factor
     misfit = (epoch.coordinates - predicted).ravel()
-    return np.concatenate([*columns, by_place, by_held], axis=1), misfit, spread
+    return np.concatenate([*columns, by_place, by_fixed], axis=1), misfit, spread
 
 
 @dataclass(frozen=True, eq=False)
-class _Held:
-    """Coefficients that are not free: values off the model's = factor z, z standard normal, the same in all postures.
+class _FixedCoefficients:
+    """Fixed coefficients with a covariance.
+
+    Values off the model's = factor z, z standard normal, the same in all postures.
 
     factors   frame: its first z, and (6 k, m) m and rad
     count     of all z
@@ -248,7 +256,7 @@ class _Held:
     count: int
 
 
-def _held(antenna: Antenna, layout: tuple[tuple[str, str], ...]) -> _Held:
+def _fixed_coefficients(antenna: Antenna, layout: tuple[tuple[str, str], ...]) -> _FixedCoefficients:
     factors: dict[str, tuple[int, np.ndarray]] = {}
     first = 0
     for name, motion in antenna.motions.items():
@@ -263,7 +271,7 @@ def _held(antenna: Antenna, layout: tuple[tuple[str, str], ...]) -> _Held:
         if real.any():
             factors[name] = (first, scale[:, None] * vectors[:, real] * np.sqrt(values[real]))
             first += int(real.sum())
-    return _Held(factors, first)
+    return _FixedCoefficients(factors, first)
 
 
 def _layout(antenna: Antenna, free: Mapping[str, Sequence[str]]) -> tuple[tuple[str, str], ...]:
@@ -272,7 +280,7 @@ def _layout(antenna: Antenna, free: Mapping[str, Sequence[str]]) -> tuple[tuple[
             raise InputError(f"{name!r} has no motion in the structural model (it has {', '.join(antenna.motions)})")
         for component in components:
             if component not in COMPONENTS:
-                raise InputError(f"{name}: {component!r} is no component (expected {', '.join(COMPONENTS)})")
+                raise InputError(f"{name}: {component!r} is not a component (expected {', '.join(COMPONENTS)})")
     layout = tuple((name, c) for name, components in free.items() for c in COMPONENTS if c in components)
     if not layout:
         raise InputError("no coefficient is free: name a frame and its components")
@@ -280,37 +288,40 @@ def _layout(antenna: Antenna, free: Mapping[str, Sequence[str]]) -> tuple[tuple[
 
 
 def _indices(antenna: Antenna, layout: tuple[tuple[str, str], ...], name: str) -> np.ndarray:
-    """Where the free coefficients of a frame stand among its own 6 k."""
+    """Positions of a frame's free coefficients among its own 6 k."""
     k = len(antenna.motions[name].basis)
     return np.concatenate([COMPONENTS.index(c) * k + np.arange(k) for frame, c in layout if frame == name])
 
 
 def _priors(antenna: Antenna, layout: tuple[tuple[str, str], ...], size: int) -> tuple[np.ndarray, np.ndarray]:
-    """The free coefficients as the model has them (size,), and the inverse of their covariance; zero without one."""
+    """Prior values (size,) and inverse covariance of the free coefficients.
+
+    Zero without a covariance.
+    """
     start, normal, first = np.zeros(size), np.zeros((size, size)), 0
     for name in dict.fromkeys(name for name, _ in layout):
         at = _indices(antenna, layout, name)
-        own = slice(first, first + len(at))
-        start[own] = antenna.motions[name].coefficients.ravel()[at]
+        rows = slice(first, first + len(at))
+        start[rows] = antenna.motions[name].coefficients.ravel()[at]
         covariance = antenna.motions[name].covariance[np.ix_(at, at)]
-        known = np.diag(covariance) > 0.0
-        if known.any():
-            size_of = np.sqrt(np.diag(covariance)[known])
-            scaled = covariance[np.ix_(known, known)] / np.outer(size_of, size_of)
+        positive = np.diag(covariance) > 0.0
+        if positive.any():
+            size_of = np.sqrt(np.diag(covariance)[positive])
+            scaled = covariance[np.ix_(positive, positive)] / np.outer(size_of, size_of)
             if np.linalg.eigvalsh(scaled)[0] < FLOATING:
                 raise EstimationError(
-                    f"the covariance of {name!r} ties free coefficients to one another without play: no prior can be "
-                    "made of it; take it out of the file, or give each its own variance"
+                    f"the covariance of {name!r} ties free coefficients exactly: no prior can be "
+                    "made of it; remove it from the file, or give each its own variance"
                 )
             inverse = np.linalg.inv(scaled) / np.outer(size_of, size_of)
-            where = first + np.flatnonzero(known)
+            where = first + np.flatnonzero(positive)
             normal[np.ix_(where, where)] = inverse
         first += len(at)
     return start, normal
 
 
 def _spread_out(antenna: Antenna, layout: tuple[tuple[str, str], ...], theta: np.ndarray) -> dict[str, np.ndarray]:
-    """All coefficients (6, k) of the frames that have free ones."""
+    """Coefficients (6, k) of the frames that have free ones."""
     coefficients: dict[str, np.ndarray] = {}
     first = 0
     for name in dict.fromkeys(name for name, _ in layout):
@@ -327,7 +338,10 @@ def _labels(antenna: Antenna, layout: tuple[tuple[str, str], ...]) -> list[str]:
 
 
 def _inverse(normal: np.ndarray, labels: list[str]) -> np.ndarray:
-    """The inverse of a normal matrix, or EstimationError with the parameters that float."""
+    """Inverse of a normal matrix.
+
+    EstimationError with the parameters that float.
+    """
     size = np.sqrt(np.diag(normal))
     if np.any(size == 0.0):
         raise EstimationError(f"{labels[int(np.argmin(size))]} floats: no measured target depends on it")

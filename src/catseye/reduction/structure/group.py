@@ -1,4 +1,4 @@
-"""Points as measured in many postures, taken into the axes of the frame that carries them."""
+"""Points of many postures in the axes of their frame."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,12 +24,12 @@ from catseye.verdict import Verdict
 Array = NDArray[np.float64]
 FRAMES = ("ground", "alidade", "reflector")
 MOST = 2e8  # numbers of all covariances: 1.6 GB
-MOVED = 0.05 * DEGREE  # of elevation: less is no move, and the way of the last one lasts
+MOVED = 0.05 * DEGREE  # of elevation: less is no move, and the previous direction holds
 
 
 @dataclass(frozen=True)
 class Nominal:
-    """A rigid telescope: m, as `geometry.antenna.frames` has them."""
+    """Constants of a rigid telescope, m, as in `geometry.antenna.frames`."""
 
     elevation_axis_height: float = ELEVATION_AXIS_HEIGHT
     reflector_to_elevation: tuple[float, float, float] = REFLECTOR_TO_ELEVATION
@@ -46,7 +46,7 @@ class PlacesEpoch:
     names          n
     coordinates    (n, 3) m, ground frame
     covariance     (3n, 3n) m^2
-    verdict        of the reduction; None where it says none
+    verdict        of the reduction; None without one
     """
 
     label: str
@@ -70,15 +70,15 @@ def group_series(
     nominal: Nominal | None = None,
     correlated: bool = True,
 ) -> GroupSeries:
-    """A group's points through the epochs, in order of time.
+    """Group of points through the epochs, in order of time.
 
-    epochs    one up; those without any of the points are left out
+    epochs    at least one; those without any of the points are left out
     points    names, or patterns such as "ZEG*"
     group     its name
-    frame     that carries it: "ground", "alidade" or "reflector"
-    pivot     (3,) m in the frame, of turns; the middle of the points where it is None
+    frame     of the group: "ground", "alidade" or "reflector"
+    pivot     (3,) m in the frame, of turns; None: the middle of the points
     nominal   the rigid telescope
-    correlated   False takes the points of an epoch as independent, each with its own covariance: for thousands
+    correlated   False: points of an epoch independent, each with its own covariance: for thousands
 
     Raises InputError for too many points, an unknown frame, points that no epoch has, epochs of one name.
     """
@@ -90,48 +90,50 @@ def group_series(
         if not any(fnmatchcase(name, pattern) for name in every_name):
             some = ", ".join(every_name[:8]) + (", ..." if len(every_name) > 8 else "")
             raise InputError(f"no epoch has a point {pattern!r} (they have {some})")
-    kept = [epoch for epoch in epochs if set(epoch.names) & set(names)]
-    labels = [epoch.label for epoch in kept]
+    used = [epoch for epoch in epochs if set(epoch.names) & set(names)]
+    labels = [epoch.label for epoch in used]
     if len(set(labels)) < len(labels):
         twice = next(label for label in labels if labels.count(label) > 1)
-        raise InputError(f"epoch {twice!r} is given twice (expected each once)")
-    kept.sort(key=lambda epoch: (np.isnan(epoch.mjd), epoch.mjd))
-    if correlated and len(kept) * (3 * len(names)) ** 2 > MOST:
+        raise InputError(f"epoch {twice!r} appears twice (expected each once)")
+    used.sort(key=lambda epoch: (np.isnan(epoch.mjd), epoch.mjd))
+    if correlated and len(used) * (3 * len(names)) ** 2 > MOST:
         raise InputError(
-            f"{len(names)} points in {len(kept)} epochs with a covariance of all in each are too many (expected "
+            f"{len(names)} points in {len(used)} epochs with a covariance of all in each are too many (expected "
             f"{MOST:.0e} numbers at most): name fewer, or take them as independent (--independent)"
         )
-    places = np.full((len(kept), len(names), 3), np.nan)
-    # of points that are not there: ones, never used
-    full = np.tile(np.eye(3 * len(names)), (len(kept), 1, 1)) if correlated else np.zeros((0, 0, 0))
-    alone = np.tile(np.eye(3), (len(kept), len(names), 1, 1))
-    for t, epoch in enumerate(kept):
-        own = [i for i, name in enumerate(epoch.names) if name in names]
-        at = np.array([names.index(epoch.names[i]) for i in own])
+    places = np.full((len(used), len(names), 3), np.nan)
+    # of absent points: ones, never used
+    full = np.tile(np.eye(3 * len(names)), (len(used), 1, 1)) if correlated else np.zeros((0, 0, 0))
+    alone = np.tile(np.eye(3), (len(used), len(names), 1, 1))
+    for t, epoch in enumerate(used):
+        present = [i for i, name in enumerate(epoch.names) if name in names]
+        at = np.array([names.index(epoch.names[i]) for i in present])
         carrier = carrier_of(frame, epoch.azimuth, epoch.elevation, nominal=nominal or Nominal())
-        places[t, at] = (epoch.coordinates[own] - carrier.translation) @ carrier.rotation
-        rows = (3 * np.array(own)[:, None] + np.arange(3)).ravel()
+        places[t, at] = (epoch.coordinates[present] - carrier.translation) @ carrier.rotation
+        rows = (3 * np.array(present)[:, None] + np.arange(3)).ravel()
         into = (3 * at[:, None] + np.arange(3)).ravel()
         if not correlated:
-            each = 3 * np.array(own)[:, None] + np.arange(3)
-            blocks = epoch.covariance[each[:, :, None], each[:, None, :]]
+            coordinates = 3 * np.array(present)[:, None] + np.arange(3)
+            blocks = epoch.covariance[coordinates[:, :, None], coordinates[:, None, :]]
             alone[t, at] = carrier.rotation.T @ blocks @ carrier.rotation
             continue
-        turn = np.kron(np.eye(len(own)), carrier.rotation.T)
+        turn = np.kron(np.eye(len(present)), carrier.rotation.T)
         full[t][np.ix_(into, into)] = turn @ epoch.covariance[np.ix_(rows, rows)] @ turn.T
-    e = np.array([epoch.elevation for epoch in kept])
+    e = np.array([epoch.elevation for epoch in used])
     posture = TelescopePosture(
-        np.array([epoch.azimuth for epoch in kept]), e, np.array([epoch.temperature_c for epoch in kept])
+        np.array([epoch.azimuth for epoch in used]), e, np.array([epoch.temperature_c for epoch in used])
     )
     middle = np.nanmean(places, axis=(0, 1)) if pivot is None else np.asarray(pivot, dtype=float)
-    mjd = np.array([epoch.mjd for epoch in kept])
-    sorted_labels = tuple(epoch.label for epoch in kept)
+    mjd = np.array([epoch.mjd for epoch in used])
+    sorted_labels = tuple(epoch.label for epoch in used)
     spread = Spread(full=full) if correlated else Spread(points=alone)
     return GroupSeries(group, frame, names, mjd, posture, ways(e), places, spread, middle, sorted_labels)
 
 
 def carrier_of(frame: str, azimuth: float, elevation: float, *, nominal: Nominal) -> Transforms:
-    """Points of a frame into the ground, at one posture of the rigid telescope.
+    """Transform from a frame to the ground, at one posture.
+
+    Of the rigid telescope.
 
     frame                "ground", "alidade" or "reflector"
     azimuth, elevation   rad
@@ -151,16 +153,18 @@ def carrier_of(frame: str, azimuth: float, elevation: float, *, nominal: Nominal
 
 
 def ways(elevation: Array) -> Array:
-    """Way of the last elevation move before each epoch: 1 rose, -1 fell, 0 unknown.
+    """Direction of the last elevation move: 1 rose, -1 fell, 0 unknown.
+
+    Before each epoch.
 
     elevation   (T,) rad, in order of time
 
     >>> ways(np.radians([10.0, 20.0, 20.01, 15.0])).tolist()
     [0.0, 1.0, 1.0, -1.0]
     """
-    way, last = np.zeros(len(elevation)), 0.0
+    direction, last = np.zeros(len(elevation)), 0.0
     for t in range(1, len(elevation)):
         step = elevation[t] - elevation[t - 1]
         last = float(np.sign(step)) if abs(step) > MOVED else last
-        way[t] = last
-    return way
+        direction[t] = last
+    return direction

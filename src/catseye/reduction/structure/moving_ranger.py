@@ -1,7 +1,7 @@
-"""Rangers that the telescope carries, and targets that move with it: where they are at a time, and how well known.
+"""Rangers and targets on the moving telescope: place and uncertainty.
 
 R_i and gamma of a feed-arm ranger follow azimuth and elevation (first order), gravity and temperature (the structural
-model), what was measured of that (corrections), and the arm's vibration, foretold by the phase-locked filter.
+model), measured corrections, and the arm's vibration, predicted by the phase-locked filter.
 """
 
 from collections.abc import Mapping
@@ -30,7 +30,7 @@ FEED_ARM = "feed_arm"
 
 @dataclass(frozen=True, eq=False)
 class Driven:
-    """The telescope's motion about a time, as its control system gives it.
+    """Telescope motion about a time, from its control system.
 
     time                             s, to which azimuth and elevation belong
     azimuth, elevation               rad
@@ -49,7 +49,9 @@ class Driven:
     u_elevation: float
 
     def posture(self, times: ArrayLike) -> TelescopePosture:
-        """How the telescope stands at times (...), s, near its own: both axes at constant rates.
+        """Posture of the telescope at times (...), s, near its own.
+
+        Both axes at constant rates.
 
         Source: [PARKER04] section 2.6.1, positions and velocities from the monitor and control system.
         """
@@ -60,12 +62,12 @@ class Driven:
 
 @dataclass(frozen=True, eq=False)
 class FrameCorrections:
-    """Shifts and turns of frames on top of the model's, with what is known of them.
+    """Corrections to the frames' shifts and turns, with covariance.
 
     six           frame or group: (..., 6) m and rad, F of them
     covariance    (..., 6F, 6F), in the order of six
-    replaces      whether the covariance stands in for the model's own (measured by `correct_posture` in the posture for
-                  which it is used: in another one, what the model leaves is there anew), or comes on top
+    replaces      True if the covariance replaces the model's own (measured by `correct_posture` in the posture for
+                  which it is used: in another one, the model's scatter is new), False if it is added
     """
 
     six: Mapping[str, np.ndarray]
@@ -78,7 +80,7 @@ class Placed:
     """Points of the telescope in the ground frame.
 
     position      (..., 3) m
-    covariance    (..., 3, 3) m^2 of each point by itself
+    covariance    (..., 3, 3) m^2 of each point
     """
 
     position: np.ndarray
@@ -87,7 +89,7 @@ class Placed:
 
 @dataclass(frozen=True, eq=False)
 class MovingRanger:
-    """A ranger on the feed arm at one or more times.
+    """Feed-arm ranger at one or more times.
 
     station       of batch shape (...)
     covariance    (..., 6, 6): scan point, ground frame, m; then the small turn of the mount about ground axes, rad
@@ -97,12 +99,14 @@ class MovingRanger:
     covariance: np.ndarray
 
     def counts_covariance(self, points: ArrayLike, of_points: ArrayLike | None = None) -> np.ndarray:
-        """Covariance (..., 2, 2), counts^2, of the encoder counts for points (..., 3) m of the ground frame.
+        """Covariance (..., 2, 2), counts^2, of the encoder counts for points.
+
+        Points (..., 3), m, of the ground frame.
 
         points       m, whose batch axes broadcast against the station's
-        of_points    (..., 3, 3) m^2, independent of the ranger's; none if None
+        of_points    (..., 3, 3) m^2, independent of the ranger's; zero if None
 
-        A mount turned by w and moved by s sees a point R as a still one sees R - s - w x (R - S).
+        A mount turned by w and moved by s sees a point R as a fixed one sees R - s - w x (R - S).
         """
         by_point, _ = counts_jacobian(self.station, points)
         arm = np.asarray(points, dtype=float) - self.station.scan_point
@@ -117,9 +121,11 @@ class MovingRanger:
 def tracked(
     antenna: Antenna, target: str, coordinates: ArrayLike, *, covariance: ArrayLike, posture: TelescopePosture
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Displacements (N, 3), m, of a target in its frame's axes and their covariances: samples for the vibration filter.
+    """Displacements (N, 3), m, of a target in its frame's axes.
 
-    antenna       the structural model, which says where the target is at rest
+    With covariances: samples for the vibration filter.
+
+    antenna       the structural model, for the target's place at rest
     target        of one of its groups, such as one at the top of the feed arm
     coordinates   (N, 3), m, ground frame, as ground rangers track it
     covariance    (3, 3) or (N, 3, 3), m^2
@@ -139,16 +145,18 @@ def tracked(
 def vibrating(
     record: StructuralModel, state: FilterState, times: ArrayLike, *, seen_at: tuple[Antenna, str] | None = None
 ) -> FrameCorrections:
-    """What the vibration adds to the frames at times (...), s, foretold from the filter's state.
+    """Motion of the frames by vibration at times (...), s.
+
+    Predicted from the filter's state.
 
     record    whose vibrations are the state's modes, in the same order
     state     of the filter, not after the times; two axes, those of the quadrant detector, or with `seen_at` three
     times     (...), s
-    seen_at   the antenna and the target on the vibrating frame whose displacements, by `tracked`, the filter follows
+    seen_at   the antenna and the target on the vibrating frame that the filter follows by `tracked`
 
-    A target's displacement is, to first order, the mode's shift and turn at its place; the detector's x and y that
-    belong to it are taken back out by least squares. Raises InputError where the modes of record and state are not as
-    many, where the state has other axes, or where the target does not stand on the frame that vibrates.
+    A target's displacement is, to first order, the mode's shift and turn at its place; the detector's x and y are
+    recovered by least squares. Raises InputError where the modes of record and state differ in
+    number, where the state has other axes, or where the target does not stand on the frame that vibrates.
     """
     axes = 2 if seen_at is None else 3
     if len(record.vibration) != len(state.modes) or state.axes != axes:
@@ -171,12 +179,12 @@ def vibrating(
             by_detector = by_detector @ np.linalg.pinv(_displaced(*seen_at, mode.frame) @ by_detector)
         response[first : first + 6, axes * k : axes * (k + 1)] = by_detector
     six = flat @ response.T
-    each = {frame: six[..., 6 * i : 6 * i + 6] for i, frame in enumerate(frames)}
-    return FrameCorrections(each, response @ spread @ response.T)
+    frame_motion = {frame: six[..., 6 * i : 6 * i + 6] for i, frame in enumerate(frames)}
+    return FrameCorrections(frame_motion, response @ spread @ response.T)
 
 
 def _displaced(antenna: Antenna, target: str, frame: str) -> np.ndarray:
-    """Displacement (3, 6) of a target in its frame's axes by the frame's shift and turn."""
+    """Displacement (3, 6) of a target in its frame by the frame's motion."""
     points = antenna.groups[group_of(antenna, target)]
     if points.frame != frame:
         raise InputError(f"target {target!r} stands on {points.frame!r}, the vibration is of {frame!r}: track another")
@@ -194,7 +202,9 @@ def moving_ranger(
     u_position: float = 0.010,
     known: tuple[FrameCorrections, ...] = (),
 ) -> MovingRanger:
-    """A feed-arm ranger's station at times, with the covariance of its scan point and of the turn of its mount.
+    """Station of a feed-arm ranger at some times.
+
+    With the covariance of its scan point and of the turn of its mount.
 
     ranger      with mount_z and mount_y
     mirror      in it
@@ -202,15 +212,15 @@ def moving_ranger(
     drive       the telescope's motion about these times
     times       (...), s
     u_mount     rad, of each turn of the mount on the arm
-    u_position  m, of each coordinate of the scan point where the record says nothing
+    u_position  m, of each coordinate of the scan point without one in the record
     known       corrections and vibrations; their six are added
 
-    Raises InputError where the record does not say how the mount is turned, ValidityError outside the model's range.
+    Raises InputError where the record has no orientation of the mount, ValidityError outside the model's range.
 
     Source: [PARKER04] section 2.6.1: R_i and gamma are functions of azimuth, elevation and vibration.
     """
     times = np.asarray(times, dtype=float)
-    posture, added = drive.posture(times), _added(known)
+    posture, added = drive.posture(times), _sum_by_frame(known)
     arm_from_reflector = antenna.ground_from(
         FEED_ARM, _somewhere(posture), deformed=False
     ).inverse() @ antenna.ground_from("reflector", _somewhere(posture), deformed=False)
@@ -243,7 +253,9 @@ def projected(
     known: tuple[FrameCorrections, ...] = (),
     subreflector: SubreflectorPosition | None = None,
 ) -> Placed:
-    """Coordinates (..., n, 3) of a group's targets in the ground frame at times (...), such as t0 and t1 of a buffer.
+    """Ground coordinates (..., n, 3) of a group's targets at some times.
+
+    For example t0 and t1 of a buffer.
 
     antenna        the structural model
     group          of its points
@@ -256,7 +268,7 @@ def projected(
 
     Source: [PARKER04] section 2.6.1, the projected R_j(t0) and R_j(t1) that the ZIY sends.
     """
-    posture, added = drive.posture(times), _added(known)
+    posture, added = drive.posture(times), _sum_by_frame(known)
     position = antenna.points(group, posture, added=added, subreflector=subreflector)
     wide = TelescopePosture(
         *(np.asarray(v)[..., None] for v in (posture.azimuth, posture.elevation, posture.temperature_c))
@@ -273,17 +285,17 @@ def projected(
         slopes[group] = antenna.group_derivatives(group, wide, added=room, subreflector=moved)[group]
     covariance = _propagated(antenna, wide, slopes, known, room=True)
     covariance = covariance + antenna.u_points(group)[:, None, None] ** 2 * np.eye(3)
-    if "elevation" in antenna.chain(frame):  # what stands on the alidade does not follow the elevation
+    if "elevation" in antenna.chain(frame):  # points on the alidade do not follow the elevation
         covariance = covariance + _of_axes(antenna.axis_derivatives(position, wide), drive)
     else:
         covariance = covariance + _of_axes(antenna.axis_derivatives(position, wide)[..., :1], drive)
     return Placed(position, covariance)
 
 
-def _added(known: tuple[FrameCorrections, ...]) -> dict[str, np.ndarray]:
-    """The sum of all that is known, by frame."""
+def _sum_by_frame(corrections: tuple[FrameCorrections, ...]) -> dict[str, np.ndarray]:
+    """Sum of corrections and vibrations, by frame."""
     total: dict[str, np.ndarray] = {}
-    for one in known:
+    for one in corrections:
         for name, six in one.six.items():
             total[name] = total[name] + np.asarray(six) if name in total else np.asarray(six, dtype=float)
     return total
@@ -293,18 +305,18 @@ def _propagated(
     antenna: Antenna,
     posture: TelescopePosture,
     slopes: Mapping[str, np.ndarray],
-    known: tuple[FrameCorrections, ...],
+    corrections: tuple[FrameCorrections, ...],
     *,
     room: bool = False,
 ) -> np.ndarray:
-    """Covariance of what the slopes (..., r, 6) of each frame lead to."""
-    measured = {name for one in known if one.replaces for name in one.six}
+    """Covariance propagated by the slopes (..., r, 6) of each frame."""
+    measured = {name for one in corrections if one.replaces for name in one.six}
     total: np.ndarray = np.zeros((1, 1))
     for name, slope in slopes.items():
         if name in antenna.motions and name not in measured:
             total = total + slope @ antenna.motions[name].six_covariance(posture) @ np.swapaxes(slope, -1, -2)
     some = next(iter(slopes.values()))
-    for one in known:
+    for one in corrections:
         parts = [slopes.get(name, np.zeros((*some.shape[-2:],))) for name in one.six]
         batch = np.broadcast_shapes(*(part.shape[:-2] for part in parts))
         slope = np.concatenate([np.broadcast_to(part, (*batch, *part.shape[-2:])) for part in parts], axis=-1)
@@ -320,12 +332,18 @@ def _of_axes(slopes: np.ndarray, drive: Driven) -> np.ndarray:
 
 
 def _axis_turns(posture: TelescopePosture) -> np.ndarray:
-    """The small turn (..., 3, 2) about ground axes that a radian of azimuth, of elevation makes."""
+    """Small turn (..., 3, 2) about ground axes by azimuth and elevation.
+
+    A radian of each.
+    """
     across = ground_from_alidade_at(posture.azimuth).rotation[..., :, 0]
     return np.stack(np.broadcast_arrays(np.array([0.0, 0.0, -1.0]), across), axis=-1)
 
 
 def _somewhere(posture: TelescopePosture) -> TelescopePosture:
-    """One posture: how two frames stand to each other at rest is the same in all."""
+    """Arbitrary posture for relations that are the same in all.
+
+    Two frames at rest.
+    """
     first = [float(np.ravel(v)[0]) for v in (posture.azimuth, posture.elevation, posture.temperature_c)]
     return TelescopePosture(*first)

@@ -1,13 +1,15 @@
-"""A flexible model of a group of points from many epochs, and what it foretells.
+"""Flexible model of a group of points from many epochs.
 
-In the axes of the frame that carries the group, each point is where the rigid telescope would hold it, and moved by
+With its predictions.
+
+In the axes of the frame that carries the group, each point is at its place on the rigid telescope, plus
 
     the group's shift and turn about a pivot    for every function of posture and temperature that is not the points'
     the point's own shift                       for "place": a constant; for "each": for every function
 
 The functions are 1, sinE, cosE, with two harmonics sin2E, cos2E, with temperatures t (degrees C off the reference),
-and for hysteresis `up`: 1 after the elevation rose, -1 after it fell. What no function foretells in an epoch (wind,
-what the sun did) is estimated too, by moments: a shift and turn of the group, new in each, and a shift of each point.
+and for hysteresis `up`: 1 after the elevation rose, -1 after it fell. The scatter of an epoch that no function predicts
+(wind, sunshine) is estimated too, by moments: a shift and turn of the group, new in each, and a shift of each point.
 """
 
 from dataclasses import dataclass, replace
@@ -31,13 +33,15 @@ UP = "up"
 
 @dataclass(frozen=True)
 class SeriesModel:
-    """Which functions of posture a flexible model has, and whether points have them alone or as one body.
+    """Functions of a flexible model.
+
+    For each point or for the rigid body.
 
     harmonics     of elevation, 1 or 2
-    temperature   whether there is a coefficient of temperature
-    hysteresis    whether the way of the last elevation move counts
-    own           "place": each point has a place of its own; "each": and all functions of its own
-    scatter       whether what is new in each epoch is estimated; else the measurements' covariance is all there is
+    temperature   True for a coefficient of temperature
+    hysteresis    True for a term of the last elevation move's direction
+    own           "place": each point has its own constant; "each": its own coefficients of all functions
+    scatter       True to estimate the scatter of epochs; else only the measurements' covariance
     """
 
     harmonics: int = 1
@@ -52,13 +56,13 @@ class SeriesModel:
 
     @property
     def functions(self) -> tuple[str, ...]:
-        """Names, the constant first."""
+        """Names of the functions, the constant first."""
         waves = ("sinE", "cosE", "sin2E", "cos2E")[: 2 * self.harmonics]
         return ("1", *waves, *(("t",) if self.temperature else ()), *((UP,) if self.hysteresis else ()))
 
     @property
     def own_count(self) -> int:
-        """How many of the functions, from the first, the points have themselves."""
+        """Number of functions, from the first, that each point has of its own."""
         return 1 if self.own == "place" else len(self.functions)
 
     def rows(self, posture: TelescopePosture, way: ArrayLike, reference_c: float) -> Array:
@@ -78,7 +82,7 @@ class SeriesModel:
 
 @dataclass(frozen=True, eq=False)
 class GroupSeries:
-    """A group's points in T epochs, in the axes of the frame that carries them rigidly.
+    """Group of points in T epochs, in the axes of its rigid frame.
 
     group, frame    names
     names           n points
@@ -106,18 +110,18 @@ class GroupSeries:
         return len(self.places)
 
     def part(self, epochs: NDArray[np.intp]) -> "GroupSeries":
-        """Some of the epochs, and the points that were measured in any of them."""
+        """Some of the epochs, with the points measured in any of them."""
         with_points = np.isfinite(self.places[epochs]).all(axis=2).any(axis=0)
         at = np.flatnonzero(with_points)
 
         def cut(q: Array | None, axes: int) -> Array | None:
             if q is None:
                 return None
-            kept = q[epochs] if len(q) > 1 else q
+            selected = q[epochs] if len(q) > 1 else q
             if axes == 2:
                 rows = (3 * at[:, None] + np.arange(3)).ravel()
-                return kept[:, rows[:, None], rows]
-            return kept[:, at] if kept.shape[1] > 1 else kept
+                return selected[:, rows[:, None], rows]
+            return selected[:, at] if selected.shape[1] > 1 else selected
 
         spread = Spread(cut(self.spread.full, 2), cut(self.spread.points, 1), cut(self.spread.shared, 1))
         posture = (np.asarray(v, dtype=float)[epochs] for v in vars(self.posture).values())
@@ -135,10 +139,10 @@ class GroupSeries:
 
 @dataclass(frozen=True, eq=False)
 class EpochScatter:
-    """What no function foretells, new in each epoch.
+    """Scatter of epochs that no function predicts.
 
     covariance   (6, 6) m and rad, of the group's shift and turn
-    u_point      m, of each coordinate of each point besides
+    u_point      m, of each coordinate of each point in addition
     """
 
     covariance: Array
@@ -151,7 +155,7 @@ class EpochScatter:
 
     @property
     def root(self) -> Array:
-        """(6, r) factor of the covariance, r its rank."""
+        """Factor (6, r) of the covariance, r its rank."""
         size = np.where(self.u_six > 0.0, self.u_six, 1.0)
         values, vectors = np.linalg.eigh(self.covariance / np.outer(size, size))
         real = values > ROUNDING
@@ -160,14 +164,14 @@ class EpochScatter:
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Where the group's points will be.
+    """Predicted places of a group.
 
     names          n
-    place          (P, n, 3) m, in the frame's axes as the rigid telescope carries them
-    covariance     (P, n, 3, 3) m^2 of each point, what is new in an epoch with it
+    place          (P, n, 3) m, in the axes of the rigid telescope's frame
+    covariance     (P, n, 3, 3) m^2 of each point, scatter of epochs included
     six            (P, 6) m and rad, the group's shift and turn from the mean of the fitted epochs
-    six_covariance (P, 6, 6), with what is new in an epoch; NaN where the points show no rigid motion
-    outside        what lies outside the epochs of the fit: it is extrapolated
+    six_covariance (P, 6, 6), scatter of epochs included; NaN where the points determine no rigid motion
+    outside        quantities outside the range of the fit: extrapolated
     """
 
     names: tuple[str, ...]
@@ -180,13 +184,13 @@ class Prediction:
 
 @dataclass(frozen=True, eq=False)
 class StructureFit:
-    """A flexible model fitted to a group's epochs.
+    """Flexible model fitted to a group's epochs.
 
-    series, model   what was fitted
-    rest            (n, 3) m, the middle of each point's places, from which displacements count
+    series, model   of the fit
+    rest            (n, 3) m, mean of each point's places, origin of the displacements
     reference_c     degrees C at which t is 0: the mean of the epochs
     fit             the coefficients: functions of the body are those after the points' own
-    scatter         what is left in each epoch anew
+    scatter         of each epoch
     """
 
     series: GroupSeries
@@ -202,7 +206,10 @@ class StructureFit:
         return self.rest - self.series.pivot
 
     def six_of(self) -> tuple[Array, Array]:
-        """Shift and turn (6, k) a unit of each function, m and rad, and the covariance (6 k, 6 k), by functions."""
+        """Shift and turn (6, k) per unit of each function, with covariance.
+
+        m and rad; covariance (6 k, 6 k), by functions.
+        """
         m, k = self.model.own_count, len(self.model.functions)
         order = np.concatenate([np.arange(k - m, k), np.arange(k - m)])  # the fit has the body's own first
         at = (6 * order[:, None] + np.arange(6)).ravel()
@@ -212,22 +219,23 @@ class StructureFit:
     def predict(
         self, elevation: ArrayLike, *, temperature_c: ArrayLike | None = None, way: ArrayLike = 0.0
     ) -> Prediction:
-        """Where the points will be, and how sure that is.
+        """Predicted places of the points, with covariance.
 
         elevation       (P,) rad
-        temperature_c   (P,) degrees C; the reference where it is None
-        way             (P,) 1 after the elevation rose, -1 after it fell; 0 is between both
+        temperature_c   (P,) degrees C; None: the reference
+        way             (P,) 1 after the elevation rose, -1 after it fell; 0 is the mean of both
 
-        Raises InputError for values that are not finite. Outside the epochs it is extrapolated, and says so.
+        Raises InputError for values that are not finite. Outside the fitted epochs `outside` lists the extrapolated
+        quantities.
         """
-        posture = self._asked(elevation, temperature_c)
+        posture = self._target_posture(elevation, temperature_c)
         rows = self.model.rows(posture, way, self.reference_c)
         if not np.isfinite(rows).all():
             raise InputError("a prediction's elevation, temperature or way is not a finite number (expected numbers)")
         m = self.model.own_count
-        own, body = rows[:, :m], rows[:, m:]
-        place = self.rest + self.fit.displacement(body, own, self.arms)
-        covariance = self.fit.covariance(body, own, self.arms) + self._fresh()
+        local_rows, body = rows[:, :m], rows[:, m:]
+        place = self.rest + self.fit.displacement(body, local_rows, self.arms)
+        covariance = self.fit.covariance(body, local_rows, self.arms) + self._fresh()
         six, q = self.six_of()
         change = rows - self.model.rows(
             fitted_posture(self.series, self.model), self.series.way, self.reference_c
@@ -238,14 +246,14 @@ class StructureFit:
         return Prediction(self.series.names, place, covariance, change @ six.T, spread, self.outside(posture, way))
 
     def outside(self, posture: TelescopePosture, way: ArrayLike = 0.0) -> tuple[str, ...]:
-        """What of a posture lies outside the epochs of the fit, in words."""
+        """Quantities of a posture outside the fitted range, as texts."""
         notes = []
-        asked: list[tuple[str, ArrayLike, ArrayLike, float, str]] = [
+        quantities: list[tuple[str, ArrayLike, ArrayLike, float, str]] = [
             ("elevation", posture.elevation, self.series.posture.elevation, DEGREE, "deg")
         ]
         if self.model.temperature:
-            asked.append(("temperature", posture.temperature_c, self.series.posture.temperature_c, 1.0, "C"))
-        for name, values, fitted, unit, text in asked:
+            quantities.append(("temperature", posture.temperature_c, self.series.posture.temperature_c, 1.0, "C"))
+        for name, values, fitted, unit, text in quantities:
             low, high = float(np.min(fitted)) / unit, float(np.max(fitted)) / unit
             x = np.atleast_1d(np.asarray(values, dtype=float)) / unit
             for value in x[(x < low - 1e-9) | (x > high + 1e-9)]:
@@ -254,45 +262,45 @@ class StructureFit:
             notes.append("way is outside -1 to 1: extrapolated")
         return tuple(notes)
 
-    def _asked(self, elevation: ArrayLike, temperature_c: ArrayLike | None) -> TelescopePosture:
+    def _target_posture(self, elevation: ArrayLike, temperature_c: ArrayLike | None) -> TelescopePosture:
         e = np.atleast_1d(np.asarray(elevation, dtype=float))
         warm = np.broadcast_to(self.reference_c if temperature_c is None else np.asarray(temperature_c, float), e.shape)
         return TelescopePosture(np.zeros_like(e), e, warm)
 
     def _fresh(self) -> Array:
-        """Covariance (n, 3, 3) m^2 of what is new in an epoch."""
+        """Covariance (n, 3, 3), m^2, of the scatter of epochs."""
         r = rigid_design(self.arms)
         return np.einsum("nij,jk,nlk->nil", r, self.scatter.covariance, r) + self.scatter.u_point**2 * np.eye(3)
 
 
 def fit_structure(series: GroupSeries, model: SeriesModel | None = None) -> StructureFit:
-    """A flexible model of a group, by least squares from its epochs.
+    """Least-squares fit of a group's flexible model to its epochs.
 
     series   its epochs
-    model    which functions; the usual where it is None
+    model    functions; None: the defaults
 
     Raises InputError where a function's posture or temperature is unknown, EstimationError for what floats.
 
-    Source: [RAO73] section 4a (least squares with a full covariance); what is new in each epoch by moments:
-    covariance of its rigid parts less what the measurements' explains, in the directions where it is more.
+    Source: [RAO73] section 4a (least squares with a full covariance); the scatter of epochs by moments:
+    covariance of its rigid parts minus that of the measurements, in the directions where it is larger.
     """
     what = model or SeriesModel()
     refuse_unknown(series, what)
-    rest = np.nanmean(series.places, axis=0)
+    middle = np.nanmean(series.places, axis=0)
     reference_c = float(np.mean(np.asarray(series.posture.temperature_c, dtype=float))) if what.temperature else 0.0
     rows = what.rows(fitted_posture(series, what), series.way, reference_c)
     m = what.own_count
     scatter = EpochScatter(np.zeros((6, 6)), 0.0)
 
     def fitted() -> StructureFit:
-        spread = widened(series.spread, rest - series.pivot, scatter)
+        spread = widened(series.spread, middle - series.pivot, scatter)
         try:
             harmonics = fit_harmonics(
-                series.places - rest, rest - series.pivot, body=rows[:, m:], own=rows[:, :m], spread=spread
+                series.places - middle, middle - series.pivot, body=rows[:, m:], own=rows[:, :m], spread=spread
             )
         except EstimationError as problem:
             raise EstimationError(_named(str(problem), series, what)) from problem
-        return StructureFit(series, what, rest, reference_c, harmonics, scatter)
+        return StructureFit(series, what, middle, reference_c, harmonics, scatter)
 
     fit = fitted()
     if what.scatter:
@@ -305,25 +313,28 @@ def fit_structure(series: GroupSeries, model: SeriesModel | None = None) -> Stru
 
 
 def fitted_posture(series: GroupSeries, model: SeriesModel) -> TelescopePosture:
-    """Postures of the epochs as the functions need them: at the reference temperature 0 where none counts."""
+    """Postures of the epochs for the functions.
+
+    At the reference temperature 0 where temperature does not count.
+    """
     e = np.asarray(series.posture.elevation, dtype=float)
     warm = np.asarray(series.posture.temperature_c, dtype=float) if model.temperature else np.zeros_like(e)
     return TelescopePosture(np.zeros_like(e), e, warm)
 
 
 def widened(spread: Spread, arms: Array, scatter: EpochScatter) -> Spread:
-    """A spread with what is new in each epoch.
+    """Spread with the scatter of epochs added.
 
     spread    of the measurements
     arms      (n, 3) m, from the pivot
     scatter   to be added
     """
     factor = rigid_design(arms) @ scatter.root
-    own = scatter.u_point**2
+    point_variance = scatter.u_point**2
     if spread.full is not None:
         flat = factor.reshape(3 * len(arms), -1)
-        return Spread(full=spread.full + (flat @ flat.T + own * np.eye(3 * len(arms))))
-    points = spread.points + own * np.eye(3) if spread.points is not None else None
+        return Spread(full=spread.full + (flat @ flat.T + point_variance * np.eye(3 * len(arms))))
+    points = spread.points + point_variance * np.eye(3) if spread.points is not None else None
     if not factor.shape[2]:
         return Spread(points=points, shared=spread.shared)
     shared = factor[None]
@@ -334,27 +345,29 @@ def widened(spread: Spread, arms: Array, scatter: EpochScatter) -> Spread:
 
 
 def scatter_of(fit: StructureFit) -> EpochScatter:
-    """What is new in each epoch, by moments of the residuals' rigid parts and of what is left of them.
+    """Scatter of epochs, by moments of the residuals' rigid parts.
 
-    fit   whose own scatter does not matter but for the weights
+    And of the remaining residuals.
+
+    fit   its own scatter affects the weights only
     """
     series, arms, e = fit.series, fit.arms, fit.fit.residual
-    known = variances_of(series)
+    variances = variances_of(series)
     count, m = len(series), fit.model.own_count
     degrees, own_degrees = (count / max(count - k, 1) for k in (len(fit.model.functions), m))
-    squares, noise, left, expected = [], [], 0.0, 0.0
+    squares, noise, remaining, expected = [], [], 0.0, 0.0
     for t in range(len(series)):
         at = np.flatnonzero(np.isfinite(e[t]).all(axis=1))
         part = rigid_part(arms[at]) if len(at) >= 3 else None
         if part is None:
             continue
         flat = part.reshape(6, -1)
-        q = known(t, at)
+        q = variances(t, at)
         keep = np.eye(3 * len(at)) if q.ndim == 2 else None
         six = flat @ e[t, at].ravel()
         squares.append(np.outer(six, six))
-        rest = e[t, at].ravel() - rigid_design(arms[at]).reshape(-1, 6) @ six
-        left += float(rest @ rest)
+        remainder = e[t, at].ravel() - rigid_design(arms[at]).reshape(-1, 6) @ six
+        remaining += float(remainder @ remainder)
         if keep is not None:
             noise.append(flat @ q @ flat.T)
             keep -= rigid_design(arms[at]).reshape(-1, 6) @ flat
@@ -366,12 +379,12 @@ def scatter_of(fit: StructureFit) -> EpochScatter:
         return EpochScatter(np.zeros((6, 6)), 0.0)
     more = _excess(degrees * np.mean(squares, axis=0), np.mean(noise, axis=0))
     free = 3 * int(np.isfinite(e).all(axis=2).sum()) - 6 * len(squares)
-    each = (own_degrees * left - expected) / free if free > 0 else 0.0
-    return EpochScatter(more, float(np.sqrt(max(each, 0.0))))
+    point_scatter = (own_degrees * remaining - expected) / free if free > 0 else 0.0
+    return EpochScatter(more, float(np.sqrt(max(point_scatter, 0.0))))
 
 
 def _excess(covariance: Array, noise: Array) -> Array:
-    """What a covariance (6, 6) has more than that of noise, in the directions in which it has more."""
+    """Excess of a covariance (6, 6) over noise, where positive."""
     size = np.sqrt(np.diag(noise))
     root = size[:, None] * np.linalg.cholesky(noise / np.outer(size, size))
     inverse = np.linalg.inv(root)
@@ -381,14 +394,17 @@ def _excess(covariance: Array, noise: Array) -> Array:
 
 
 def variances_of(series: GroupSeries):
-    """What gives the covariance of some points of an epoch: (3q, 3q), or (q, 3, 3) where points stand alone."""
+    """Function of an epoch's points that gives their covariance.
+
+    (3q, 3q), or (q, 3, 3) for independent points.
+    """
     spread = series.spread
 
     def of(t: int, at: NDArray[np.intp]) -> Array:
         if spread.full is not None:
             rows = (3 * at[:, None] + np.arange(3)).ravel()
             return spread.full[t if len(spread.full) > 1 else 0][rows[:, None], rows]
-        assert spread.points is not None  # a spread has one of both
+        assert spread.points is not None  # a spread has one of the two
         q = spread.points[t if len(spread.points) > 1 else 0]
         return q[at] if len(q) > 1 else np.broadcast_to(q, (len(at), 3, 3))
 
@@ -396,12 +412,12 @@ def variances_of(series: GroupSeries):
 
 
 def refuse_unknown(series: GroupSeries, model: SeriesModel) -> None:
-    """Raises InputError where a function needs what an epoch does not say."""
-    wanted = [("elevation", np.asarray(series.posture.elevation, dtype=float), "a posture")]
+    """Raise InputError where a function needs a quantity that an epoch lacks."""
+    requirements = [("elevation", np.asarray(series.posture.elevation, dtype=float), "a posture")]
     if model.temperature:
         hint = "a temperature of the structure, or a model without (--no-temperature)"
-        wanted.append(("temperature", np.asarray(series.posture.temperature_c, dtype=float), hint))
-    for name, values, hint in wanted:
+        requirements.append(("temperature", np.asarray(series.posture.temperature_c, dtype=float), hint))
+    for name, values, hint in requirements:
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
             label = series.labels[bad[0]] if series.labels else f"{bad[0]} (counted from 0)"
@@ -409,7 +425,7 @@ def refuse_unknown(series: GroupSeries, model: SeriesModel) -> None:
 
 
 def _named(text: str, series: GroupSeries, model: SeriesModel) -> str:
-    """A refusal with the names of points and functions in the place of their numbers."""
+    """Error text with names of points and functions for their numbers."""
     import re
 
     m, functions = model.own_count, model.functions

@@ -1,4 +1,7 @@
-"""Verdict of a structure's model: its forecasts of epochs left out, what claims leave out, what it rests on."""
+"""Verdict on a structure's model.
+
+By its predictions of epochs left out, omissions from its claims, and its inputs' verdicts.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -13,7 +16,7 @@ LARGEST_RATIO = 1.5  # of departure over claim, epochs left out
 def structure_verdict(
     check: LeaveOut | None, *, sources: Mapping[str, Verdict | None], doubts: Sequence[str] = ()
 ) -> Verdict:
-    """Whether epochs left out are predicted as the model claims, and what speaks against its claims.
+    """Verdict by the epochs left out and the doubts.
 
     check     epochs left out; None: none was
     sources   verdict of each epoch, by its label
@@ -24,9 +27,11 @@ def structure_verdict(
 
 def _own_verdict(check: LeaveOut | None) -> Verdict:
     if check is None:
-        return Verdict("doubtful", "no epoch was left out to check what the model foretells")
+        return Verdict("doubtful", "no epoch was left out to check the model's predictions")
     if not np.isfinite(check.ratio):
-        return Verdict("doubtful", "too few epochs to check what the model foretells")
+        return Verdict("doubtful", "too few epochs to check the model's predictions")
     if check.ratio > LARGEST_RATIO:
-        return Verdict("doubtful", f"epochs left out miss what was foretold {check.ratio:.2f} times as far as claimed")
-    return Verdict("good", f"epochs left out are foretold as claimed (ratio {check.ratio:.2f})")
+        return Verdict(
+            "doubtful", f"epochs left out miss their prediction by {check.ratio:.2f} times the claimed uncertainty"
+        )
+    return Verdict("good", f"epochs left out are predicted as claimed (ratio {check.ratio:.2f})")

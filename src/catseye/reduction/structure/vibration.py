@@ -1,8 +1,10 @@
-"""Vibration from ranges at full rate: spectra, modes and shapes of points; differences in which the common cancels.
+"""Vibration from ranges at full rate.
+
+Spectra, modes and shapes of points; differences in which common errors cancel.
 
 A range changes by e . dx when its target moves by dx, e the unit vector from the ranger to the target: approximate
-coordinates are enough (0.1 m off at 100 m is 0.1 % of the movement), and what is left out is dx^2 / 2 range, 5 nm for
-1 mm at 100 m. A movement within the mean of a buffer is dampened; within an interval of samples it is aliased.
+coordinates are enough (0.1 m off at 100 m is 0.1 % of the movement), and the neglected term is dx^2 / 2 range, 5 nm for
+1 mm at 100 m. A movement within the mean of a buffer is attenuated; within an interval of samples it is aliased.
 """
 
 from collections.abc import Sequence
@@ -27,21 +29,21 @@ from catseye.signal.vibration.spectrum import (
 
 Array = NDArray[np.float64]
 LEAST = 64  # samples of a series: 8 s at full rate
-STRETCHES = 8  # that the shortest series is cut into, half overlapping, where none is given
-HIGHEST_HZ = 12.0  # of a structure's modes that are thought of when an alias is named
-CLEAR = 0.02  # of the share that real shapes hold: nearer alternatives stay open
-MOST_SAMPLES = 4000  # of the series from which the modes' damping is found: some seconds of work
+STRETCHES = 8  # segments of the shortest series by default, half overlapping
+HIGHEST_HZ = 12.0  # highest frequency of a structure's modes when aliases are named
+CLEAR = 0.02  # of the share of real shapes: nearer alternatives stay open
+MOST_SAMPLES = 4000  # most samples for the modes' damping: some seconds of work
 MOST_MODES = 3
 
 
 @dataclass(frozen=True, eq=False)
 class RangeSeries:
-    """Ranges of one ranger to one target, or a difference of such.
+    """Ranges of one ranger to one target, or their difference.
 
     ranger, target   names
     seconds          (n,) s, middles of the buffers, rising; one clock for all series
     ranges           (n,) m
-    u                (n,) m, standard uncertainty of what is new in each
+    u                (n,) m, standard uncertainty of each range's independent error
     window           s, of a buffer
     """
 
@@ -65,14 +67,14 @@ class RangeSeries:
 
 @dataclass(frozen=True, eq=False)
 class FoundPeak:
-    """A peak, and what it may be.
+    """Peak with its possible frequencies.
 
     peak         of the summed density
-    may_be_hz    all frequencies that would look alike, lowest first
-    likely_hz    of them, by the rhythms of several series; that of the peak where nothing decides
-    share        (candidates,) of the density that one real shape holds at each
-    decided      whether the best is clear of the next
-    shape        of the series about the peak; None of a single one
+    may_be_hz    all indistinguishable frequencies, lowest first
+    likely_hz    of them, by the sampling rates of several series; that of the peak if undecided
+    share        (candidates,) of the density explained by one real shape at each
+    decided      True if the best is clearly ahead of the next
+    shape        of the series about the peak; None for a single one
     """
 
     peak: Peak
@@ -85,14 +87,14 @@ class FoundPeak:
 
 @dataclass(frozen=True, eq=False)
 class Vibration:
-    """Spectra, peaks and modes of vibration that some series of ranges show.
+    """Spectra, peaks and modes of vibration of some series of ranges.
 
-    series     as given
-    spectrum   of all, each by its own times; what the mean over a buffer takes off is not put back
+    series     of the input
+    spectrum   of all, each by its own times; attenuation by the mean over a buffer is not corrected
     peaks      the highest first
-    modes      by maximum likelihood, frequency with u; none where they did not settle, see the notes
+    modes      by maximum likelihood, frequency with u; none without convergence, see the notes
     floor      (A,) m^2/Hz, of the lowest fifth of each density
-    notes      for people
+    notes      for the user
     """
 
     series: tuple[RangeSeries, ...]
@@ -112,30 +114,30 @@ def vibration(
 ) -> Vibration:
     """Spectra, peaks, modes and shapes of ranges.
 
-    series       one up, that overlap in time
-    stretch      s, transformed at once: resolution is 1.5 / stretch; a quarter of the common time where it is None
-    most_modes   whose frequency and damping are found by maximum likelihood, among the highest peaks
-    highest_hz   of the frequencies that a peak may be an alias of
+    series       at least one, overlapping in time
+    stretch      s, segment length: resolution is 1.5 / stretch; None: a quarter of the common time
+    most_modes   number of modes fitted by maximum likelihood, among the highest peaks
+    highest_hz   limit of the frequencies considered as aliases
 
     Raises InputError for series that are too short or do not overlap.
     """
-    kept = tuple(series)
-    for one in kept:
+    series_list = tuple(series)
+    for one in series_list:
         if len(one.seconds) < LEAST:
             raise InputError(f"{one.name}: {len(one.seconds)} ranges (expected {LEAST} at least)")
-    if not kept:
-        raise InputError("there is no series of ranges (expected one up)")
-    first, last = max(s.seconds[0] for s in kept), min(s.seconds[-1] for s in kept)
+    if not series_list:
+        raise InputError("there is no series of ranges (expected at least one)")
+    first, last = max(s.seconds[0] for s in series_list), min(s.seconds[-1] for s in series_list)
     if not last - first > 8.0:
         raise InputError(f"the series overlap by {max(last - first, 0.0):.3g} s (expected more than 8)")
-    cut = [(s.seconds >= first) & (s.seconds <= last) for s in kept]
-    times = [s.seconds[at] for s, at in zip(kept, cut, strict=True)]
-    values = [s.ranges[at] for s, at in zip(kept, cut, strict=True)]
+    cut = [(s.seconds >= first) & (s.seconds <= last) for s in series_list]
+    times = [s.seconds[at] for s, at in zip(series_list, cut, strict=True)]
+    values = [s.ranges[at] for s, at in zip(series_list, cut, strict=True)]
     length = (last - first) * 2.0 / (STRETCHES + 1) if stretch is None else stretch
     spectra = spectrum(times, values, stretch=length)
     rate = float(spectra.rate_hz.min())
     notes = [
-        f"Above {0.5 * rate:.3g} Hz, half the rate of {rate:.3g} Hz, nothing is seen where it is: a wave there appears "
+        f"Above {0.5 * rate:.3g} Hz, half the rate of {rate:.3g} Hz, frequencies are aliased: a wave there appears "
         "below, at the distance to the nearest multiple of the rate."
     ]
     found_peaks = [_found_peak(spectra, peak, times, values, length, highest_hz) for peak in peaks(spectra)]
@@ -143,22 +145,25 @@ def vibration(
     if open_ones:
         some = ", ".join(f"{p.peak.frequency_hz:.3g}" for p in open_ones[:5])
         notes.append(
-            f"Whether the peaks at {some} Hz are aliases is open: rangers of other rhythms on the same target decide."
+            f"Whether the peaks at {some} Hz are aliases is open: rangers with other rates on the same target decide."
         )
     floor = np.quantile(spectra.density, 0.2, axis=0)
     modes: tuple[Mode, ...] = ()
     if found_peaks and most_modes:
         try:
-            modes = _modes(kept, spectra, found_peaks[:most_modes], floor, notes)
+            modes = _modes(series_list, spectra, found_peaks[:most_modes], floor, notes)
         except CatseyeError as problem:
             notes.append(f"Modes were not found: {problem}.")
-    return Vibration(kept, spectra, tuple(found_peaks), modes, floor, tuple(notes))
+    return Vibration(series_list, spectra, tuple(found_peaks), modes, floor, tuple(notes))
 
 
 def _found_peak(
     spectra: Spectrum, peak: Peak, times: Sequence[Array], values: Sequence[Array], length: float, highest_hz: float
 ) -> FoundPeak:
-    """A peak with all that it may be, by the rate of the series that shows it most."""
+    """Peak with its possible frequencies.
+
+    By the rate of the series that shows it most.
+    """
     top = spectra.density[int(np.argmin(np.abs(spectra.frequency_hz - peak.frequency_hz)))]
     loudest = int(np.argmax(top))
     may_be = aliases(peak.frequency_hz, float(spectra.rate_hz[loudest]), max(highest_hz, peak.frequency_hz))
@@ -171,7 +176,10 @@ def _found_peak(
 def _modes(
     series: Sequence[RangeSeries], spectra: Spectrum, found_peaks: Sequence[FoundPeak], floor: Array, notes: list[str]
 ) -> tuple[Mode, ...]:
-    """Modes by maximum likelihood from the peaks on, of the series that shows the faintest of them best."""
+    """Modes by maximum likelihood, starting from the peaks.
+
+    Of the series with the best signal of the faintest of them.
+    """
     rows = [int(np.argmin(np.abs(spectra.frequency_hz - p.peak.frequency_hz))) for p in found_peaks]
     best = int(np.argmax(np.min(spectra.density[rows] / floor, axis=0)))
     one = series[best]
@@ -180,7 +188,7 @@ def _modes(
     if count < len(one.seconds):
         notes.append(f"Modes are from the first {count} of {len(one.seconds)} ranges of {one.name}.")
     else:
-        notes.append(f"Modes are from {one.name}, which shows the faintest of them best.")
+        notes.append(f"Modes are from {one.name}, with the best signal of the faintest of them.")
     when = one.seconds[:count]
     samples = one.ranges[:count] - slow(when, one.ranges[:count], 4.0 / min(p.peak.frequency_hz for p in found_peaks))
     u = max(float(np.median(one.u)), float(np.sqrt(floor[best] * 0.5 * one.rate_hz)))
@@ -188,65 +196,65 @@ def _modes(
 
 
 def slow(seconds: Array, values: Array, interval: float) -> Array:
-    """What changes slowly, (n,): a cubic spline by least squares.
+    """Slow part (n,) of a series: a cubic spline by least squares.
 
     seconds    (n,) s, rising
     values     (n,)
-    interval   s between its knots: waves of a quarter of it and shorter stay out
+    interval   s between its knots: waves of a quarter of it and shorter are excluded
     """
     from scipy.interpolate import make_lsq_spline
 
     first, last = float(seconds[0]), float(seconds[-1])
     parts = max(1, int((last - first) / interval))
     inner = np.linspace(first, last, parts + 1)[1:-1]
-    held = np.searchsorted(seconds, inner)
-    inner = inner[np.concatenate([[True], np.diff(held) >= 4])] if len(inner) else inner  # gaps hold no knots
+    before_knot = np.searchsorted(seconds, inner)
+    inner = inner[np.concatenate([[True], np.diff(before_knot) >= 4])] if len(inner) else inner  # no knots in gaps
     knots = np.concatenate([[first] * 4, inner, [last] * 4])
     middle = values.mean()
     return middle + make_lsq_spline(seconds, values - middle, knots, k=3)(seconds)
 
 
-def difference(one: RangeSeries, other: RangeSeries, *, scale: float = 1.0, longest_gap: float = 0.5) -> RangeSeries:
-    """One series less another, in which what they share cancels.
+def difference(one: RangeSeries, second: RangeSeries, *, scale: float = 1.0, longest_gap: float = 0.5) -> RangeSeries:
+    """Difference of two series, in which common errors cancel.
 
     one, other    two targets of one ranger (its electronics and the air near it cancel), or two rangers on one target
-    scale         of the other: 1 for electronics, the ratio of the lengths for a common refractivity
-    longest_gap   s, between two ranges of the other: it is interpolated in a line between them
+    scale         of the second: 1 for electronics, the ratio of the lengths for a common refractivity
+    longest_gap   s, between two ranges of the second: linear interpolation between them
 
-    At a part w of a gap T of the other, a wave of frequency f comes through the interpolation with the power
-    1 - 2 w (1 - w)(1 - cos 2 pi f T): nothing is lost where instants agree, and up to all at f = 1/2T, w = 1/2.
+    At a part w of a gap T of the second, a wave of frequency f passes the interpolation with the power
+    1 - 2 w (1 - w)(1 - cos 2 pi f T): no loss where instants agree, and up to a total loss at f = 1/2T, w = 1/2.
     Raises InputError where fewer than 64 instants remain.
 
-    Source: [PARKER04] section 3.2.4 (differences need no absolute coordinates); the interpolation is ours.
+    Source: [PARKER04] section 3.2.4 (differences need no absolute coordinates); the interpolation is catseye's.
     """
-    after = np.searchsorted(other.seconds, one.seconds, side="right")
-    exact = np.isin(one.seconds, other.seconds)
-    after = np.where(exact & (after == len(other.seconds)), after - 1, after)
-    inside = (after > 0) & (after < len(other.seconds))
+    after = np.searchsorted(second.seconds, one.seconds, side="right")
+    exact = np.isin(one.seconds, second.seconds)
+    after = np.where(exact & (after == len(second.seconds)), after - 1, after)
+    inside = (after > 0) & (after < len(second.seconds))
     at = np.where(inside, after, 1)
-    gap = other.seconds[at] - other.seconds[at - 1]
-    part = (one.seconds - other.seconds[at - 1]) / gap
-    kept = inside & ((gap <= longest_gap) | exact)
-    if kept.sum() < LEAST:
+    gap = second.seconds[at] - second.seconds[at - 1]
+    part = (one.seconds - second.seconds[at - 1]) / gap
+    usable = inside & ((gap <= longest_gap) | exact)
+    if usable.sum() < LEAST:
         raise InputError(
-            f"{one.name} less {other.name}: {int(kept.sum())} instants lie within gaps of {longest_gap:g} s of the "
+            f"{one.name} less {second.name}: {int(usable.sum())} instants lie within gaps of {longest_gap:g} s of the "
             f"other (expected {LEAST} at least): they must be measured at the same time"
         )
-    value = (1.0 - part) * other.ranges[at - 1] + part * other.ranges[at]
-    spread = ((1.0 - part) * other.u[at - 1]) ** 2 + (part * other.u[at]) ** 2
+    value = (1.0 - part) * second.ranges[at - 1] + part * second.ranges[at]
+    spread = ((1.0 - part) * second.u[at - 1]) ** 2 + (part * second.u[at]) ** 2
     return RangeSeries(
         one.name,
-        f"less {other.name}" if scale == 1.0 else f"less {scale:.6g} {other.name}",
-        one.seconds[kept],
-        (one.ranges - scale * value)[kept],
-        np.sqrt(one.u**2 + scale**2 * spread)[kept],
+        f"less {second.name}" if scale == 1.0 else f"less {scale:.6g} {second.name}",
+        one.seconds[usable],
+        (one.ranges - scale * value)[usable],
+        np.sqrt(one.u**2 + scale**2 * spread)[usable],
         one.window,
     )
 
 
 @dataclass(frozen=True, eq=False)
 class TargetMovement:
-    """A target's movement by differences of ranges.
+    """Movement of a target by differences of ranges.
 
     seconds      (n,) s
     x            (n, 3) m, from the mean, axes of the directions
@@ -259,9 +267,11 @@ class TargetMovement:
 
 
 def movements(series: Sequence[RangeSeries], directions: ArrayLike, *, longest_gap: float = 0.5) -> TargetMovement:
-    """How a target moved, from three rangers or more and approximate coordinates.
+    """Movement of a target from three rangers or more.
 
-    series        ranges of A rangers, three up, to one target; the first one's instants count
+    And approximate coordinates.
+
+    series        ranges of A rangers, at least three, to one target, at the first one's instants
     directions    (A, 3) unit vectors from ranger to target
     longest_gap   s, as for `difference`
 
@@ -272,13 +282,15 @@ def movements(series: Sequence[RangeSeries], directions: ArrayLike, *, longest_g
     """
     e = np.asarray(directions, dtype=float)
     if len(series) < 3 or e.shape != (len(series), 3):
-        raise InputError(f"{len(series)} series with directions {e.shape} (expected three up, and as many by 3)")
+        raise InputError(f"{len(series)} series with directions {e.shape} (expected at least three, and as many by 3)")
     if np.linalg.svd(e, compute_uv=False)[2] < 1e-3:
-        raise InputError("the directions lie in one plane: a movement across it is not seen (expected another ranger)")
+        raise InputError(
+            "the directions lie in one plane: a movement across it is unobserved (expected another ranger)"
+        )
     first = series[0]
     zero = RangeSeries("", "", first.seconds, np.zeros_like(first.ranges), np.zeros_like(first.u))
-    # the others at the first one's instants: 0 less the other, turned round
-    moved = [difference(zero, other, longest_gap=longest_gap) for other in series[1:]]
+    # the others at the first one's instants: 0 minus the second, sign reversed
+    moved = [difference(zero, second, longest_gap=longest_gap) for second in series[1:]]
     when = first.seconds
     for one in moved:
         when = np.intersect1d(when, one.seconds)

@@ -1,1 +1,1 @@
-"""A dish's shape from its prisms, its change, and what its actuators should do."""
+"""Shape of a dish from its prisms, its change, and actuator corrections."""

@@ -1,7 +1,9 @@
-"""What every actuator has to do, from the prisms that were measured: interpolation with its uncertainty, limits.
+"""Actuator corrections from the measured prisms.
 
-An actuator whose travel is along the unit vector m raises the surface at its place by m . n of its travel, n the
-surface's normal; a correction that brings a deviation d to zero is -d / (m . n). Along the normal it is -d.
+Interpolation with its uncertainty, and limits. An actuator whose travel is along the unit vector m raises the surface
+at its place by m . n of its travel, n the surface's normal; a correction that brings a deviation d to zero is
+-d / (m . n). Along the normal it is -d.
+
 """
 
 from collections.abc import Mapping
@@ -20,7 +22,7 @@ from catseye.records.panels.actuators import LIMIT_MM, STEP_MM, ActuatorCorrecti
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.surface.shape import LitAperture, SurfaceShape
 
-NEAR = 1e-9  # of a trend's columns: what is left of one beside the others
+NEAR = 1e-9  # of a trend's columns: relative remainder of one beside the others
 TREND_TERMS = 10  # Zernike terms to the third order
 SUPPORTS = 3
 
@@ -33,13 +35,13 @@ class Actuators:
 
     names, places     (m, 3) m, reflector frame, on the design paraboloid
     deviation         (m,) m, along the normal, against the fitted paraboloid
-    covariance        (m, m) m^2, of foretold less true
+    covariance        (m, m) m^2, of predicted minus true
     correction        (m,) m, of the travel
     u_correction      (m,) m
     position          (m,) m, travel before
     weights           (m, k) of the measured prisms
     prisms            k names
-    measured          (m,) whether the actuator's own prism was
+    measured          (m,) True where the actuator's own prism was measured
     roughness         of the surface beside its trend
     """
 
@@ -57,12 +59,17 @@ class Actuators:
 
     @property
     def within(self) -> np.ndarray:
-        """(m,) whether each target lies within the actuator's limits; nothing is cut to them."""
+        """True (m,) where the target is within the actuator's limits.
+
+        Targets are not clipped to them.
+        """
         return np.abs(self.position + self.correction) <= LIMIT_MM * MILLIMETRE
 
 
 def actuators_of(site: SiteFolder) -> tuple[tuple[str, ...], np.ndarray]:
-    """Names and design places (m, 3) m of a site's actuators: one under each prism of the reflector frame.
+    """Names and design places (m, 3), m, of a site's actuators.
+
+    One under each prism of the reflector frame.
 
     Raises InputError for a site without any.
     """
@@ -86,27 +93,27 @@ def corrections(
     shape       one epoch's surface
     names       of m actuators; one of a prism's name has that prism
     places      (m, 3) m, reflector frame
-    positions   travel of each before, mm, by name; the middle where none are known
+    positions   travel of each before, mm, by name; the middle without any
     travel      along the surface's "normal" or the paraboloid's "axis"
-    roughness   of the surface; found from the prisms without
+    roughness   of the surface; None: estimated from the prisms
 
-    The model: ten Zernike terms and the paraboloid's own parameters, free; a smooth part and a part of each point's own
-    beside them (`estimation.shapes.surface_field`). Raises InputError for a position without its actuator,
+    The model: ten Zernike terms and the paraboloid's own parameters, free; plus a smooth part and an independent part
+    per point (`estimation.shapes.surface_field`). Raises InputError for a position without its actuator,
     EstimationError where the prisms are too few.
     """
     own_place = {name: row for row, name in enumerate(shape.prisms.names)}
-    same = np.array([own_place.get(name, -1) for name in names])
-    local, wanted = shape.fit.local[:, :2], places[:, :2]
-    trend, wanted_trend = _trend(shape, local, wanted)
+    prism_rows = np.array([own_place.get(name, -1) for name in names])
+    local, targets = shape.fit.local[:, :2], places[:, :2]
+    trend, wanted_trend = _trend(shape, local, targets)
     values, noise = shape.fit.deviation, shape.fit.along
     rough = roughness or find_roughness(local, values, noise, trend=trend)
-    nominal_design = _parameter_rows(shape, wanted)
+    nominal_design = _parameter_rows(shape, targets)
     foretold: Foretold = foretell(
         MeasuredField(local, values, noise, trend),
-        wanted,
+        targets,
         wanted_trend,
         roughness=rough,
-        same=same,
+        same=prism_rows,
         design=shape.fit.design,
         gain=shape.fit.gain,
         wanted_design=nominal_design,
@@ -122,13 +129,16 @@ def corrections(
         _positions(names, positions or {}),
         foretold.weights,
         shape.prisms.names,
-        same >= 0,
+        prism_rows >= 0,
         rough,
     )
 
 
 def rows_of(actuators: Actuators) -> list[ActuatorCorrection]:
-    """The table, a record an actuator, in mm; EstimationError for a number that no actuator's table can hold."""
+    """Table of corrections, a record per actuator, in mm.
+
+    EstimationError for a number outside the table's range.
+    """
     records = []
     u = np.sqrt(np.diag(actuators.covariance))
     within = actuators.within
@@ -164,33 +174,36 @@ def rows_of(actuators: Actuators) -> list[ActuatorCorrection]:
     return records
 
 
-def _trend(shape: SurfaceShape, local: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Columns that span the Zernike terms and the paraboloid's parameters, at prisms and at actuators."""
+def _trend(shape: SurfaceShape, local: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Columns of the trend, at prisms and at actuators.
+
+    They span the Zernike terms and the paraboloid's parameters.
+    """
     aperture: LitAperture = shape.aperture
     low = terms(TREND_TERMS, "noll")
-    here, there = aperture.unit(local), aperture.unit(wanted)
-    one = np.column_stack([shape.fit.design, zernike(low, here[:, 0], here[:, 1])])
-    two = np.column_stack([_parameter_rows(shape, wanted), zernike(low, there[:, 0], there[:, 1])])
+    at_prisms, at_targets = aperture.unit(local), aperture.unit(targets)
+    one = np.column_stack([shape.fit.design, zernike(low, at_prisms[:, 0], at_prisms[:, 1])])
+    two = np.column_stack([_parameter_rows(shape, targets), zernike(low, at_targets[:, 0], at_targets[:, 1])])
     size = np.linalg.norm(one, axis=0)
     orthogonal, triangle = np.linalg.qr(one / size)
-    kept = np.abs(np.diag(triangle)) > NEAR
-    if kept.all():
+    independent = np.abs(np.diag(triangle)) > NEAR
+    if independent.all():
         return orthogonal, np.linalg.solve(triangle.T, (two / size).T).T
-    return _trimmed(one / size, two / size, kept)
+    return _trimmed(one / size, two / size, independent)
 
 
-def _trimmed(one: np.ndarray, two: np.ndarray, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    orthogonal, triangle = np.linalg.qr(one[:, kept])
-    return orthogonal, np.linalg.solve(triangle.T, two[:, kept].T).T
+def _trimmed(one: np.ndarray, two: np.ndarray, independent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    orthogonal, triangle = np.linalg.qr(one[:, independent])
+    return orthogonal, np.linalg.solve(triangle.T, two[:, independent].T).T
 
 
-def _parameter_rows(shape: SurfaceShape, wanted: np.ndarray) -> np.ndarray:
-    """(m, p) of `ParaboloidFit.design` at other places of the fitted surface."""
-    return design_rows(shape.fit, wanted, shape.prisms.nominal)
+def _parameter_rows(shape: SurfaceShape, targets: np.ndarray) -> np.ndarray:
+    """Rows (m, p) of `ParaboloidFit.design` at other places of the surface."""
+    return design_rows(shape.fit, targets, shape.prisms.nominal)
 
 
-def _positions(names: tuple[str, ...], given: Mapping[str, float]) -> np.ndarray:
-    for name in given:
+def _positions(names: tuple[str, ...], typed: Mapping[str, float]) -> np.ndarray:
+    for name in typed:
         if name not in names:
-            raise InputError(f"actuator = {shown(name)} of the positions is none of this site's")
-    return np.array([given.get(name, 0.0) for name in names]) * MILLIMETRE
+            raise InputError(f"actuator = {shown(name)} of the positions is unknown at this site")
+    return np.array([typed.get(name, 0.0) for name in names]) * MILLIMETRE

@@ -1,8 +1,9 @@
-"""How a surface changed between two epochs: the dish's motion by all coordinates of its prisms, and what is left of it.
+"""Change of a surface between two epochs.
 
-The motion comes from the prisms themselves, not from paraboloids through them: a turn of an offset dish about its
-centre of curvature leaves nearly the same paraboloid but for astigmatism, which a fitted paraboloid therefore takes for
-a turn. The prisms' motion along the surface, some 20 mm for such a turn, tells them apart.
+The dish's motion by all coordinates of its prisms, and the remaining deformation. The motion comes from the prisms
+themselves, not from paraboloids through them: a turn of an offset dish about its centre of curvature leaves nearly
+the same paraboloid but for astigmatism, which a fitted paraboloid therefore takes for a turn. The prisms' motion
+along the surface, some 20 mm for such a turn, separates them.
 """
 
 from dataclasses import dataclass, replace
@@ -28,14 +29,14 @@ from catseye.reduction.surface.shape import (
     mean_square,
 )
 
-FEWEST = 6  # prisms seen in both epochs
+FEWEST = 6  # prisms common to both epochs
 ITERATIONS = 20
 SETTLED = 1e-11  # m and rad
 
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """Second epoch less first.
+    """Difference second minus first epoch.
 
     first, second         the epochs' prisms
     names                 k prisms of both
@@ -68,15 +69,17 @@ class Change:
 
 
 def change_between(first: Prisms, second: Prisms, aperture: LitAperture, *, settings: ShapeSettings) -> Change:
-    """What the surface did between two epochs, each in its own nominal posture.
+    """Change of a surface between two epochs.
+
+    Each is in its own nominal posture.
 
     first, second   at least six prisms of the same names
     aperture        of the design
     settings        terms, illumination and frequencies; nothing of the paraboloid is fitted
 
     The motion is least squares of all three coordinates, each prism by the inverse of its own covariance; the full
-    covariances are carried through. The epochs are taken to be independent of each other. Raises EstimationError for
-    fewer prisms, and for prisms that do not hold a motion.
+    covariances are propagated. The epochs are taken as independent. Raises EstimationError for
+    fewer prisms, and for prisms that do not determine a motion.
     """
     at = {name: row for row, name in enumerate(second.names)}
     rows = [row for row, name in enumerate(first.names) if name in at]
@@ -90,26 +93,26 @@ def change_between(first: Prisms, second: Prisms, aperture: LitAperture, *, sett
     covariance = _sum(first_covariance, second_covariance)
     motion, columns, gain = _motion(one, two, _blocks(covariance, len(names)))
     moved = from_vector(motion[3:]).T
-    left = (two - motion[:3]) @ moved.T - one
+    displacement = (two - motion[:3]) @ moved.T - one
     f = aperture.focal_length
     slope = one[:, :2] / (2.0 * f)
     normal = np.column_stack([-slope, np.ones(len(one))]) * cosine(one, f)[:, None]
-    deviation = np.einsum("ki,ki->k", normal, left)
-    carried = _through(covariance, normal, columns, gain)
+    deviation = np.einsum("ki,ki->k", normal, displacement)
+    propagated = _through(covariance, normal, columns, gain)
     places, cos = aperture.unit(one), cosine(one, f)
     weights = cells(places, edge_db=settings.taper_db)
-    half, half_covariance = deviation * cos, carried * cos[:, None] * cos
+    half, half_covariance = deviation * cos, propagated * cos[:, None] * cos
     plain = ShapeSettings((), settings.taper_db, settings.frequencies, settings.terms, settings.numbering)
     expansion = expansion_of(
         places, half, weights=weights, covariance=half_covariance, along=half_covariance,
         design=np.zeros((len(names), 0)), settings=plain,
     )  # fmt: skip
-    lost = np.full_like(expansion.joint, np.nan)
+    undetermined = np.full_like(expansion.joint, np.nan)
     expansion = replace(
         expansion,
-        share=_taken(expansion, places, weights, normal=normal, cos=cos, columns=columns, gain=gain),
-        joint=lost,
-        joint_covariance=np.outer(lost, lost),
+        share=_motion_share(expansion, places, weights, normal=normal, cos=cos, columns=columns, gain=gain),
+        joint=undetermined,
+        joint_covariance=np.outer(undetermined, undetermined),
     )
     square = mean_square(half, half_covariance, weights)
     return Change(
@@ -122,7 +125,7 @@ def change_between(first: Prisms, second: Prisms, aperture: LitAperture, *, sett
         motion,
         _sandwich(gain, covariance),
         deviation,
-        carried,
+        propagated,
         half,
         weights,
         places,
@@ -132,7 +135,7 @@ def change_between(first: Prisms, second: Prisms, aperture: LitAperture, *, sett
     )
 
 
-def _taken(
+def _motion_share(
     expansion: Expansion,
     places: np.ndarray,
     weights: np.ndarray,
@@ -142,7 +145,10 @@ def _taken(
     columns: np.ndarray,
     gain: np.ndarray,
 ) -> np.ndarray:
-    """(t,) share of each term's square that the motion takes, when the surface moves by it along its normals."""
+    """Share (t,) of each term's square that the motion absorbs.
+
+    When the surface moves by it along its normals.
+    """
     values = zernike(expansion.terms, places[:, 0], places[:, 1])
     moved = (normal[:, :, None] * (values / cos[:, None])[:, None, :]).reshape(-1, values.shape[1])
     rest = values - np.einsum("ki,kij->kj", normal, columns) @ (gain @ moved) * cos[:, None]
@@ -150,20 +156,23 @@ def _taken(
 
 
 def _own_frame(prisms: Prisms, rows: list[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Points and covariance of some prisms in the nominal paraboloid's frame."""
+    """Some prisms in the nominal paraboloid's frame, with covariance."""
     turn = prisms.nominal.rotation
     points = (prisms.points[rows] - prisms.nominal.translation) @ turn
-    known = prisms.covariance
-    if isinstance(known, JointPoints):
-        return points, turn_in_place(known.block(np.array(rows)), turn.T)
-    if known.ndim == 3:
-        return points, turn.T @ known[rows] @ turn
+    covariance = prisms.covariance
+    if isinstance(covariance, JointPoints):
+        return points, turn_in_place(covariance.block(np.array(rows)), turn.T)
+    if covariance.ndim == 3:
+        return points, turn.T @ covariance[rows] @ turn
     at = (3 * np.array(rows)[:, None] + np.arange(3)).ravel()
-    return points, turn_in_place(known[np.ix_(at, at)], turn.T)
+    return points, turn_in_place(covariance[np.ix_(at, at)], turn.T)
 
 
 def _sum(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Sum of two covariances, each full (3k, 3k) or a block a point (k, 3, 3); full where one of them is."""
+    """Sum of two covariances.
+
+    Each full (3k, 3k) or a block per point (k, 3, 3); full where one of them is.
+    """
     if first.ndim == second.ndim:
         return first + second
     full, blocks = (first, second) if first.ndim == 2 else (second, first)
@@ -180,7 +189,10 @@ def _blocks(covariance: np.ndarray, k: int) -> np.ndarray:
 
 
 def _motion(one: np.ndarray, two: np.ndarray, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Motion (6,), its columns (k, 3, 6) in the first epoch's axes, and the gain (6, 3k) from displacements."""
+    """Motion (6,), its columns (k, 3, 6), and its gain (6, 3k).
+
+    Columns in the first epoch's axes; gain from displacements.
+    """
     try:
         weight = np.linalg.inv(blocks)
     except np.linalg.LinAlgError as problem:
@@ -191,14 +203,14 @@ def _motion(one: np.ndarray, two: np.ndarray, blocks: np.ndarray) -> tuple[np.nd
     scale = np.sqrt(np.diag(normal))
     scaled = normal / np.outer(scale, scale)
     if not np.linalg.cond(scaled) < 1e12:
-        raise EstimationError(f"{len(one)} prisms do not hold a motion: they lie on one line")
+        raise EstimationError(f"{len(one)} prisms do not determine a motion: they lie on one line")
     gain = np.linalg.solve(scaled, pulled.reshape(6, -1) / scale[:, None]) / scale[:, None]
     motion = np.zeros(6)
     for _ in range(ITERATIONS):
         turn = from_vector(motion[3:])
-        left = (two - motion[:3]) @ turn - one  # turned back into the first epoch's axes
-        step = gain @ left.ravel()
-        # a small turn on top of the one there is, in the moved axes
+        displacement = (two - motion[:3]) @ turn - one  # turned back into the first epoch's axes
+        step = gain @ displacement.ravel()
+        # a small turn on top of the present one, in the moved axes
         motion = np.concatenate([motion[:3] + turn @ step[:3], to_vector(turn @ from_vector(step[3:]))])
         if np.max(np.abs(step)) < SETTLED:
             return motion, columns, gain
@@ -214,7 +226,7 @@ def _sandwich(gain: np.ndarray, covariance: np.ndarray) -> np.ndarray:
 
 
 def _through(covariance: np.ndarray, normal: np.ndarray, columns: np.ndarray, gain: np.ndarray) -> np.ndarray:
-    """(k, k) m^2 of normal components of displacements less the motion that they give."""
+    """Covariance (k, k), m^2, of normal displacements minus the motion."""
     k = len(normal)
     lever = np.einsum("ki,kij->kj", normal, columns)  # (k, 6)
     if covariance.ndim == 3:

@@ -1,9 +1,9 @@
-"""How a surface's Zernike terms go with elevation, temperature and the way it came: a look-up table.
+"""Look-up table of Zernike terms by elevation, temperature and direction.
 
     coefficient(E) = constant + gravity_sin sin E + gravity_cos cos E + thermal (T - mean T) ± hysteresis / 2
 
-A linear elastic structure turned in gravity deforms by sin E and cos E and nothing else: gravity's components along its
-own axes. Hysteresis is what a term is more when elevation rises than when it falls.
+A linear elastic structure turned in gravity deforms by sin E and cos E only: gravity's components along its own axes.
+Hysteresis is the excess of a term when elevation rises over when it falls.
 """
 
 from collections.abc import Sequence
@@ -17,14 +17,16 @@ from catseye.optics.zernike import Term
 from catseye.reduction.surface.shape import SurfaceShape
 
 APART_DEG = 1.0  # elevations nearer than this count as one
-APART_C = 0.5  # temperatures that differ by less say nothing of a thermal term
+APART_C = 0.5  # temperatures that differ by less do not determine a thermal term
 STEP_DEG = 5.0  # of the table
 CONSTANT, SIN, COS, THERMAL, HYSTERESIS = "constant", "gravity_sin", "gravity_cos", "thermal", "hysteresis"
 
 
 @dataclass(frozen=True, eq=False)
 class TermModel:
-    """One Zernike term as a function of elevation, and of direction and temperature where the epochs tell them.
+    """Zernike term as a function of elevation.
+
+    And of direction and temperature where the epochs have them.
 
     value, covariance   (p,) m (thermal m/°C), (p, p), as measured by the epochs' covariances
     residual            (T,) m, observed minus predicted
@@ -41,17 +43,20 @@ class TermModel:
 
     @property
     def raised(self) -> float:
-        """By what standard uncertainties are multiplied: root of the variance factor where the epochs scatter more."""
+        """Factor of the standard uncertainties.
+
+        Root of the variance factor where the epochs scatter more than claimed, else 1.
+        """
         return float(np.sqrt(max(1.0, self.variance_factor))) if np.isfinite(self.variance_factor) else 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class Lookup:
-    """A look-up table of the terms.
+    """Look-up table of the terms.
 
     columns        of the model, in their order
-    left_out       column: why it is not in the model
-    elevation_deg  (T,) of the epochs, in the order they were given
+    left_out       column: reason that it is not in the model
+    elevation_deg  (T,) of the epochs, in input order
     rising         (T,) +1 where elevation rose to the epoch, -1 where it fell
     temperature_c  (T,), or None
     measured       (T, t) m
@@ -77,12 +82,14 @@ class Lookup:
 
 
 def lookup_of(shapes: Sequence[SurfaceShape]) -> Lookup:
-    """The look-up table of several epochs, in the order in which the telescope came to them.
+    """Look-up table of several epochs.
+
+    In the order in which the telescope came to them.
 
     shapes   two epochs or more, each with its elevation; all with the same terms and the same free parts
 
-    Each term for itself, least squares weighted by the epochs' uncertainties. Nothing is foretold beyond the
-    elevations that were seen. Raises EstimationError for fewer epochs and for one without an elevation.
+    Each term separately, least squares weighted by the epochs' uncertainties. No prediction beyond the measured
+    elevations. Raises EstimationError for fewer epochs and for one without an elevation.
     """
     elevation = _elevations(shapes)
     rising = directions(elevation)
@@ -100,12 +107,12 @@ def lookup_of(shapes: Sequence[SurfaceShape]) -> Lookup:
     ways = (1.0, 0.0, -1.0) if HYSTERESIS in columns else (0.0, 0.0, 0.0)
     table = np.empty((len(table_deg), len(models), 3))
     u_table = np.empty_like(table)
-    for way, direction in enumerate(ways):
+    for position, direction in enumerate(ways):
         rows = _design(columns, table_deg, np.full(len(table_deg), direction), None, temperature)
         for k, model in enumerate(models):
-            table[:, k, way] = rows @ model.value
+            table[:, k, position] = rows @ model.value
             variance = np.einsum("ea,ab,eb->e", rows, model.covariance, rows)
-            u_table[:, k, way] = model.raised * np.sqrt(variance)
+            u_table[:, k, position] = model.raised * np.sqrt(variance)
     return Lookup(
         tuple(shapes),
         columns,
@@ -123,7 +130,9 @@ def lookup_of(shapes: Sequence[SurfaceShape]) -> Lookup:
 
 
 def directions(elevation_deg: np.ndarray) -> np.ndarray:
-    """(T,) +1 where elevation rose to an epoch, -1 where it fell; the first is on its way to the second.
+    """Direction (T,) of elevation before each epoch, +1 rising, -1 falling.
+
+    The first epoch takes the direction to the second.
 
     elevation_deg   (T,), T at least 2
 
@@ -134,10 +143,10 @@ def directions(elevation_deg: np.ndarray) -> np.ndarray:
     """
     direction = np.sign(np.diff(elevation_deg))
     direction = np.concatenate([direction[:1], direction])
-    known = np.flatnonzero(direction)
-    if not len(known):
+    moved = np.flatnonzero(direction)
+    if not len(moved):
         return np.ones(len(elevation_deg))
-    direction[: known[0]] = direction[known[0]]
+    direction[: moved[0]] = direction[moved[0]]
     for k in range(1, len(direction)):
         if direction[k] == 0.0:
             direction[k] = direction[k - 1]
@@ -146,24 +155,24 @@ def directions(elevation_deg: np.ndarray) -> np.ndarray:
 
 def _elevations(shapes: Sequence[SurfaceShape]) -> np.ndarray:
     if len(shapes) < 2:
-        raise EstimationError(f"a look-up table needs 2 epochs at least, {len(shapes)} given")
-    given: list[float] = []
+        raise EstimationError(f"a look-up table needs 2 epochs at least, not {len(shapes)}")
+    result: list[float] = []
     for shape in shapes:
         if shape.prisms.elevation_deg is None:
-            raise EstimationError(f"{shape.prisms.source}: no elevation is known; say it by --elevation-deg")
-        given.append(shape.prisms.elevation_deg)
-    return np.array(given)
+            raise EstimationError(f"{shape.prisms.source}: unknown elevation; set it by --elevation-deg")
+        result.append(shape.prisms.elevation_deg)
+    return np.array(result)
 
 
 def _temperatures(shapes: Sequence[SurfaceShape]) -> np.ndarray | None:
-    given = [shape.prisms.temperature_c for shape in shapes if shape.prisms.temperature_c is not None]
-    return np.array(given) if len(given) == len(shapes) else None
+    result = [shape.prisms.temperature_c for shape in shapes if shape.prisms.temperature_c is not None]
+    return np.array(result) if len(result) == len(shapes) else None
 
 
 def _columns(
     elevation: np.ndarray, rising: np.ndarray, temperature: np.ndarray | None
 ) -> tuple[tuple[str, ...], dict[str, str]]:
-    """What these epochs can tell, and why the rest not."""
+    """Columns that these epochs determine, and reasons for the others."""
     places = 1 + int(np.count_nonzero(np.diff(np.sort(elevation)) > APART_DEG))
     columns = [CONSTANT]
     left_out: dict[str, str] = {}
@@ -172,18 +181,18 @@ def _columns(
     else:
         left_out |= dict.fromkeys((SIN, COS), f"{places} elevations more than {APART_DEG:g}° apart (3 are needed)")
     if temperature is None:
-        left_out[THERMAL] = "not every epoch's temperature is known"
+        left_out[THERMAL] = "the temperature of an epoch is unknown"
     elif np.ptp(temperature) < APART_C:
         left_out[THERMAL] = f"temperatures within {np.ptp(temperature):.2f} °C"
     else:
         columns.append(THERMAL)
     if len(set(rising.tolist())) < 2:
-        left_out[HYSTERESIS] = "elevation went one way only"
+        left_out[HYSTERESIS] = "elevation moved in one direction only"
     else:
         columns.append(HYSTERESIS)
     while len(columns) > len(elevation) or _loose(columns, elevation, rising, temperature):
         last = columns.pop()
-        left_out[last] = f"{len(elevation)} epochs do not hold it beside {', '.join(columns)}"
+        left_out[last] = f"{len(elevation)} epochs do not determine it beside {', '.join(columns)}"
     return tuple(columns), left_out
 
 
@@ -199,7 +208,10 @@ def _design(
     temperature: np.ndarray | None,
     mean_of: np.ndarray | None,
 ) -> np.ndarray:
-    """(T, p); a table, which tells no temperature, holds at the mean of `mean_of`."""
+    """Design matrix (T, p).
+
+    A table, without temperatures, holds at the mean of `mean_of`.
+    """
     e = elevation_deg * DEGREE
     thermal = np.zeros(len(e)) if temperature is None or mean_of is not None else temperature - temperature.mean()
     values = {CONSTANT: np.ones(len(e)), SIN: np.sin(e), COS: np.cos(e), THERMAL: thermal, HYSTERESIS: rising / 2.0}
@@ -213,9 +225,9 @@ def _model(term: Term, design: np.ndarray, measured: np.ndarray, u: np.ndarray) 
     value = gain @ (measured / u)
     residual = measured - design @ value
     covariance = gain @ gain.T
-    own = u**2 - np.einsum("ta,ab,tb->t", design, covariance, design)
+    residual_variance = u**2 - np.einsum("ta,ab,tb->t", design, covariance, design)
     freedom = len(u) - design.shape[1]
-    checked = own > 1e-9 * u**2
-    standardised = np.where(checked, residual / np.sqrt(np.where(checked, own, 1.0)), np.nan)
+    checked = residual_variance > 1e-9 * u**2
+    standardised = np.where(checked, residual / np.sqrt(np.where(checked, residual_variance, 1.0)), np.nan)
     factor = float(np.sum((residual / u) ** 2) / freedom) if freedom else float("nan")
     return TermModel(term, value, covariance, residual, standardised, factor)

@@ -1,7 +1,8 @@
-"""Prisms against the site's dish: inside its aperture, on its paraboloid, each at the place of its own name.
+"""Check of prisms against the site's dish.
 
-A paraboloid is the same from all sides, so that a fit passes prisms with exchanged or mirrored axes; the aperture of an
-offset dish, and the names of its prisms, do not.
+Inside its aperture, on its paraboloid, each at the place of its own name. A paraboloid is the same from all sides,
+so that a fit passes prisms with exchanged or mirrored axes; the aperture of an offset dish, and the names of its
+prisms, do not.
 """
 
 from collections.abc import Mapping
@@ -19,14 +20,14 @@ from catseye.records.site.folder import SiteFolder
 from catseye.reduction.surface.shape import LitAperture, Prisms
 
 RIM = 0.05  # of the radius: corners of panels stand up to 0.028 outside the circle (examples/sites/gbt)
-TRAVEL = LIMIT_MM * MILLIMETRE  # m: no point of a surface that actuators hold is further off its paraboloid
+TRAVEL = LIMIT_MM * MILLIMETRE  # m: largest deviation of a surface on actuators from its paraboloid
 AXES = "xyz"
-ROUNDING = 1e-6  # of the radius: of coordinates as tables print them
+ROUNDING = 1e-6  # of the radius: rounding of coordinates in tables
 
 
 @dataclass(frozen=True, eq=False)
 class DishPlacement:
-    """Where k prisms stand on the site's dish.
+    """Position of k prisms on the site's dish.
 
     inside     prisms within the circle of the aperture
     outside    (k,) m beyond its rim, the panels' corners allowed for; 0 inside
@@ -43,40 +44,45 @@ class DishPlacement:
 
     @property
     def doubt(self) -> str:
-        """How the prisms miss the site's dish; "" where they stand on it."""
-        count, found = len(self.outside), []
+        """Misfit of the prisms and the site's dish, as a text; "" for none."""
+        count, faults = len(self.outside), []
         if np.any(self.outside > 0.0):
             inside = f"{self.inside or 'none'} of {count}"
-            found.append(f"{inside} prisms inside the aperture, the farthest {self.outside.max():.2f} m beyond its rim")
+            faults.append(
+                f"{inside} prisms inside the aperture, the farthest {self.outside.max():.2f} m beyond its rim"
+            )
         if self.deviation > TRAVEL:
             size = f"up to {self.deviation:.3g} m off" if np.isfinite(self.deviation) else "nowhere near"
-            found.append(f"{size} its paraboloid, where actuators move {TRAVEL / MILLIMETRE:g} mm")
+            faults.append(f"{size} its paraboloid, beyond the actuators' {TRAVEL / MILLIMETRE:g} mm")
         if self.elsewhere:
             named = ", ".join(self.elsewhere[:3]) + (" ..." if len(self.elsewhere) > 3 else "")
-            found.append(f"{len(self.elsewhere)} prisms nearer to another's design place than to their own ({named})")
-        if not found:
+            faults.append(f"{len(self.elsewhere)} prisms nearer to another's design place than to their own ({named})")
+        if not faults:
             return ""
         cure = f"; with {' or '.join(self.cures)} they do" if self.cures else "; check --site and the units"
-        return f"the points do not fit the site's dish: {'; '.join(found)}{cure}"
+        return f"the points do not fit the site's dish: {'; '.join(faults)}{cure}"
 
 
 def placement_of(prisms: Prisms, aperture: LitAperture, design: Mapping[str, np.ndarray]) -> DishPlacement:
-    """Where prisms stand on the site's dish, and which change of their axes would put them there.
+    """Position of prisms on the site's dish, and axis changes that fit.
 
     prisms     as measured
     aperture   of the design
     design     (3,) m of each prism that the site's records name, in the dish's frame
     """
     local = prisms.nominal.inverse().points(prisms.points)
-    found = _placed(prisms.names, local, aperture, design)
-    if not found.doubt:
-        return found
+    placed = _placed(prisms.names, local, aperture, design)
+    if not placed.doubt:
+        return placed
     cures = [text for text, changed in _changes(local) if not _placed(prisms.names, changed, aperture, design).doubt]
-    return replace(found, cures=tuple(cures))
+    return replace(placed, cures=tuple(cures))
 
 
 def design_places(site: SiteFolder) -> dict[str, np.ndarray]:
-    """Design place (3,) m of each prism of the dish that the site's records name, in the dish's frame."""
+    """Design place (3,), m, of each dish prism in the site's records.
+
+    In the dish's frame.
+    """
     return {
         name: np.array(target.position_mm) * MILLIMETRE
         for name, target in site.targets.items()
@@ -85,48 +91,48 @@ def design_places(site: SiteFolder) -> dict[str, np.ndarray]:
 
 
 def _changes(local: np.ndarray) -> list[tuple[str, np.ndarray]]:
-    """Points with two axes exchanged, all three in another order, or one reversed."""
-    made = []
+    """Points with two axes exchanged, all three permuted, or one reversed."""
+    changed = []
     for order in list(permutations(range(3)))[1:]:
         moved = [k for k in range(3) if order[k] != k]
         text = " and ".join(AXES[k] for k in moved) if len(moved) == 2 else ", ".join(AXES[k] for k in order)
-        made.append((f"{text} exchanged" if len(moved) == 2 else f"axes in the order {text}", local[:, order]))
-    made += [(f"{AXES[k]} reversed", local * np.where(np.arange(3) == k, -1.0, 1.0)) for k in range(3)]
-    return made
+        changed.append((f"{text} exchanged" if len(moved) == 2 else f"axes in the order {text}", local[:, order]))
+    changed += [(f"{AXES[k]} reversed", local * np.where(np.arange(3) == k, -1.0, 1.0)) for k in range(3)]
+    return changed
 
 
 def _placed(
     names: tuple[str, ...], local: np.ndarray, aperture: LitAperture, design: Mapping[str, np.ndarray]
 ) -> DishPlacement:
     size = np.linalg.norm(aperture.unit(local), axis=1)
-    beyond = np.maximum(size - 1.0 - RIM, 0.0) * aperture.radius
+    overhang = np.maximum(size - 1.0 - RIM, 0.0) * aperture.radius
     inside = int((size <= 1.0 + ROUNDING).sum())
-    return DishPlacement(inside, beyond, _largest_deviation(local, aperture), _elsewhere(names, local, design), ())
+    return DishPlacement(inside, overhang, _largest_deviation(local, aperture), _elsewhere(names, local, design), ())
 
 
 def _largest_deviation(local: np.ndarray, aperture: LitAperture) -> float:
     """Largest deviation of points (k, 3) m from the paraboloid of the design's focal length, m."""
-    own = Transform("reflector", "reflector", np.eye(3), np.zeros(3))
+    identity = Transform("reflector", "reflector", np.eye(3), np.zeros(3))
     exact = np.zeros((len(local), 3, 3))
     try:
-        fit = fit_paraboloid(local, exact, own, focal_length=aperture.focal_length)
+        fit = fit_paraboloid(local, exact, identity, focal_length=aperture.focal_length)
     except EstimationError:
         return float("inf")
     return float(np.abs(fit.deviation).max()) if _small(fit.rotation) else float("inf")
 
 
 def _small(rotation: np.ndarray) -> bool:
-    """A turn that keeps the dish's opening where it was, rad."""
+    """True if a turn (rad) keeps the dish's opening in place."""
     return bool(np.linalg.norm(rotation) < 0.5)
 
 
 def _elsewhere(names: tuple[str, ...], local: np.ndarray, design: Mapping[str, np.ndarray]) -> tuple[str, ...]:
-    """Prisms that stand nearer to another's design place than to their own."""
+    """Prisms nearer to another's design place than to their own."""
     from scipy.spatial import cKDTree
 
-    known = [k for k, name in enumerate(names) if name in design]
-    if not known:
+    designed = [k for k, name in enumerate(names) if name in design]
+    if not designed:
         return ()
     called = list(design)
-    nearest = cKDTree(np.array([design[name] for name in called])).query(local[known])[1]
-    return tuple(names[k] for k, at in zip(known, nearest.tolist(), strict=True) if called[at] != names[k])
+    nearest = cKDTree(np.array([design[name] for name in called])).query(local[designed])[1]
+    return tuple(names[k] for k, at in zip(designed, nearest.tolist(), strict=True) if called[at] != names[k])

@@ -1,4 +1,7 @@
-"""A dish's shape from its prisms: the paraboloid that fits best, half-path errors, Zernike terms, rms, gain."""
+"""Shape of a dish from its prisms.
+
+Best-fitting paraboloid, half-path errors, Zernike terms, rms, gain.
+"""
 
 from dataclasses import dataclass, field
 
@@ -14,12 +17,14 @@ from catseye.optics.zernike import Numbering, Term, orthonormal, terms, zernike
 from catseye.records.site.site import ParaboloidRecord
 from catseye.verdict import Verdict
 
-HELD = 1e-8  # smallest singular value of Zernike terms beside the paraboloid: below it nothing tells them apart
+SMALLEST_SEPARATION = (
+    1e-8  # smallest singular value of Zernike terms beside the paraboloid: below, they are inseparable
+)
 
 
 @dataclass(frozen=True, eq=False)
 class LitAperture:
-    """What is lit of a paraboloid: a circle in the projection along its axis.
+    """Illuminated part of a paraboloid: a circle in projection along its axis.
 
     centre         (2,) m, from the axis
     radius         m
@@ -32,7 +37,7 @@ class LitAperture:
 
     @classmethod
     def of(cls, record: ParaboloidRecord) -> "LitAperture":
-        """The aperture that a site's record says."""
+        """Aperture of a site's record."""
         return cls(
             np.array(record.aperture_centre_mm) * MILLIMETRE,
             record.aperture_radius_mm * MILLIMETRE,
@@ -40,18 +45,21 @@ class LitAperture:
         )
 
     def unit(self, local: np.ndarray) -> np.ndarray:
-        """Points (k, 2 or 3) m of the paraboloid's frame in the aperture's own units, (k, 2)."""
+        """Points (k, 2) in units of the aperture.
+
+        From points (k, 2 or 3), m, of the paraboloid's frame.
+        """
         return (local[:, :2] - self.centre) / self.radius
 
 
 @dataclass(frozen=True)
 class ShapeSettings:
-    """What is fitted of a surface, and what is asked of its errors.
+    """Fitted parameters of a surface, and requested results.
 
-    free           of "vertex", "axis", "focal-length": what of the paraboloid is fitted
-    taper_db       how much less power the feed sends to the edge than to the middle; 0: uniform
-    frequencies    Hz, at which the gain is wanted
-    terms          how many Zernike terms
+    free           of "vertex", "axis", "focal-length": fitted parameters of the paraboloid
+    taper_db       illumination at the edge below that of the middle; 0: uniform
+    frequencies    Hz, of the computed gain
+    terms          number of Zernike terms
     numbering      "noll" or "ansi"
     """
 
@@ -64,15 +72,15 @@ class ShapeSettings:
 
 @dataclass(frozen=True, eq=False)
 class Prisms:
-    """Prisms of a dish, as one epoch knows them.
+    """Prisms of a dish in one epoch.
 
     names         of k prisms
     points        (k, 3) m, in the frame `nominal.to`
-    covariance    (3k, 3k), or (k, 3, 3) where they are independent, m^2, or of k points what gives its parts
+    covariance    (3k, 3k), or (k, 3, 3) where they are independent, m^2, or for k points an object that gives its parts
     nominal       that frame from the nominal paraboloid's
-    source        where they come from
-    elevation_deg, azimuth_deg, temperature_c   of the epoch, where known
-    verdict       of the reduction that they come from; None where there is none
+    source        file or job
+    elevation_deg, azimuth_deg, temperature_c   of the epoch, None if unknown
+    verdict       of the reduction; None without one
     """
 
     names: tuple[str, ...]
@@ -86,7 +94,7 @@ class Prisms:
     verdict: Verdict | None = None
 
     def along(self, normals: np.ndarray) -> np.ndarray:
-        """(k, k) m^2 of the prisms' components along unit vectors (k, 3)."""
+        """Covariance (k, k), m^2, of the prisms along unit vectors (k, 3)."""
         if isinstance(self.covariance, JointPoints):
             return self.covariance.along(np.arange(len(self.names)), normals)
         return covariance_along(self.covariance, normals)
@@ -97,11 +105,11 @@ class Expansion:
     """Zernike terms of half-path errors over the aperture.
 
     terms              t of them
-    value, covariance  (t,) m, (t, t) m^2: least squares under the weights, of the errors as the fit leaves them
-    share              (t,) of each term's square that the free parts of the paraboloid take for themselves
+    value, covariance  (t,) m, (t, t) m^2: weighted least squares, of the errors after the fit
+    share              (t,) of each term's square that the free parameters of the paraboloid absorb
     joint              (t,) m, the term itself, paraboloid and terms estimated together; nan where the paraboloid stands
-                       for it (piston and tilts of a free vertex, defocus of a free focal length), or nothing tells them
-                       apart
+                       for it (piston and tilts of a free vertex, defocus of a free focal length), or they are
+                       inseparable
     joint_covariance   (t, t) m^2
     orthonormal        (t,) m, in terms made orthonormal on these prisms under the weights, each from itself and those
                        before it: their squares sum up to the square of the rms that the terms explain
@@ -122,10 +130,12 @@ class Expansion:
 
 @dataclass(frozen=True)
 class MeanSquare:
-    """Of half-path errors under the illumination, about their mean: a constant phase costs no gain.
+    """Mean square of half-path errors under the illumination.
+
+    About their mean: a constant phase costs no gain.
 
     measured   m^2, of the measured errors
-    noise      m^2, what the measurement alone is expected to put into it
+    noise      m^2, expected contribution of the measurement
     u          m^2, standard uncertainty of `own`
     """
 
@@ -135,13 +145,16 @@ class MeanSquare:
 
     @property
     def own(self) -> float:
-        """m^2, the surface's own: unbiased, and below zero where the noise hides it."""
+        """Mean square of the surface alone, m^2.
+
+        Unbiased, and below zero where the noise hides it.
+        """
         return self.measured - self.noise
 
 
 @dataclass(frozen=True)
 class Gain:
-    """Gain over the perfect surface's at one frequency.
+    """Gain relative to the perfect surface's at one frequency.
 
     ruze, u_ruze   by Ruze, from the surface's own mean square
     measured       by Ruze, the measurement's noise included
@@ -157,9 +170,9 @@ class Gain:
 
 @dataclass(frozen=True, eq=False)
 class SurfaceShape:
-    """One epoch's surface.
+    """Surface of one epoch.
 
-    weights      (k,) share of the illumination that each prism stands for
+    weights      (k,) share of the illumination of each prism
     places       (k, 2) in the aperture, units of its radius
     """
 
@@ -175,19 +188,21 @@ class SurfaceShape:
 
     @property
     def rms_normal(self) -> float:
-        """m, of the normal deviations, every prism alike."""
+        """Root mean square of the normal deviations, m, unweighted."""
         return float(np.sqrt(np.mean(self.fit.deviation**2)))
 
 
 def shape_of(prisms: Prisms, aperture: LitAperture, settings: ShapeSettings | None = None) -> SurfaceShape:
-    """The surface of one epoch: half-path errors, squared under the illumination, are least.
+    """Surface of one epoch.
+
+    The sum of squared half-path errors under the illumination is least.
 
     prisms     their places and covariance
     aperture   of the design
-    settings   what is free, lit, wanted
+    settings   free parameters, illumination, results
 
-    Each prism weighs what of the illumination is nearest to it. Raises EstimationError for too few prisms and for
-    prisms that do not hold the paraboloid or the terms; ValidityError for settings out of range.
+    The weight of each prism is the illumination nearest to it. Raises EstimationError for too few prisms and for
+    prisms that do not determine the paraboloid or the terms; ValidityError for settings out of range.
     """
     settings = settings or ShapeSettings()
     first = aperture.unit(prisms.nominal.inverse().points(prisms.points))
@@ -234,23 +249,23 @@ def expansion_of(
     covariance   (k, k) m^2 of the errors
     along        (k, k) m^2 of them before the paraboloid was fitted
     design       (k, p) of the paraboloid's free parameters, half-path
-    settings     which terms
+    settings     number and numbering of terms
 
-    Raises EstimationError where the prisms are too few or do not hold the terms.
+    Raises EstimationError where the prisms are too few or do not determine the terms.
     """
-    wanted = terms(settings.terms, settings.numbering)
-    values = zernike(wanted, places[:, 0], places[:, 1])
+    selected = terms(settings.terms, settings.numbering)
+    values = zernike(selected, places[:, 0], places[:, 1])
     try:
         basis, matrix = orthonormal(values, weights)
     except ValidityError as problem:
-        raise EstimationError(f"{len(wanted)} Zernike terms: {problem}") from problem
+        raise EstimationError(f"{len(selected)} Zernike terms: {problem}") from problem
     shares = weights / weights.sum()
     ortho_gain = (basis * shares[:, None]).T
     gain = matrix @ ortho_gain
     value = gain @ error
-    share, joint, joint_covariance = _beside(values, error, along, shares, design, wanted, settings.free)
+    share, joint, joint_covariance = _joint_terms(values, error, along, shares, design, selected, settings.free)
     return Expansion(
-        wanted,
+        selected,
         value,
         _rounded(gain @ covariance @ gain.T),
         share,
@@ -263,43 +278,51 @@ def expansion_of(
 
 
 def _rounded(covariance: np.ndarray) -> np.ndarray:
-    """A covariance whose variances are 0 where rounding left them below: of terms that the paraboloid stands for."""
+    """Covariance with variances 0 where rounding left them negative.
+
+    For terms that the paraboloid absorbs.
+    """
     rounded = covariance.copy()
     rounded[np.diag_indices_from(rounded)] = np.maximum(np.diag(rounded), 0.0)
     return rounded
 
 
-def _beside(
+def _joint_terms(
     values: np.ndarray,
     error: np.ndarray,
     along: np.ndarray,
     shares: np.ndarray,
     design: np.ndarray,
-    wanted: tuple[Term, ...],
+    selected: tuple[Term, ...],
     free: tuple[str, ...],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What the paraboloid takes of each term, and the terms beside it: share, joint, its covariance."""
+    """Share absorbed by the paraboloid, joint terms, and their covariance.
+
+    For each term: estimated together with the paraboloid.
+    """
     root = np.sqrt(shares)[:, None]
     rows = root * values
-    taken = np.linalg.qr(root * design / np.linalg.norm(root * design, axis=0))[0]
-    rest = rows - taken @ (taken.T @ rows)
-    share = 1.0 - np.sum(rest**2, axis=0) / np.sum(rows**2, axis=0)
-    stood_for = {t for t in wanted if t.n <= 1 and "vertex" in free}
-    stood_for |= {t for t in wanted if t == (2, 0) and "focal-length" in free}
-    asked = [k for k, t in enumerate(wanted) if t not in stood_for]
-    joint, covariance = np.full(len(wanted), np.nan), np.full((len(wanted),) * 2, np.nan)
-    if asked:
-        left, sizes, right = np.linalg.svd(rest[:, asked], full_matrices=False)
-        if sizes[-1] > HELD:
-            gain = (right.T / sizes) @ left.T
-            gain = (gain - (gain @ taken) @ taken.T) * root.T
-            joint[asked] = gain @ error
-            covariance[np.ix_(asked, asked)] = gain @ along @ gain.T
+    absorbed = np.linalg.qr(root * design / np.linalg.norm(root * design, axis=0))[0]
+    remainder = rows - absorbed @ (absorbed.T @ rows)
+    share = 1.0 - np.sum(remainder**2, axis=0) / np.sum(rows**2, axis=0)
+    stood_for = {t for t in selected if t.n <= 1 and "vertex" in free}
+    stood_for |= {t for t in selected if t == (2, 0) and "focal-length" in free}
+    estimated = [k for k, t in enumerate(selected) if t not in stood_for]
+    joint, covariance = np.full(len(selected), np.nan), np.full((len(selected),) * 2, np.nan)
+    if estimated:
+        u_matrix, sizes, right = np.linalg.svd(remainder[:, estimated], full_matrices=False)
+        if sizes[-1] > SMALLEST_SEPARATION:
+            gain = (right.T / sizes) @ u_matrix.T
+            gain = (gain - (gain @ absorbed) @ absorbed.T) * root.T
+            joint[estimated] = gain @ error
+            covariance[np.ix_(estimated, estimated)] = gain @ along @ gain.T
     return share, joint, covariance
 
 
 def mean_square(error: np.ndarray, covariance: np.ndarray, weights: np.ndarray) -> MeanSquare:
-    """Weighted mean square of errors about their weighted mean, what of it is noise, and its uncertainty.
+    """Weighted mean square of errors about their weighted mean.
+
+    Also the share of noise, and the uncertainty.
 
     error        (k,) m
     covariance   (k, k) m^2
@@ -320,12 +343,15 @@ def mean_square(error: np.ndarray, covariance: np.ndarray, weights: np.ndarray) 
 def gains_of(
     error: np.ndarray, weights: np.ndarray, square: MeanSquare, *, frequencies: tuple[float, ...]
 ) -> tuple[Gain, ...]:
-    """The gain at each frequency (Hz), by Ruze and by the aperture's own integral."""
-    made = []
+    """Gain at each frequency (Hz).
+
+    By Ruze and by the aperture's own integral.
+    """
+    result = []
     for frequency in frequencies:
         wavelength = SPEED_OF_LIGHT / frequency
         ruze = float(ruze_gain(square.own, wavelength))
         slope = ruze * (4.0 * np.pi / wavelength) ** 2
         measured = float(ruze_gain(square.measured, wavelength))
-        made.append(Gain(frequency, ruze, slope * square.u, measured, coherent_gain(error, weights, wavelength)))
-    return tuple(made)
+        result.append(Gain(frequency, ruze, slope * square.u, measured, coherent_gain(error, weights, wavelength)))
+    return tuple(result)

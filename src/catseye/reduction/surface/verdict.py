@@ -1,4 +1,7 @@
-"""Verdict of surfaces: where the prisms stand, what a dish can be, errors above the noise, what they rest on."""
+"""Verdict on surfaces.
+
+By the prisms' places, the limits of a dish, errors above the noise, and the inputs' verdicts.
+"""
 
 from dataclasses import dataclass
 
@@ -19,7 +22,9 @@ CLEAR = 2.0  # standard uncertainties by which a mean square stands out: 95 %
 
 @dataclass(frozen=True, eq=False)
 class SurfaceFindings:
-    """All that one call of `catseye surface` found: an epoch, a change, a look-up table; perhaps actuators.
+    """Results of one call of `catseye surface`.
+
+    An epoch, a change, a look-up table; perhaps actuators.
 
     placements   of each shape's prisms on the site's dish
     """
@@ -32,7 +37,10 @@ class SurfaceFindings:
 
 
 def surface_verdict(result: SurfaceFindings) -> Verdict:
-    """Prisms on the site's dish, errors above the noise, epochs that fit the look-up table, and what they rest on."""
+    """Verdict on a surface.
+
+    Prisms on the site's dish, errors above the noise, epochs that fit the look-up table, and the inputs' verdicts.
+    """
     sources = {shape.prisms.source: shape.prisms.verdict for shape in result.shapes}
     return _own_verdict(result).resting_on(sources)
 
@@ -50,8 +58,8 @@ def _own_verdict(result: SurfaceFindings) -> Verdict:
     if noisy:
         return Verdict("doubtful", f"{noisy[0].prisms.source}: no error of the surface stands out from the noise")
     prisms = ", ".join(str(len(shape.prisms.names)) for shape in result.shapes)
-    held = "" if "focal-length" in result.shapes[-1].fit.free else ", focal length held"
-    return Verdict("good", f"{prisms} prisms hold the paraboloid{held}, and its errors stand out from the noise")
+    fixed = "" if "focal-length" in result.shapes[-1].fit.free else ", focal length held"
+    return Verdict("good", f"{prisms} prisms determine the paraboloid{fixed}, and its errors stand out from the noise")
 
 
 def _of_lookup(result: SurfaceFindings) -> Verdict:
@@ -66,12 +74,12 @@ def _of_lookup(result: SurfaceFindings) -> Verdict:
 
 
 def stands_out(square: MeanSquare) -> bool:
-    """Errors above the measurement's noise, with 95 %."""
+    """True for errors above the measurement's noise, with 95 %."""
     return bool(square.own > CLEAR * square.u)
 
 
 def _implausible(shape: SurfaceShape) -> str:
-    """What of a fit no dish of the site can be; "" of a plausible one.
+    """Implausible property of a fit, as a text; "" if plausible.
 
     The surface lies within the actuators' travel t; so does a change of focal length, which moves the rim of radius R
     by R² / 4f² of it; the dish stands where encoders say, to the largest correction of the pointing series.

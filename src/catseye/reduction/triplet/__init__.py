@@ -1,1 +1,1 @@
-"""Goldman's triplet units: from a laboratory sheet to H_corr, and their use on the telescope."""
+"""Goldman's triplet units: H_corr from a laboratory sheet, and telescope use."""

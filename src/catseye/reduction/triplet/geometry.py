@@ -1,4 +1,6 @@
-"""From a triplet's phases to the height of its ball above the prisms' mid-point, exactly, for arrays of placements.
+"""Height of a triplet's ball above the prisms' mid-point, from phases.
+
+Exact, for arrays of placements.
 
 Axes at the synthetic reference plane: along the line of the prisms (left to right), up, and the normal towards the
 ranger. The unit is flipped about the line of its centres and pushed against the same stops, so that a point at the
@@ -7,10 +9,10 @@ point along the normal,
 
     Z_MP = Z_plane - (L_MP - L_post),  Z_BCfp = Z_plane + (L_BC - L_post),  Z_MP - Z_BCfp = 2 L_post - 2 L_MP - H_corr.
 
-Three ranges tell both depths: D_MP from the median (3.17), the scan point's place along the prisms from D_1^2 - D_2^2,
-its height from h_S. No plane need be perpendicular to the beam: what the stops are tilted by is a lateral offset of
-the scan point, which D_1 and D_2 show. The memo's (D_MP - D_BCfp) sec Psi (3.28) is the same to first order; it is
-right that the secant multiplies: a distance changes by less than the depth does, dD = dZ cos Psi.
+Three ranges determine both depths: D_MP from the median (3.17), the scan point's place along the prisms from D_1^2 -
+D_2^2, its height from h_S. No plane need be perpendicular to the beam: a tilt of the stops is a lateral offset of the
+scan point, which D_1 and D_2 show. The memo's (D_MP - D_BCfp) sec Psi (3.28) is the same to first order; the secant
+correctly multiplies: a distance changes by less than the depth, dD = dZ cos Psi.
 """
 
 from collections.abc import Callable, Mapping
@@ -29,7 +31,9 @@ Values = float | Array
 
 @dataclass(frozen=True, eq=False)
 class TripletReadings:
-    """Readings and constants, arrays that broadcast together; metres, radians. `_fp` is after the flip.
+    """Readings and constants, arrays that broadcast together.
+
+    Metres, radians. `_fp` is after the flip.
 
     A number becomes an array without axes.
 
@@ -74,17 +78,20 @@ class TripletReadings:
     modulation_hz: Array = field(default_factory=lambda: np.asarray(1500e6))
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            object.__setattr__(self, each.name, np.asarray(getattr(self, each.name), dtype=float))
+        for item in fields(self):
+            object.__setattr__(self, item.name, np.asarray(getattr(self, item.name), dtype=float))
 
     def moved(self, by: Mapping[str, Array]) -> "TripletReadings":
-        """The same with some readings changed by something."""
+        """Readings with some values shifted."""
         return replace(self, **{name: getattr(self, name) + change for name, change in by.items()})
 
 
 @dataclass(frozen=True, eq=False)
 class TripletCycles:
-    """Whole half wavelengths N as in (3.11), and how much further D_TOPPL could be off, m: the least of three."""
+    """Whole half wavelengths N as in (3.11), with margin.
+
+    The margin, m, is the additional error of D_TOPPL before N changes: the least of three.
+    """
 
     n_1: NDArray[np.int64]
     n_2: NDArray[np.int64]
@@ -94,7 +101,9 @@ class TripletCycles:
 
 @dataclass(frozen=True, eq=False)
 class TripletLengths:
-    """What follows from readings and whole cycles; metres, radians, in the memo's symbols (`i` an incidence).
+    """Lengths and angles from readings and whole cycles.
+
+    Metres, radians, in the memo's symbols (`i` an incidence).
 
     d_1, d_2, d_bcfp        scan point to the left and right fiducial point, and to the ball's centre after the flip
     d_mp                    to the mid-point, the exact median (3.17)
@@ -134,13 +143,15 @@ def half_wavelengths(readings: TripletReadings) -> tuple[Array, Array]:
 
 
 def triplet_cycles(r: TripletReadings) -> TripletCycles:
-    """Whole half wavelengths by the nearest integer to the coarse length plus the phase's share.
+    """Whole half wavelengths by the nearest integer.
 
-    r   readings; d_toppl right within the margin, 40 mm and more
+    To the coarse length plus the phase's share.
+
+    r   readings; d_toppl correct within the margin, 40 mm and more
 
     The coarse distance to a prism includes that it stands half of d_12 aside, 2.8 mm at 18 m.
 
-    Source: [GOLDMAN00] eq. 3.11 solved for N. Its own rule (3.13, 3.16) takes INT and slips where true and coarse
+    Source: [GOLDMAN00] eq. 3.11 solved for N. Its own rule (3.13, 3.16) uses INT and slips where true and coarse
     length straddle a whole half wavelength: see `memo`.
     """
     half, half_fp = half_wavelengths(r)
@@ -153,14 +164,14 @@ def triplet_cycles(r: TripletReadings) -> TripletCycles:
 
 
 def triplet_lengths(r: TripletReadings, cycles: TripletCycles) -> TripletLengths:
-    """All lengths and angles of a calibration, exactly; NaN where the ranges make no triangle.
+    """Lengths and angles of a calibration, exact; NaN without a triangle.
 
     r         readings
     cycles    whole half wavelengths
 
     Source: [GOLDMAN00] eqs. 3.11, 3.14, 3.15, 3.17, 3.22, 3.26, 3.29, B.1; the depths by exact geometry (module) for
     3.20 to 3.25 and 3.28. Exact, but for the ball's centre in the plate (`ball_along`, `ball_up`), which ranges of one
-    direction do not tell.
+    direction do not determine.
     """
     half, half_fp = half_wavelengths(r)
     before, after = _phases(r)
@@ -200,13 +211,18 @@ def triplet_lengths(r: TripletReadings, cycles: TripletCycles) -> TripletLengths
 
 
 def _phases(r: TripletReadings) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
-    """Functions that take the reference and the calibration off a phase, before and after the flip; not reduced."""
+    """Functions that correct a phase for reference and calibration.
+
+    Before and after the flip; not reduced.
+    """
     zero, zero_fp = r.phi_zrg + r.phi_cal, r.phi_zrg_fp + r.phi_cal_fp
     return (lambda phi: phi - zero), (lambda phi: phi - zero_fp)
 
 
 def _scan_point(r: TripletReadings, d_1: Array, d_2: Array, rise: Array) -> tuple[Array, Array, Array, Array]:
-    """D_MP, and the scan point from the mid-point: depth along the normal, along the prisms, up; exact.
+    """Distance D_MP and the scan point from the mid-point, exact.
+
+    Depth along the normal, along the prisms, up.
 
     rise   of the right fiducial point over the left, towards the ranger: the line of the prisms leans by as much
     """
@@ -225,7 +241,7 @@ def _root(square: Array) -> Array:
 
 
 def _arccos(cosine: Array) -> Array:
-    """NaN beyond 1, which no triangle has, but for rounding."""
+    """Arc cosine; NaN beyond 1 except for rounding."""
     cosine = np.where((cosine > 1.0) & (cosine < 1.0 + 1e-12), 1.0, cosine)
     with np.errstate(invalid="ignore"):
         return np.arccos(cosine)

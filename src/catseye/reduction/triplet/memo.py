@@ -1,6 +1,6 @@
-"""The triplet memo's own numbers, to be reported beside ours and never used.
+"""Numbers by the triplet memo's own formulas, for comparison only.
 
-They depart where its formulas are approximate: INT and the phase's sign for whole cycles (3.13, 3.16), the series for
+They differ where its formulas are approximate: INT and the phase's sign for whole cycles (3.13, 3.16), the series for
 the median (3.19b), D_0 from D_TOPPL (3.20) instead of from the ranges.
 """
 
@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class MemoNumbers:
-    """What the memo's formulas give, one value a placement; NaN where they do not apply.
+    """Results of the memo's formulas, one per placement; NaN where invalid.
 
     n_1, n_2, n_bc        whole half wavelengths by 3.13 and 3.16; NaN where Phi - Phi_ZRG - Phi_Cal breaks 3.5
     d_mp                  m, the series 3.19b, with the right whole cycles
-    d_0, i_1, i_2, psi    3.20, 3.23, 3.25; psi signed; NaN where a distance comes out shorter than D_0
+    d_0, i_1, i_2, psi    3.20, 3.23, 3.25; psi signed; NaN for a distance shorter than D_0
     delta_range, h_corr   m, 3.28 and 3.29 with the right whole cycles
     h_corr_by_int         m, the same with its own
     """
@@ -61,7 +61,7 @@ def median_series(d_1: Array, d_2: Array, d_12: Array, *, delta: Array) -> Array
 
 
 def memo_numbers(r: TripletReadings, cycles: TripletCycles, lengths: TripletLengths) -> MemoNumbers:
-    """The memo's way from the same readings.
+    """Memo's results from the same readings.
 
     r         readings
     cycles    ours, right
@@ -98,7 +98,7 @@ def memo_numbers(r: TripletReadings, cycles: TripletCycles, lengths: TripletLeng
 
 
 def _by_int(coarse: Array, phase: Array, half: Array) -> Array:
-    """N by INT and sign; NaN where the phase lies outside what the rule is made for."""
+    """Whole cycles by INT and sign; NaN outside the rule's domain."""
     coarse, phase, half = np.broadcast_arrays(coarse, phase, half)
     legal = np.abs(phase) < TWO_PI
     return np.where(legal, memo_whole_cycles(coarse, np.where(legal, phase, 0.0), half), np.nan)

@@ -1,4 +1,6 @@
-"""What the surface plate says of a triplet: how far its points are from the bare plate, and how thick the paint may be.
+"""Surface plate results of a triplet: points against the bare plate, and paint.
+
+Distances of its points from the bare plate, and the possible thickness of paint.
 
 The paint lies between the top plate and the synthetic plane, so the bare surface is at L_post - t_paint.
 """
@@ -13,15 +15,15 @@ TOLERANCE = 0.15e-3  # m, of a point's place as made
 
 @dataclass(frozen=True)
 class PlatePoints:
-    """Heights of the points, and what they say of the paint; metres.
+    """Heights of the points, and the paint's thickness; metres.
 
     height             of T_1, T_2 and BC above the granite plate
     departure          of each above the bare top plate, (least, most): for the memo's thinnest and thickest paint
     paint              (least, most) thickness for which all three lie within 0.15 mm of the bare top plate, not below
                        0; None where no thickness does
     paint_from_design  thickness for which the mean of the three lies in the bare top plate, as designed
-    sampled            painted surface above the synthetic plane, (least, mean, most); None where it was not sampled.
-                       It tells how the paint varies: the fixture rests on the paint, too
+    sampled            painted surface above the synthetic plane, (least, mean, most); None if not sampled.
+                       It shows the paint's variation: the fixture rests on the paint, too
     """
 
     height: tuple[float, float, float]
@@ -32,7 +34,7 @@ class PlatePoints:
 
 
 def plate_points(measurement: TripletMeasurement) -> PlatePoints:
-    """The three points above granite and above the bare plate.
+    """Height of the three points above granite and above the bare plate.
 
     measurement   a measured unit
 
@@ -45,12 +47,12 @@ def plate_points(measurement: TripletMeasurement) -> PlatePoints:
         (plate.l2_mm - measurement.right_prism.hrp_mm) * 1e-3,
         (plate.l_bt_mm + measurement.ball.r1_mm) * 1e-3,
     )
-    low = max(0.0, *(post - each - TOLERANCE for each in height))
-    high = min(post - each + TOLERANCE for each in height)
-    tops = [each * 1e-3 - post for each in plate.top_surface_mm]
+    low = max(0.0, *(post - value - TOLERANCE for value in height))
+    high = min(post - value + TOLERANCE for value in height)
+    tops = [value * 1e-3 - post for value in plate.top_surface_mm]
     return PlatePoints(
         height=height,
-        departure=tuple((each - post + THINNEST, each - post + THICKEST) for each in height),
+        departure=tuple((value - post + THINNEST, value - post + THICKEST) for value in height),
         paint=(low, high) if low <= high else None,
         paint_from_design=post - sum(height) / 3.0,
         sampled=(min(tops), sum(tops) / len(tops), max(tops)) if tops else None,

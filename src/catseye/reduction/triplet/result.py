@@ -1,4 +1,7 @@
-"""What a triplet's laboratory sheet gives: H_corr and L_MPBC with uncertainty, and whether the unit is accepted."""
+"""Result of a triplet's laboratory sheet.
+
+H_corr and L_MPBC with uncertainty, and the acceptance of the unit.
+"""
 
 import math
 from dataclasses import dataclass
@@ -19,22 +22,24 @@ TOLERANCE = 0.15e-3  # m, the memo's limit of |H_corr - L_MPBC|
 
 @dataclass(frozen=True, eq=False)
 class TripletReduction:
-    """The calibration of one unit; metres, radians; arrays over its k placements.
+    """Calibration of one unit; metres, radians.
 
-    measurement                    what was measured
-    readings, cycles, lengths      with every symbol of the memo; `memo` its own numbers where they differ
+    Arrays over its k placements.
+
+    measurement                    the sheet
+    readings, cycles, lengths      with every symbol of the memo; `memo` its own numbers for comparison
     plate                          heights of the points and the paint
     h, u                           (k,) H_corr of each placement and its standard uncertainty
     covariance                     (k, k) m^2, of h
-    weights                        (k,) of each in h_corr; 0 where it is left out
+    weights                        (k,) of each in h_corr; 0 where it is rejected
     h_corr, u_h_corr               the best, ball centre above the prisms' mid-point towards the prism side
     l_mpbc, u_l_mpbc               the same from the surface plate
-    difference, u_difference       h_corr - l_mpbc, with what both share taken off
-    accepted                       whether |difference| is at most 0.15 mm
-    conformity_probability         that the true difference is
+    difference, u_difference       h_corr - l_mpbc, shared errors removed
+    accepted                       True if |difference| is at most 0.15 mm
+    conformity_probability         of the true difference
     residuals, statistics          (k,) h - h_corr, m, and standardised (w)
     chi_square, degrees_of_freedom, p   of all placements agreeing; p NaN with one
-    suspects                       placements, counted from 0, that the others contradict; named, not dropped
+    suspects                       placements, counted from 0, contradicted by the others; named, not dropped
     h_corr_without_suspects        NaN without suspects, or without others
     budget                         group of inputs -> its share in u_h_corr, m
     steps, u_steps                 (k,) place of the stops by ranging less the first placement's: 0 if spacers fit
@@ -42,7 +47,7 @@ class TripletReduction:
                                    50 %; 0 where the sheet gives the index of the glass
     agreeing_ratio, u_agreeing_ratio   index ratio for which ranging and plate would agree
     status                         (k,) in words
-    notes                          what a reader should know, a line each
+    notes                          for the reader, a line each
     """
 
     measurement: TripletMeasurement
@@ -81,7 +86,7 @@ class TripletReduction:
 
 
 def conformity_probability(difference: float, u: float, tolerance: float = TOLERANCE) -> float:
-    """Probability that a quantity lies within plus or minus a tolerance, after it was measured.
+    """Probability that a measured quantity lies within ± a tolerance.
 
     difference   m, measured
     u            m, its standard uncertainty, above 0 (at 0: 1 or 0)

@@ -1,14 +1,16 @@
-"""How far a triplet that is not as designed, or not calibrated as meant, puts H_corr and the ball: exact geometry.
+"""Errors of H_corr and the ball by departures from design or calibration.
+
+By exact geometry.
 
 The unit, the flip and the scan point are placed in three dimensions and their distances turned into phases; the
 calibration's own reduction (`geometry`), told the design, gives H_corr. On the telescope the same unit is
 ranged from any direction and reduced by `use`.
 
-What the flip does to the glass: the ball's constant cancels and the prisms' counts twice. With ranges to the prisms e_p
+Effect of the flip on the glass: the ball's constant cancels and the prisms' counts twice. With ranges to the prisms e_p
 too long and to the ball e_b, the calibration gives H_corr + e_b - e_p; in use the mid-point seems e_p deeper, and from
 the other side the ground sees the ball e_b deeper; so ground and feed arm need H_corr + e_b + e_p. They disagree by
-2 e_p along the normal, whatever e_b is. The surface plate's L_MPBC knows the small radius but no path in glass: in the
-place of H_corr it would leave e_b + e_p, and what R_1 is wrong by.
+2 e_p along the normal, whatever e_b is. The surface plate's L_MPBC contains the small radius but no path in glass: in
+the place of H_corr it would leave e_b + e_p, and the error of R_1.
 """
 
 from collections.abc import Mapping
@@ -33,7 +35,9 @@ FIDUCIALS, BALL = -0.10e-3, -0.04e-3  # m, above the synthetic plane: paint, and
 
 @dataclass(frozen=True)
 class Departures:
-    """What is so but was taken to be otherwise, true less assumed; arrays that broadcast, metres and radians.
+    """Departures from the assumptions, true minus assumed.
+
+    Arrays that broadcast, metres and radians.
 
     spacing                         between the prisms
     along, across                   ball from the prisms' mid-point in the plate, unit's x and y
@@ -42,7 +46,7 @@ class Departures:
     index, index_flipped            group index of the air before and after the flip
     ratio                           group index of all glass over the air's
     height, radius_1, radius_2      of both prisms' glass, of the ball's small and large sphere
-    lean_x, lean_y                  on the telescope: the plate's normal beside where it is taken to point
+    lean_x, lean_y                  on the telescope: the plate's normal against its assumed direction
     """
 
     spacing: Values = 0.0
@@ -63,18 +67,18 @@ class Departures:
 
     @property
     def prism_excess(self) -> Values:
-        """How much too long a range to a prism is, at normal incidence, m."""
+        """Error of a range to a prism at normal incidence, m (positive: too long)."""
         return (RATIO + self.ratio) * (HEIGHT + self.height) - RATIO * HEIGHT
 
     @property
     def ball_excess(self) -> Values:
-        """How much too long a range to the ball's centre is, m."""
+        """Error of a range to the ball's centre, m (positive: too long)."""
         small, large = R_1 + self.radius_1, R_2 + self.radius_2
         return (RATIO + self.ratio) * (small + large) - small - RATIO * (R_1 + R_2) + R_1
 
 
 def calibration_error(d: Departures, *, depth: Values = 18.0, aside: Values = 0.0, above: Values = 0.0) -> Array:
-    """H_corr as the calibration finds it less the true one, m.
+    """Error of H_corr by the calibration, m.
 
     d               departures
     depth           m, of the synthetic plane below the scan point
@@ -98,7 +102,7 @@ def calibration_error(d: Departures, *, depth: Values = 18.0, aside: Values = 0.
     pc_b = R_1 - RATIO * (R_1 + R_2)
     ways.append((d_b - pc_b + d.ball_excess) * (INDEX + d.index_flipped))
     cycle = 0.5 * SPEED_OF_LIGHT / MODULATION
-    phi = [np.mod(-TWO_PI * way / cycle, TWO_PI) for way in ways]
+    phi = [np.mod(-TWO_PI * path / cycle, TWO_PI) for path in ways]
     face = POST + FIDUCIALS + HEIGHT / RATIO
     numbers = {
         "phi_zrg": 0.0, "phi_cal": 0.0, "phi_zrg_fp": 0.0, "phi_cal_fp": 0.0, "eta_a": INDEX, "eta_a_fp": INDEX,
@@ -119,11 +123,11 @@ def calibration_error(d: Departures, *, depth: Values = 18.0, aside: Values = 0.
 
 
 def telescope_error(d: Departures, *, scan_point: ArrayLike, h_error: Values = 0.0) -> Array:
-    """Distance to the ball as two prism ranges give it less the true one to its centre, m.
+    """Error of the distance to the ball's centre by two prism ranges, m.
 
-    d            departures; of these the laboratory's (slips, indices of its air, h_S) do nothing here
+    d            departures; the laboratory's (slips, indices of its air, h_S) have no effect here
     scan_point   (..., 3) m, from the mid-point in the unit's axes
-    h_error      m, that H_corr is too large
+    h_error      m, error of H_corr (positive: too large)
 
     Source: [GOLDMAN00] appendix C, placed in three dimensions. Exact.
 
@@ -135,18 +139,18 @@ def telescope_error(d: Departures, *, scan_point: ArrayLike, h_error: Values = 0
     scan = tuple(np.moveaxis(s, -1, 0))
     half, h_corr = 0.5 * (D_12 + d.spacing), BALL - FIDUCIALS
     true = _length(scan, (d.along, d.across, h_corr))
-    taken = np.stack(np.broadcast_arrays(-np.tan(d.lean_x), -np.tan(d.lean_y), 1.0), axis=-1)
-    taken = taken / np.linalg.norm(taken, axis=-1, keepdims=True)
+    assumed = np.stack(np.broadcast_arrays(-np.tan(d.lean_x), -np.tan(d.lean_y), 1.0), axis=-1)
+    assumed = assumed / np.linalg.norm(assumed, axis=-1, keepdims=True)
     ranges = []
     for side in (-1.0, 1.0):
         one = _length(scan, (side * half, 0.0, 0.0))
         towards = (s - np.array([side * 0.5 * D_12, 0.0, 0.0])) / one[..., None]
-        applied = _obliquity(np.sum(taken * towards, axis=-1))
+        applied = _obliquity(np.sum(assumed * towards, axis=-1))
         ranges.append(one + d.prism_excess - _obliquity(scan[2] / one) + applied)
     sight = s - h_corr * np.array([0.0, 0.0, 1.0])
     sight = sight / np.linalg.norm(sight, axis=-1, keepdims=True)
     d_mp = median(ranges[0], ranges[1], D_12)
-    return ball_distance(d_mp, sight, np.asarray(h_corr + h_error)[..., None] * taken) - true
+    return ball_distance(d_mp, sight, np.asarray(h_corr + h_error)[..., None] * assumed) - true
 
 
 class LargestEffects(NamedTuple):
@@ -176,7 +180,9 @@ def triplet_sensitivities(
     distance: float = 46.0,
     incidence: float = 12.0 * DEGREE,
 ) -> tuple[LargestEffects, ...]:
-    """The table: every cause alone at its tolerance, the worst sign and the worst direction on the telescope.
+    """Table of effects, each cause alone at its tolerance.
+
+    The worst sign and the worst direction on the telescope.
 
     depth, aside, above    m, of the scan point at the calibration; A.8's bound is for the perpendicular on a prism
     distance, incidence    m, rad, on the telescope: the nearest, the most oblique
@@ -191,10 +197,12 @@ def triplet_sensitivities(
     ahead = np.array([0.0, 0.0, distance])
     rows = []
     for cause, size, memo, values in _causes():
-        both = [Departures(**{k: sign * v for k, v in values.items()}) for sign in (-1.0, 1.0)]
-        h = [calibration_error(d, depth=depth, aside=aside, above=above) for d in both]
-        used = [np.abs(telescope_error(d, scan_point=around)).max() for d in both]
-        tie = [telescope_error(d, scan_point=ahead, h_error=e) + d.ball_excess for d, e in zip(both, h, strict=True)]
+        departures = [Departures(**{k: sign * v for k, v in values.items()}) for sign in (-1.0, 1.0)]
+        h = [calibration_error(d, depth=depth, aside=aside, above=above) for d in departures]
+        used = [np.abs(telescope_error(d, scan_point=around)).max() for d in departures]
+        tie = [
+            telescope_error(d, scan_point=ahead, h_error=e) + d.ball_excess for d, e in zip(departures, h, strict=True)
+        ]
         rows.append(
             LargestEffects(cause, size, memo, float(np.abs(h).max()), float(max(used)), float(np.abs(tie).max()))
         )

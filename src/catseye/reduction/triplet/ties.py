@@ -1,6 +1,8 @@
-"""Triplets as observations of a network: what their sheets say of them, and ranges to their prisms with the obliquity.
+"""Triplets as observations of a network.
 
-The memo's steps one by one (`use`) lose what the ranges say of the unit's own shape; here the prisms, the ball,
+Their sheets' data, and ranges to their prisms with the obliquity.
+
+The memo's steps one by one (`use`) lose the ranges' information on the unit's own shape; here the prisms, the ball,
 the plate's tilts and the ball's lateral offsets are parameters, the offsets the same in every posture.
 """
 
@@ -25,7 +27,9 @@ COUNT = 13
 
 @dataclass(frozen=True, eq=False)
 class TripletParameters:
-    """Where the parameters of n units stand: thirteen each from `first`, the lateral pair elsewhere if it is shared.
+    """Positions of the parameters of n units.
+
+    Thirteen each from `first`; the lateral pair is elsewhere if shared.
 
     first     (n,) column of the x of the left prism; then right prism, ball, tilts, lateral offsets
     lateral   (n,) column of the first of both lateral offsets; default `first` + 11
@@ -40,7 +44,9 @@ class TripletParameters:
 
 
 def triplet_start(units: Sequence[MountedTriplet]) -> NDArray[np.float64]:
-    """Start values (13n,) of the units' parameters, from their approximate places.
+    """Start values (13n,) of the units' parameters.
+
+    From their approximate places.
 
     units   in the frame of the network
     """
@@ -48,20 +54,23 @@ def triplet_start(units: Sequence[MountedTriplet]) -> NDArray[np.float64]:
 
 
 def triplet_observations(units: Sequence[MountedTriplet], at: TripletParameters) -> tuple[ObservationGroup, ...]:
-    """What the sheets say: rigid bodies, priors of the plates' tilts and of the balls' lateral offsets.
+    """Observations from the sheets.
+
+    Rigid bodies, priors of the plates' tilts and of the balls' lateral offsets.
 
     units   n, in the frame of the network
     at      their parameters
 
     A unit seen in several postures has its own points and tilts in each, and one pair of lateral offsets: their prior
-    is given once. The spacing and H_corr of such a unit enter each posture anew: take their covariance with care.
+    appears once. The spacing and H_corr of such a unit enter each posture independently: use their covariance with
+    care.
 
     Source: [GOLDMAN00] sections 1.2, 1.3, figure 10.
     """
     n = len(units)
     if at.first.shape != (n,) or at.offsets.shape != (n,):
-        raise InputError(f"columns of {len(at.first)} and {len(at.offsets)} triplets for {n} units; give one each")
-    none = np.full(n, -1)
+        raise InputError(f"columns of {len(at.first)} and {len(at.offsets)} triplets for {n} units; expected one each")
+    no_columns = np.full(n, -1)
     u = [(U_FIXED, U_FIXED, t.u_h_corr, t.u_d_12, t.u_square) for t in units]
     bodies = RigidTriplets(
         "triplets",
@@ -72,7 +81,7 @@ def triplet_observations(units: Sequence[MountedTriplet], at: TripletParameters)
         at.first + BALL,
         at.first[:, None] + (TILT, TILT + 1),
         np.stack([t.normal for t in units]),
-        np.stack([at.offsets, at.offsets + 1, none, none, none], axis=1),
+        np.stack([at.offsets, at.offsets + 1, no_columns, no_columns, no_columns], axis=1),
     )
     shared, which = np.unique(at.offsets, return_index=True)
     return (
@@ -93,18 +102,20 @@ def prism_ranges(
     covariance: ArrayLike,
     zeros: Columns | None = None,
 ) -> Distances:
-    """Ranges from k rangers to both prisms of n units as distances, dPc added, its tilts' derivatives as nuisance.
+    """Ranges from k rangers to both prisms of n units as distances.
+
+    dPc added, derivatives by its tilts as nuisance.
 
     name           of the group
     units          n, in the frame of the network
     at             their parameters
     scan_points    (k, 3) m, approximately
     scan_columns   (k,) column of the x of each
-    ranges         (n, k, 2) m, with Pc but without dPc; NaN where there is none
+    ranges         (n, k, 2) m, with Pc but without dPc; NaN for missing ones
     covariance     (2nk,) variances or (2nk, 2nk), m^2, in that order
-    zeros          (k,) column of each ranger's zero, that its ranges read too long; -1 or None for none
+    zeros          (k,) column of each ranger's zero (positive: ranges too long); -1 or None for none
 
-    Observed minus D is -dPc for what the tilts add beyond the start: D = measured + dPc(tilts).
+    Observed minus D is -dPc for the tilts' change from the start: D = measured + dPc(tilts).
 
     Source: [GOLDMAN00] appendices B and C.
     """
@@ -118,8 +129,8 @@ def prism_ranges(
     corrections, slopes = zip(*(_obliquity(unit, s) for unit in units), strict=True)
     observed = (d + np.stack(corrections)).ravel()
     used = np.flatnonzero(np.isfinite(observed))
-    unit, rest = np.divmod(used, 2 * k)
-    ranger, side = np.divmod(rest, 2)
+    unit, remainder = np.divmod(used, 2 * k)
+    ranger, side = np.divmod(remainder, 2)
     zero = np.full(k, -1) if zeros is None else zeros
     tilt = at.first[unit][:, None] + (TILT, TILT + 1)
     return Distances(
@@ -134,7 +145,10 @@ def prism_ranges(
 
 
 def _obliquity(unit: MountedTriplet, s: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """dPc and its derivatives along the two directions in which `RigidTriplets` tilts the normal."""
+    """Range constant change dPc and its derivatives by the two tilts.
+
+    Along the two directions in which `RigidTriplets` tilts the normal.
+    """
     return obliquity_by_tilt(unit, s, across(unit.normal[None])[0])
 
 

@@ -1,4 +1,6 @@
-"""What fabrication and refractivity do to a triplet: the memo's appendices A and D, exact and as it approximates.
+"""Effects of fabrication and refractivity on a triplet.
+
+The memo's appendices A and D, exact and by its approximations.
 
 Scan point S at s along the prisms, h above their line and Z out of the plate, seen from the mid-point MP; D = |S - MP|.
 
@@ -13,7 +15,7 @@ Pythagoras. Likewise A.8's |D_2 - D_1| < D_12^2/(2 D_0) says |s| < D_12/2: the p
 between the prisms. "Plate normal to the beam" alone does not give it.
 
 On the telescope s/D and h/D are the sines of an incidence of up to 12 deg: 0.15 mm aside there is 31 um, twelve times
-the bound. The appendix speaks of the calibration only, and that is where it is true.
+the bound. The appendix is about the calibration only, where it holds.
 
 D.2 and D.3 give D.1's n only with their unrounded values. The D.4 slope by temperature is misprinted: -0.895887e-6
 per degree (the memo prints -0.985e-6), and D.3's temperature is 20.0 deg C, not 20.5; see `MEMO_SLOPES`, `SLOPES`.
@@ -47,7 +49,9 @@ SLOPES = RefractivitySlopes(-0.895887e-6, 0.272048e-6, -0.0096058e-6)
 
 
 def spacing_effect(d_12: ArrayLike, change: ArrayLike, d_mp: ArrayLike) -> Array:
-    """How much longer the computed D_MP is when the prisms are taken to be further apart, m; below zero for longer.
+    """Error of the computed D_MP by a larger assumed spacing, m.
+
+    Below zero: the computed D_MP is shorter.
 
     d_12     m, between the prisms
     change   m, added to it
@@ -61,12 +65,14 @@ def spacing_effect(d_12: ArrayLike, change: ArrayLike, d_mp: ArrayLike) -> Array
     base, d, distance = (np.asarray(v, dtype=float) for v in (d_12, change, d_mp))
     fall = 0.25 * d * (2.0 * base + d)
     if np.any(fall >= distance**2):
-        raise ValidityError(f"spacing changed by {np.max(d):g} m: no triangle is left; give metres")
+        raise ValidityError(f"spacing changed by {np.max(d):g} m: no triangle remains; expected metres")
     return -fall / (distance + np.sqrt(distance**2 - fall))
 
 
 def spacing_effect_memo(d_12: ArrayLike, change: ArrayLike, d_mp: ArrayLike) -> Array:
-    """The same to first order; arguments as of `spacing_effect`.
+    """Error of the computed D_MP to first order.
+
+    Arguments as of `spacing_effect`.
 
     Source: [GOLDMAN00] eq. A.2.
 
@@ -78,7 +84,7 @@ def spacing_effect_memo(d_12: ArrayLike, change: ArrayLike, d_mp: ArrayLike) -> 
 
 
 def along_effect(along: ArrayLike, *, d_1: ArrayLike, d_2: ArrayLike, d_12: ArrayLike) -> Array:
-    """D_BC - D_MP of a ball that lies on the prisms' line beside their mid-point, m.
+    """Difference D_BC - D_MP of a ball displaced along the prisms' line, m.
 
     along      m, towards the right prism T_2
     d_1, d_2   m, from the scan point to the left and right prism
@@ -96,7 +102,9 @@ def along_effect(along: ArrayLike, *, d_1: ArrayLike, d_2: ArrayLike, d_12: Arra
 
 
 def along_effect_memo(along: ArrayLike, *, d_1: ArrayLike, d_2: ArrayLike, d_12: ArrayLike) -> Array:
-    """The same by the memo's shortcut x (D_2 - D_1)/D_12; arguments as of `along_effect`.
+    """Difference by the memo's shortcut x (D_2 - D_1)/D_12.
+
+    Arguments as of `along_effect`.
 
     Source: [GOLDMAN00] eq. A.7.
 
@@ -108,7 +116,9 @@ def along_effect_memo(along: ArrayLike, *, d_1: ArrayLike, d_2: ArrayLike, d_12:
 
 
 def along_bound(along: ArrayLike, d_12: ArrayLike, d_0: ArrayLike) -> Array:
-    """The most that |D_BC - D_MP| can be while the perpendicular from the scan point falls between the prisms, m.
+    """Upper bound of |D_BC - D_MP|, m.
+
+    While the perpendicular from the scan point falls between the prisms.
 
     along   m, of the ball beside the mid-point
     d_12    m, between the prisms
@@ -123,7 +133,9 @@ def along_bound(along: ArrayLike, d_12: ArrayLike, d_0: ArrayLike) -> Array:
 
 
 def across_effect(across: ArrayLike, *, height: ArrayLike, d_mp: ArrayLike) -> Array:
-    """D_BC - D_MP of a ball that lies in the plate beside the prisms' line, m.
+    """Difference D_BC - D_MP of a ball displaced across the line, m.
+
+    In the plate.
 
     across   m, along the unit's y, normal x axis
     height   m, of the scan point along the same direction: the memo's h_S where the plate is upright
@@ -146,7 +158,7 @@ def across_effect(across: ArrayLike, *, height: ArrayLike, d_mp: ArrayLike) -> A
 def refractivity_slopes(
     temperature_c: float = 20.0, pressure_hpa: float = 933.0, humidity_percent: float = 50.0
 ) -> RefractivitySlopes:
-    """How air's group refractivity at 0.780 um moves with the weather.
+    """Derivatives of air's group refractivity at 0.780 um by the weather.
 
     temperature_c, pressure_hpa, humidity_percent   deg C, hPa, %
 
@@ -166,7 +178,9 @@ def refractivity_change(
     *,
     slopes: RefractivitySlopes = SLOPES,
 ) -> Array:
-    """Change of air's group refractivity for moderate changes of the weather, linear.
+    """Linear change of air's group refractivity by the weather.
+
+    For moderate changes.
 
     temperature_c, pressure_hpa, humidity_percent   changes, deg C, hPa, %
     slopes                                          D.4, right by default
@@ -182,7 +196,9 @@ def refractivity_change(
 
 
 def ratio_change(refractivity: ArrayLike, ratio: float = RATIO, index: float = 1.000253247) -> Array:
-    """Change of the index ratio n of glass over air as the air's refractivity changes, the glass held.
+    """Change of the index ratio n of glass over air.
+
+    As the air's refractivity changes, at constant glass.
 
     refractivity   change of n_air
     ratio, index   n and n_air before
@@ -197,7 +213,9 @@ def ratio_change(refractivity: ArrayLike, ratio: float = RATIO, index: float = 1
 
 
 def glass_effect(glass: ArrayLike, refractivity: ArrayLike, ratio: float = RATIO) -> Array:
-    """How much too long a range to a fixed point in glass is when P_c is kept as tabulated, m.
+    """Error of a range to a point in glass with the tabulated P_c, m.
+
+    Positive: too long.
 
     glass          m, one way: height of a prism, R_1 + R_2 of the ball
     refractivity   change of n_air since the table

@@ -1,8 +1,8 @@
-"""How uncertain each placement of a triplet's calibration is, and what the placements share.
+"""Uncertainty of each placement of a triplet, and what placements share.
 
 Each input is moved by its standard uncertainty up and down; half the change is its share ([JCGM100] 5.1.4, note 2). An
-input that several placements use is moved once, in all of them: heights, sizes of the glass, index ratio, fixture, a
-phase that was read once and written down for several flips.
+input common to several placements is moved once, in all of them: heights, sizes of the glass, index ratio, fixture, a
+phase that was read once and recorded for several flips.
 """
 
 from collections.abc import Iterator
@@ -18,14 +18,16 @@ from catseye.reduction.triplet.geometry import TripletCycles, TripletLengths, Tr
 
 Array = NDArray[np.float64]
 Moves = dict[str, Array]
-FEW = 0.1  # of u_phase: in steps coarser than that two readings agree to the last digit more often than one in 35
+FEW = 0.1  # of u_phase: coarser steps make two readings agree to the last digit more often than one in 35
 
 
 @dataclass(frozen=True, eq=False)
 class TripletShares:
-    """Shares of q inputs in the outputs of k placements, m, one standard uncertainty each.
+    """Contributions of q inputs to the outputs of k placements.
 
-    groups    (q,) what kind of input
+    m, one standard uncertainty each.
+
+    groups    (q,) kind of input
     h_corr    (q, k)
     depth     (q, k) of the mid-point below the scan point
     l_mpbc    (q,)
@@ -38,11 +40,11 @@ class TripletShares:
 
 
 def triplet_shares(measurement: TripletMeasurement, readings: TripletReadings, cycles: TripletCycles) -> TripletShares:
-    """Every input's share in every placement.
+    """Contribution of every input to every placement.
 
     measurement   a measured unit
     readings      its readings
-    cycles        whole half wavelengths, held
+    cycles        whole half wavelengths, fixed
 
     Source: [JCGM100] 5.1.4 note 2 and eq. F.2.
     """
@@ -69,7 +71,10 @@ def triplet_shares(measurement: TripletMeasurement, readings: TripletReadings, c
 
 
 def _inputs(measurement: TripletMeasurement) -> Iterator[tuple[str, Moves]]:
-    """(group, what moves together by one standard uncertainty), every input once."""
+    """Every input once, as (group, joint change).
+
+    The change is by one standard uncertainty.
+    """
     yield from _phases(measurement)
     yield from _air(measurement)
     one = np.ones(len(measurement.placement))
@@ -95,40 +100,42 @@ def _inputs(measurement: TripletMeasurement) -> Iterator[tuple[str, Moves]]:
 
 
 def _phases(measurement: TripletMeasurement) -> Iterator[tuple[str, Moves]]:
-    """Each phase that was read, once, wherever it is written.
+    """Each phase reading once, wherever it is recorded.
 
-    Equal digits are one reading, unless they are so few that a second reading would often show the same: there one that
-    is written at the flip counts as read again.
+    Equal digits are one reading, unless they are so few that a second reading would often show the same: then one
+    recorded at the flip counts as a new reading.
     """
     count = len(measurement.placement)
     step = written_step(measurement)
     read: dict[tuple[object, ...], Moves] = {}
 
     def again(k: int, quantity: str) -> tuple[object, ...]:
-        each = measurement.placement[k]
-        coarse = step > FEW * each.u_phase_rad
-        return ("again", k) if coarse and getattr(each, f"{quantity}_flipped_rad") is not None else ()
+        placement = measurement.placement[k]
+        coarse = step > FEW * placement.u_phase_rad
+        return ("again", k) if coarse and getattr(placement, f"{quantity}_flipped_rad") is not None else ()
 
-    for k, each in enumerate(measurement.placement):
-        place = (each.spacer_mm, each.d_toppl_mm)
+    for k, placement in enumerate(measurement.placement):
+        place = (placement.spacer_mm, placement.d_toppl_mm)
         written = [
-            ("phi_1", (*place, 1, each.phi_1_rad)),
-            ("phi_2", (*place, 2, each.phi_2_rad)),
-            ("phi_bcfp", (*place, 3, each.phi_bcfp_rad)),
-            ("phi_zrg", ("reference", each.phi_zrg_rad)),
-            ("phi_zrg_fp", ("reference", *again(k, "phi_zrg"), each.flipped("phi_zrg", "rad"))),
-            ("phi_cal", ("calibration", each.phi_cal_rad)),
-            ("phi_cal_fp", ("calibration", *again(k, "phi_cal"), each.flipped("phi_cal", "rad"))),
+            ("phi_1", (*place, 1, placement.phi_1_rad)),
+            ("phi_2", (*place, 2, placement.phi_2_rad)),
+            ("phi_bcfp", (*place, 3, placement.phi_bcfp_rad)),
+            ("phi_zrg", ("reference", placement.phi_zrg_rad)),
+            ("phi_zrg_fp", ("reference", *again(k, "phi_zrg"), placement.flipped("phi_zrg", "rad"))),
+            ("phi_cal", ("calibration", placement.phi_cal_rad)),
+            ("phi_cal_fp", ("calibration", *again(k, "phi_cal"), placement.flipped("phi_cal", "rad"))),
         ]
         for name, key in written:
-            moves = read.setdefault((*key, each.u_phase_rad), {})
-            moves.setdefault(name, np.zeros(count))[k] = each.u_phase_rad
+            moves = read.setdefault((*key, placement.u_phase_rad), {})
+            moves.setdefault(name, np.zeros(count))[k] = placement.u_phase_rad
     for moves in read.values():
         yield "phases", moves
 
 
 def written_step(measurement: TripletMeasurement) -> float:
-    """The last digit to which the sheet's measured phases are written, rad: of the finest of them.
+    """Last recorded digit of the sheet's phases, rad.
+
+    Of the finest of them.
 
     measurement   a measured unit
     """
@@ -138,15 +145,18 @@ def written_step(measurement: TripletMeasurement) -> float:
 
 
 def _air(measurement: TripletMeasurement) -> Iterator[tuple[str, Moves]]:
-    """What the readings of the weather add, each time they were needed; a common offset cancels."""
+    """Contribution of the weather's readings, each time they were needed.
+
+    A common offset cancels.
+    """
     common = {"wavelength_um": measurement.wavelength_um, "model": measurement.air_model}
     count = len(measurement.placement)
-    for k, each in enumerate(measurement.placement):
-        before = (each.temperature_c, each.pressure_hpa, each.humidity_percent)
+    for k, placement in enumerate(measurement.placement):
+        before = (placement.temperature_c, placement.pressure_hpa, placement.humidity_percent)
         after = (
-            each.flipped("temperature", "c"),
-            each.flipped("pressure", "hpa"),
-            each.flipped("humidity", "percent"),
+            placement.flipped("temperature", "c"),
+            placement.flipped("pressure", "hpa"),
+            placement.flipped("humidity", "percent"),
         )
         for name, weather in (("eta_a", before), ("eta_a_fp", after)):
             slope = air(*weather, **common).sensitivity

@@ -1,4 +1,4 @@
-"""A triplet unit's calibration: from its sheet to one H_corr with uncertainty, and whether the unit is accepted."""
+"""Calibration of a triplet unit: H_corr with uncertainty, and acceptance."""
 
 import math
 from dataclasses import dataclass, replace
@@ -23,21 +23,21 @@ from catseye.reduction.triplet.uncertainty import TripletShares, triplet_shares
 
 LEVEL = 0.05  # of the tests of consistency and of single placements together
 SIGMAS = 5.0  # of D_TOPPL that the margin of the whole cycles must hold
-FAR = 10e-3  # m: ranging and plate differ by more than any triplet's parts could, a tenth of a slip
+FAR = 10e-3  # m: ranging and plate differ by more than any triplet's parts, a tenth of a slip
 REFERENCE_AIR = (20.0, 933.0, 50.0)  # deg C, hPa, %: of the memo's index ratio 1.527077
-FLOOR = 1e-9  # m, added to each placement: below what phases are written to; keeps repeated ones apart
+FLOOR = 1e-9  # m, added to each placement: below the phases' last digit; keeps repeated ones non-singular
 GOOD, THIN, SUSPECT, NOT_A_TRIANGLE, SLIPPED = (
     "good", "thin margin", "suspect", "no triangle: left out", "whole cycles doubtful",
 )  # fmt: skip
 
 
 def reduce_triplet(measurement: TripletMeasurement) -> TripletReduction:
-    """The whole reduction of one sheet.
+    """Reduction of one sheet.
 
     measurement   a measured unit
 
-    A placement whose ranges make no triangle is left out with its status; with none left the answer is NaN and the unit
-    is not accepted. Nothing else is left out.
+    A placement whose ranges make no triangle is left out with its status; without any other the answer is NaN and the
+    unit is not accepted. Nothing else is left out.
 
     Source: [GOLDMAN00] sections 3.1 and 3.2; combination of placements by generalised least squares.
     """
@@ -49,13 +49,13 @@ def reduce_triplet(measurement: TripletMeasurement) -> TripletReduction:
     used = np.flatnonzero(np.isfinite(np.diagonal(covariance)) & np.isfinite(lengths.h_corr))
     best = combined(lengths.h_corr, covariance, used)
     l_mpbc = float(np.ravel(lengths.l_mpbc)[0])
-    # shares of each input in the best h_corr: placements that are left out weigh nothing, whatever their NaN
+    # shares of each input in the best h_corr: rejected placements have weight 0, whatever their NaN
     share = shares.h_corr[:, used] @ best.weights[used]
     valid = len(used) > 0
     u_h = float(np.linalg.norm(share)) if valid else math.nan
     difference = best.value - l_mpbc
     u_difference = float(np.linalg.norm(share - shares.l_mpbc)) if valid else math.nan
-    others = np.setdiff1d(used, best.suspects)
+    consistent = np.setdiff1d(used, best.suspects)
     agreeing_ratio, u_agreeing_ratio = _agreeing_ratio(measurement, shares, difference, share)
     steps, u_steps = _steps(measurement, lengths, shares)
     status = tuple(_status(measurement, k, lengths, cycles, best.suspects) for k in range(len(measurement.placement)))
@@ -86,7 +86,7 @@ def reduce_triplet(measurement: TripletMeasurement) -> TripletReduction:
         p=best.p,
         suspects=best.suspects,
         h_corr_without_suspects=(
-            combined(lengths.h_corr, covariance, others).value if best.suspects and len(others) else math.nan
+            combined(lengths.h_corr, covariance, consistent).value if best.suspects and len(consistent) else math.nan
         ),
         budget=_budget(shares, share) if valid else {},
         steps=steps,
@@ -101,24 +101,26 @@ def reduce_triplet(measurement: TripletMeasurement) -> TripletReduction:
 
 
 def triplet_readings(measurement: TripletMeasurement) -> TripletReadings:
-    """The sheet as arrays over its placements, metres; the air's index by the sheet's model.
+    """Sheet as arrays over its placements, metres.
+
+    The air's index by the sheet's model.
 
     measurement   a measured unit
 
-    Where the sheet gives the group index of the glass, the delay in it follows the air of each placement, the fiducial
-    points staying where the sheet has them.
+    Where the sheet has the group index of the glass, the delay in it follows the air of each placement, the fiducial
+    points staying at the sheet's places.
     """
     m, plate = measurement, measurement.surface_plate
-    left, right = m.prisms
+    left_prism, right_prism = m.prisms
 
     def column(name: str) -> Array:
-        return np.array([getattr(each, name) for each in m.placement], dtype=float)
+        return np.array([getattr(placement, name) for placement in m.placement], dtype=float)
 
     def metres(length_mm: float) -> Array:
         return np.asarray(length_mm * 1e-3)
 
     def after(quantity: str, unit: str) -> Array:
-        return np.array([each.flipped(quantity, unit) for each in m.placement], dtype=float)
+        return np.array([placement.flipped(quantity, unit) for placement in m.placement], dtype=float)
 
     light = {"wavelength_um": m.wavelength_um, "model": m.air_model}
     weather = column("temperature_c"), column("pressure_hpa"), column("humidity_percent")
@@ -146,12 +148,12 @@ def triplet_readings(measurement: TripletMeasurement) -> TripletReadings:
         l_2=metres(plate.l2_mm),
         l_bt=metres(plate.l_bt_mm),
         l_post=metres(plate.l_post_mm),
-        height_1=metres(left.height_mm),
-        height_2=metres(right.height_mm),
-        hrp_1=metres(left.hrp_mm),
-        hrp_2=metres(right.hrp_mm),
-        pc_1=(left.pc_mm - left.height_mm * extra) * 1e-3,
-        pc_2=(right.pc_mm - right.height_mm * extra) * 1e-3,
+        height_1=metres(left_prism.height_mm),
+        height_2=metres(right_prism.height_mm),
+        hrp_1=metres(left_prism.hrp_mm),
+        hrp_2=metres(right_prism.hrp_mm),
+        pc_1=(left_prism.pc_mm - left_prism.height_mm * extra) * 1e-3,
+        pc_2=(right_prism.pc_mm - right_prism.height_mm * extra) * 1e-3,
         pc_b=(m.ball.pc_b_mm - (m.ball.r1_mm + m.ball.r2_mm) * extra_fp) * 1e-3,
         r_1=metres(m.ball.r1_mm),
         n=np.asarray(n),
@@ -161,7 +163,10 @@ def triplet_readings(measurement: TripletMeasurement) -> TripletReadings:
 
 @dataclass(frozen=True, eq=False)
 class Combined:
-    """Correlated values of one quantity, combined; see `TripletReduction` for the words."""
+    """Combination of correlated values of one quantity.
+
+    See `TripletReduction` for the terms.
+    """
 
     value: float
     weights: Array
@@ -174,14 +179,15 @@ class Combined:
 
 
 def combined(values: Array, covariance: Array, used: NDArray[np.intp]) -> Combined:
-    """The mean of correlated values with weights of least variance, and which of them the others contradict.
+    """Least-variance mean of correlated values, with suspects.
 
     values       (k,)
     covariance   (k, k), of the used ones above zero
-    used         which count
+    used         True where a value counts
 
     The suspects are found one by one, the largest standardised residual w first, each judged without those before it,
-    by the two-sided limit of the level 5 % shared among all. Of two values that contradict each other both are.
+    by the two-sided limit of the level 5 % shared among all. Of two values that contradict each other both are
+    suspects.
 
     Source: generalised least squares with Baarda's w, written out for one unknown.
 
@@ -196,45 +202,48 @@ def combined(values: Array, covariance: Array, used: NDArray[np.intp]) -> Combin
         return Combined(math.nan, weights, residuals, statistics, math.nan, 0, math.nan, ())
     weights[used], inverse = _weights(covariance, used)
     value = float(weights[used] @ values[used])
-    left = values[used] - value
-    residuals[used] = left
+    deviation = values[used] - value
+    residuals[used] = deviation
     degrees = len(used) - 1
     if not degrees:
         return Combined(value, weights, residuals, statistics, 0.0, 0, math.nan, ())
-    chi_square = float(left @ inverse @ left)
+    chi_square = float(deviation @ inverse @ deviation)
     statistics[used] = _standardised(values, covariance, used)
     limit = -float(ndtri(0.5 * LEVEL / len(used)))
     suspects: list[int] = []
-    rest, w = used, statistics[used]
-    while len(rest) > 1 and np.max(np.abs(w)) > limit:
-        if len(rest) == 2:  # nothing says which
-            suspects += [int(k) for k in rest]
+    unsuspected, w = used, statistics[used]
+    while len(unsuspected) > 1 and np.max(np.abs(w)) > limit:
+        if len(unsuspected) == 2:  # undecided which
+            suspects += [int(k) for k in unsuspected]
             break
         worst = int(np.argmax(np.abs(w)))
-        suspects.append(int(rest[worst]))
-        rest = np.delete(rest, worst)
-        w = _standardised(values, covariance, rest)
+        suspects.append(int(unsuspected[worst]))
+        unsuspected = np.delete(unsuspected, worst)
+        w = _standardised(values, covariance, unsuspected)
     p = float(chdtrc(degrees, chi_square))
     return Combined(value, weights, residuals, statistics, chi_square, degrees, p, tuple(sorted(suspects)))
 
 
 def _weights(covariance: Array, used: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Of least variance, and the inverse of the covariance."""
-    apart = covariance[np.ix_(used, used)] + np.eye(len(used)) * FLOOR**2  # placements that share everything
+    """Weights of least variance, and the inverse of the covariance."""
+    apart = covariance[np.ix_(used, used)] + np.eye(len(used)) * FLOOR**2  # placements with identical errors
     inverse = np.asarray(np.linalg.inv(apart), dtype=np.float64)
     return inverse.sum(axis=1) / inverse.sum(), inverse
 
 
 def _standardised(values: Array, covariance: Array, used: NDArray[np.intp]) -> Array:
-    """w of each; with v the residuals the covariance of C^-1 v is C^-1 - C^-1 1 1' C^-1 / (1' C^-1 1)."""
+    """Test statistic w of each value.
+
+    With v the residuals the covariance of C^-1 v is C^-1 - C^-1 1 1' C^-1 / (1' C^-1 1).
+    """
     weights, inverse = _weights(covariance, used)
-    left = values[used] - weights @ values[used]
+    residuals = values[used] - weights @ values[used]
     spread = inverse - np.outer(inverse.sum(axis=1), inverse.sum(axis=0)) / inverse.sum()
-    return (inverse @ left) / np.sqrt(np.diagonal(spread))
+    return (inverse @ residuals) / np.sqrt(np.diagonal(spread))
 
 
 def _budget(shares: TripletShares, share: Array) -> dict[str, float]:
-    """Each group's share in the uncertainty of h_corr, m."""
+    """Contribution of each group to the uncertainty of h_corr, m."""
     budget: dict[str, float] = {}
     for group, value in zip(shares.groups, share, strict=True):
         budget[group] = math.hypot(budget.get(group, 0.0), float(value))
@@ -244,7 +253,7 @@ def _budget(shares: TripletShares, share: Array) -> dict[str, float]:
 def _agreeing_ratio(
     m: TripletMeasurement, shares: TripletShares, difference: float, share: Array
 ) -> tuple[float, float]:
-    """The index ratio with which ranging and surface plate would agree, and its u.
+    """Index ratio that reconciles ranging and surface plate, and its u.
 
     difference   m, H_corr by ranging less that by the surface plate
     share        (q,) m, of each input in H_corr by ranging
@@ -256,15 +265,15 @@ def _agreeing_ratio(
 
 
 def _steps(m: TripletMeasurement, lengths: TripletLengths, shares: TripletShares) -> tuple[Array, Array]:
-    """How far ranging puts the stops from where it put them in the first placement, and its u."""
-    spacer = np.array([each.spacer_mm for each in m.placement]) * 1e-3
+    """Place of the stops by ranging relative to the first placement, and its u."""
+    spacer = np.array([placement.spacer_mm for placement in m.placement]) * 1e-3
     place = lengths.depth_mp + spacer
     u_spacer = np.where(spacer != spacer[0], math.sqrt(2.0) * m.u_spacer_mm * 1e-3, 0.0)
     return place - place[0], np.hypot(np.linalg.norm(shares.depth - shares.depth[:, :1], axis=0), u_spacer)
 
 
 def _air_in_glass(m: TripletMeasurement, r: TripletReadings, weights: Array) -> float:
-    """What an index of glass that does not follow the air's would add to h_corr."""
+    """Change of h_corr by a glass index that does not follow the air's."""
     if m.bk7_group_index is not None:
         return 0.0
     reference = 1.0 + float(group_refractivity(*REFERENCE_AIR, wavelength_um=m.wavelength_um, model=m.air_model))

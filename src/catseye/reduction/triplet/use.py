@@ -1,4 +1,4 @@
-"""Triplets on the telescope: ranges to both prisms give the distance to the ball behind them.
+"""Triplets on the telescope: ball distance from ranges to both prisms.
 
 Two ranges of a feed-arm ranger, corrected for the glass at normal incidence, become by the memo's steps
 
@@ -11,11 +11,11 @@ the memo leaves out H_corr^2 sin^2 / (2 D), 0.02 nm for 0.2 mm at 12 deg and 46 
 may hold. Figure 10's series, that of 3.19b, leaves out D_12^2 (delta_1 + delta_2) / (16 Delta^2): 2.4 um at 46 m where
 delta_1 + delta_2 is a wavelength (`memo.median_series`).
 
-The memo takes the angles A-T-S for the incidences. The prisms' normals are parallel to the plate's, not meeting in A:
+The memo uses the angles A-T-S as incidences. The prisms' normals are parallel to the plate's, not meeting in A:
 T_1 A and T_2 A lean by D_12 / (2 D), 3 to 7 mrad, either way. At 46 m that is up to 0.3 um in each range at 10 deg,
 7 um at 30 deg, with opposite signs: the mid-point keeps a fiftieth of it or less. Here the normal itself is used.
 
-What lies beside the mid-point counts here, as it does not at the calibration: the ball 0.15 mm aside in the plate is
+Displacements from the mid-point matter here, unlike at the calibration: the ball 0.15 mm aside in the plate is
 0.15 mm times the sine of the incidence, 31 um at 12 deg (`tolerances`).
 """
 
@@ -39,7 +39,9 @@ SQUARE = 1e-9  # of unit vectors: their dot product and their lengths
 
 @dataclass(frozen=True, eq=False)
 class MountedTriplet:
-    """A triplet on the telescope as its records say, in one frame; metres, radians.
+    """Triplet on the telescope by its records, in one frame.
+
+    Metres, radians.
 
     name                 of the unit
     ball                 (3,) its centre, approximately
@@ -74,10 +76,10 @@ class MountedTriplet:
 
     @classmethod
     def of(cls, record: TripletRecord, frame: Transform, *, ratio: float, u_normal: float) -> "MountedTriplet":
-        """The unit of a data sheet.
+        """Mounted triplet of a data sheet.
 
         record     the sheet
-        frame      from the sheet's frame to the one wanted
+        frame      from the sheet's frame to the target frame
         ratio      group index of the glass over that of the air
         u_normal   rad, of the plate's normal, each direction
 
@@ -103,18 +105,20 @@ class MountedTriplet:
 
     @property
     def across(self) -> Array:
-        """(3,) the unit's y axis: normal x axis."""
+        """Unit's y axis (3,): normal x axis."""
         return np.cross(self.normal, self.axis)
 
     @property
     def prisms(self) -> Array:
-        """(2, 3) m, reference points of the left and right prism."""
+        """Reference points (2, 3), m, of the left and right prism."""
         return self.ball - self.h_corr * self.normal + np.outer([-0.5, 0.5], self.d_12 * self.axis)
 
 
 @dataclass(frozen=True, eq=False)
 class BallRanges:
-    """Distances from k rangers to the balls of n triplets; NaN where a prism was not ranged or no triangle closes.
+    """Distances from k rangers to the balls of n triplets.
+
+    NaN for a prism without a range or without a closed triangle.
 
     incidence    (n, k, 2) rad, on the left and right prism
     obliquity    (n, k, 2) m, dPc, added to the measured ranges, never positive
@@ -132,7 +136,9 @@ class BallRanges:
 
 
 def median(d_1: ArrayLike, d_2: ArrayLike, d_12: ArrayLike) -> Array:
-    """Distance to the mid-point of the prisms, m; NaN where three lengths make no triangle.
+    """Distance to the mid-point of the prisms, m.
+
+    NaN where three lengths make no triangle.
 
     d_1, d_2   m, to the prisms
     d_12       m, between them
@@ -149,7 +155,7 @@ def median(d_1: ArrayLike, d_2: ArrayLike, d_12: ArrayLike) -> Array:
 
 
 def ball_distance(d_mp: ArrayLike, sight: ArrayLike, offset: ArrayLike) -> Array:
-    """Distance from a ranger to the ball, m, from that to the prisms' mid-point.
+    """Distance from a ranger to the ball, m, from that to the mid-point.
 
     d_mp     (...) m
     sight    (..., 3) unit vector from the ball to the ranger
@@ -167,7 +173,9 @@ def ball_distance(d_mp: ArrayLike, sight: ArrayLike, offset: ArrayLike) -> Array
 
 
 def ball_distance_memo(d_mp: ArrayLike, sight: ArrayLike, offset: ArrayLike) -> Array:
-    """The same by the memo's subtraction, too long by the offset's square across the sight over twice the distance.
+    """Distance to the ball by the memo's subtraction, m.
+
+    Too long by the offset's square across the sight over twice the distance.
 
     Arguments as of `ball_distance`.
 
@@ -186,20 +194,21 @@ def ball_ranges(
 
     units         n, in the frame of the scan points
     scan_points   (k, 3) m, approximately
-    ranges        (n, k, 2) m, to the left and right prism, with Pc but without dPc; NaN where there is none
+    ranges        (n, k, 2) m, to the left and right prism, with Pc but without dPc; NaN for missing ones
     covariance    (2nk, 2nk) m^2 of the ranges in that order: zeros and glass constants are common to many
 
-    Besides the ranges' own, each unit adds what all its distances share: u of D_12, H_corr, both lateral offsets and
-    both tilts of the normal. Approximate coordinates good to 20 mm turn a sight by 0.4 mrad at 50 m: 0.1 um at most.
+    Besides the ranges' own, each unit adds the common errors of its distances: u of D_12, H_corr, both lateral offsets
+    and both tilts of the normal. Approximate coordinates good to 20 mm turn a sight by 0.4 mrad at 50 m: 0.1 um at
+    most.
 
     Source: [GOLDMAN00] appendix C; covariance to first order, [JCGM100] section 5.2.
     """
     s, d = np.asarray(scan_points, dtype=float), np.asarray(ranges, dtype=float)
     n, k = len(units), len(s)
-    given = np.asarray(covariance, dtype=float)
-    if d.shape != (n, k, 2) or given.shape != (2 * n * k, 2 * n * k):
+    full = np.asarray(covariance, dtype=float)
+    if d.shape != (n, k, 2) or full.shape != (2 * n * k, 2 * n * k):
         raise InputError(
-            f"ranges have shape {d.shape} and covariance {given.shape}; expected ({n}, {k}, 2) and "
+            f"ranges have shape {d.shape} and covariance {full.shape}; expected ({n}, {k}, 2) and "
             f"({2 * n * k}, {2 * n * k}) for {n} triplets and {k} scan points"
         )
     by_triplet = [_one(unit, s, rows) for unit, rows in zip(units, d, strict=True)]
@@ -207,20 +216,22 @@ def ball_ranges(
         np.stack(part) for part in zip(*by_triplet, strict=True)
     )
     slope = by_range.reshape(n * k, 2)
-    known = np.isfinite(d_bc).ravel()
-    blocks = np.where(np.isfinite(given), given, 0.0).reshape(n * k, 2, n * k, 2)
+    solved = np.isfinite(d_bc).ravel()
+    blocks = np.where(np.isfinite(full), full, 0.0).reshape(n * k, 2, n * k, 2)
     total = np.einsum(
-        "ia,iajb,jb->ij", np.where(known[:, None], slope, 0.0), blocks, np.where(known[:, None], slope, 0.0)
+        "ia,iajb,jb->ij", np.where(solved[:, None], slope, 0.0), blocks, np.where(solved[:, None], slope, 0.0)
     )
     for i, part in enumerate(np.nan_to_num(by_unit)):
         rows = slice(i * k, (i + 1) * k)
         total[rows, rows] += part @ part.T
-    total[~known], total[:, ~known] = np.nan, np.nan
+    total[~solved], total[:, ~solved] = np.nan, np.nan
     return BallRanges(incidence, obliquity, d_mp, d_bc, memo, total)
 
 
 def incidence_on_prisms(unit: MountedTriplet, scan_points: ArrayLike) -> tuple[Array, Array]:
-    """Cosine of incidence (k, 2) on the left and right prism, and the unit vectors (k, 2, 3) towards the rangers.
+    """Cosine of incidence (k, 2) on both prisms, and unit vectors.
+
+    Vectors (k, 2, 3) towards the rangers; left and right prism.
 
     scan_points   (k, 3) m, approximately, in the unit's frame
 
@@ -232,7 +243,9 @@ def incidence_on_prisms(unit: MountedTriplet, scan_points: ArrayLike) -> tuple[A
 
 
 def obliquity_by_tilt(unit: MountedTriplet, scan_points: ArrayLike, tilts: ArrayLike) -> tuple[Array, Array]:
-    """dPc (k, 2) in m, and its derivatives (k, 2, t) in m/rad as the normal moves along t directions.
+    """Range constant change dPc (k, 2), m, and derivatives by tilts.
+
+    (k, 2, t) in m/rad as the normal moves along t directions.
 
     scan_points   (k, 3) m, approximately
     tilts         (t, 3) unit vectors in the plate
@@ -248,7 +261,10 @@ def obliquity_by_tilt(unit: MountedTriplet, scan_points: ArrayLike, tilts: Array
 
 
 def _one(unit: MountedTriplet, s: Array, d: Array) -> tuple[Array, ...]:
-    """Of one unit: incidence, dPc, D_MP, D_BC, the memo's D_BC, slopes by both ranges, shares of what it adds."""
+    """Results of one unit.
+
+    Incidence, dPc, D_MP, D_BC, the memo's D_BC, slopes by both ranges, contributions of its errors.
+    """
     tilts = np.stack([unit.axis, unit.across])
     obliquity, by_tilt = obliquity_by_tilt(unit, s, tilts)
     right = d + obliquity
@@ -278,7 +294,7 @@ def _one(unit: MountedTriplet, s: Array, d: Array) -> tuple[Array, ...]:
 
 
 def _parts(sight: ArrayLike, offset: ArrayLike) -> tuple[Array, Array]:
-    """The offset along the sight, and its square length."""
+    """Offset along the sight, and its square length."""
     e, v = np.asarray(sight, dtype=float), np.asarray(offset, dtype=float)
     return np.sum(e * v, axis=-1), np.sum(v * v, axis=-1)
 
@@ -286,12 +302,14 @@ def _parts(sight: ArrayLike, offset: ArrayLike) -> tuple[Array, Array]:
 def scan_points_from_balls(
     start: ArrayLike, balls: ArrayLike, *, ball_covariance: ArrayLike, ranges: BallRanges
 ) -> LeastSquaresSolution:
-    """Coordinates of feed-arm scan points from those of the balls and the distances between: the memo's third step.
+    """Feed-arm scan points from the balls and distances.
+
+    The memo's third step.
 
     start             (k, 3) m, approximate scan points
     balls             (n, 3) m, ground coordinates of the balls' centres
     ball_covariance   (3n, 3n) m^2 of these
-    ranges            distances n by k with their covariance; those that are NaN are left out
+    ranges            distances n by k with their covariance; NaN for missing ones
 
     Returns a Solution over the scan points (3k) and then the balls (3n), which the distances improve a little.
 

@@ -47,7 +47,7 @@ def test_a_planted_zero_and_scale_are_found_with_every_correction():
     assert found.value("scale_ppm") == pytest.approx(40.0, abs=1e-4)
 
 
-def test_zero_and_scale_scatter_as_their_covariance_says_whoever_shares_a_block():
+def test_zero_and_scale_scatter_as_their_covariance_with_shared_blocks():
     rng = np.random.default_rng(8)
     found, claimed = [], []
     for _ in range(400):
@@ -63,7 +63,7 @@ def test_zero_and_scale_scatter_as_their_covariance_says_whoever_shares_a_block(
     assert np.all(np.abs(np.mean(found, axis=0)) < 4 * u / 20)
 
 
-def test_spacers_share_what_their_instrument_does_not_know():
+def test_spacers_share_their_instruments_uncertainty():
     sheet = {"zero_mm": 0.01, "u_zero_mm": 0.002, "scale_ppm": 40.0, "u_scale_ppm": 0.0, "temperature_c": 20.0}
     made = readings(
         SpacersSheet,

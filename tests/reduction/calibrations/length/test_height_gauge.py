@@ -74,7 +74,7 @@ def test_blocks_films_and_a_warm_gauge_are_added_as_they_are():
     assert found.u("dy_mm") == pytest.approx(np.sqrt(2 * 0.001**2 / 2 + 3 * 2e-4**2), rel=1e-3)
 
 
-def test_what_a_set_up_leans_by_itself_is_in_u():
+def test_the_lean_of_a_single_set_up_is_in_u():
     found = calibrated({"offset": OFFSET}, u_seating_arcsec=4.0)
     alone = 4 * ARC * 247.459
     assert found.u("dx_mm") == pytest.approx(alone / np.sqrt(2), rel=0.02)  # two set-ups show x
@@ -90,14 +90,14 @@ def test_what_a_set_up_leans_by_itself_is_in_u():
         ("setup", "b", "setup = 'b' stands another way than before"),
     ],
 )
-def test_words_that_mean_nothing_are_refused(name, value, said):
+def test_unknown_words_are_refused(name, value, said):
     numbers, words = heights({"offset": OFFSET})
     words[name][0] = value
     with pytest.raises(InputError, match=said):
         RECIPE.recipe(table(RECIPE, numbers, words, **SHEET), False)
 
 
-def test_an_offset_that_nothing_shows_must_be_given():
+def test_an_unobserved_offset_must_be_in_the_sheet():
     with pytest.raises(InputError, match=r"dz_mm is missing .* has z up"):
         calibrated({"offset": OFFSET}, made={"places": {name: PLACES[name] for name in ("a", "b", "c")}})
     numbers, words = heights({"offset": OFFSET})

@@ -38,7 +38,7 @@ def test_hung_as_certified_it_shows_its_certified_length_and_the_scales():
     assert found.value("distance_mm") == pytest.approx(24_003.25, abs=1e-8)
 
 
-def test_the_doubt_of_the_known_distance_is_that_of_the_wire():
+def test_the_u_of_the_known_distance_is_that_of_the_wire():
     exact = {key: 0.0 for key in WIRE if key.startswith("u_")}
     found = hung(
         **exact, tension_n=[100.0], temperature_c=20.0, u_reading_mm=1e-6, known_distance_mm=24_000.1,
@@ -75,7 +75,7 @@ def test_a_known_distance_gives_back_the_wire():
 
 
 @draws(150)
-def test_the_claimed_uncertainty_is_the_scatter_of_all_that_is_not_known(runs):
+def test_the_claimed_uncertainty_matches_the_scatter_of_all_inputs(runs):
     rng = np.random.default_rng(3)
     found, u = [], []
     for _ in range(runs):

@@ -33,7 +33,7 @@ def test_screens_before_and_after_the_mirror_agree_whatever_the_face_does(screen
     assert [found.value(f"beam_{a}_mm") for a in "xy"] == pytest.approx([0.21, -0.33], abs=4e3 * SECOND)
 
 
-def test_one_distance_alone_does_not_tell_place_from_tilt():
+def test_one_distance_alone_does_not_separate_place_and_tilt():
     with pytest.raises(EstimationError, match=r"rank deficient: .*(beam|tilt)"):
         calibrated(made={"screens": (("far", 4.0),)})
 

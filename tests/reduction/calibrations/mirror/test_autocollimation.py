@@ -56,7 +56,7 @@ def test_beta_is_no_better_than_the_autocollimators_alignment():
     assert abs(leaning.value("beta2_rad") - 25 * ARC) < leaning.u("beta2_rad")
 
 
-def test_one_azimuth_tells_beta_neither_from_the_tilt_of_the_face_nor_from_the_shaft():
+def test_one_azimuth_separates_beta_neither_from_the_face_tilt_nor_the_shaft():
     made = {"settings": [(0, e, "mirror") for e in (-12, 0, 12) for _ in range(4)]}
     with pytest.raises(EstimationError, match=r"rank deficient: .*beta"):
         calibrated(TRUTH, made=made, u_na0_counts=5.0)
@@ -71,7 +71,7 @@ def test_a_tilt_known_before_is_a_prior_and_stays_out_of_the_record():
     assert held.value("beta1_rad") == pytest.approx(-150 * ARC, abs=1e-9)
 
 
-def test_flips_tell_only_the_face_less_the_shaft_and_sights_in_both_faces_tell_them_apart():
+def test_flips_give_face_minus_shaft_and_both_faces_separate_them():
     truth = {**TRUTH, "axis_tilt": 15 * ARC}
     near = {"settings": SETTINGS}
     flips = calibrated(truth, made=near, u_na0_counts=2.0, na0_nominal=-4195.3)
@@ -85,7 +85,7 @@ def test_flips_tell_only_the_face_less_the_shaft_and_sights_in_both_faces_tell_t
     )
 
 
-def test_a_wrong_reading_is_named_and_left_out_only_when_asked():
+def test_a_wrong_reading_is_named_and_rejected_only_on_request():
     numbers, words = autocollimation(TRUTH, np.random.default_rng(5))
     numbers["y_arcsec"][9] += 30.0
     readings = table(RECIPE, numbers, words, **SHEET, u_reading_arcsec=0.3)
@@ -121,7 +121,7 @@ def test_readings_that_cannot_be_are_refused(change, said):
         RECIPE.recipe(table(RECIPE, numbers, words, **SHEET, u_reading_arcsec=0.3), False)
 
 
-def test_what_the_sheet_must_say_is_asked_for():
+def test_missing_keys_of_the_sheet_are_reported():
     with pytest.raises(InputError, match=r"t\.toml: u_na0_counts is missing"):
         calibrated(TRUTH, made={"settings": SETTINGS})
     with pytest.raises(InputError, match=r"t\.toml: u_flat_arcsec is missing"):

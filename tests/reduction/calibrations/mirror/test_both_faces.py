@@ -122,14 +122,14 @@ def test_the_difference_of_the_azimuths_by_hand_at_ninety_degrees():
     assert found.value("ne0") == pytest.approx(1430.0, abs=1e-3)
 
 
-def test_an_axis_offset_left_out_of_the_sheet_moves_the_elevation_zero_as_told():
+def test_an_omitted_axis_offset_moves_the_elevation_zero_as_predicted():
     at = [(0.2, np.pi / 2, 10.0)] * 2
     found = found_by_counts({**POINT, "tilt": 0.0, "beam_tilt": (0, 0)}, made={"targets": at}, axis_offset_mm=0.0)
     # 4 e sin^2(45) / R of the sum, half of it the zero's, in counts of Phi
     assert found.value("ne0") - 1434.7 == pytest.approx(2 * 0.4e-3 * 0.5 / 10.0 * 1e5 / (4 * np.pi), rel=0.01)
 
 
-def test_a_shaft_that_leans_is_told_from_the_face_by_targets_at_several_heights():
+def test_targets_at_several_heights_separate_shaft_and_face_tilt():
     truth = {**POINT, "tilt": 2e-4}
     numbers, words = pointings(truth)
     numbers = {k: v for k, v in numbers.items() if k not in ("theta_deg", "phi_deg")}

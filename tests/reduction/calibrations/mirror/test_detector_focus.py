@@ -68,14 +68,14 @@ def test_an_even_fall_is_seldom_called_lopsided_by_few_readings(runs):
     assert wrong <= poisson.isf(1e-4, runs * 2 * norm.sf(3.0))
 
 
-def test_a_curve_says_nothing_beyond_its_run():
+def test_a_curve_is_not_extrapolated():
     with pytest.raises(InputError, match=r"installed_mm = 10 lies outside of the run, -?[\d.]+ to [\d.]+ mm"):
         calibrated(model="curve", installed_mm=10.0)
     share = calibrated(installed_mm=10.0).value("amplitude_share")  # a beam is known beyond it
     assert share == pytest.approx(1 / (1 + (9.69 / 1.4) ** 2), rel=1e-6)
 
 
-def test_a_run_that_does_not_reach_the_focus_says_so():
+def test_a_run_that_does_not_reach_the_focus_is_reported():
     found = calibrated(made={"places": np.linspace(1.0, 3.0, 15)})
     assert found.value("best_focus_mm") == pytest.approx(0.31, abs=1e-4)
     assert found.decisions[0].passed is False

@@ -22,7 +22,7 @@ def test_a_polygon_gives_back_the_waves_in_the_records_keys():
     assert found.record["u_encoder_counts"] == max(q.u for q in found.quantities)
 
 
-def test_the_record_is_read_by_the_pointing_as_what_the_encoder_reads_too_high():
+def test_the_pointing_reads_the_record_as_the_encoders_error():
     from catseye.geometry.mirror.imperfect import Imperfections, imperfect_ray
     from catseye.geometry.mirror.pointing import MirrorStation, ray
 
@@ -48,7 +48,7 @@ def test_targets_of_the_elevation_count_by_half_the_beam():
 
 @pytest.mark.parametrize(("display", "factor"), [("mirror", 1.0), ("beam", 2.0)])
 @pytest.mark.parametrize("sign", [1, -1])
-def test_what_the_autocollimator_shows_is_added_with_its_sign_and_factor(display, factor, sign):
+def test_the_autocollimators_reading_is_added_with_sign_and_factor(display, factor, sign):
     numbers, words = polygon(TRUTH)
     off = np.linspace(-40, 40, len(numbers["counts"]))
     psi = (
@@ -80,7 +80,7 @@ def test_counts_that_do_not_go_with_the_angles_are_refused():
         calibrated(beam, axis="elevation", angle_is="axis", zero_counts=1434.0)
 
 
-def test_an_encoder_without_waves_is_seldom_said_to_have_them_from_few_readings():
+def test_few_readings_seldom_give_false_encoder_waves():
     flagged, tables = 0, 200
     for seed in range(tables):
         psi = np.radians(np.arange(0, 360, 60.0))
@@ -90,12 +90,12 @@ def test_an_encoder_without_waves_is_seldom_said_to_have_them_from_few_readings(
     assert flagged <= 22  # 5 % of 200 are 10; more than 22 is a chance of 1e-4
 
 
-def test_a_second_run_from_another_face_tells_the_polygon_from_the_encoder():
+def test_a_second_run_from_another_face_separates_polygon_and_encoder():
     one, two = (calibrated(*polygon(TRUTH, starts=starts), u_face_arcsec=20.0) for starts in ((0,), (0, 3, 6, 9)))
     assert one.u("azimuth_encoder_cosine_1_counts") > 4 * two.u("azimuth_encoder_cosine_1_counts")
 
 
-def test_what_a_polygon_of_few_faces_cannot_tell_is_refused_by_name():
+def test_orders_that_a_polygon_cannot_determine_are_refused_by_name():
     psi = np.radians(np.arange(0, 360, 90.0))
     with pytest.raises(EstimationError, match=r"rank deficient: .*2"):
         calibrated({"angle_deg": np.degrees(psi), "counts": 2691.0 + PER_RADIAN * psi})
@@ -108,7 +108,7 @@ def test_each_order_is_judged():
     assert first.statistic > first.limit > second.statistic
 
 
-def test_a_wrong_reading_is_left_out_when_asked_and_the_sheet_is_checked():
+def test_a_wrong_reading_is_rejected_on_request_and_the_sheet_checked():
     numbers, words = polygon(TRUTH, np.random.default_rng(2))
     numbers["counts"][7] += 1.0
     found = calibrated(numbers, words, True)

@@ -56,7 +56,7 @@ def test_the_directions_out_of_reach_are_named_by_theta():
     assert narrow.decisions[0].passed is False  # less than half a turn: prime does not help everywhere
 
 
-def test_a_touch_of_something_else_is_rejected_when_asked():
+def test_a_touch_of_another_object_is_rejected_on_request():
     found = calibrated([*TOUCHES, 76_100.0], {"stop": [*WORDS["stop"], "high"]}, True, u_touch_counts=1.0)
     assert found.states[-1] == "rejected"
     assert found.value("az_high_stop_counts") == pytest.approx(76_191.0)

@@ -18,7 +18,7 @@ def calibrated(parameters, rng=None, reject=False, made=None, monument=MONUMENT,
     return RECIPE.recipe(table(RECIPE, numbers, words, monument=monument, mirror=mirror, **sheet), reject)
 
 
-def test_counts_as_the_records_say_change_nothing():
+def test_counts_predicted_by_the_records_change_nothing():
     truth, u = station_truth()
     found = calibrated(truth)
     np.testing.assert_allclose([found.value("na0"), found.value("ne0")], [2691.0, 1434.0], atol=1e-6)
@@ -28,7 +28,7 @@ def test_counts_as_the_records_say_change_nothing():
 
 
 @pytest.mark.parametrize(("name", "by"), [("na0", 2.0), ("ne0", -2.0), ("alpha3", 3e-5), ("alpha1", -5e-5)])
-def test_a_change_that_the_counts_can_tell_is_found_with_its_sign(name, by):
+def test_a_detectable_change_is_found_with_its_sign(name, by):
     truth, _ = station_truth()
     k = NAMES.index(name)
     truth[k] += by
@@ -109,7 +109,7 @@ def test_a_target_seen_twice_keeps_its_error():
     assert same.u("ne0") > 1.5 * apart.u("ne0")
 
 
-def test_a_wrong_target_is_left_out_when_asked_and_the_page_reads_back():
+def test_a_wrong_target_is_rejected_on_request_and_the_page_reads_back():
     import tomllib
 
     numbers, words = searches(station_truth()[0], np.random.default_rng(7))

@@ -142,7 +142,7 @@ def test_each_way_to_tie_the_circle_finds_the_same_azimuth(readings, way):
     assert found.value("alpha1_rad") == pytest.approx(np.pi - TRUE, abs=1e-9)
 
 
-def test_both_faces_take_out_collimation_and_trunnion_and_a_single_face_says_what_it_costs(readings):
+def test_both_faces_remove_collimation_and_trunnion_a_single_face_reports_their_u(readings):
     errors = (25 * ARCSECOND, -40 * ARCSECOND)
     plate = {"plate_zero_deg": float(np.degrees(0.4)), "u_plate_zero_arcsec": 0.0}
     both = calibrate_azimuth(readings(seen(errors=errors), **plate))
@@ -257,7 +257,7 @@ def test_polaris_gives_the_frame_s_north_not_the_star_s():
     assert HEIGHT > 0.0 > LONGITUDE
 
 
-def test_the_pole_and_unknown_time_are_in_the_u_unless_the_sheet_knows_them(readings):
+def test_pole_and_time_are_in_the_u_unless_the_sheet_has_them(readings):
     plain = calibrate_azimuth(
         readings(
             [("Polaris", 1.0, "left"), ("Polaris", 1.0 + np.pi, "right")],
@@ -323,7 +323,7 @@ def test_a_full_covariance_counts_as_such(readings):
         readings(field, **plate, covariance_mm2=(-np.eye(12)).tolist())
 
 
-def test_a_wrong_target_is_rejected_when_asked(readings):
+def test_a_wrong_target_is_rejected_on_request(readings):
     plate = {"plate_zero_deg": float(np.degrees(0.4)), "u_plate_zero_arcsec": 0.5}
     field = seen() * 2
     field[4] = (field[4][0], field[4][1] + 20 * ARCSECOND, field[4][2])
@@ -334,7 +334,7 @@ def test_a_wrong_target_is_rejected_when_asked(readings):
     assert off(kept) == pytest.approx(0.0, abs=0.01)
 
 
-def test_what_does_not_go_together_is_refused(readings):
+def test_inconsistent_input_is_refused(readings):
     plate = {"plate_zero_deg": 0.0, "u_plate_zero_arcsec": 0.0}
     with pytest.raises(InputError, match=r"line 2, target = 'ZZ' is not in t.toml"):
         calibrate_azimuth(readings([("ZZ", 0.0, "left")], **plate))

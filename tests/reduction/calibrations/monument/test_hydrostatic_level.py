@@ -138,7 +138,7 @@ def test_the_misclosure_is_the_sum_of_the_readings_around_the_loop(table):
     assert abs(c.decisions[0].statistic) == pytest.approx(0.05 + 0.02, abs=1e-9)
 
 
-def test_misclosures_scatter_as_their_u_says(table):
+def test_misclosures_scatter_as_their_u(table):
     rng, ratio = np.random.default_rng(51), []
     for _ in range(150):
         c = calibrate_level(run(table, RING, [1, 1, 2, 1], noise=7.07e-6 * rng.standard_normal((4, 2)),
@@ -148,7 +148,7 @@ def test_misclosures_scatter_as_their_u_says(table):
     assert np.mean(np.square(ratio)) == pytest.approx(1.0, abs=4 * np.sqrt(2 / 150))
 
 
-def test_the_micrometers_scale_acts_on_what_they_show_and_not_on_the_elevation_of_the_held_mark(table):
+def test_the_micrometers_scale_acts_on_readings_not_on_the_held_elevation(table):
     low, high = (
         calibrate_level(run(table, RING * 2, [1] * 4 + [2] * 4, u_scale_ppm=100.0, held_height_mm=height))
         for height in (0.0, 806_420.0)

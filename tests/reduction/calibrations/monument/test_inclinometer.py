@@ -73,7 +73,7 @@ def test_the_model_s_inverse_gives_the_tilts_back():
         bent.tilts([20.0, 0.0])
 
 
-def test_turning_the_case_tells_the_table_s_own_tilt_from_the_zeros(table):
+def test_turning_the_case_separates_the_tables_tilt_and_the_zeros(table):
     own = np.array([70.0, -40.0]) * ARCSECOND
     azimuth = np.repeat([0.0, np.pi], 25)
     tilts = np.tile(GRID, (2, 1))
@@ -139,7 +139,7 @@ def test_a_wrong_reading_leaves_with_both_axes(table):
     assert [k for k, s in enumerate(c.states) if s == "rejected"] == [7]
 
 
-def test_what_does_not_tell_is_refused(table):
+def test_insufficient_readings_are_refused(table):
     line = np.column_stack([STEPS, STEPS])
     with pytest.raises(EstimationError, match="in one direction"):
         calibrate_inclinometer(table(LAYOUT, numbers(shown(line), line), u_volt=1e-4))

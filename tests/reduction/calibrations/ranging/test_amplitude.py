@@ -27,7 +27,7 @@ def test_a_phase_that_grows_with_amplitude_has_a_positive_coefficient(table):
 
 
 @pytest.mark.parametrize("phase", [0.0, 1.0, 3.1416, 6.2831])
-def test_where_the_phase_stands_does_not_matter(table, phase):
+def test_the_phase_origin_does_not_matter(table, phase):
     found = calibrate_amplitude(table(LAYOUT, columns(LEVELS, -3e-3, phase), **BASE, u_phasor_volt=3e-4))
     assert found.value("amplitude_to_phase_rad") == pytest.approx(-3e-3, abs=1e-12)
 
@@ -78,7 +78,7 @@ def test_the_test_of_the_line_raises_false_alarms_at_its_level(table, runs):
     assert alarms / runs == pytest.approx(0.05, abs=4 * np.sqrt(0.05 * 0.95 / runs))
 
 
-def test_leakage_left_over_is_in_u_and_is_what_its_phasor_does(table):
+def test_residual_leakage_is_in_u_with_its_phasors_effect(table):
     # All of it along the quadrature: phase moves by left over / A, which looks like coupling.
     left = 2e-4
     light = LEVELS * np.exp(1j * (1.0 - 1.8e-3 * np.log(LEVELS / 5.0)))
@@ -91,7 +91,7 @@ def test_leakage_left_over_is_in_u_and_is_what_its_phasor_does(table):
     assert aware.u("amplitude_to_phase_rad") > blind.u("amplitude_to_phase_rad")
 
 
-def test_one_attenuation_tells_nothing_and_a_wrong_reading_is_left_out(table):
+def test_one_attenuation_is_insufficient_and_a_wrong_reading_is_rejected(table):
     with pytest.raises(EstimationError, match="rank deficient"):
         calibrate_amplitude(table(LAYOUT, columns(np.full(5, 2.0), 1e-3), **BASE, u_phase_rad=1e-4))
     rng = np.random.default_rng(4)

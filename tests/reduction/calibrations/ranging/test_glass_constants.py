@@ -75,7 +75,7 @@ def test_a_part_that_is_none_is_refused_with_its_line():
         calibrate_ball(made)
 
 
-def test_what_the_index_and_the_expansion_leave_open_is_in_the_constants_of_a_prism():
+def test_u_of_index_and_expansion_is_in_the_constants_of_a_prism():
     sheet = {**GLASS, "u_index_ratio": 1e-3, "u_gauge_mm": 0.0, "u_temperature_c": 0.0}
     heights = {"height_mm": [38.4] * 4}
     found = calibrate_prism(readings(GlassSheet, PRISM, numbers=heights, u_reading_mm=1e-6, **sheet))
@@ -91,7 +91,7 @@ def test_what_the_index_and_the_expansion_leave_open_is_in_the_constants_of_a_pr
 
 @draws(1000)
 @pytest.mark.parametrize("count", [2, 3, 6])
-def test_the_interval_holds_the_height_as_often_as_it_says_even_from_two_readings(count, runs):
+def test_the_interval_covers_the_height_as_claimed_even_from_two_readings(count, runs):
     rng = np.random.default_rng(count)
     held = 0
     sheet = {**GLASS, "u_gauge_mm": 0.0, "u_temperature_c": 0.0, "temperature_c": 20.0}
@@ -102,6 +102,6 @@ def test_the_interval_holds_the_height_as_often_as_it_says_even_from_two_reading
     assert abs(held - 0.9545 * runs) < same_sigmas(27 / 1000, 1000, runs) * runs  # four standard deviations of a count
 
 
-def test_what_is_known_keeps_the_factor_two():
+def test_claimed_scatter_keeps_the_factor_two():
     known = readings(GlassSheet, PRISM, numbers={"height_mm": [38.2, 38.201]}, u_reading_mm=0.001, **GLASS)
     assert {q.coverage for q in calibrate_prism(known).quantities} == {2.0}

@@ -48,7 +48,7 @@ def test_balanced_sessions_give_the_mean_of_their_means(table):
     assert found.record["u_leakage_volt"] == pytest.approx(expected, rel=1e-6)
 
 
-def test_amplitude_and_phase_columns_say_the_same_as_parts(table):
+def test_amplitude_and_phase_columns_agree_with_real_and_imaginary(table):
     rng = np.random.default_rng(1)
     z = TRUE + 3e-4 * noise(rng, 12)
     parts = leakage.calibrate_leakage(blocked(table, z, np.arange(12) // 4))
@@ -62,7 +62,7 @@ def test_amplitude_and_phase_columns_say_the_same_as_parts(table):
     assert [q.value for q in polar.quantities] == pytest.approx([q.value for q in parts.quantities], rel=1e-9)
 
 
-def test_one_session_says_that_it_says_nothing_of_other_days(table):
+def test_one_session_notes_that_other_days_are_unknown(table):
     rng = np.random.default_rng(2)
     z = TRUE + 3e-4 * noise(rng, 12)
     alone = leakage.calibrate_leakage(blocked(table, z, np.zeros(12)))
@@ -177,7 +177,7 @@ def test_lit_leakage_scatters_as_claimed(table, scatters_as_claimed, known, runs
     scatters_as_claimed(values, covariances, POLAR)
 
 
-def test_few_sessions_are_said_to_tell_little(table):
+def test_few_sessions_are_reported_as_insufficient(table):
     rng = np.random.default_rng(3)
     for count, passed in ((2, False), (6, True)):
         z = TRUE + 3e-4 * noise(rng, 4 * count)
@@ -185,7 +185,7 @@ def test_few_sessions_are_said_to_tell_little(table):
         assert (decision.name, decision.passed) == ("sessions", passed)
 
 
-def test_a_scatter_between_sessions_that_comes_out_as_zero_is_not_taken_for_known(table):
+def test_zero_scatter_between_sessions_is_not_taken_as_exact(table):
     """Buffers alone would have 2 (24 - 1) degrees of freedom; six sessions that might differ have fewer."""
     rng = np.random.default_rng(11)
     while True:

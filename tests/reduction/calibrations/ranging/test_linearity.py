@@ -110,7 +110,7 @@ def test_positions_a_half_wavelength_apart_show_one_phase_and_no_cyclic_term(tab
     numbers = {"range_m": reads(2.4 + length, cosine=(8e-6,), sine=(0.0,)), "interferometer_m": length}
     found = calibrate_linearity(table(LAYOUT, numbers, **BASE, u_range_mm=1e-3))
     assert not found.record
-    assert "do not tell them apart" in found.notes[0]
+    assert "do not separate them" in found.notes[0]
 
 
 def test_an_interferometer_in_vacuum_lengths_is_brought_to_its_air(table):
@@ -153,7 +153,7 @@ def test_one_thermometer_for_both_cancels_but_for_the_ranger_s_longer_path(table
     assert both.u("scale_ppm") < 0.1 + 1e6 * formula * 2
 
 
-def test_a_reading_wrong_by_a_lot_is_left_out_when_asked(table):
+def test_a_grossly_wrong_reading_is_rejected_on_request(table):
     rng = np.random.default_rng(5)
     range_ = reads(2.4 + rail(), cosine=(5e-6,), sine=(5e-6,)) + 1e-6 * rng.standard_normal(80)
     range_[33] -= 3e-5
@@ -222,7 +222,7 @@ def test_weather_at_the_ends_of_its_scales_has_slopes_from_the_side_that_there_i
     assert at == pytest.approx(near, rel=0.08)  # over half a degree that of humidity grows by 5 % at -40 °C
 
 
-def test_readings_that_agree_to_the_last_digit_say_so(table):
+def test_readings_that_agree_to_the_last_digit_are_reported(table):
     length = np.arange(0.0, 3.0, 0.03)
     with pytest.raises(EstimationError, match="do not scatter at all"):
         calibrate_linearity(table(LAYOUT, {"range_m": 2.4 + length, "interferometer_m": length}, **BASE, **START))

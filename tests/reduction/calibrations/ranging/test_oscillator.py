@@ -46,7 +46,7 @@ def test_series_with_holes_or_too_short_are_refused():
         measure_oscillator(readings(OscillatorSheet, KIND, numbers={"phase_rad": phases()[:20]}, interval_s=0.001))
 
 
-def test_a_drifting_phase_is_told_and_readings_that_alternate_make_no_infinite_figure():
+def test_a_drifting_phase_is_noted_and_alternating_readings_make_no_infinite_figure():
     drifting = phases(spur=0.0) + 0.5 * np.arange(8192) * 1e-3
     found = measure_oscillator(readings(OscillatorSheet, KIND, numbers={"phase_rad": drifting}, interval_s=0.001))
     assert found.decisions[0].passed

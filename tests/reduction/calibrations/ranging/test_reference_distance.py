@@ -81,7 +81,7 @@ def test_a_ranger_that_reads_long_has_a_positive_scale(table):
     assert held.value("d0_mm") < D0 * 1e3 - 0.1
 
 
-def test_u_is_that_of_a_mean_with_what_all_readings_share_beside(table):
+def test_u_is_that_of_a_mean_plus_the_common_errors(table):
     n, u, common = 7, 0.012, 0.005
     sheet = {**BASE, "u_distance_common_mm": common, "u_pc_mm": 0.003}
     found = calibrate_reference_distance(table(LAYOUT, columns(np.full(n, 4.0)), **sheet, u_distance_mm=u))
@@ -102,7 +102,7 @@ def test_frequency_and_thermometer_act_through_the_distance(table):
         assert found.u("d0_mm") == pytest.approx(np.hypot(0.3 * 0.895887e-6, FORMULA) * length, rel=1e-3)
 
 
-def test_a_warmer_air_than_read_makes_d0_too_large_or_small_as_the_index_says(table):
+def test_air_warmer_than_read_biases_d0_by_the_index(table):
     # True air is 1 °C warmer than read: true index lower, true lengths longer than computed, D - L too large.
     numbers = columns(np.full(6, 40.0), half=HALF * (1 + 0.895887e-6))
     found = calibrate_reference_distance(table(LAYOUT, numbers, **BASE, u_distance_mm=0.01))
@@ -140,7 +140,7 @@ def test_leakage_left_over_at_one_place_in_closed_form(table):
     assert found.u("d0_mm") == pytest.approx(np.hypot(leakage, FORMULA * (4.02 - D0) * 1e3), rel=1e-4)
 
 
-def test_leakage_effects_are_what_a_small_phasor_does(table):
+def test_leakage_effects_equal_those_of_a_small_phasor(table):
     target, reference = phases(PLACES)
     row = columns(PLACES) | {"amplitude_target_volt": PLACES, "amplitude_reference_volt": np.full(len(PLACES), 5.0)}
     effects = leakage_effects(table(LAYOUT, row, **BASE), 1e-3)
@@ -149,7 +149,7 @@ def test_leakage_effects_are_what_a_small_phasor_does(table):
         np.testing.assert_allclose(effect.column, (moved[0] - moved[1]) / 1e-7, atol=1e-6)
 
 
-def test_one_wrong_reading_is_named_and_left_out_only_when_asked(table):
+def test_one_wrong_reading_is_named_and_rejected_only_on_request(table):
     rng = np.random.default_rng(1)
     numbers = columns(PLACES)
     numbers["phase_target_rad"] = numbers["phase_target_rad"] + 2e-4 * rng.standard_normal(len(PLACES))
@@ -175,7 +175,7 @@ def test_a_thin_margin_of_whole_cycles_is_a_failed_decision(table):
     assert decision.statistic == pytest.approx(HALF * 500 - 47.0, abs=1e-3)
 
 
-def test_what_is_missing_is_said(table):
+def test_missing_input_is_reported(table):
     numbers = columns(PLACES)
     with pytest.raises(InputError, match=r"t\.csv: line 1, column 'amplitude_target_volt' is missing"):
         calibrate_reference_distance(table(LAYOUT, numbers, **BASE, u_leakage_volt=1e-3))
@@ -204,7 +204,7 @@ def test_d0_and_scale_scatter_as_claimed(table, scatters_as_claimed, runs):
     scatters_as_claimed(values, covariances, [D0 * 1e3, 0.0])
 
 
-def test_whole_cycles_are_judged_by_the_readings_used_and_all_that_is_not_known_of_them(table):
+def test_whole_cycles_are_judged_by_the_used_readings_and_their_total_u(table):
     distance = np.append(PLACES, 20.0)
     rows = columns(distance)
     rows["distance_m"] = np.append(PLACES, 20.047)  # a typing error, nearly half a wavelength

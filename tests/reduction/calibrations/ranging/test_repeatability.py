@@ -23,7 +23,7 @@ def test_both_deviations_scatter_as_claimed():
     assert np.mean(found, axis=0) == pytest.approx([10.0, 20.0, np.hypot(10.0, 20.0)], rel=0.03)
 
 
-def test_sets_that_agree_have_nothing_between_them():
+def test_sets_that_agree_have_no_scatter_between_them():
     value = [1.0, 1.00002, 1.00001, 1.00001]
     c = measure_repeatability(
         readings(RepeatabilitySheet, KIND, numbers={"range_m": value}, words={"set": ("a", "a", "b", "b")})
@@ -34,7 +34,7 @@ def test_sets_that_agree_have_nothing_between_them():
     assert c.u("between_um") > 1.0  # zero was found, not known
 
 
-def test_readings_that_tell_nothing_are_refused_and_a_set_left_out_is_no_warning():
+def test_insufficient_readings_are_refused_and_an_omitted_set_is_no_warning():
     same = readings(RepeatabilitySheet, KIND, numbers={"range_m": [1.0] * 4}, words={"set": ("a", "a", "b", "b")})
     with pytest.raises(ValidityError, match="agree to the last digit"):
         measure_repeatability(same)

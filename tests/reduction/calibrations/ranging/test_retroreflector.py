@@ -90,7 +90,7 @@ def test_cyclic_terms_count_where_the_two_lengths_stand_at_two_phases(table):
     assert u["half"] == pytest.approx(0.02, rel=1e-2)
 
 
-def test_a_wrong_reading_and_what_is_missing(table):
+def test_a_wrong_reading_is_rejected_and_missing_input_reported(table):
     rng = np.random.default_rng(0)
     time, which = sequence("ABABABAB", per=4)
     range_ = 6.2 + np.array([EXCESS[w] for w in which]) + 2e-6 * rng.standard_normal(32)

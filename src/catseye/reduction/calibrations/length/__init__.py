@@ -1,1 +1,1 @@
-"""Lengths in the laboratory: gauge blocks, height gauge, invar wire."""
+"""Lengths in the laboratory: gauge blocks, height gauge, Invar wire."""

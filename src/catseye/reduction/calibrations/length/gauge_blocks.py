@@ -1,4 +1,4 @@
-"""Gauge blocks and spacers: an instrument against wrung blocks, and spacers by an instrument.
+"""Instruments against gauge blocks, and spacers by an instrument.
 
     reads = zero + (1 + scale) L,   L = (sum of the blocks + films) (1 + expansion (t - 20 °C))
 
@@ -40,7 +40,7 @@ Coefficient = Annotated[float, Within(-5, 50)]
 
 
 class Block(Record):
-    """A gauge block: its name in the table, its certified length at 20 °C and standard uncertainty."""
+    """Gauge block: name in the table, certified length at 20 °C, u."""
 
     name: Words
     length_mm: Annotated[float, LENGTH]
@@ -48,7 +48,7 @@ class Block(Record):
 
 
 class LengthSheet(Sheet):
-    """What both kinds say.
+    """Common keys of both kinds' sheets.
 
     expansion_ppm_per_c, u_...   of blocks or spacers: 11.5 for steel
     temperature_c, u_temperature_c   of them, the thermometer's offset common; a column where it changed
@@ -67,7 +67,7 @@ class BlocksSheet(LengthSheet):
 
     block            certificates, one table a block
     film_um, u_film_um   thickness of each film where two blocks are wrung together
-    estimate_scale   seek the instrument's scale beside its zero
+    estimate_scale   estimate the instrument's scale beside its zero
     """
 
     block: Annotated[tuple[Block, ...], Field(strict=False, min_length=1)]
@@ -76,7 +76,7 @@ class BlocksSheet(LengthSheet):
     estimate_scale: bool = True
 
     @model_validator(mode="after")
-    def _names_each_block_once(self) -> "BlocksSheet":
+    def _check_block_names(self) -> "BlocksSheet":
         names = [block.name for block in self.block]
         for name in names:
             if names.count(name) > 1:
@@ -85,7 +85,9 @@ class BlocksSheet(LengthSheet):
 
 
 class SpacersSheet(LengthSheet):
-    """Sheet of spacers measured by a calibrated instrument: true = (reads - zero) / (1 + scale).
+    """Sheet of spacers measured by a calibrated instrument.
+
+    true = (reads - zero) / (1 + scale).
 
     zero_mm, u_zero_mm, scale_ppm, u_scale_ppm   of the instrument, from its own calibration
     """
@@ -103,7 +105,7 @@ SPACERS_LAYOUT = SheetLayout(SPACERS, SpacersSheet, required={"spacer": TEXT, "r
 
 
 def calibrate_against_blocks(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """Zero and scale of an instrument from what it reads on stacks of gauge blocks.
+    """Zero and scale of an instrument from stacks of gauge blocks.
 
     readings   columns blocks ("100+25+1.005", names of the sheet's blocks) and reads_mm; sheet BlocksSheet
     reject     leave out what the tests reject
@@ -115,19 +117,19 @@ def calibrate_against_blocks(readings: SheetReadings, reject: bool = False) -> C
     films = np.maximum(used.sum(axis=1) - 1.0, 0.0)
     cold = used @ np.array([block.length_mm for block in sheet.block]) + films * sheet.film_um * 1e-3
     temperature = readings.get("temperature_c")
-    grown = expanded(1.0, temperature, sheet.expansion_ppm_per_c * PPM)
-    length = cold * grown
+    expansion = expanded(1.0, temperature, sheet.expansion_ppm_per_c * PPM)
+    length = cold * expansion
     fit = fit_readings(
         readings.get("reads_mm") - length,
         np.column_stack([np.ones(m), length * PPM][: 1 + sheet.estimate_scale]),
         _scatter(sheet, m),
         names=["zero", "scale"][: 1 + sheet.estimate_scale],
-        effects=[  # of reads - L: what makes a stack longer makes it smaller
+        effects=[  # of reads - L: a longer stack makes it smaller
             *(
-                Effect(f"block {block.name}, mm", -used[:, k] * grown, block.u_mm)
+                Effect(f"block {block.name}, mm", -used[:, k] * expansion, block.u_mm)
                 for k, block in enumerate(sheet.block)
             ),
-            Effect("film, µm", -films * grown * 1e-3, sheet.u_film_um),
+            Effect("film, µm", -films * expansion * 1e-3, sheet.u_film_um),
             *_temperature_effects(sheet, -cold, temperature),
         ],
         options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
@@ -157,7 +159,9 @@ def calibrate_against_blocks(readings: SheetReadings, reject: bool = False) -> C
 
 
 def calibrate_spacers(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """Lengths of spacers at 20 °C, with the covariance that the instrument and the thermometer give them in common.
+    """Lengths of spacers at 20 °C, with joint covariance.
+
+    Instrument and thermometer are common to all.
 
     readings   columns spacer (its name) and reads_mm; sheet SpacersSheet
     reject     leave out what the tests reject
@@ -168,9 +172,9 @@ def calibrate_spacers(readings: SheetReadings, reject: bool = False) -> Calibrat
         raise readings.refuse(readings.words["spacer"].index(""), "spacer is empty (expected its name)")
     design = np.array([[float(name == spacer) for name in names] for spacer in readings.words["spacer"]])
     temperature = readings.get("temperature_c")
-    grown = expanded(1.0, temperature, sheet.expansion_ppm_per_c * PPM)
+    expansion = expanded(1.0, temperature, sheet.expansion_ppm_per_c * PPM)
     true = (readings.get("reads_mm") - sheet.zero_mm) / (1.0 + sheet.scale_ppm * PPM)
-    observed = true / grown
+    observed = true / expansion
     fit = fit_readings(
         observed,
         design,
@@ -199,15 +203,15 @@ def calibrate_spacers(readings: SheetReadings, reject: bool = False) -> Calibrat
 
 
 def _stacks(readings: SheetReadings) -> np.ndarray:
-    """(m, blocks) how often each block stands in each stack: 0 or 1."""
-    known = {block.name: k for k, block in enumerate(readings.sheet.block)}
-    used = np.zeros((len(readings), len(known)))
+    """Incidence (m, blocks) of blocks in stacks: 0 or 1."""
+    positions = {block.name: k for k, block in enumerate(readings.sheet.block)}
+    used = np.zeros((len(readings), len(positions)))
     for row, stack in enumerate(readings.words["blocks"]):
         for name in (part.strip() for part in stack.split("+")):
-            if name not in known:
+            if name not in positions:
                 raise readings.refuse(row, f"blocks = {stack!r}: {name!r} has no [[block]] in {readings.sheet_file}")
-            used[row, known[name]] += 1.0
-            if used[row, known[name]] > 1.0:
+            used[row, positions[name]] += 1.0
+            if used[row, positions[name]] > 1.0:
                 raise readings.refuse(row, f"blocks = {stack!r}: {name!r} stands twice (expected each block once)")
     return used
 
@@ -219,7 +223,9 @@ def _scatter(sheet: LengthSheet, m: int) -> ObservedScatter:
 
 
 def _temperature_effects(sheet: LengthSheet, length: np.ndarray, temperature: np.ndarray) -> list[Effect]:
-    """Thermometer and expansion; `length` is what a factor of 1 + expansion (t - 20) multiplies, with its sign.
+    """Effects of thermometer and expansion.
+
+    `length`, with its sign, is multiplied by 1 + expansion (t - 20).
 
     A thermometer that reads u too high, or an expansion taken too large: the true length is smaller than computed, the
     observed value that holds it (with the sign of `length`) moves accordingly; only the size matters to a prior.
@@ -231,7 +237,10 @@ def _temperature_effects(sheet: LengthSheet, length: np.ndarray, temperature: np
 
 
 class CommonParts(TypedDict):
-    """What calibrations by blocks and of spacers have alike; see `Calibration` for the words."""
+    """Common parts of calibrations by blocks and of spacers.
+
+    See `Calibration` for the terms.
+    """
 
     provenance: dict[str, object]
     columns: tuple[str, ...]
@@ -244,7 +253,7 @@ class CommonParts(TypedDict):
 
 
 def _common(readings: SheetReadings, fit: CalibrationFit, length: np.ndarray) -> CommonParts:
-    """What both kinds report alike."""
+    """Common parts of both kinds' results."""
     word = next(iter(readings.words))
     rows = tuple(
         (readings.words[word][k], float(readings.get("reads_mm")[k]), float(length[k]),

@@ -1,4 +1,6 @@
-"""dx, dy, dz from the tooling ball to the scan point, with a height gauge over a surface plate.
+"""Offsets dx, dy, dz from tooling ball to scan point, by height gauge.
+
+Over a surface plate.
 
 The assembly stands on matched v-blocks. In each set-up one of the mount's axes looks up and another one to the front
 of the plate; ball and mirror are touched, and their heights differ by the offset along the axis that looks up:
@@ -57,10 +59,10 @@ class HeightSheet(Sheet):
     block, film_um, u_film_um   gauge blocks under the indicator, as for gauge-blocks
     u_lean_arcsec         of what it stands on, towards the front and the right: the same in all set-ups with one axis
                           up or down
-    u_seating_arcsec      what each set-up leans by itself, both ways
+    u_seating_arcsec      independent lean of each set-up, both directions
     u_scale_ppm           of the height gauge
     gauge_temperature_c, gauge_expansion_ppm_per_c   of the gauge's scale and the blocks, which are true at 20 degrees
-    dx_mm, dy_mm, dz_mm, u_offset_mm   of an offset whose axis never looks up; it is not sought then
+    dx_mm, dy_mm, dz_mm, u_offset_mm   of an offset whose axis never looks up; it is fixed then
     u_reading_mm          scatter of a reading, if known
     """
 
@@ -99,14 +101,16 @@ LAYOUT = SheetLayout(
 
 
 def calibrate_height_gauge(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """Offsets of the scan point from the tooling ball, mount axes, from heights over a surface plate.
+    """Offsets of the scan point from the tooling ball, mount axes.
+
+    From heights over a surface plate.
 
     readings   columns setup (a word for each), up and front ("+y": the mount's axis that looks there), feature ("ball"
                or "mirror"), touch ("top", "centre", "bottom"), height_mm, perhaps indicator_mm (added) and blocks
                (names of the sheet's blocks, joined by +; added); sheet HeightSheet
     reject     leave out what the tests reject
 
-    Raises EstimationError where ball and mirror are not both touched in a set-up that shows what is sought.
+    Raises EstimationError where ball and mirror are not both touched in a set-up that determines a free offset.
 
     Source: [PARKER04] section 2.2.2, step 3; eq. 2.7 for the signs.
     """
@@ -129,11 +133,11 @@ def calibrate_height_gauge(readings: SheetReadings, reject: bool = False) -> Cal
 
     def predict(values: np.ndarray) -> np.ndarray:
         p = dict(zip(names, values, strict=True))
-        there = turned @ np.array([p[name] for name in OFFSETS])  # right, front, up in each set-up
-        leans = np.array([[p[f"{axis} set-ups lean {way}"] for way in WAYS] for axis in AXES])[upright]
+        offsets = turned @ np.array([p[name] for name in OFFSETS])  # right, front, up in each set-up
+        leans = np.array([[p[f"{axis} set-ups lean {direction}"] for direction in WAYS] for axis in AXES])[upright]
         seats = values[SHARED : SHARED + 3 * s].reshape(s, 3)[which]
         lean = leans + seats[:, 1:]
-        height = there[:, 2] + np.sum(lean * there[:, :2], axis=1)
+        height = offsets[:, 2] + np.sum(lean * offsets[:, :2], axis=1)
         radius = 0.5 * np.where(mirror, p["mirror diameter"], p["ball diameter"])
         true = seats[:, 0] + mirror * height + touched * radius
         off = stacks @ values[SHARED + 3 * s : SHARED + 3 * s + blocks] + films * p["film"]
@@ -154,7 +158,10 @@ def calibrate_height_gauge(readings: SheetReadings, reject: bool = False) -> Cal
 
 
 def _placed(readings: SheetReadings) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(m, 3, 3) plate axes (right, front, up) in mount axes; (m,) whether the mirror is touched; (m,) +1, 0, -1."""
+    """Plate axes (m, 3, 3) in mount axes, mirror flags, and touch sign.
+
+    Axes right, front, up; (m,) True where the mirror is touched; (m,) +1, 0, -1.
+    """
     turned = np.zeros((len(readings), 3, 3))
     places: dict[str, tuple[str, str]] = {}
     for row in range(len(readings)):
@@ -188,23 +195,23 @@ def _placed(readings: SheetReadings) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 def _stacks(readings: SheetReadings) -> tuple[np.ndarray, np.ndarray]:
-    """(m, blocks) 1 where a block stands under the indicator, and (m,) films between them."""
-    known = {block.name: k for k, block in enumerate(readings.sheet.block)}
-    used = np.zeros((len(readings), len(known)))
+    """Blocks under the indicator (m, blocks), and films between them (m,)."""
+    positions = {block.name: k for k, block in enumerate(readings.sheet.block)}
+    used = np.zeros((len(readings), len(positions)))
     for row, stack in enumerate(readings.words.get("blocks", ())):
         for name in (part.strip() for part in stack.split("+") if part.strip()):
-            if name not in known:
+            if name not in positions:
                 raise readings.refuse(row, f"blocks = {stack!r}: {name!r} has no [[block]] in {readings.sheet_file}")
-            if used[row, known[name]]:
+            if used[row, positions[name]]:
                 raise readings.refuse(row, f"blocks = {stack!r}: {name!r} stands twice (expected each block once)")
-            used[row, known[name]] = 1.0
+            used[row, positions[name]] = 1.0
     return used, np.maximum(used.sum(axis=1) - 1.0, 0.0)
 
 
 def _parameters(
     readings: SheetReadings, sought: set[str], setups: list[str], observed: np.ndarray, which: np.ndarray
 ) -> list[ModelParameter]:
-    """Those that all set-ups share, three of each set-up, one of each block."""
+    """Common parameters, three of each set-up, one of each block."""
     sheet = readings.sheet
     offsets = []
     for name in OFFSETS:
@@ -223,13 +230,13 @@ def _parameters(
         *offsets,
         ModelParameter("ball diameter", sheet.ball_diameter_mm or 0.0, 1e-2, sheet.u_ball_diameter_mm),
         ModelParameter("mirror diameter", sheet.mirror_diameter_mm or 0.0, 1e-2, sheet.u_mirror_diameter_mm),
-        *(ModelParameter(f"{axis} set-ups lean {way}", 0.0, 1e-4, lean) for axis in AXES for way in WAYS),
+        *(ModelParameter(f"{axis} set-ups lean {direction}", 0.0, 1e-4, lean) for axis in AXES for direction in WAYS),
         ModelParameter("film", 0.0, 1e-3, sheet.u_film_um * 1e-3),
         ModelParameter("scale", 0.0, 1e-4, sheet.u_scale_ppm * PPM),
     ]
     for k, setup in enumerate(setups):
         shared.append(ModelParameter(f"zero of {setup}", float(np.mean(observed[which == k])), 1e-2))
-        shared += [ModelParameter(f"{setup} leans {way}", 0.0, 1e-4, seating) for way in WAYS]
+        shared += [ModelParameter(f"{setup} leans {direction}", 0.0, 1e-4, seating) for direction in WAYS]
     return shared + [ModelParameter(f"block {block.name}", 0.0, 1e-3, block.u_mm) for block in sheet.block]
 
 
@@ -251,7 +258,7 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, sought: list[str]
     )  # fmt: skip
     leans = [
         f'{name} {solution.value(name) / ARCSECOND:+.2g}" (u {solution.u(name) / ARCSECOND:.2g}")'
-        for name in (f"{offset[1]} set-ups lean {way}" for offset in sought for way in WAYS)
+        for name in (f"{offset[1]} set-ups lean {direction}" for offset in sought for direction in WAYS)
     ]
     return Calibration(
         kind=KIND,

@@ -1,4 +1,4 @@
-"""The Invar wire: the straight distance between two marks from a wire that hangs between them, or the wire itself.
+"""Invar wire: distance between two marks, or calibration of the wire.
 
     distance = chord of the hanging wire (length, temperature, tension, weight, height difference) + scales
 
@@ -57,7 +57,9 @@ SHARED = {  # whose offset all readings share
 
 
 class WireSheet(Sheet):
-    """Sheet of measurements with a wire; every u_ key is of an offset that all readings share.
+    """Sheet of measurements with a wire.
+
+    Every u_ key is of an offset that all readings share.
 
     certified_mm, u_certified_mm           length between its marks at 20 °C
     certified_tension_n, hanging           tension at its calibration; certified hanging (chord) or supported
@@ -66,8 +68,8 @@ class WireSheet(Sheet):
     expansion_ppm_per_c, u_expansion_ppm_per_c
     tension_n, u_tension_n; temperature_c, u_temperature_c; height_difference_mm, u_height_difference_mm
                                            of the use; columns where they changed
-    scale_sum_mm, u_scale_sum_mm           what the end scales add to the chord; a column as a rule
-    known_distance_mm, u_known_distance_mm the wire is sought instead
+    scale_sum_mm, u_scale_sum_mm           addition of the end scales to the chord; usually a column
+    known_distance_mm, u_known_distance_mm then the wire is calibrated instead
     u_reading_mm                           scatter of a reading, if known
     """
 
@@ -108,12 +110,14 @@ LAYOUT = SheetLayout(
 
 
 def measure_with_wire(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """The distance between two marks by a wire; or, where the sheet knows the distance, the wire's length.
+    """Distance between two marks by a wire, or the wire's length.
+
+    The latter where the sheet has the distance.
 
     readings   columns tension_n, temperature_c, height_difference_mm, scale_sum_mm where they changed; sheet WireSheet
     reject     leave out what the tests reject
 
-    Raises InputError for a value that neither table nor sheet gives, ValidityError for a wire that does not reach.
+    Raises InputError for a value in neither table nor sheet, ValidityError for a wire that does not reach.
 
     Source: [IRVINE81] section 1.4; systematic effects by numerical derivatives of it.
     """
@@ -125,11 +129,11 @@ def measure_with_wire(readings: SheetReadings, reject: bool = False) -> Calibrat
         for name, label in SHARED.items()
         if not (name == "certified_mm" and sheet.known_distance_mm is not None)
     ]
-    known = sheet.known_distance_mm
-    if known is None:
+    certified = sheet.known_distance_mm
+    if certified is None:
         observed, design = distance, np.ones((m, 1))
-    else:  # observed = how much longer the wire is than certified, times its slope
-        observed, design = known - distance, _slope(values, "certified_mm", sheet.hanging)[:, None]
+    else:  # observed = excess of the wire over its certified length, times its slope
+        observed, design = certified - distance, _slope(values, "certified_mm", sheet.hanging)[:, None]
         effects = [Effect(e.name, -e.column, e.u) for e in effects]
         effects.append(Effect("known distance, mm", np.ones(m), sheet.u_known_distance_mm))
     scatter = ObservedScatter(np.zeros((m, m)), {"scatter of one reading": np.eye(m)})
@@ -139,7 +143,7 @@ def measure_with_wire(readings: SheetReadings, reject: bool = False) -> Calibrat
         observed,
         design,
         scatter,
-        names=["distance" if known is None else "wire"],
+        names=["distance" if certified is None else "wire"],
         effects=effects,
         options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
@@ -169,7 +173,7 @@ def _distance_mm(values: dict[str, np.ndarray], hanging: bool) -> np.ndarray:
 
 
 def _slope(values: dict[str, np.ndarray], name: str, hanging: bool) -> np.ndarray:
-    """Change of the computed distance, mm, for each unit by which a value is larger."""
+    """Derivative of the computed distance, mm, by a value."""
     if name == "scale_sum_mm":
         return np.ones(len(values[name]))
 
@@ -184,8 +188,8 @@ def _slope(values: dict[str, np.ndarray], name: str, hanging: bool) -> np.ndarra
 
 def _calibration(readings: SheetReadings, fit: CalibrationFit, distance: np.ndarray) -> Calibration:
     sheet = readings.sheet
-    known = sheet.known_distance_mm
-    if known is None:
+    certified = sheet.known_distance_mm
+    if certified is None:
         key, shift, meaning = "distance_mm", 0.0, "straight distance between the marks"
     else:
         key, shift, meaning = (
@@ -206,7 +210,7 @@ def _calibration(readings: SheetReadings, fit: CalibrationFit, distance: np.ndar
     )
     return Calibration(
         kind=KIND,
-        title=f"{'Distance by' if known is None else 'Length of'} Invar wire {sheet.instrument}",
+        title=f"{'Distance by' if certified is None else 'Length of'} Invar wire {sheet.instrument}",
         provenance=provenance(readings),
         quantities=quantities([(key, "mm", meaning)], np.array([value]), fit.covariance, fit=fit),
         covariance=fit.covariance,

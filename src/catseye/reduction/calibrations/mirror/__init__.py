@@ -1,1 +1,1 @@
-"""A steered mirror: angles, encoders, stops, alignment, focus."""
+"""Steered mirror: angles, encoders, stops, alignment, focus."""

@@ -1,4 +1,4 @@
-"""The laser beam against the azimuth axis, from the spot's place on screens that turn with the mount.
+"""Laser beam against the azimuth axis, by spots on turning screens.
 
 The mirror folds the beam and nothing else: on a screen square to the beam, l metres past the mirror (below zero: before
 it), the spot of a beam through (x_b, y_b) that comes in from the direction (t_x, t_y, ~1) stands at
@@ -11,7 +11,7 @@ stands and where the face lies only make p_0 and q_0; so does the face's tilt, b
 the circle's radius vector at two distances gives place and tilt of the beam; a screen that does not turn mixes them
 with the mount's own axis.
 
-What it does to pointing and range is computed with exact rays (`geometry.mirror.imperfect`). A tilt of the beam moves
+Its effect on pointing and range is computed with exact rays (`geometry.mirror.imperfect`). A tilt of the beam moves
 the pointing by itself; it moves no range to first order, as the wave's phase is the same all across.
 """
 
@@ -44,7 +44,7 @@ COUNTS, SPOT, PATH = Within(-1_000_000, 1_000_000), Within(-1000, 1000), Within(
 PLACE = 1e-6  # m: screens nearer to each other are one
 AZIMUTHS = 36  # at which the effect is looked up
 Tilt = Annotated[float, Within(-0.1, 0.1)]
-NONE = np.zeros((2, 0))  # encoders without waves
+NO_WAVES = np.zeros((2, 0))  # encoders without waves
 
 
 class AlignmentSheet(Sheet):
@@ -55,7 +55,7 @@ class AlignmentSheet(Sheet):
     u_screen_turn_deg     of each screen about the beam, against p and q
     u_path_mm             of each screen's path_m
     face_tilt_rad, u_face_tilt_rad   of the mirror against its elevation shaft, from an autocollimation, for the effect
-    effect_phi_deg, effect_distance_m   where the effect on range and pointing is told ([30, 60, 90, 120], 100)
+    effect_phi_deg, effect_distance_m   directions of the reported effect on range and pointing ([30, 60, 90, 120], 100)
     """
 
     na0: Annotated[float, COUNTS]
@@ -81,7 +81,9 @@ LAYOUT = SheetLayout(
 
 
 def calibrate_alignment(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """Place and tilt of the laser beam against the azimuth axis, with what they do to range and pointing.
+    """Place and tilt of the laser beam against the azimuth axis.
+
+    With their effect on range and pointing.
 
     readings   columns screen (a word for each), path_m (past the mirror along the beam, below zero before it; one for
                each screen), azimuth_counts, p_mm and q_mm (the spot); sheet AlignmentSheet
@@ -140,42 +142,44 @@ def calibrate_alignment(readings: SheetReadings, reject: bool = False) -> Calibr
 def effect(
     tilts: np.ndarray, beam_mm: np.ndarray, *, theta: np.ndarray, phi: float, distance: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Change of range (n,), m, and of both counts (n, 2), when the beam's middle meets a target.
+    """Change of range (n,), m, and of both counts (n, 2), at a target.
 
-    tilts      (3,), rad: face, beam x, beam y, as `Imperfections` has them
+    When the beam's middle meets the target.
+
+    tilts      (3,), rad: face, beam x, beam y, as in `Imperfections`
     beam_mm    (2,), mm: beam x, beam y
     theta      (n,), rad, and phi, rad: the target's direction in mirror axes
     distance   m, from the scan point
 
-    The way runs from the plane across the incoming beam through the scan point, as in
+    The path runs from the plane across the incoming beam through the scan point, as in
     `geometry.mirror.mirror_path.path_change`.
 
     >>> change, counts = effect(np.array([0.0, 1e-4, 0.0]), np.zeros(2), theta=np.zeros(1), phi=1.0, distance=100.0)
     >>> round(float(change[0] * 1e6), 6), counts.round(3).tolist()  # one count of elevation is 125.66 urad of the beam
     (-0.0, [[0.0, 0.796]])
     """
-    imperfections = Imperfections(np.array([0.0, 0.0, *beam_mm]) * MILLIMETRE, tilts, NONE, NONE)
+    imperfections = Imperfections(np.array([0.0, 0.0, *beam_mm]) * MILLIMETRE, tilts, NO_WAVES, NO_WAVES)
     station = MirrorStation(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2))
     u = np.stack([np.sin(phi) * np.cos(theta), np.sin(phi) * np.sin(theta), np.full(len(theta), np.cos(phi))], axis=-1)
     target = distance * u @ gamma(0.0, 0.0, 0.0)
     counts = imperfect_counts(station, imperfections, target)
     ray = imperfect_ray(station, imperfections, counts)
     coming = -np.array([tilts[1], tilts[2], np.sqrt(1.0 - tilts[1] ** 2 - tilts[2] ** 2)]) @ gamma(0.0, 0.0, 0.0)
-    way = ray.origin @ coming + np.sum((target - ray.origin) * ray.direction, axis=-1)
+    path = ray.origin @ coming + np.sum((target - ray.origin) * ray.direction, axis=-1)
     ideal = aim(station, target)
-    return way - distance, counts - np.stack([ideal.azimuth_counts, ideal.elevation_counts], axis=-1)
+    return path - distance, counts - np.stack([ideal.azimuth_counts, ideal.elevation_counts], axis=-1)
 
 
 def _calibration(readings: SheetReadings, solution: CurvedFit) -> Calibration:
     sheet, fit = readings.sheet, solution.fit
-    wanted = [
+    selection = [
         (f"beam {axis}", f"beam_{axis}_mm", "mm", f"laser beam from the azimuth axis at the mirror, along {axis}", 1.0)
         for axis in "xy"
     ] + [
         (f"tilt {axis}", f"beam_tilt_{axis}_rad", "rad", f"{axis} of the direction that the laser beam comes from", 1.0)
         for axis in "xy"
     ]  # fmt: skip
-    calibrated, covariance = solution.quantities(wanted)
+    calibrated, covariance = solution.quantities(selection)
     record: dict[str, RecordValue] = {q.key: q.value for q in calibrated}
     record["u_axis_mm"] = max(solution.u("beam x"), solution.u("beam y"))
     record["u_tilt_rad"] = max(solution.u("tilt x"), solution.u("tilt y"), sheet.u_face_tilt_rad)
@@ -218,7 +222,7 @@ def _calibration(readings: SheetReadings, solution: CurvedFit) -> Calibration:
 
 
 def _effects(sheet: AlignmentSheet, solution: CurvedFit) -> list[str]:
-    """What the beam and the face do to range and pointing, the worst of all azimuths."""
+    """Worst effects of beam and face on range and pointing, as texts."""
     theta = np.linspace(0.0, 2.0 * np.pi, AZIMUTHS, endpoint=False)
     tilts = np.array([sheet.face_tilt_rad, solution.value("tilt x"), solution.value("tilt y")])
     beam = np.array([solution.value("beam x"), solution.value("beam y")])

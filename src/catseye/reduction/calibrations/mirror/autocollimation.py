@@ -1,10 +1,12 @@
-"""beta1, beta2, N_e0, N_a0 and the tilt of the face from an autocollimator that looks into the mirror.
+"""Mirror axes, encoder zeros and face tilt by an autocollimator.
+
+beta1, beta2, N_e0, N_a0 and the tilt of the face.
 
 One adjustment of all readings with exact rays (`geometry.mirror.autocollimator`). Into the mirror near Phi = 0 the
 reflection goes round a circle as the azimuth is turned: its centre is beta, its radius is how far the shaft stands from
 N_e0, and the face's tilt. Into a flat on the x axis, at Phi = 90 degrees, it shows N_a0.
 
-What the readings tell apart:
+Separable parameters:
     beta, face tilt, N_e0   by azimuths half a turn apart; with one azimuth only, not at all
     face tilt and N_a0      at Phi = 0: the tilt makes a circle where the shaft stands right, N_a0 does not; at 90
                             degrees by direct and prime readings
@@ -49,16 +51,16 @@ class AutocollimationSheet(Sheet):
 
     displays             "beam" or "mirror": which angle the autocollimator's scale shows, the beam's or half of it
     x_sign, y_sign       1 if the reading grows as the mirror's normal leans towards +x^, +y^ (up); -1 if it falls
-    na0_nominal, ne0_nominal   counts, where the search begins
-    u_na0_counts         of na0_nominal, where no reading is into a flat: then N_a0 is not sought
-    u_face_tilt_arcsec   of a face tilt of zero, where the readings do not hold it: then it is not sought
-    face_tilt_limit_arcsec   what the mirror is shimmed or adjusted to, if the tilt is to be judged
+    na0_nominal, ne0_nominal   counts, start of the search
+    u_na0_counts         of na0_nominal, without a reading into a flat: then N_a0 is fixed
+    u_face_tilt_arcsec   of a face tilt of zero, where the readings do not determine it: then it is fixed
+    face_tilt_limit_arcsec   tolerance of the mirror's adjustment, if the tilt is to be judged
     u_axis_tilt_arcsec   elevation shaft against the plane across the azimuth axis
     u_lean_x_arcsec, u_lean_y_arcsec, u_roll_arcsec   of the autocollimator against the mount's z, and about it
     u_scale_percent      of its scale
     u_flat_arcsec        lean of the flat out of the vertical (towards y); u_flat_turn_arcsec, its turn about y
     u_reading_arcsec     scatter of each reading of each axis, as displayed, if known
-    u_count              counts: how well the encoder's counts say where the shafts stand, each reading by itself
+    u_count              counts: of the shafts' places by the encoder's counts, independent for each reading
     """
 
     displays: Literal["beam", "mirror"]
@@ -89,15 +91,15 @@ LAYOUT = SheetLayout(
 
 
 def calibrate_autocollimation(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """Turn of the mirror's axes in the mount, encoder zeros and face tilt, from autocollimator readings.
+    """Mirror axes, encoder zeros and face tilt from autocollimator readings.
 
     readings   columns azimuth_counts, elevation_counts, x_arcsec, y_arcsec, perhaps into ("mirror" or "flat"); sheet
                AutocollimationSheet
     reject     leave out what the tests reject, both axes of a reading together
 
-    Raises EstimationError where the readings do not hold what is sought, naming it.
+    Raises EstimationError where the readings do not determine a parameter, naming it.
 
-    Source: [PARKER04] sections 2.2 (step 4) and 2.4 (step 6), with what `geometry.mirror.autocollimator` says of them.
+    Source: [PARKER04] sections 2.2 (step 4) and 2.4 (step 6), with the remarks in `geometry.mirror.autocollimator`.
     """
     sheet, m = readings.sheet, len(readings)
     flat = _flat(readings)
@@ -105,7 +107,7 @@ def calibrate_autocollimation(readings: SheetReadings, reject: bool = False) -> 
     observed = (np.column_stack([readings.get("x_arcsec"), readings.get("y_arcsec")]) * sign * ARCSECOND).ravel()
     parameters = _parameters(readings, bool(flat.any()))
     names = [p.name for p in parameters]
-    shown = 1.0 if sheet.displays == "beam" else 0.5
+    display_factor = 1.0 if sheet.displays == "beam" else 0.5
     na, ne = readings.get("azimuth_counts"), readings.get("elevation_counts")
 
     def predict(values: np.ndarray, aside: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
@@ -117,7 +119,7 @@ def calibrate_autocollimation(readings: SheetReadings, reject: bool = False) -> 
         reading = mirror_reading(normal, beta, alignment)
         if flat.any():
             reading[flat] = flat_reading(normal[flat], beta, alignment, flat=[p["flat up"], p["flat along"]])
-        return (shown * (1.0 + p["scale"]) * reading).ravel()
+        return (display_factor * (1.0 + p["scale"]) * reading).ravel()
 
     start = np.array([p.start for p in parameters])
     shaking = np.zeros((2 * m, 2 * m))
@@ -133,11 +135,14 @@ def calibrate_autocollimation(readings: SheetReadings, reject: bool = False) -> 
             active=np.repeat(readings.active, 2), together=np.repeat(np.arange(m), 2), reject=reject, level=sheet.level
         ),
     )
-    return _calibration(readings, solution, flat, shown)
+    return _calibration(readings, solution, flat, display_factor)
 
 
 def _flat(readings: SheetReadings) -> np.ndarray:
-    """(m,) bool: into the flat. Refuses other words, and counts that do not look there."""
+    """True (m,) for readings into the flat.
+
+    Raises InputError for other words, and counts of another direction.
+    """
     sheet, words = readings.sheet, readings.words.get("into", ("mirror",) * len(readings))
     for row, word in enumerate(words):
         if word not in ("mirror", "flat"):
@@ -147,11 +152,11 @@ def _flat(readings: SheetReadings) -> np.ndarray:
     off = np.where(flat, np.abs(np.abs(phi) - 0.5 * np.pi), np.abs(phi))
     if np.any(off > NEAR):
         row = int(np.argmax(off > NEAR))
-        wanted = "90, or -90 in prime, into a flat" if flat[row] else "0, into the mirror"
+        expected = "90, or -90 in prime, into a flat" if flat[row] else "0, into the mirror"
         raise readings.refuse(
             row,
             f"elevation_counts = {readings.get('elevation_counts')[row]:g} points to Phi = {phi[row] / DEGREE:.2f} "
-            f"degrees from ne0_nominal = {sheet.ne0_nominal:g} (expected within 5 of {wanted})",
+            f"degrees from ne0_nominal = {sheet.ne0_nominal:g} (expected within 5 of {expected})",
         )
     if flat.any() and sheet.u_flat_arcsec is None:
         raise refusal(readings.sheet_file, f"u_flat_arcsec is missing (expected, as {readings.file} reads into a flat)")
@@ -192,7 +197,7 @@ def _scatter(readings: SheetReadings, shaking: np.ndarray) -> ObservedScatter:
     return ObservedScatter(shaking, {"scatter of one reading": np.eye(len(shaking))})
 
 
-WANTED = (
+QUANTITIES = (
     ("beta1", "beta1_rad", "rad", "turn of the mirror's axes about x: minus the azimuth axis's lean upwards", 1.0),
     ("beta2", "beta2_rad", "rad", "turn about y: the azimuth axis's lean towards +x", 1.0),
     ("N_e0", "ne0", "counts", "elevation encoder where the beam is along the azimuth axis", 1.0),
@@ -201,11 +206,11 @@ WANTED = (
 )
 
 
-def _calibration(readings: SheetReadings, solution: CurvedFit, flat: np.ndarray, shown: float) -> Calibration:
+def _calibration(readings: SheetReadings, solution: CurvedFit, flat: np.ndarray, display_factor: float) -> Calibration:
     sheet, fit = readings.sheet, solution.fit
     sought = {p.name for p in solution.parameters if np.isinf(p.u)}
-    wanted = [w for w in WANTED if w[0] in sought]
-    calibrated, covariance = solution.quantities(wanted)
+    selection = [w for w in QUANTITIES if w[0] in sought]
+    calibrated, covariance = solution.quantities(selection)
     record: dict[str, RecordValue] = {q.key: q.value for q in calibrated}
     record["u_beta_rad"] = max(solution.u("beta1"), solution.u("beta2"))
     record["u_zero_counts"] = max(solution.u("N_e0"), solution.u("N_a0"))
@@ -233,7 +238,7 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, flat: np.ndarray,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),
         notes=_notes(solution, bool(flat.any())),
-        curve=_circles(readings, solution, flat, shown),
+        curve=_circles(readings, solution, flat, display_factor),
         axes=("x (arcsec of the mirror)", "y (arcsec of the mirror)"),
         method="The light's way from the autocollimator by the mirror, and by the flat, back is computed exactly for "
         "each reading; all readings are adjusted together. The autocollimator's alignment and scale, the flat and the "
@@ -276,10 +281,13 @@ def _notes(solution: CurvedFit, flat: bool) -> tuple[str, ...]:
 
 
 def _circles(
-    readings: SheetReadings, solution: CurvedFit, flat: np.ndarray, shown: float
+    readings: SheetReadings, solution: CurvedFit, flat: np.ndarray, display_factor: float
 ) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Readings into the mirror, and the circle that each elevation setting gives, arcsec of mirror angles."""
-    sheet, scale = readings.sheet, 0.5 / shown
+    """Readings into the mirror, and the circle of each elevation setting.
+
+    Arcsec of mirror angles.
+    """
+    sheet, scale = readings.sheet, 0.5 / display_factor
     x = readings.get("x_arcsec") * sheet.x_sign * scale
     y = readings.get("y_arcsec") * sheet.y_sign * scale
     on = solution.fit.active.reshape(-1, 2).all(axis=1)

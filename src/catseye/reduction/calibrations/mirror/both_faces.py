@@ -1,4 +1,4 @@
-"""Axis offset and mirror offset from distances in the direct and the prime pointing.
+"""Axis offset and mirror offset by distances in both pointings.
 
     to the face, from afar, at autocollimation     L - s - e sin Phi     (prime: L - s + e sin Phi)
     to the back retroreflector, from afar          L - b - e sin Phi     (prime: L - b + e sin Phi)
@@ -61,7 +61,9 @@ LAYOUT = SheetLayout(
 
 
 def calibrate_both_faces(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """Axis offset, and where distances are known mirror offset, from distances in both pointings.
+    """Axis offset, and with known distances mirror offset.
+
+    From distances in both pointings.
 
     readings   columns line (a word for each line of sight), to ("face", "back", "target"), pointing ("direct",
                "prime"), phi_deg (the line's angle from the azimuth axis), distance_m, perhaps known_distance_m (from
@@ -76,7 +78,7 @@ def calibrate_both_faces(readings: SheetReadings, reject: bool = False) -> Calib
     lines = _lines(readings, words)
     keys = list(dict.fromkeys(lines))
     which = np.array([keys.index(line) for line in lines])
-    known = "known_distance_m" in readings.numbers
+    has_distances = "known_distance_m" in readings.numbers
     measured, phi = readings.get("distance_m"), readings.get("phi_deg") * DEGREE
     to = {name: np.array([word == name for word in words["to"]]) for name in (FACE, BACK, TARGET)}
     prime = np.array([word == "prime" for word in words["pointing"]])
@@ -104,11 +106,11 @@ def calibrate_both_faces(readings: SheetReadings, reject: bool = False) -> Calib
         scatter=scatter,
         options=FitOptions(active=readings.active, reject=reject, level=readings.sheet.level),
     )
-    return _calibration(readings, solution, words, known)
+    return _calibration(readings, solution, words, has_distances)
 
 
 def _checked(readings: SheetReadings) -> dict[str, tuple[str, ...]]:
-    """The columns of words, each of them one of those expected."""
+    """Columns of words, checked against the allowed ones."""
     expected = {"to": (FACE, BACK, TARGET), "pointing": POINTINGS}
     for name, allowed in expected.items():
         for row, word in enumerate(readings.words[name]):
@@ -118,7 +120,10 @@ def _checked(readings: SheetReadings) -> dict[str, tuple[str, ...]]:
 
 
 def _lines(readings: SheetReadings, words: dict[str, tuple[str, ...]]) -> list[str]:
-    """A name for what each reading's unknown length is: of the line, or of the line to one of its ends."""
+    """Name of each reading's unknown length.
+
+    Of the line, or of the line to one of its ends.
+    """
     if "known_distance_m" not in readings.numbers:
         return [f"{line} ({to})" for line, to in zip(words["line"], words["to"], strict=True)]
     if readings.sheet.u_known_distance_mm is None:
@@ -139,28 +144,30 @@ def _parameters(
     readings: SheetReadings, keys: list[str], which: np.ndarray, to: dict[str, np.ndarray]
 ) -> list[ModelParameter]:
     sheet = readings.sheet
-    known = "known_distance_m" in readings.numbers
-    distance = readings.get("known_distance_m" if known else "distance_m")
-    u = sheet.u_known_distance_mm * MILLIMETRE if known else np.inf
+    has_distances = "known_distance_m" in readings.numbers
+    distance = readings.get("known_distance_m" if has_distances else "distance_m")
+    u = sheet.u_known_distance_mm * MILLIMETRE if has_distances else np.inf
     return [
         ModelParameter("axis offset", 0.0, 1e-2),
-        ModelParameter("mirror offset", 0.0, 1e-2, np.inf if known and (to[FACE] | to[TARGET]).any() else 0.0),
-        ModelParameter("back retroreflector", 0.0, 1e-2, np.inf if known and to[BACK].any() else 0.0),
-        ModelParameter("zero", 0.0, 1e-2, (sheet.u_zero_mm or 0.0) if known and to[TARGET].any() else 0.0),
+        ModelParameter("mirror offset", 0.0, 1e-2, np.inf if has_distances and (to[FACE] | to[TARGET]).any() else 0.0),
+        ModelParameter("back retroreflector", 0.0, 1e-2, np.inf if has_distances and to[BACK].any() else 0.0),
+        ModelParameter("zero", 0.0, 1e-2, (sheet.u_zero_mm or 0.0) if has_distances and to[TARGET].any() else 0.0),
         *(ModelParameter(f"line {key}", float(distance[which == k][0]), 1e-4, u) for k, key in enumerate(keys)),
     ]
 
 
 def _calibration(
-    readings: SheetReadings, solution: CurvedFit, words: dict[str, tuple[str, ...]], known: bool
+    readings: SheetReadings, solution: CurvedFit, words: dict[str, tuple[str, ...]], has_distances: bool
 ) -> Calibration:
     sheet, fit = readings.sheet, solution.fit
-    wanted = [
+    selection = [
         ("axis offset", "axis_offset_mm", "mm", "elevation axis off the azimuth axis, along the beam's azimuth", 1.0)
     ]
     notes = []
     if np.isinf(solution.parameters[1].u):
-        wanted.append(("mirror offset", "mirror_offset_mm", "mm", "face off the elevation axis, along its normal", 1.0))
+        selection.append(
+            ("mirror offset", "mirror_offset_mm", "mm", "face off the elevation axis, along its normal", 1.0)
+        )
     else:
         notes.append(
             "the mirror offset moves both pointings alike: no distance is known here from the scan point, so it cannot "
@@ -170,14 +177,14 @@ def _calibration(
         notes.append(
             f"the back retroreflector stands {solution.value('back retroreflector'):.4f} mm before the scan point"
         )
-    calibrated, covariance = solution.quantities(wanted)
+    calibrated, covariance = solution.quantities(selection)
     record: dict[str, RecordValue] = {q.key: q.value for q in calibrated}
     record["u_axis_mm"] = max(q.u for q in calibrated)
     notes.append(
         f"a mirror's record has one u_axis_mm for four values; this one is of {', '.join(q.key for q in calibrated)}: "
         "keep the larger of it and the record's"
     )
-    if known and np.any([word == TARGET for word in words["to"]]):
+    if has_distances and np.any([word == TARGET for word in words["to"]]):
         notes.append(f"the ranger's zero came out as {solution.value('zero'):+.4f} mm (u {solution.u('zero'):.4f} mm)")
     rows = tuple(
         (words["line"][k], words["to"][k], words["pointing"][k], float(readings.get("phi_deg")[k]),

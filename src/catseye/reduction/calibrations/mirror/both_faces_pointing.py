@@ -1,4 +1,4 @@
-"""Face tilt, beam tilt and encoder zeros from counts at which targets were found in both pointings.
+"""Face tilt, beam tilt and encoder zeros by counts in both pointings.
 
 With psi = Phi/2 the direct and the prime counts of one target, at a distance R, differ by
 
@@ -43,16 +43,16 @@ COUNTS = Within(-1_000_000, 1_000_000)
 Offset = Annotated[float, Within(-10, 10)]
 Arcseconds = Annotated[float, Within(0, 3600)]
 STEP = 1e-5  # rad
-SAME = 1e-9  # degrees
+ANGLE_ROUNDING = 1e-9  # degrees
 OFFSETS = ("axis_offset_mm", "mirror_offset_mm", "beam_x_mm", "beam_y_mm")
 AXES = gamma(0.0, 0.0, 0.0)  # mirror axes of ground vectors for a mount that is not turned
-NONE = np.zeros((2, 0))  # encoders without waves
+NO_WAVES = np.zeros((2, 0))  # encoders without waves
 
 
 class PointingSheet(Sheet):
     """Sheet of counts in both pointings.
 
-    na0_nominal, ne0_nominal   counts: good to a few hundred, where the search begins
+    na0_nominal, ne0_nominal   counts: good to a few hundred, start of the search
     axis_offset_mm, mirror_offset_mm, beam_x_mm, beam_y_mm, u_axis_mm   of the mirror (0, 0)
     u_axis_tilt_arcsec     elevation shaft against the plane across the azimuth axis
     u_direction_arcsec     of each target's theta_deg and phi_deg, if these columns are there
@@ -88,7 +88,9 @@ LAYOUT = SheetLayout(
 
 
 def calibrate_both_faces_pointing(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """Face tilt and N_e0, with known directions beam tilt and N_a0 too, from counts in both pointings.
+    """Face tilt and N_e0 from counts in both pointings.
+
+    With known directions beam tilt and N_a0 too.
 
     readings   columns target (its name), pointing ("direct", "prime"), azimuth_counts, elevation_counts, distance_m
                (from the scan point), perhaps theta_deg and phi_deg (known direction, mirror axes); sheet PointingSheet
@@ -96,7 +98,7 @@ def calibrate_both_faces_pointing(readings: SheetReadings, reject: bool = False)
 
     Raises EstimationError where no target was found in both pointings.
 
-    Source: [PARKER04] eq. 2.21 to 2.26 and what section 2.4 says of measuring in both; derived in
+    Source: [PARKER04] eq. 2.21 to 2.26 and section 2.4 on measuring in both; derived in
     `geometry.mirror.imperfect`.
     """
     m, names = len(readings), list(dict.fromkeys(readings.words["target"]))
@@ -118,12 +120,15 @@ def calibrate_both_faces_pointing(readings: SheetReadings, reject: bool = False)
         offsets = np.array([e, s, beam_x, beam_y]) * MILLIMETRE
         station = MirrorStation(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(2), np.array([na0, ne0]))
         counts = imperfect_counts(
-            station, Imperfections(offsets, np.array([face, tilt_x, tilt_y]), NONE, NONE), points @ AXES, prime=prime
+            station,
+            Imperfections(offsets, np.array([face, tilt_x, tilt_y]), NO_WAVES, NO_WAVES),
+            points @ AXES,
+            prime=prime,
         )
         shaft = 0.5 * elevation_angle(counts[:, 1], ne0)
         return (counts + back + np.column_stack([COUNTS_PER_RADIAN * kappa / np.tan(shaft), np.zeros(m)])).ravel()
 
-    # Counts may stand any whole turns off: the nearest turn of what is predicted.
+    # Counts may be off by whole turns: the turn nearest to the prediction.
     start = predict(np.array([p.start for p in parameters])).reshape(m, 2)
     back[:, 0] = 2.0 * HALF_TURN * np.round((observed[:, 0] - start[:, 0]) / (2.0 * HALF_TURN))
     eye = np.eye(2 * m)
@@ -148,20 +153,23 @@ def calibrate_both_faces_pointing(readings: SheetReadings, reject: bool = False)
 def _parameters(
     readings: SheetReadings, names: list[str], which: np.ndarray, prime: np.ndarray
 ) -> list[ModelParameter]:
-    """Twelve of the mirror, two of each target; directions that nobody knows begin where the counts point."""
+    """Twelve parameters of the mirror, two of each target.
+
+    Unknown directions begin at the counts.
+    """
     sheet = readings.sheet
-    known = "theta_deg" in readings.numbers and "phi_deg" in readings.numbers
+    has_directions = "theta_deg" in readings.numbers and "phi_deg" in readings.numbers
     if ("theta_deg" in readings.numbers) != ("phi_deg" in readings.numbers):
         raise refusal(
             readings.file, "line 1, of the columns 'theta_deg' and 'phi_deg' one is missing (expected both or none)"
         )
-    if known:
+    if has_directions:
         for key in ("u_direction_arcsec", "u_frame_arcsec"):
             if getattr(sheet, key) is None:
                 raise refusal(
                     readings.sheet_file, f"{key} is missing (expected with the columns theta_deg and phi_deg)"
                 )
-    free = np.inf if known else 0.0
+    free = np.inf if has_directions else 0.0
     mirror = [
         ModelParameter("N_a0", sheet.na0_nominal, 0.1, free),
         ModelParameter("N_e0", sheet.ne0_nominal, 0.1),
@@ -171,20 +179,20 @@ def _parameters(
         *(ModelParameter(key, getattr(sheet, key), 1e-2, sheet.u_axis_mm) for key in OFFSETS),
         ModelParameter("axis tilt", 0.0, STEP, sheet.u_axis_tilt_arcsec * ARCSECOND),
         *(
-            ModelParameter(f"frame {axis}", 0.0, STEP, (sheet.u_frame_arcsec if known else 0.0) * ARCSECOND)
+            ModelParameter(f"frame {axis}", 0.0, STEP, (sheet.u_frame_arcsec if has_directions else 0.0) * ARCSECOND)
             for axis in "xy"
         ),
     ]
     theta = azimuth_angle(readings.get("azimuth_counts"), sheet.na0_nominal) - np.where(prime, np.pi, 0.0)
     phi = np.abs(elevation_angle(readings.get("elevation_counts"), sheet.ne0_nominal))
     u = np.inf
-    if known:
+    if has_directions:
         theta, phi, u = (
             readings.get("theta_deg") * DEGREE,
             readings.get("phi_deg") * DEGREE,
             sheet.u_direction_arcsec * ARCSECOND,
         )
-        _one_direction_each(readings, which)
+        _check_directions(readings, which)
     for k, name in enumerate(names):
         first = int(np.argmax(which == k))
         across = np.sin(phi[first])  # u is across the sight
@@ -193,21 +201,21 @@ def _parameters(
     return mirror
 
 
-def _one_direction_each(readings: SheetReadings, which: np.ndarray) -> None:
-    """The known direction of a target is one; another one is another target."""
+def _check_directions(readings: SheetReadings, which: np.ndarray) -> None:
+    """Raise InputError for different known directions of one target."""
     for name in ("theta_deg", "phi_deg"):
-        given = readings.get(name)
-        for row in range(len(given)):
-            first = given[np.argmax(which == which[row])]
-            if abs(given[row] - first) > SAME:
+        directions = readings.get(name)
+        for row in range(len(directions)):
+            first = directions[np.argmax(which == which[row])]
+            if abs(directions[row] - first) > ANGLE_ROUNDING:
                 raise readings.refuse(
                     row,
-                    f"{name} = {given[row]:.10g} of target {readings.words['target'][row]!r} was {first:.10g} before "
-                    "(expected one direction for each)",
+                    f"{name} = {directions[row]:.10g} of target {readings.words['target'][row]!r} was {first:.10g} "
+                    "before (expected one direction for each)",
                 )
 
 
-WANTED = (
+QUANTITIES = (
     ("face tilt", "face_tilt_rad", "rad", "face against the elevation shaft: its normal towards +y at Theta = 0", 1.0),
     ("N_e0", "ne0", "counts", "elevation encoder where the beam is along the azimuth axis", 1.0),
     (
@@ -224,8 +232,8 @@ WANTED = (
 
 def _calibration(readings: SheetReadings, solution: CurvedFit) -> Calibration:
     fit, sought = solution.fit, {p.name for p in solution.parameters if np.isinf(p.u)}
-    wanted = [w for w in WANTED if w[0] in sought]
-    calibrated, covariance = solution.quantities(wanted)
+    selection = [w for w in QUANTITIES if w[0] in sought]
+    calibrated, covariance = solution.quantities(selection)
     record: dict[str, RecordValue] = {q.key: q.value for q in calibrated}
     record["u_tilt_rad"] = max(q.u for q in calibrated if "tilt" in q.key)
     record["u_zero_counts"] = max(q.u for q in calibrated if q.key in ("na0", "ne0"))

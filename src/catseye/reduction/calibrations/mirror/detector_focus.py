@@ -1,4 +1,4 @@
-"""Where the detector is in focus, how deep the focus is, and what the detector's place costs.
+"""Focus of the detector: place, depth, and cost of defocus.
 
 The return's amplitude against the detector's place z along the optical axis, about its top at z_0:
 
@@ -52,8 +52,8 @@ class FocusSheet(Sheet):
     model                  "gaussian_beam" or "curve"
     fill                   2 (radius of the detector over the spot's waist) squared, of the Gaussian beam; 0 if small
     degree                 of the curve: 2, 3 or 4 (4)
-    installed_mm, u_installed_mm   where the detector was fixed, in the column's scale
-    u_amplitude_share      scatter of an amplitude over itself, if known
+    installed_mm, u_installed_mm   of the fixed detector, in the column's scale
+    u_amplitude_share      relative scatter of an amplitude, if known
     amplitude_to_phase_rad, u_amplitude_to_phase_rad   of the mirror's record, for the effect on range
     half_wavelength_mm     of the modulation in air (99.93)
     """
@@ -73,7 +73,7 @@ LAYOUT = SheetLayout(KIND, FocusSheet, required={"position_mm": PLACE, "amplitud
 
 
 def calibrate_detector_focus(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """Best focus and depth of focus of the detector, and its defocus as installed.
+    """Best focus and depth of focus, and the detector's defocus as installed.
 
     readings   columns position_mm (growing one way along the optical axis) and amplitude_volt, leakage taken out; sheet
                FocusSheet
@@ -102,7 +102,10 @@ def calibrate_detector_focus(readings: SheetReadings, reject: bool = False) -> C
 
 
 def _model(sheet: FocusSheet, place: np.ndarray) -> Model:
-    """ln A at places, those of the readings where none are given."""
+    """Function for ln A at places.
+
+    Those of the readings by default.
+    """
 
     def level(values: np.ndarray, at: np.ndarray = place) -> np.ndarray:
         top, middle, depth = values[:3]
@@ -124,7 +127,10 @@ def _steepness(fill: float) -> float:
 
 
 def _parameters(sheet: FocusSheet, place: np.ndarray, observed: np.ndarray) -> list[ModelParameter]:
-    """Top, place and depth; then what changes nothing of the readings and only enters what they mean."""
+    """Parameters: top, place and depth, then derived inputs.
+
+    The latter change nothing of the readings and only enter their meaning.
+    """
     best = place[np.argmax(observed)]
     falls = observed.max() - observed
     far = falls > 0.05
@@ -171,10 +177,10 @@ def _fitted(
 
 
 def _derived(values: np.ndarray, model: Model) -> np.ndarray:
-    """Best focus, depth, defocus (mm), share of the amplitude that is left there, change of range (um)."""
+    """Derived best focus, depth, defocus (mm), amplitude share, change of range (um)."""
     middle, depth, installed, coupling, half = values[1:SHARED]
-    left = float(model(values, np.array([installed]))[0] - model(values, np.array([middle]))[0])
-    return np.array([middle, depth, installed - middle, np.exp(left), -1e3 * half / TWO_PI * coupling * left])
+    log_ratio = float(model(values, np.array([installed]))[0] - model(values, np.array([middle]))[0])
+    return np.array([middle, depth, installed - middle, np.exp(log_ratio), -1e3 * half / TWO_PI * coupling * log_ratio])
 
 
 def _results(solution: CurvedFit, model: Model, coupled: bool) -> tuple[tuple[Quantity, ...], np.ndarray]:
@@ -250,7 +256,10 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, model: Model, lon
 
 
 def _within_the_run(solution: CurvedFit, place: np.ndarray) -> CheckOutcome:
-    """Best focus must lie among the readings: beyond them it is a guess of the model."""
+    """Check that best focus lies among the readings.
+
+    Beyond them it is a guess of the model.
+    """
     on = place[solution.fit.active]
     middle, low, high = solution.value("best focus"), float(on.min()), float(on.max())
     nearer = min(middle - low, high - middle)
@@ -261,7 +270,10 @@ def _within_the_run(solution: CurvedFit, place: np.ndarray) -> CheckOutcome:
 
 
 def _symmetry(longer: CurvedFit | None) -> tuple[CheckOutcome, ...]:
-    """Whether the fall is alike on both sides, by an odd term; spherical aberration makes it differ."""
+    """Check of symmetry by an odd term.
+
+    Spherical aberration makes the sides differ.
+    """
     if longer is None:
         return ()
     ratio = abs(longer.value("skew")) / longer.u("skew")

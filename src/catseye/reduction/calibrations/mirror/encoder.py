@@ -1,4 +1,6 @@
-"""What an encoder reads beside its zero: eccentricity (once a turn), ellipticity (twice), and more where asked.
+"""Encoder errors beside the zero: eccentricity, ellipticity, higher orders.
+
+Once a turn, twice, and more on request.
 
     N = zero + 1e5/(2 pi) psi + sum c_k cos k psi + s_k sin k psi
 
@@ -46,9 +48,9 @@ class EncoderSheet(Sheet):
 
     axis                 "azimuth" or "elevation"
     angle_is             "axis" (the axis's turn) or "beam" (of the elevation: Phi, twice the mirror's turn)
-    zero_counts          na0 or ne0 of the record: where psi is zero
-    orders               how many waves a turn are sought (2)
-    displays             "mirror" or "beam": what the scale of the column reading_arcsec shows
+    zero_counts          na0 or ne0 of the record: counts at psi = 0
+    orders               number of estimated waves a turn (2)
+    displays             "mirror" or "beam": angle on the scale of the column reading_arcsec
     reading_sign         1 if a reading grows as the axis turns on, -1 if it falls
     u_face_arcsec        of each face of the polygon (column face), by its certificate
     u_reading_arcsec     scatter of an angle, as an angle of the axis, if known
@@ -82,7 +84,7 @@ def calibrate_encoder(readings: SheetReadings, reject: bool = False) -> Calibrat
                sheet EncoderSheet
     reject     leave out what the tests reject
 
-    Raises EstimationError where the angles do not tell all orders apart.
+    Raises EstimationError where the angles do not separate all orders.
 
     Source: [PARKER04] eq. 2.21 and 2.22 are the encoder without waves; a Fourier series of them, tested order by order.
     """
@@ -91,8 +93,8 @@ def calibrate_encoder(readings: SheetReadings, reject: bool = False) -> Calibrat
         raise refusal(readings.sheet_file, "angle_is = 'beam' belongs to axis = 'elevation' (expected 'axis')")
     turn = readings.get("angle_deg") * DEGREE * (0.5 if sheet.angle_is == "beam" else 1.0)
     if "reading_arcsec" in readings.numbers:
-        shown = 0.5 if sheet.displays == "beam" else 1.0
-        turn = turn + sheet.reading_sign * shown * readings.get("reading_arcsec") * ARCSECOND
+        display_factor = 0.5 if sheet.displays == "beam" else 1.0
+        turn = turn + sheet.reading_sign * display_factor * readings.get("reading_arcsec") * ARCSECOND
     runs, which = _labels(readings, "run")
     faces, face = _labels(readings, "face")
     if "face" in readings.words and sheet.u_face_arcsec is None:
@@ -101,8 +103,8 @@ def calibrate_encoder(readings: SheetReadings, reject: bool = False) -> Calibrat
     off = (counts - sheet.zero_counts) / COUNTS_PER_RADIAN - turn
     for k in range(len(runs)):  # a table that begins again at 360 degrees: the counts decide the whole turns
         rows = which == k
-        whole = TWO_PI * np.round((off[rows] - off[rows][0]) / TWO_PI)
-        turn[rows], off[rows] = turn[rows] + whole, off[rows] - whole
+        whole_turns = TWO_PI * np.round((off[rows] - off[rows][0]) / TWO_PI)
+        turn[rows], off[rows] = turn[rows] + whole_turns, off[rows] - whole_turns
     _refuse_far(readings, which, off)
     parameters = _parameters(sheet, runs, which, off)
     if "face" in readings.words:
@@ -132,14 +134,20 @@ def calibrate_encoder(readings: SheetReadings, reject: bool = False) -> Calibrat
 
 
 def _labels(readings: SheetReadings, name: str) -> tuple[list[str], np.ndarray]:
-    """The different words of a column and (m,) which; one for all where there is no such column."""
+    """Distinct words of a column and (m,) their index.
+
+    A single one without such a column.
+    """
     words = readings.words.get(name, ("",) * len(readings))
     names = list(dict.fromkeys(words))
     return names, np.array([names.index(word) for word in words])
 
 
 def _refuse_far(readings: SheetReadings, which: np.ndarray, off: np.ndarray) -> None:
-    """Counts that do not go with the angles are no waves: another unit, sense or axis."""
+    """Raise InputError for counts that do not follow the angles.
+
+    Such are no waves: another unit, sense or axis.
+    """
     for row in np.flatnonzero(readings.active):
         run = (which == which[row]) & readings.active
         far = float(COUNTS_PER_RADIAN * (off[row] - np.median(off[run])))
@@ -157,7 +165,7 @@ def _wave(psi: np.ndarray, terms: np.ndarray, order: np.ndarray) -> np.ndarray:
 
 
 def _parameters(sheet: EncoderSheet, runs: list[str], which: np.ndarray, off: np.ndarray) -> list[ModelParameter]:
-    """Cosines, sines, then how each run stands to the zero."""
+    """Parameters: cosines, sines, then the start of each run."""
     waves = [f"{part} {k}" for part in ("cosine", "sine") for k in range(1, sheet.orders + 1)]
     return [ModelParameter(name, 0.0, 0.1) for name in waves] + [
         ModelParameter(f"start of run {name}".rstrip(), float(np.median(off[which == k])), 1e-5)
@@ -167,11 +175,11 @@ def _parameters(sheet: EncoderSheet, runs: list[str], which: np.ndarray, off: np
 
 def _calibration(readings: SheetReadings, solution: CurvedFit, psi: np.ndarray) -> Calibration:
     sheet, fit, n = readings.sheet, solution.fit, readings.sheet.orders
-    wanted = [
+    selection = [
         (f"{part} {k}", f"{sheet.axis}_encoder_{part}_{k}_counts", "counts", "term of what it reads too high", 1.0)
         for part in ("cosine", "sine") for k in range(1, n + 1)
     ]  # fmt: skip
-    calibrated, covariance = solution.quantities(wanted)
+    calibrated, covariance = solution.quantities(selection)
     values = [q.value for q in calibrated]
     record: dict[str, RecordValue] = {
         f"{sheet.axis}_encoder_cosine_counts": values[:n],
@@ -218,7 +226,9 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, psi: np.ndarray) 
 
 
 def _order_decisions(solution: CurvedFit, n: int, level: float) -> tuple[CheckOutcome, ...]:
-    """Whether each order is there at all: its squared Mahalanobis distance from zero.
+    """Significance test of each order by its squared Mahalanobis distance.
+
+    From zero.
 
     Chi-square of two degrees where the scatter is claimed, else twice Fisher's F with the scatter's own degrees.
 

@@ -1,4 +1,4 @@
-"""The azimuth's mechanical stops, each touched several times, to the limits that the commands keep.
+"""Azimuth limits from touches of the mechanical stops.
 
 A stop's place is the mean of its touches. The limit stands inside of it by the margin and by as much as a touch to
 come may differ, rounded inwards to whole counts: three standard deviations, or where the touches themselves show the
@@ -64,8 +64,8 @@ def calibrate_limits(readings: SheetReadings, reject: bool = False) -> Calibrati
         if word not in STOPS:
             raise readings.refuse(row, f"stop = {word!r} is unknown (expected 'low' or 'high')")
     high = np.array([word == "high" for word in readings.words["stop"]])
-    for name, there in (("low", ~high), ("high", high)):
-        if not np.any(there & readings.active):
+    for name, at_stop in (("low", ~high), ("high", high)):
+        if not np.any(at_stop & readings.active):
             raise refusal(readings.file, f"column 'stop': {name!r} was never touched (expected touches of both stops)")
     eye = np.eye(len(counts))
     claimed = sheet.u_touch_counts
@@ -78,8 +78,8 @@ def calibrate_limits(readings: SheetReadings, reject: bool = False) -> Calibrati
         counts,
         lambda values: np.where(high, values[1], values[0]),
         [
-            ModelParameter(f"{name} stop", float(np.median(counts[there])), 0.1)
-            for name, there in (("low", ~high), ("high", high))
+            ModelParameter(f"{name} stop", float(np.median(counts[at_stop])), 0.1)
+            for name, at_stop in (("low", ~high), ("high", high))
         ],
         scatter=scatter,
         options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
@@ -142,7 +142,10 @@ def _calibration(readings: SheetReadings, solution: CurvedFit, single: float) ->
 
 
 def _reach(low: int, high: int) -> CheckOutcome:
-    """Whether every direction is reached, direct or prime: the pointings lie half a turn apart."""
+    """Check that every direction is reached, direct or prime.
+
+    The pointings lie half a turn apart.
+    """
     travel = float(high - low)
     reached = "every direction is reached" if travel >= HALF_TURN else "some directions are not reached"
     text = f"{reached}, in the direct or the prime pointing"
@@ -150,7 +153,10 @@ def _reach(low: int, high: int) -> CheckOutcome:
 
 
 def _travel(solution: CurvedFit) -> CheckOutcome:
-    """Whether two stops of one axis can lie so far apart: a lever lets a pin by, once."""
+    """Check that two stops of one axis can be so far apart.
+
+    A lever lets a pin by, once.
+    """
     travel, most = solution.value("high stop") - solution.value("low stop"), 1.5 * COUNTS_PER_TURN
     text = "stops of one axis"
     if travel > most:

@@ -1,4 +1,6 @@
-"""A campaign's search results against the laboratory: all 13 numbers of a station, adjusted together.
+"""Adjustment of a station's 13 parameters to search results.
+
+A campaign in the field against the laboratory.
 
 Each target of known coordinates was found at some counts. The monument's and the mirror's records give the station's
 parameters with their standard uncertainties; these are priors, and the counts decide as much as they can. What they
@@ -54,10 +56,10 @@ IN_FILES = {  # name -> key of the records, its unit, size of the unit, record
     **{k: (k, "counts", 1.0, "mirror") for k in ("na0", "ne0")},
 }
 NEEDED = ("u_alpha1_rad", "u_alpha2_rad", "u_alpha3_rad", "u_beta_rad", "u_zero_counts")
-DECIDED = 0.5  # share of a combination's variance that the counts took away: more is theirs, less is the laboratory's
-NOTHING = 1e-6  # of the largest singular value: a combination that no count depends on
+DECIDED = 0.5  # share of a combination's variance removed by the counts: more is theirs, less is the laboratory's
+INDETERMINATE = 1e-6  # of the largest singular value: a combination that no count depends on
 INFORMED = 1e-3  # share below which a change is rounding
-SHOWN = 0.3  # of a unit combination: parameters named in it
+NAMED_PART = 0.3  # of a unit combination: parameters named in it
 
 
 class SearchSheet(Sheet):
@@ -75,7 +77,7 @@ class SearchSheet(Sheet):
     mirror: Annotated[MirrorGeometry, Field()]
 
     @field_serializer("monument", "mirror")
-    def _as_given(self, record: MonumentGeometry | MirrorGeometry) -> dict[str, object]:
+    def _as_typed(self, record: MonumentGeometry | MirrorGeometry) -> dict[str, object]:
         return record.model_dump(exclude_unset=True)
 
 
@@ -95,7 +97,9 @@ LAYOUT = SheetLayout(
 
 
 def calibrate_search_results(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """A station's parameters from targets found in the field, compared with the laboratory's.
+    """Station's parameters from targets in the field.
+
+    Compared with the laboratory's.
 
     readings   columns target (its name), x_m, y_m, z_m (ground frame), azimuth_counts, elevation_counts, perhaps
                pointing ("direct" if missing, "prime"), u_azimuth_counts, u_elevation_counts; sheet SearchSheet
@@ -125,7 +129,7 @@ def calibrate_search_results(readings: SheetReadings, reject: bool = False) -> C
     turns = np.zeros((m, 2))
     start = station_of(sheet.monument, sheet.mirror).parameters
     u = np.sqrt(np.diag(covariance))
-    parameters = [ModelParameter(*each) for each in zip(PARAMETERS, start, STEPS, u, strict=True)]
+    parameters = [ModelParameter(*parameter) for parameter in zip(PARAMETERS, start, STEPS, u, strict=True)]
     parameters += [
         ModelParameter(f"{name} {axis}", 0.0, 1e-4, sheet.u_target_mm * MILLIMETRE) for name in names for axis in "xyz"
     ]
@@ -157,7 +161,10 @@ def calibrate_search_results(readings: SheetReadings, reject: bool = False) -> C
 
 
 def _u_counts(readings: SheetReadings) -> np.ndarray:
-    """(m, 2) of azimuth and elevation: the columns', else the sheet's."""
+    """Standard uncertainty (m, 2) of the counts, azimuth and elevation.
+
+    The columns', else the sheet's.
+    """
     columns = []
     for name in ("u_azimuth_counts", "u_elevation_counts"):
         if name in readings.numbers:
@@ -178,7 +185,10 @@ def _prime(readings: SheetReadings) -> np.ndarray:
 
 
 def _refuse_far(readings: SheetReadings, off: np.ndarray) -> None:
-    """Counts a quarter turn from where the records point are another target, pointing or station."""
+    """Raise InputError for counts a quarter turn off the records.
+
+    Another target, pointing or station.
+    """
     far = np.any(np.abs(off) > 0.5 * HALF_TURN, axis=1) & readings.active
     if far.any():
         row = int(np.argmax(far))
@@ -190,7 +200,10 @@ def _refuse_far(readings: SheetReadings, off: np.ndarray) -> None:
 
 
 class _Compared:
-    """What the counts decided, in units of the priors of the parameters that are not held."""
+    """Parameters decided by the counts, in units of the priors.
+
+    Only parameters that are not held.
+    """
 
     def __init__(self, solution: CurvedFit) -> None:
         prior = np.array([p.u for p in solution.parameters[:P]])
@@ -203,8 +216,11 @@ class _Compared:
         self.share, self.vectors = np.clip(values[::-1], 0.0, 1.0), vectors[:, ::-1]
         self.decided = int(np.count_nonzero(self.share > DECIDED))
 
-    def whole(self, level: float) -> CheckOutcome:
-        """Whether laboratory and field agree in all that the counts say something of."""
+    def total(self, level: float) -> CheckOutcome:
+        """Joint test of laboratory and field.
+
+        In all combinations that the counts determine.
+        """
         informed = self.share > INFORMED
         along = self.vectors[:, informed].T @ self.change
         statistic, degrees = float(np.sum(along**2 / self.share[informed])), int(informed.sum())
@@ -224,7 +240,7 @@ class _Compared:
         )
 
     def single(self, level: float) -> list[CheckOutcome]:
-        """Each parameter's change over its own standard uncertainty."""
+        """Test of each parameter's change over its own standard uncertainty."""
         limit = w_critical(single_level(level, len(self.free)))
         outcomes = []
         for k, j in enumerate(self.free):
@@ -237,20 +253,23 @@ class _Compared:
                 )
                 continue
             ratio = float(self.change[k] / np.sqrt(share))
-            left = np.sqrt(self.left[k, k])
-            text = f"changed by {self.change[k]:+.2f} of the laboratory's u, of which {left:.2f} is left"
+            remaining = np.sqrt(self.left[k, k])
+            text = f"changed by {self.change[k]:+.2f} of the laboratory's u, of which {remaining:.2f} is left"
             outcomes.append(CheckOutcome(f"{name}: change over its u", abs(ratio), limit, abs(ratio) <= limit, text))
         return outcomes
 
     def combination(self, k: int) -> str:
-        """A combination by its leading parameters, in units of their priors."""
+        """Combination by its leading parameters, in units of their priors."""
         vector = self.vectors[:, k] * np.sign(self.vectors[np.argmax(np.abs(self.vectors[:, k])), k])
-        order = [i for i in np.argsort(-np.abs(vector)) if abs(vector[i]) > SHOWN]
+        order = [i for i in np.argsort(-np.abs(vector)) if abs(vector[i]) > NAMED_PART]
         return " ".join(f"{vector[i]:+.2f} {PARAMETERS[self.free[i]]}" for i in order)
 
 
 def _inseparable(solution: CurvedFit, predict: Callable[[np.ndarray], np.ndarray]) -> tuple[int, list[str]]:
-    """Rank of the counts in the free parameters, and the parameters that no number of counts would tell."""
+    """Rank of the counts in the free parameters, and undetermined parameters.
+
+    Parameters that no number of counts would determine.
+    """
     free = [k for k, p in enumerate(solution.parameters[:P]) if p.u > 0.0]
     columns = []
     for k in free:
@@ -260,9 +279,9 @@ def _inseparable(solution: CurvedFit, predict: Callable[[np.ndarray], np.ndarray
     scaled = np.column_stack(columns)
     scaled = scaled / np.maximum(np.linalg.norm(scaled, axis=0), 1e-300)
     _, size, turned = np.linalg.svd(scaled)
-    rank = int(np.count_nonzero(size > NOTHING * size[0]))
+    rank = int(np.count_nonzero(size > INDETERMINATE * size[0]))
     part = np.sum(turned[rank:] ** 2, axis=0)
-    return rank, [PARAMETERS[k] for k, share in zip(free, part, strict=True) if share > NOTHING]
+    return rank, [PARAMETERS[k] for k, share in zip(free, part, strict=True) if share > INDETERMINATE]
 
 
 def _calibration(
@@ -286,9 +305,9 @@ def _calibration(
         f"without the laboratory they would hold {rank} of {len(free)}"
         + (f"; these cannot be told apart by any counts: {', '.join(loose)}" if loose else ""),
     ]
-    held = [name for k, name in enumerate(PARAMETERS) if k not in compared.free]
-    if held:
-        notes.append(f"held as the records have them, without a u: {', '.join(held)}")
+    fixed = [name for k, name in enumerate(PARAMETERS) if k not in compared.free]
+    if fixed:
+        notes.append(f"held as the records have them, without a u: {', '.join(fixed)}")
     residual = fit.residual.reshape(-1, 2)
     words = readings.words.get("pointing", ("direct",) * len(readings))
     rows = tuple(
@@ -306,7 +325,7 @@ def _calibration(
         columns=("target", "pointing", "azimuth_counts", "elevation_counts", "residual_azimuth_counts",
                  "residual_elevation_counts", fit.test, "state"),
         rows=rows,
-        decisions=(compared.whole(sheet.level), *compared.single(sheet.level), *fit.decisions()),
+        decisions=(compared.total(sheet.level), *compared.single(sheet.level), *fit.decisions()),
         fit=fit,
         variance_factor=fit.variance_factor,
         degrees_of_freedom=round(fit.degrees_of_freedom),

@@ -1,1 +1,1 @@
-"""A monument: azimuth, levels, place."""
+"""Monument: azimuth, levels, place."""

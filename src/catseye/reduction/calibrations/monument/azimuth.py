@@ -1,4 +1,6 @@
-"""Monument azimuth: directions on a Kelvin mount to known points, stars and references give where z^ looks, and alpha1.
+"""Monument azimuth: direction of z^, and alpha1, by directions.
+
+Directions on a Kelvin mount to known points, stars and references.
 
 The circle is tied to the mount in one of three ways: a Kelvin plate whose circle reads a known direction of z^
 (`plate_zero_deg`), references in the lab before and after the instrument was carried to the field with its circle
@@ -44,7 +46,9 @@ STEPS = {"angle": ARCSECOND, "length": 1e-4, "time": 1.0}
 
 @dataclass(frozen=True, eq=False)
 class LinearisedDirections:
-    """Circle readings about an azimuth and zeros: observed = design x + effects, rad.
+    """Circle readings linearised about an azimuth and zeros.
+
+    observed = design x + effects, rad.
 
     observed   (m,)
     design     (m, p) by the azimuth of z^ and, where the plate does not tell it, the zero of each set
@@ -57,13 +61,15 @@ class LinearisedDirections:
 
 
 def calibrate_azimuth(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """Azimuth of a mount's line fixed point to v-block in the ground frame, and alpha1.
+    """Azimuth of a mount's line fixed point to v-block, and alpha1.
+
+    In the ground frame.
 
     readings   columns target, direction_deg, perhaps face, place, set, zenith_deg, mjd_utc; sheet AzimuthSheet
     reject     leave out what the tests reject
 
-    Raises InputError for targets that the sheet does not know or a circle that nothing ties to the mount,
-    EstimationError where nothing in the field tells the azimuth.
+    Raises InputError for targets missing in the sheet or a circle without a connection to the mount,
+    EstimationError where nothing in the field determines the azimuth.
 
     Source: [PARKER04] sections 2.2.1 and 2.5, eq. 2.6 (its example turns x^ to 32° 11' 50", z^ looks 90° further);
     [JCGM100] 5.1.3 (propagation); geometry/frames/plumb.py (convergence and Laplace's equation), geometry/sky/star.py.
@@ -86,7 +92,10 @@ def calibrate_azimuth(readings: SheetReadings, reject: bool = False) -> Calibrat
 
 
 def _tied(sights: DirectionSights) -> bool:
-    """The circle's zero is known from the plate; else each set of circle readings must see a reference."""
+    """True if the plate determines the circle's zero.
+
+    Else each set of circle readings must see a reference.
+    """
     readings = sights.readings
     sheet, on = readings.sheet, readings.active
     for k, name in enumerate(sights.sets):
@@ -122,9 +131,9 @@ def _start(sights: DirectionSights, tied: bool) -> np.ndarray:
 
 
 def _linear(sights: DirectionSights, at: np.ndarray, tied: bool) -> LinearisedDirections:
-    """The readings about the latest (azimuth, zeros).
+    """Readings linearised about the latest (azimuth, zeros).
 
-    The parameters themselves, not their changes, are sought, so that the priors of the effects stay about zero.
+    The parameters themselves, not their changes, are estimated, so that the priors of the effects stay about zero.
     """
     sheet = sights.readings.sheet
     m = len(sights.observed)
@@ -156,7 +165,10 @@ def _linear(sights: DirectionSights, at: np.ndarray, tied: bool) -> LinearisedDi
 
 
 def _instrument_effects(sights: DirectionSights, turned: np.ndarray, zenith: np.ndarray) -> list[Effect]:
-    """Collimation, trunnion axis, lean of the vertical axis, the known directions of references, the transport."""
+    """Effects of the instrument, references and transport.
+
+    Collimation, trunnion axis, lean of the vertical axis, the known directions of references, the transport.
+    """
     sheet = sights.readings.sheet
     per = ARCSECOND
     effects = [
@@ -191,7 +203,10 @@ def _instrument_effects(sights: DirectionSights, turned: np.ndarray, zenith: np.
 
 
 def _changes(sights: DirectionSights) -> list[tuple[str, float, float, Callable[[float], SightConditions]]]:
-    """(name, u, step, change of a step -> conditions) of what the geometry hangs on; u in the unit of the step."""
+    """Changes of the geometry's inputs.
+
+    (name, u, step, change of a step -> conditions); u in the unit of the step.
+    """
     sheet = sights.readings.sheet
     angle, length = STEPS["angle"], STEPS["length"]
 
@@ -224,13 +239,16 @@ def _changes(sights: DirectionSights) -> list[tuple[str, float, float, Callable[
 
 
 def _coordinate_columns(sheet: AzimuthSheet) -> list[np.ndarray]:
-    """Columns (3 n,), m, whose products with independent unit effects have the covariance of the coordinates."""
+    """Columns (3 n,), m, of the coordinates' covariance.
+
+    Their products with independent unit effects have it.
+    """
     if sheet.covariance_mm2:
         values, vectors = np.linalg.eigh(np.array(sheet.covariance_mm2))
         root = vectors * np.sqrt(np.maximum(values, 0.0))
     else:
-        own = [sheet.u_x_mm, sheet.u_y_mm, sheet.u_z_mm]
-        root = np.diag([*own, *(u for p in sheet.point for u in (p.u_x_mm, p.u_y_mm, p.u_z_mm))])
+        sigmas = [sheet.u_x_mm, sheet.u_y_mm, sheet.u_z_mm]
+        root = np.diag([*sigmas, *(u for p in sheet.point for u in (p.u_x_mm, p.u_y_mm, p.u_z_mm))])
     return [column * MILLIMETRE for column in root.T if np.abs(column).max() > 1e-9]
 
 
@@ -253,7 +271,10 @@ def _fitted(
 
 
 def _closures(sights: DirectionSights, fit: CalibrationFit, effects: list[Effect]) -> list[tuple[str, float, float]]:
-    """Set, lab after less before (rad), its u: scatter of readings, transport, what both visits do not share."""
+    """Closure of each set: lab after minus before (rad), with u.
+
+    u: scatter of readings, transport, errors that both visits do not share.
+    """
     closures = []
     plain = sights.observed - geometry_of(sights, float(fit.x[0]), SightConditions())[0]
     for k, name in enumerate(sights.sets):
@@ -264,8 +285,8 @@ def _closures(sights: DirectionSights, fit: CalibrationFit, effects: list[Effect
         for one, sign in zip(rows, (-1.0, 1.0), strict=True):
             faces = np.unique(sights.face[one])
             for f in faces:  # faces have one mean each, so that the collimation goes out where both were read
-                there = one & (sights.face == f)
-                weight[there] = sign / (len(faces) * np.count_nonzero(there))
+                face_rows = one & (sights.face == f)
+                weight[face_rows] = sign / (len(faces) * np.count_nonzero(face_rows))
         closure = float(weight @ wrapped(plain - plain[np.argmax(rows[0])]))
         shared = sum((float(weight @ e.column) * e.u) ** 2 for e in effects)
         closures.append((name, closure, float(np.sqrt(np.sum((weight * fit.sigma) ** 2) + shared))))
@@ -273,7 +294,9 @@ def _closures(sights: DirectionSights, fit: CalibrationFit, effects: list[Effect
 
 
 def _rows(sights: DirectionSights, fit: CalibrationFit, azimuth: float) -> tuple[tuple[Cell, ...], ...]:
-    """Each sight with the azimuth and the zenith angle (degrees) of its target about the plumb line, and how it fits.
+    """Table of sights: azimuth, zenith angle (degrees), and residual.
+
+    About the plumb line.
 
     azimuth   rad, of z^
     """
@@ -299,7 +322,10 @@ def _rows(sights: DirectionSights, fit: CalibrationFit, azimuth: float) -> tuple
 
 
 def _closure_decisions(sights: DirectionSights, fit: CalibrationFit, effects: list[Effect]) -> list[CheckOutcome]:
-    """The closure of each set that visited the lab twice, against three of its u."""
+    """Check of the closure of each set with two visits to the lab.
+
+    Against three of its u.
+    """
     return [
         CheckOutcome(
             f"closure of set {name}, size in arcsec",
@@ -368,7 +394,10 @@ def _calibration(sights: DirectionSights, fit: CalibrationFit, linear: Linearise
 
 
 def _largest(fit: CalibrationFit, linear: LinearisedDirections) -> str:
-    """The three effects that the azimuth owes most of its u to, in arcseconds: gain times column times u."""
+    """Three effects with the largest shares of the azimuth's u, arcseconds.
+
+    Gain times column times u.
+    """
     on, acting = fit.active, [e for e in linear.effects if e.u > 0.0]
     columns = np.column_stack([np.zeros(int(on.sum())), *(e.column[on] * e.u for e in acting)])
     design = linear.design[on]
@@ -386,8 +415,8 @@ def _dms(angle: float) -> str:
     32° 11' 50.0"
     """
     tenths = round(np.degrees(np.mod(angle, TWO_PI)) * 36_000.0) % (360 * 36_000)
-    degrees, rest = divmod(tenths, 36_000)
-    minutes, seconds = divmod(rest, 600)
+    degrees, remainder = divmod(tenths, 36_000)
+    minutes, seconds = divmod(remainder, 600)
     return f"{degrees}° {minutes:02d}' {seconds / 10:04.1f}\""
 
 

@@ -1,4 +1,4 @@
-"""The sheet and the table of directions on a Kelvin mount."""
+"""Sheet and table of directions on a Kelvin mount."""
 
 from typing import Annotated
 
@@ -15,7 +15,10 @@ ULength = Annotated[float, Within(0, 1e4)]  # mm
 
 
 class Reference(Record):
-    """A target whose direction from the v-block is known: the v-block lies v_block_deg clockwise of it."""
+    """Target with a known direction from the v-block.
+
+    The v-block lies v_block_deg clockwise of it.
+    """
 
     name: Name
     v_block_deg: Direction
@@ -23,7 +26,7 @@ class Reference(Record):
 
 
 class KnownPoint(Record):
-    """A target with coordinates in the ground frame and their standard uncertainties."""
+    """Target with coordinates in the ground frame and their u."""
 
     name: Name
     x_mm: Coordinate
@@ -35,7 +38,10 @@ class KnownPoint(Record):
 
 
 class CataloguedStar(Record):
-    """A star, ICRS at J2000.0; motion a year, that of right ascension times cos(declination)."""
+    """Star, ICRS at J2000.0.
+
+    Motion a year, that of right ascension times cos(declination).
+    """
 
     name: Name
     ra_deg: Annotated[float, Within(0, 360)]

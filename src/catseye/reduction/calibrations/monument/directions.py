@@ -1,4 +1,6 @@
-"""Directions on a Kelvin mount: what a theodolite's circle should read, and how that hangs on everything known.
+"""Predicted circle readings of directions on a Kelvin mount.
+
+And their dependence on all inputs.
 
 All angles here are rad, clockwise; the v-block's direction is that of the mount's z^. With the circle's reading o of
 z^, taken through a transport as o + drift,
@@ -29,7 +31,9 @@ FACES = {"left": 1.0, "right": -1.0}
 
 @dataclass(frozen=True)
 class SightConditions:
-    """What the predicted readings hang on besides azimuth and circle zeros; zero is what the sheet states.
+    """Inputs of the predicted readings besides azimuth and circle zeros.
+
+    Zero is the sheet's value.
 
     xi, eta      rad, change of the deflection
     time         s, by which the clock is late, UT1 - UTC included
@@ -48,7 +52,7 @@ class SightConditions:
 
 @dataclass(frozen=True, eq=False)
 class DirectionSights:
-    """The rows of a table as sights.
+    """Rows of a table as sights.
 
     readings   the table, with sheet AzimuthSheet
     observed   (m,) circle reading, that of face right turned by half a turn
@@ -70,30 +74,33 @@ class DirectionSights:
     share: np.ndarray
 
     def are(self, kind: str) -> np.ndarray:
-        """Whether each sight is of a kind, (m,) bool."""
+        """True (m,) for sights of a kind."""
         return self.kind == kind
 
 
 def sights_of(readings: SheetReadings) -> DirectionSights:
-    """The sights of a table; InputError for a target, face or place that is not known, or a star without a time."""
+    """Sights of a table.
+
+    InputError for an unknown target, face or place, or a star without a time.
+    """
     m = len(readings)
-    known = _known(readings)
+    targets_by_name = _target_kinds(readings)
     targets = readings.words["target"]
     face_words = readings.words.get("face", ("left",) * m)
     places = readings.words.get("place", (FIELD,) * m)
     set_words = readings.words.get("set", ("1",) * m)
     for row in range(m):
-        if targets[row] not in known:
+        if targets[row] not in targets_by_name:
             raise readings.refuse(row, f"target = {shown(targets[row])} is not in {readings.sheet_file} (expected one "
-                                       f"of {', '.join(known)})")  # fmt: skip
+                                       f"of {', '.join(targets_by_name)})")  # fmt: skip
         if face_words[row] not in FACES:
             raise readings.refuse(row, f"face = {shown(face_words[row])} (expected left or right)")
         if places[row] not in (BEFORE, FIELD, AFTER):
             raise readings.refuse(row, f"place = {shown(places[row])} (expected before, field or after)")
-        if places[row] != FIELD and known[targets[row]][0] != "reference":
+        if places[row] != FIELD and targets_by_name[targets[row]][0] != "reference":
             raise readings.refuse(row, f"target = {shown(targets[row])} is seen in the lab, {places[row]} the carriage "
                                        "(expected a reference there)")  # fmt: skip
-        if known[targets[row]][0] == "star" and TIME not in readings.numbers:
+        if targets_by_name[targets[row]][0] == "star" and TIME not in readings.numbers:
             raise refusal(readings.file, f"line 1, column {TIME!r} is missing (needed for the star {targets[row]})")
     face = np.array([FACES[word] for word in face_words])
     observed = readings.get("direction_deg") * DEGREE - np.where(face < 0.0, np.pi, 0.0)
@@ -105,15 +112,15 @@ def sights_of(readings: SheetReadings) -> DirectionSights:
         face=face,
         sets=sets,
         of_set=np.array([sets.index(word) for word in set_words]),
-        kind=np.array([known[name][0] for name in targets]),
-        which=np.array([known[name][1] for name in targets]),
+        kind=np.array([targets_by_name[name][0] for name in targets]),
+        which=np.array([targets_by_name[name][1] for name in targets]),
         place=place,
         share=_share(readings, place, set_words),
     )
 
 
-def _known(readings: SheetReadings) -> dict[str, tuple[str, int]]:
-    """Name -> (kind, index) of everything that the sheet knows; Polaris is always there."""
+def _target_kinds(readings: SheetReadings) -> dict[str, tuple[str, int]]:
+    """Name -> (kind, index) of the sheet's targets and Polaris."""
     sheet = readings.sheet
     named = [(r.name, ("reference", k)) for k, r in enumerate(sheet.reference)]
     named += [(p.name, ("point", k)) for k, p in enumerate(sheet.point)]
@@ -126,7 +133,10 @@ def _known(readings: SheetReadings) -> dict[str, tuple[str, int]]:
 
 
 def _share(readings: SheetReadings, place: np.ndarray, sets: tuple[str, ...]) -> np.ndarray:
-    """How far the transport of each set has come: by time where it is known, else half-way in the field."""
+    """Progress of each set's transport, 0 to 1.
+
+    By time if available, else half-way in the field.
+    """
     share = np.where(place == BEFORE, 0.0, np.where(place == AFTER, 1.0, 0.5))
     if TIME not in readings.numbers:
         return share
@@ -148,11 +158,13 @@ def _share(readings: SheetReadings, place: np.ndarray, sets: tuple[str, ...]) ->
 
 
 def geometry_of(sights: DirectionSights, azimuth_z: float, changed: SightConditions) -> tuple[np.ndarray, np.ndarray]:
-    """Direction from z^ about the plumb line, and zenith angle, of each sight: (m,), (m,).
+    """Direction from z^ about the plumb line, and zenith angle.
+
+    Of each sight: (m,), (m,).
 
     sights       the table
     azimuth_z    rad, of z^ in the ground frame
-    changed        changes of what is known
+    changed        changes of the inputs
     """
     sheet, readings = sights.readings.sheet, sights.readings
     frame = frame_of(sheet, xi=changed.xi, eta=changed.eta)
@@ -193,7 +205,7 @@ def geometry_of(sights: DirectionSights, azimuth_z: float, changed: SightConditi
 
 
 def star_of(entry: CataloguedStar) -> Star:
-    """The star of an entry of a sheet, in radians and arcseconds."""
+    """Star of a sheet's entry, in radians and arcseconds."""
     return Star(
         entry.name,
         entry.ra_deg * DEGREE,
@@ -208,7 +220,7 @@ def star_of(entry: CataloguedStar) -> Star:
 def leaning(
     sights: DirectionSights, turned: np.ndarray, zenith: np.ndarray, *, lean_x: float, lean_z: float
 ) -> np.ndarray:
-    """What the lean of the vertical axis adds to each reading in the field, rad.
+    """Effect of the vertical axis' lean on each field reading, rad.
 
     turned, zenith   (m,) from `geometry_of`
     lean_x, lean_z   rad, of the axis' top towards the mount's x^ and z^
@@ -221,5 +233,5 @@ def leaning(
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:
-    """The angles brought into [-pi, pi)."""
+    """Angles reduced to [-pi, pi)."""
     return np.mod(angle + np.pi, TWO_PI) - np.pi

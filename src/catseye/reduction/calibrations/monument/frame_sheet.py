@@ -1,4 +1,7 @@
-"""What a sheet says about the ground frame and the plumb line: where the origin is, how a level's zenith leans."""
+"""Sheet of the ground frame and the plumb line.
+
+The origin's place, and the lean of a level's zenith.
+"""
 
 from typing import Annotated
 
@@ -34,7 +37,9 @@ class FrameSheet(Sheet):
 
 
 class MonumentSheet(FrameSheet):
-    """Sheet of a calibration of a monument: where its fixed point stands in the ground frame.
+    """Sheet of a monument's calibration, with its fixed point's place.
+
+    In the ground frame.
 
     x_mm, y_mm, z_mm   of the fixed point
     """
@@ -45,7 +50,7 @@ class MonumentSheet(FrameSheet):
 
 
 def frame_of(sheet: FrameSheet, *, xi: float = 0.0, eta: float = 0.0) -> LocalFrame:
-    """The ground frame of a sheet.
+    """Ground frame of a sheet.
 
     sheet    what it says of origin, geoid and plumb line
     xi, eta  rad, added to the deflection that it states

@@ -1,4 +1,6 @@
-"""Hydrostatic level: two vessels joined by a tube give height differences along a run, and the instrument's constant.
+"""Hydrostatic level: height differences along a run, and its constant.
+
+Two vessels joined by a tube.
 
 The vessels of a Pellissier H5 stand on two marks; each reading is how high the water stands above its vessel's foot.
 Vessel v reads the water zero_v lower than it is above the foot. The water in both is one level surface, so that with
@@ -106,13 +108,13 @@ def water_density(temperature_c: ArrayLike) -> np.ndarray:
 
 
 def calibrate_level(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """Heights of marks from a run, the instrument's constant, and how the loops close.
+    """Heights of marks from a run, the constant, and loop closures.
 
     readings   columns from, to, vessel_from, reading_from_mm, reading_to_mm, perhaps temperatures and depth_m
     reject     leave out what the tests reject
 
-    Raises InputError for marks that do not hang together, EstimationError where vessels that were never exchanged leave
-    the constant unknown.
+    Raises InputError for unconnected marks, EstimationError where vessels that were never exchanged leave the constant
+    unknown.
 
     Source: [PARKER04] section 7.2.4 names instrument and constant (its references 116, 146); hydrostatics as above.
     """
@@ -126,13 +128,13 @@ def calibrate_level(readings: SheetReadings, reject: bool = False) -> Calibratio
         climb[row, marks.index(first)] -= 1.0
         climb[row, marks.index(last)] += 1.0
     density, by_temperature = _density(readings)
-    shown = (readings.get("reading_from_mm") - readings.get("reading_to_mm")) * MILLIMETRE
-    observed = shown + density - climb[:, 0] * sheet.held_height_mm * MILLIMETRE
+    difference = (readings.get("reading_from_mm") - readings.get("reading_to_mm")) * MILLIMETRE
+    observed = difference + density - climb[:, 0] * sheet.held_height_mm * MILLIMETRE
     # observed = climb of the others - side C
     design, names = climb[:, 1:], [f"height of {mark}" for mark in marks[1:]]
     effects = [
         Effect("thermometers, °C", side * by_temperature, sheet.u_temperature_c),
-        Effect("micrometers, ppm", PPM * shown, sheet.u_scale_ppm),
+        Effect("micrometers, ppm", PPM * difference, sheet.u_scale_ppm),
         Effect("height of the held mark, mm", climb[:, 0] * MILLIMETRE, sheet.u_held_height_mm),
     ]
     if sheet.constant_mm is not None:
@@ -159,7 +161,10 @@ def calibrate_level(readings: SheetReadings, reject: bool = False) -> Calibratio
 
 
 def _refuse(readings: SheetReadings, ends: list[tuple[str, ...]], marks: tuple[str, ...]) -> None:
-    """InputError for a mark without a name, a set-up from a mark to itself, or a part of the run that hangs alone."""
+    """Raise InputError for unnamed marks, null set-ups or unconnected parts.
+
+    A null set-up goes from a mark to itself.
+    """
     for row, (first, last) in enumerate(zip(*ends, strict=True)):
         if not first or not last:
             raise readings.refuse(row, f"{'from' if not first else 'to'} is empty (expected a word for the mark)")
@@ -178,16 +183,19 @@ def _refuse(readings: SheetReadings, ends: list[tuple[str, ...]], marks: tuple[s
 
 
 def _density(readings: SheetReadings) -> tuple[np.ndarray, np.ndarray]:
-    """What is added for the density, m; and its derivative by the temperature of `to`, m/°C: (m,), (m,)."""
-    nothing = np.zeros(len(readings))
-    given = [name in readings.numbers for name in ("temperature_from_c", "temperature_to_c")]
-    if given[0] != given[1]:
+    """Density correction, m, and its derivative by the temperature of `to`, m/°C.
+
+    (m,), (m,).
+    """
+    zeros = np.zeros(len(readings))
+    present = [name in readings.numbers for name in ("temperature_from_c", "temperature_to_c")]
+    if present[0] != present[1]:
         raise refusal(readings.file, "line 1, expected both columns temperature_from_c and temperature_to_c, or none")
-    if not given[0]:
+    if not present[0]:
         for key in ("u_temperature_c", "u_tube_c"):
             if getattr(readings.sheet, key) > 0.0:
                 raise refusal(readings.sheet_file, f"{key} is given, but {readings.file} has no temperatures")
-        return nothing, nothing
+        return zeros, zeros
     first, last = (readings.get(f"temperature_{end}_c") for end in ("from", "to"))
     depth = readings.get("depth_m")
 
@@ -202,7 +210,7 @@ def _density(readings: SheetReadings) -> tuple[np.ndarray, np.ndarray]:
 def _loops(
     fit: CalibrationFit, design: np.ndarray, effects: list[Effect], climb: np.ndarray
 ) -> list[tuple[str, float, float]]:
-    """Set-ups (by number) of each closed loop of the run, its misclosure and the u of that, m.
+    """Set-ups (by number) of each closed loop, misclosure and u, m.
 
     Residuals of all readings add up along a loop; the heights drop out, constant and effects are as adjusted. Loops are
     those that each set-up beyond a spanning tree closes.
@@ -212,30 +220,36 @@ def _loops(
     total = np.diag(fit.sigma[on] ** 2) + shared
     off = (fit.residual + _acted(fit, effects))[on]
     least = design[on]
-    left = total - least @ np.linalg.solve(least.T @ np.linalg.solve(total, least), least.T)
+    residual_covariance = total - least @ np.linalg.solve(least.T @ np.linalg.solve(total, least), least.T)
     loops: list[tuple[str, float, float]] = []
     tree: list[int] = []
     for k, row in enumerate(on):
         if not tree or np.linalg.matrix_rank(climb[on[[*tree, k]]]) > len(tree):
             tree.append(k)
             continue
-        way = np.linalg.lstsq(climb[on[tree]].T, climb[row], rcond=None)[0].round()
+        signs = np.linalg.lstsq(climb[on[tree]].T, climb[row], rcond=None)[0].round()
         loop = np.zeros(len(on))
-        loop[k], loop[tree] = 1.0, -way
-        u = float(np.sqrt(max(loop @ left @ loop, 0.0)))
+        loop[k], loop[tree] = 1.0, -signs
+        u = float(np.sqrt(max(loop @ residual_covariance @ loop, 0.0)))
         members = ", ".join(str(on[j] + 1) for j in np.flatnonzero(loop))
         loops.append((members, float(loop @ off), u))
     return loops
 
 
 def _acted(fit: CalibrationFit, effects: list[Effect]) -> np.ndarray:
-    """What the effects were found to do to each reading, m: residuals have it taken off."""
+    """Estimated contribution of the effects to each reading, m.
+
+    Residuals are without it.
+    """
     parts = (e.column * fit.effects[e.name][0] for e in effects if e.u > 0.0)
     return sum(parts, np.zeros(len(fit.residual)))
 
 
 def _constant_note(readings: SheetReadings, fit: CalibrationFit) -> str:
-    """Where the instrument's constant comes from, and how far the readings move one that the sheet states."""
+    """Note on the source of the constant.
+
+    And the readings' change of one that the sheet states.
+    """
     sheet = readings.sheet
     if sheet.constant_mm is None:
         return "the constant was found by exchanging the vessels"
@@ -247,7 +261,10 @@ def _constant_note(readings: SheetReadings, fit: CalibrationFit) -> str:
 
 
 def _loops_decision(loops: list[tuple[str, float, float]]) -> CheckOutcome:
-    """The loop whose misclosure is largest beside its u, against three of that."""
+    """Check of the loop with the largest misclosure over u.
+
+    Against three of that.
+    """
     worst = max(loops, key=lambda loop: abs(loop[1]) / max(loop[2], 1e-12), default=None)
     if worst is None:
         return CheckOutcome("loops: misclosure, mm", float("nan"), float("nan"), None, "the run closes no loop")
@@ -261,7 +278,7 @@ def _loops_decision(loops: list[tuple[str, float, float]]) -> CheckOutcome:
 
 
 def _rows(readings: SheetReadings, fit: CalibrationFit, density: np.ndarray) -> tuple[tuple[Cell, ...], ...]:
-    """Each set-up as read, its correction for the density (m) in micrometres, and how it fits."""
+    """Table of set-ups: reading, density correction (m) in micrometres, residual."""
     micro = 1e-3 * MILLIMETRE
     return tuple(
         (

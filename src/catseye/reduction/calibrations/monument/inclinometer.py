@@ -1,4 +1,6 @@
-"""Dual-axis inclinometer: scales, zeros, axis misalignments, cubic term and temperature from a tilt table or a pier.
+"""Calibration of a dual-axis inclinometer on a tilt table or pier.
+
+Scales, zeros, axis misalignments, cubic term and temperature.
 
 `azimuth_deg` is how far the case is turned on the table, clockwise seen from above: axis x stands at the angle
 a + misalignment of x from the table's x, axis y at a - 90° + misalignment of y (x right, y forward: counter-clockwise
@@ -139,12 +141,15 @@ class Inclinometer:
 
 
 def calibrate_inclinometer(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """Scales, zeros, misalignments and, where asked, cubic terms, temperature coefficients and the table's own tilt.
+    """Scales, zeros, misalignments, and optional terms.
+
+    Optional: cubic terms, temperature coefficients and the table's own tilt.
 
     readings   columns x_volt, y_volt; tilt_x_arcsec, tilt_y_arcsec, azimuth_deg, temperature_c; InclinometerSheet
     reject     leave out what the tests reject, both axes of a reading together
 
-    Raises InputError for a sheet that lacks a value, EstimationError where the readings do not tell every parameter.
+    Raises InputError for a sheet that lacks a value, EstimationError where the readings do not determine every
+    parameter.
 
     Source: [PARKER04] chapter 7 names the model (its reference 145); least squares, [FOERSTNER16] chapter 4.
     """
@@ -175,7 +180,7 @@ def calibrate_inclinometer(readings: SheetReadings, reject: bool = False) -> Cal
 
 
 class _AxisReadings:
-    """Readings of both axes, x above y, and the parameters that they are to tell.
+    """Readings of both axes, x above y, and the parameters.
 
     Parameters in order: zero, scale, misalignment of x, y; then cubic x, y; temperature coefficient x, y; tilt of the
     table x, y, as asked for. On a pier scales and the turn of the case have priors: they are parameters with an
@@ -185,10 +190,10 @@ class _AxisReadings:
     def __init__(self, readings: SheetReadings) -> None:
         sheet = readings.sheet
         self.readings, self.sheet, self.m = readings, sheet, len(readings)
-        given = [name in readings.numbers for name in ("tilt_x_arcsec", "tilt_y_arcsec")]
-        if given[0] != given[1]:
+        present = [name in readings.numbers for name in ("tilt_x_arcsec", "tilt_y_arcsec")]
+        if present[0] != present[1]:
             raise refusal(readings.file, "line 1, expected both columns tilt_x_arcsec and tilt_y_arcsec, or none")
-        self.pier = not given[0]
+        self.pier = not present[0]
         if self.pier and not sheet.table_tilt:
             raise refusal(readings.sheet_file, "table_tilt is not true, and no tilt was applied (expected table_tilt = "
                                                "true on a pier)")  # fmt: skip
@@ -200,7 +205,7 @@ class _AxisReadings:
                 raise refusal(readings.sheet_file, "cubic = true, but one tilt shows no bend (expected a tilt table)")
         if sheet.table_tilt and "azimuth_deg" not in readings.numbers:
             raise refusal(readings.file, "line 1, column 'azimuth_deg' is missing (turning the case tells table_tilt)")
-        tilts = [readings.get(f"tilt_{k}_arcsec") * ARCSECOND if given[0] else np.zeros(self.m) for k in "xy"]
+        tilts = [readings.get(f"tilt_{k}_arcsec") * ARCSECOND if present[0] else np.zeros(self.m) for k in "xy"]
         self.applied = np.column_stack(tilts)
         turned = "azimuth_deg" in readings.numbers
         self.azimuth = readings.get("azimuth_deg") * DEGREE if turned else np.zeros(self.m)
@@ -225,21 +230,21 @@ class _AxisReadings:
         self.sizes = np.array(sizes)
 
     def full(self, at: np.ndarray) -> np.ndarray:
-        """All twelve constants, those not sought as the sheet has them."""
-        whole = np.zeros(12)
+        """All twelve constants, fixed ones by the sheet."""
+        constants = np.zeros(12)
         if self.pier:
-            whole[2:4] = self.sheet.scale_x_volt_per_rad, self.sheet.scale_y_volt_per_rad
-        whole[self.free] = at
-        return whole
+            constants[2:4] = self.sheet.scale_x_volt_per_rad, self.sheet.scale_y_volt_per_rad
+        constants[self.free] = at
+        return constants
 
-    def predicted(self, whole: np.ndarray, scale: float = 0.0) -> np.ndarray:
-        """(2 m,) V; applied tilts larger by the share `scale`."""
-        model = _model(whole)
-        return model.volts(self.applied * (1.0 + scale) + whole[10:], self.azimuth, self.temperature_c).T.ravel()
+    def predicted(self, constants: np.ndarray, scale: float = 0.0) -> np.ndarray:
+        """Predicted readings (2 m,) V; applied tilts larger by `scale`."""
+        model = _model(constants)
+        return model.volts(self.applied * (1.0 + scale) + constants[10:], self.azimuth, self.temperature_c).T.ravel()
 
     def start(self) -> np.ndarray:
-        """Zeros from the means, scales and misalignments from a plane through the readings: the model but for bends."""
-        whole = np.zeros(12)
+        """Start values: zeros by means, scales and misalignments by a plane."""
+        constants = np.zeros(12)
         if self.pier:
             return self._pier_start()
         c, s = np.cos(self.azimuth), np.sin(self.azimuth)
@@ -252,53 +257,59 @@ class _AxisReadings:
         for k in range(2):
             values = self.observed[k * self.m : (k + 1) * self.m]
             zero, by_x, by_y = np.linalg.lstsq(design[on], values[on], rcond=None)[0]
-            main, other = (by_x, -by_y) if k == 0 else (by_y, by_x)
-            whole[k], whole[2 + k] = zero, np.copysign(np.hypot(main, other), main)
-            whole[4 + k] = np.arctan(other / main)
-        return whole[self.free]
+            main, cross = (by_x, -by_y) if k == 0 else (by_y, by_x)
+            constants[k], constants[2 + k] = zero, np.copysign(np.hypot(main, cross), main)
+            constants[4 + k] = np.arctan(cross / main)
+        return constants[self.free]
 
     def _pier_start(self) -> np.ndarray:
-        whole = self.full(np.zeros(int(self.free.sum())))
+        constants = self.full(np.zeros(int(self.free.sum())))
         on = self.readings.active
         x = self.observed[: self.m][on]
         design = np.column_stack([np.ones(on.sum()), np.cos(self.azimuth[on]), -np.sin(self.azimuth[on])])
         if np.linalg.matrix_rank(design) < 3:
             raise EstimationError("the case stands in too few azimuths on the pier: turn it to three or more")
-        whole[0], p, q = np.linalg.lstsq(design, x, rcond=None)[0]
-        whole[1] = np.mean(self.observed[self.m :][on])
-        whole[10:] = np.array([p, q]) / whole[2]
-        return whole[self.free]
+        constants[0], p, q = np.linalg.lstsq(design, x, rcond=None)[0]
+        constants[1] = np.mean(self.observed[self.m :][on])
+        constants[10:] = np.array([p, q]) / constants[2]
+        return constants[self.free]
 
     def linear(self, at: np.ndarray) -> tuple[np.ndarray, list[Effect], np.ndarray]:
-        """Design (2 m, p) and effects about the parameters, by central differences; and what is predicted there."""
-        whole = self.full(at)
+        """Design (2 m, p), effects, and prediction about the parameters.
+
+        By central differences.
+        """
+        constants = self.full(at)
 
         def slope(k: int) -> np.ndarray:
             # Linear or smooth in each: steps of 1e-6 of the range leave 1e-10 of the slope.
             step = np.array([1.0, 1.0, 1.0, 1.0, 1e-4, 1e-4, 1.0, 1.0, 1e-3, 1e-3, 1e-5, 1e-5])[k]
-            ends = [self.predicted(whole + sign * step * np.eye(12)[k]) for sign in (1.0, -1.0)]
+            ends = [self.predicted(constants + sign * step * np.eye(12)[k]) for sign in (1.0, -1.0)]
             return (ends[0] - ends[1]) / (2.0 * step)
 
         design = np.column_stack([slope(int(k)) for k in np.flatnonzero(self.free)])
         effects = []
         if self.sheet.u_tilt_percent and not self.pier:
-            by_scale = (self.predicted(whole, 1e-3) - self.predicted(whole, -1e-3)) / 2e-3
+            by_scale = (self.predicted(constants, 1e-3) - self.predicted(constants, -1e-3)) / 2e-3
             effects.append(Effect("scale of the table, %", 0.01 * by_scale, self.sheet.u_tilt_percent))
         if self.pier:
             for k, axis in enumerate("xy"):
-                share = 0.01 * whole[2 + k] * slope(2 + k)
+                share = 0.01 * constants[2 + k] * slope(2 + k)
                 effects.append(Effect(f"scale of {axis}, %", share, self.sheet.u_scale_percent))
-            both = slope(4) + slope(5)
-            effects.append(Effect("turn of the case, arcsec", ARCSECOND * both, self.sheet.u_case_arcsec))
-        return design, effects, self.predicted(whole)
+            by_turn = slope(4) + slope(5)
+            effects.append(Effect("turn of the case, arcsec", ARCSECOND * by_turn, self.sheet.u_case_arcsec))
+        return design, effects, self.predicted(constants)
 
     def scatter(self, at: np.ndarray) -> ObservedScatter:
-        """Of the readings, with that of the applied tilts: they turn up in both axes of a reading together."""
-        whole, m, sheet = self.full(at), self.m, self.sheet
+        """Scatter of the readings, with that of the applied tilts.
+
+        The tilts' is common to both axes of a reading.
+        """
+        constants, m, sheet = self.full(at), self.m, self.sheet
         claimed = np.zeros((2 * m, 2 * m))
         if sheet.u_tilt_arcsec and not self.pier:
-            angle = self.azimuth[:, None] + np.array([0.0, -SQUARE]) + whole[4:6]
-            rows = np.stack([np.cos(angle), -np.sin(angle)], axis=-1) * whole[2:4, None]  # (m, axis, tilt) V/rad
+            angle = self.azimuth[:, None] + np.array([0.0, -SQUARE]) + constants[4:6]
+            rows = np.stack([np.cos(angle), -np.sin(angle)], axis=-1) * constants[2:4, None]  # (m, axis, tilt) V/rad
             pairs = np.einsum("mat,mbt->abm", rows, rows) * (sheet.u_tilt_arcsec * ARCSECOND) ** 2
             claimed = np.block([[np.diag(pairs[a, b]) for b in range(2)] for a in range(2)])
         if sheet.u_volt is not None:
@@ -308,8 +319,8 @@ class _AxisReadings:
         )
 
 
-def _model(whole: np.ndarray) -> Inclinometer:
-    return Inclinometer(whole[0:2], whole[2:4], whole[4:6], whole[6:8], whole[8:10])
+def _model(constants: np.ndarray) -> Inclinometer:
+    return Inclinometer(constants[0:2], constants[2:4], constants[4:6], constants[6:8], constants[8:10])
 
 
 MEANINGS = (
@@ -375,13 +386,15 @@ def _calibration(axes: _AxisReadings, fit: CalibrationFit) -> Calibration:
     )  # fmt: skip
 
 
-def _alike(whole: np.ndarray) -> tuple[CheckOutcome, ...]:
-    """Scales of the two axes side by side: they are of one make."""
-    scale = np.abs(whole[2:4])
+def _alike(constants: np.ndarray) -> tuple[CheckOutcome, ...]:
+    """Check of the two axes' scales: they are of one make."""
+    scale = np.abs(constants[2:4])
     ratio = float(scale.max() / scale.min()) if scale.min() > 0.0 else float("inf")
     text = "two axes of one make"
     if ratio > UNLIKE:
-        text = f"the axes' scales are {whole[2]:.4g} and {whole[3]:.4g} V/rad: a tilt or a voltage of another size"
+        text = (
+            f"the axes' scales are {constants[2]:.4g} and {constants[3]:.4g} V/rad: a tilt or a voltage of another size"
+        )
     return (CheckOutcome("larger scale over the smaller", ratio, UNLIKE, bool(ratio <= UNLIKE), text),)
 
 

@@ -1,4 +1,6 @@
-"""Monument place: a fixed point's coordinates, as a survey adjustment gives them, for the monument's record and report.
+"""Coordinates of a monument's fixed point, from a survey adjustment.
+
+For the monument's record and report.
 
 The table is `coordinates.csv` of `catseye adjust --out DIR`, as it stands; the sheet says which point is meant, and
 whether the survey's coordinates are of the ground frame or of the state plane. Both come out: x, y, z of the ground
@@ -73,7 +75,7 @@ KEYS = (
 
 
 def measure_place(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """A fixed point's place in every system of the monument's report.
+    """Place of a fixed point in every system of the monument's report.
 
     readings   `coordinates.csv` of an adjustment; sheet PlaceSheet
     reject     has no effect: the adjustment has tested its observations
@@ -101,7 +103,7 @@ def measure_place(readings: SheetReadings, reject: bool = False) -> Calibration:
 def monument_place(
     frame: LocalFrame, coordinates: np.ndarray, covariance: np.ndarray, *, system: str = "ground"
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Values (8,) and covariance (8, 8) in the order and the units of KEYS.
+    """Values (8,) and covariance (8, 8) in the order and units of KEYS.
 
     frame         ground frame
     coordinates   (3,), m, in the system
@@ -114,7 +116,7 @@ def monument_place(
         raise InputError(f"system {system!r} is unknown (expected 'ground' or 'state-plane')")
     to_ground: Callable[[np.ndarray], np.ndarray] = frame.from_state_plane if system == "state-plane" else np.asarray
 
-    def every(at: np.ndarray) -> np.ndarray:
+    def all_values(at: np.ndarray) -> np.ndarray:
         points = to_ground(at)
         plane = frame.state_plane(points)
         latitude, longitude, _ = frame.geodetic(points)
@@ -128,13 +130,13 @@ def monument_place(
         )
 
     at_point = np.asarray(coordinates, dtype=float)
-    slope = (every(at_point + STEP * np.eye(3)) - every(at_point - STEP * np.eye(3))).T / (2.0 * STEP)
+    slope = (all_values(at_point + STEP * np.eye(3)) - all_values(at_point - STEP * np.eye(3))).T / (2.0 * STEP)
     full = slope @ np.asarray(covariance, dtype=float) @ slope.T
-    return every(at_point), 0.5 * (full + full.T)
+    return all_values(at_point), 0.5 * (full + full.T)
 
 
 def _covariance(readings: SheetReadings, row: int) -> np.ndarray:
-    """(3, 3), m², of one row; InputError where it is no covariance."""
+    """Covariance (3, 3), m², of one row; InputError for an invalid one."""
     cells = {pair: float(readings.get(f"cov_{pair}_mm2")[row]) for pair in SYMMETRIC}
     matrix = np.array([[cells["".join(sorted(a + b))] for b in NAMES] for a in NAMES])
     u = np.sqrt(np.maximum(np.diag(matrix), 0.0))
@@ -145,7 +147,10 @@ def _covariance(readings: SheetReadings, row: int) -> np.ndarray:
 
 
 def _by_deflection(sheet: PlaceSheet, coordinates: np.ndarray) -> np.ndarray:
-    """What the deflection's u adds to the covariance: heights above the geoid tilt with it, 1 mm at 2" and 100 m."""
+    """Covariance added by the deflection's u.
+
+    Heights above the geoid tilt with it, 1 mm at 2" and 100 m.
+    """
     total = np.zeros((len(KEYS), len(KEYS)))
     for name in ("xi", "eta"):
         ends = [
@@ -168,7 +173,7 @@ def _calibration(
     scale, convergence = grid(latitude, longitude)
     height = frame.geodetic(values[:3] * MILLIMETRE)[2]
     factor = float(elevation_factor(latitude, height))
-    held = readings.words.get("fixed", ("",) * len(readings))[row]
+    fixed = readings.words.get("fixed", ("",) * len(readings))[row]
     value = {q.key: q.value for q in calibrated}
     record: dict[str, RecordValue] = {key: value[key] for key in ("x_mm", "y_mm", "z_mm")}
     record |= {f"u_{q.key}": q.u for q in calibrated[:3]}
@@ -205,7 +210,7 @@ def _calibration(
             f"z = {value['z_mm'] * MILLIMETRE:.4f} m, elevation {value['elevation_m']:.4f} m: their difference from "
             "that of the origin is curvature, deflection and what the sheet says of the geoid",
             "u is that of the survey's datum; of latitude, longitude and the state plane it does not hold the origin's",
-            *((f"{sheet.point} was held fixed in {held}: its u there is what the adjustment assumed",) if held else ()),
+            *((f"{sheet.point} was held fixed in {fixed}: its u is that assumed by the adjustment",) if fixed else ()),
         ),
         curve={
             "readings": (plan[:, 0], plan[:, 1]),

@@ -1,4 +1,6 @@
-"""Plate levels: a precision level on a three-ball plate tells how a Kelvin mount leans; alpha2 and alpha3 follow.
+"""Plate levels: tilt of a Kelvin mount, alpha2 and alpha3.
+
+By a precision level on a three-ball plate.
 
 The plate lies on three equal balls in the mount. `orientation_deg` is where the level's + end points, clockwise seen
 from above from the mount's x^: 0 along x^, 90 along z^ (the v-block), 180 along -x^. `reading_arcsec` is above zero
@@ -70,7 +72,7 @@ LAYOUT = SheetLayout(
 
 
 def calibrate_plate(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """alpha2 and alpha3 of a mount, against the ground frame.
+    """Angles alpha2 and alpha3 of a mount, against the ground frame.
 
     readings   columns orientation_deg, reading_arcsec, perhaps plate_deg; sheet PlateSheet
     reject     leave out what the tests reject
@@ -108,7 +110,10 @@ def calibrate_plate(readings: SheetReadings, reject: bool = False) -> Calibratio
 
 
 def _effects(readings: SheetReadings, turned: np.ndarray) -> list[Effect]:
-    """Wedge of the plate, turning with the plate where it was turned, and unequal balls in the mount's axes."""
+    """Effects of the plate's wedge and of unequal balls.
+
+    The wedge turns with the plate, the balls are fixed in the mount's axes.
+    """
     sheet = readings.sheet
     plate = readings.get("plate_deg") * DEGREE if "plate_deg" in readings.numbers else np.zeros(len(readings))
     named = {"wedge of the plate": (turned - plate, sheet.u_wedge_arcsec), "balls": (turned, sheet.u_balls_arcsec)}
@@ -121,7 +126,10 @@ def _effects(readings: SheetReadings, turned: np.ndarray) -> list[Effect]:
 
 
 def _in_ground(sheet: PlateSheet, tilts: np.ndarray, *, xi: float = 0.0, eta: float = 0.0) -> np.ndarray:
-    """alpha2, alpha3 (rad) against the ground frame, from the tilts of x^ and z^ above the level's horizon."""
+    """Angles alpha2, alpha3 (rad) against the ground frame.
+
+    From the tilts of x^ and z^ above the level's horizon.
+    """
     place = np.array([sheet.x_mm, sheet.y_mm, sheet.z_mm]) * MILLIMETRE
     plumb = plumb_from_ground(frame_of(sheet, xi=xi, eta=eta), place)
     alpha2 = np.arcsin(tilts[0])
@@ -132,7 +140,10 @@ def _in_ground(sheet: PlateSheet, tilts: np.ndarray, *, xi: float = 0.0, eta: fl
 
 
 def _derived(sheet: PlateSheet, fit: CalibrationFit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Values (3,) of alpha2, alpha3 (rad) and the level's zero (arcsec), covariance, derivatives by what was fitted."""
+    """Values (3,), covariance, and derivatives by the fit.
+
+    alpha2, alpha3 (rad) and the level's zero (arcsec).
+    """
     tilts = np.sin(fit.x[:2])
     turn = np.zeros((3, 3))
     turn[0, 0], turn[1, 1], turn[2, 2] = 1.0, -1.0, 1.0 / ARCSECOND  # tilts below 0.1 rad add as vectors to 1 %
@@ -146,7 +157,7 @@ def _derived(sheet: PlateSheet, fit: CalibrationFit) -> tuple[np.ndarray, np.nda
 
 
 def _rows(readings: SheetReadings, fit: CalibrationFit) -> tuple[tuple[Cell, ...], ...]:
-    """Where the level and the plate lay, what was read, and how it fits."""
+    """Table of orientations of level and plate, readings, residuals."""
     orientation, observed = readings.get("orientation_deg"), readings.get("reading_arcsec")
     return tuple(
         (

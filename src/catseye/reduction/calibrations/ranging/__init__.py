@@ -1,1 +1,1 @@
-"""What a ranger measures beside the range: zero, leakage, linearity, oscillator, glass."""
+"""Ranger calibrations: zero, leakage, linearity, oscillator, glass."""

@@ -1,4 +1,7 @@
-"""The air of a laboratory or a rail: group index of the ranger, phase index of the interferometer, what moves both."""
+"""Air of a laboratory or a rail: indices and their effects.
+
+Group index of the ranger, phase index of the interferometer.
+"""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -21,7 +24,7 @@ Spread = Annotated[float, Within(0, 100)]
 
 
 class AirSheet(Sheet):
-    """A sheet of readings taken through air.
+    """Sheet of readings taken through air.
 
     modulation_hz, u_modulation_ppm        frequency of the modulation, and its standard uncertainty
     wavelength_um                          of the ranger's light in vacuum
@@ -44,7 +47,7 @@ class AirSheet(Sheet):
 
 @dataclass(frozen=True, eq=False)
 class CalibrationAir:
-    """The index along each path, and how an offset of a sensor changes it.
+    """Index along each path, and its change by a sensor's offset.
 
     index    (m,)
     slopes   (3, m) per °C, hPa, %
@@ -81,12 +84,18 @@ def phase_air(readings: SheetReadings, wavelength_um: float) -> CalibrationAir:
 
 
 def half_wavelength(readings: SheetReadings, state: CalibrationAir) -> np.ndarray:
-    """(m,) m, half the modulation's group wavelength in the air of each reading. Source: [PARKER04] eq. 5.16."""
+    """Half the modulation's group wavelength per reading, (m,) m.
+
+    Source: [PARKER04] eq. 5.16.
+    """
     return 0.5 * SPEED_OF_LIGHT / (state.index * readings.sheet.modulation_hz)
 
 
 def sensor_effects(readings: SheetReadings, columns: np.ndarray) -> list[Effect]:
-    """Offsets of the three sensors, `columns` (3, m) being the change of the observed values per °C, hPa, %."""
+    """Effects of the three sensors' offsets.
+
+    `columns` (3, m): change of the observed values per °C, hPa, %.
+    """
     sheet = readings.sheet
     return [
         Effect(f"offset of the sensor of {name}", column, getattr(sheet, f"u_{name}"))
@@ -95,7 +104,9 @@ def sensor_effects(readings: SheetReadings, columns: np.ndarray) -> list[Effect]
 
 
 def ranger_effects(readings: SheetReadings, state: CalibrationAir, path: np.ndarray) -> list[Effect]:
-    """What stretches the ranger's path (m,) m: a reading too long for each unit of frequency, formula and sensors.
+    """Effects of frequency, formula and sensors on the path (m,) m.
+
+    A reading too long for each unit.
 
     A true index above the one computed with shortens the true path against the computed one, so the computed is too
     long by path / n for each unit of index; likewise a true frequency above the nominal one, by path for each unit.

@@ -1,4 +1,4 @@
-"""Amplitude-to-phase coupling: one target that stays, seen through several attenuations.
+"""Amplitude-to-phase coupling by one fixed target and attenuations.
 
 phase added = coefficient ln(A / A_ref), as `signal.systematics.amplitude.amplitude_phase` has it. Leakage left over
 turns a weak phasor more and looks like coupling; it is a systematic effect with a prior here.
@@ -65,12 +65,14 @@ LAYOUT = SheetLayout(
 
 
 def calibrate_amplitude(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """The coupling coefficient, rad a factor e of amplitude, with a test whether a line suffices.
+    """Coupling coefficient, rad per factor e of amplitude.
+
+    With a test whether a line suffices.
 
     readings   columns amplitude_target_volt, phase_target_rad, perhaps phase_reference_rad; sheet AmplitudeSheet
     reject     leave out what the tests reject
 
-    Raises EstimationError where the attenuations do not tell coefficient and phase apart.
+    Raises EstimationError where the attenuations do not separate coefficient and phase.
 
     Source: [PARKER04] chapter 6, item 5, names the effect without a formula; a model, tested here.
     """
@@ -79,24 +81,24 @@ def calibrate_amplitude(readings: SheetReadings, reject: bool = False) -> Calibr
     if "phase_reference_rad" in readings.numbers:
         phase = phase - readings.get("phase_reference_rad")
     strongest = int(np.argmax(np.where(on, amplitude, 0.0)))
-    observed = np.angle(np.exp(1j * (phase - phase[strongest])))  # the shorter way round
+    observed = np.angle(np.exp(1j * (phase - phase[strongest])))  # the shorter direction
     levels = amplitude_by_coefficient(amplitude, sheet.reference_amplitude_volt)
     design = np.column_stack([levels[:, 0], np.ones(len(amplitude)), levels[:, 1]])
     scatter, effects = _scatter(readings), []
     if sheet.u_leakage_volt > 0.0:
         effects = leakage_effects(readings, sheet.u_leakage_volt)
     names = ["coefficient", "phase", "quadratic coefficient"]
-    wanted = 3 if sheet.quadratic else 2
+    terms = 3 if sheet.quadratic else 2
     fit = fit_readings(
         observed,
-        design[:, :wanted],
+        design[:, :terms],
         scatter,
-        names=names[:wanted],
+        names=names[:terms],
         effects=effects,
         options=FitOptions(active=on, reject=reject, level=sheet.level),
     )
     longer = None
-    if wanted == 2 and fit.active.sum() > 4 and len(set(amplitude[fit.active])) > 2:
+    if terms == 2 and fit.active.sum() > 4 and len(set(amplitude[fit.active])) > 2:
         longer = fit_readings(
             observed, design, scatter, names=names, effects=effects, options=FitOptions(active=fit.active)
         )
@@ -104,7 +106,7 @@ def calibrate_amplitude(readings: SheetReadings, reject: bool = False) -> Calibr
 
 
 def _scatter(readings: SheetReadings) -> ObservedScatter:
-    """Noise of a phase goes with one over its amplitude; the walk of the electronics besides."""
+    """Scatter of a phase: noise by 1/amplitude, plus the electronics' walk."""
     sheet, m = readings.sheet, len(readings)
     claimed = np.zeros((m, m))
     if sheet.random_walk_rad_per_sqrt_hour > 0.0:
@@ -122,7 +124,10 @@ def _scatter(readings: SheetReadings) -> ObservedScatter:
 
 
 def _line_decision(longer: CalibrationFit | None) -> CheckOutcome:
-    """Does the line suffice? t of the quadratic term against Student's, or the normal where the scatter is claimed."""
+    """Test whether a line suffices, by a quadratic term.
+
+    t against Student's, or the normal where the scatter is claimed.
+    """
     from scipy.stats import norm
     from scipy.stats import t as student
 

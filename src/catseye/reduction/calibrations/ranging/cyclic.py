@@ -1,4 +1,4 @@
-"""Cyclic terms that were not corrected for, as effects on a range."""
+"""Uncorrected cyclic terms as effects on a range."""
 
 import numpy as np
 
@@ -10,7 +10,9 @@ UNCORRECTED = 2  # orders: leakage and crosstalk make the first, imbalance of th
 
 
 def cyclic_effects(phase_fraction: np.ndarray, u_cyclic_mm: float, orders: int = UNCORRECTED) -> list[Effect]:
-    """Range read too long by each cosine and sine, (m,) m for each mm of it, all with the same prior.
+    """Range error by each cosine and sine, (m,) m per mm.
+
+    All with the same prior.
 
     phase_fraction   (m,) rad, phase after the electronics'
     u_cyclic_mm      mm, 0 or more

@@ -1,4 +1,6 @@
-"""Constants of prisms and balls from their measured dimensions: where the range ends inside the glass.
+"""Constants of prisms and balls from their dimensions.
+
+The range's end inside the glass.
 
     prism   h_rp = h / n,   Pc = -(n - 1/n) h        ball   Pc = -(n (R1 + R2) - R1)
 
@@ -97,7 +99,9 @@ def calibrate_prism(readings: SheetReadings, reject: bool = False) -> Calibratio
 
 
 def calibrate_ball(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """Radii and range constant of a cat's-eye made of a small ball and a large shell about one centre.
+    """Radii and range constant of a cat's-eye.
+
+    A small ball and a large shell about one centre.
 
     readings   columns part ("r1" small ball, "r2" silvered shell) and radius_mm; sheet GlassSheet
     reject     leave out what the tests reject
@@ -128,7 +132,10 @@ def calibrate_ball(readings: SheetReadings, reject: bool = False) -> Calibration
 
 
 def _in_focus(r1: float, r2: float, n: float) -> CheckOutcome:
-    """Whether the shell lies about where the small ball focuses, without which nothing returns."""
+    """Check that the shell is near the small ball's focus.
+
+    Otherwise nothing returns.
+    """
     off = abs(r2 * (n - 1.0) / r1 - 1.0)
     text = "the shell lies near the small ball's focus"
     if off > OUT_OF_FOCUS:
@@ -163,7 +170,9 @@ def _dimensions(
 
 @dataclass(frozen=True, eq=False)
 class GlassConstants:
-    """Constants that follow from p sizes of the glass and the ratio of its group index over the air's.
+    """Constants by p sizes of the glass and its index ratio.
+
+    The ratio of its group index over the air's.
 
     keys       (q,) key, unit and meaning of each
     values     (q,) in their units

@@ -1,4 +1,6 @@
-"""Leakage from buffers taken with the beam blocked, in several sessions over a day.
+"""Leakage from buffers with the beam blocked.
+
+In several sessions over a day.
 
 Each buffer's phasor is the leakage, plus what the session shifts it, plus the buffer's own noise, alike in both
 quadratures. The mean is known better with every session; the leakage of a session to come is not, and that is what the
@@ -45,7 +47,7 @@ LAYOUT = SheetLayout(KIND, LeakageSheet, required={}, optional={"session": TEXT,
 
 
 def calibrate_leakage(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """The leakage phasor, its uncertainty, and that of the leakage in a session to come.
+    """Leakage phasor, its u, and that of the leakage in a future session.
 
     readings   columns real_volt, imaginary_volt (or amplitude_volt, phase_rad) and session; sheet LeakageSheet
     reject     leave out what the tests reject
@@ -68,32 +70,37 @@ def calibrate_leakage(readings: SheetReadings, reject: bool = False) -> Calibrat
 
 
 def _scatter(readings: SheetReadings, names: tuple[str, ...], sessions: int) -> ObservedScatter:
-    """Of real parts, then imaginary parts: each buffer's own, and one shift a session."""
+    """Scatter of each buffer, and one shift a session.
+
+    Real parts, then imaginary parts.
+    """
     m, sheet = len(readings), readings.sheet
-    same = np.kron(np.eye(2), np.array(names)[:, None] == np.array(names)).astype(float)
+    same_session = np.kron(np.eye(2), np.array(names)[:, None] == np.array(names)).astype(float)
     claimed, unknown = np.zeros((2 * m, 2 * m)), {}
     if readings.has("u_volt"):
         claimed += np.diag(np.tile(readings.get("u_volt"), 2) ** 2)
     else:
         unknown[BUFFER] = np.eye(2 * m)
     if sheet.u_session_volt is not None:
-        claimed += sheet.u_session_volt**2 * same
+        claimed += sheet.u_session_volt**2 * same_session
     elif sessions > 1:
-        unknown[SESSION] = same
+        unknown[SESSION] = same_session
     return ObservedScatter(claimed, unknown)
 
 
 def _quadratures_decision(fit: CalibrationFit, z: np.ndarray, names: tuple[str, ...]) -> CheckOutcome:
-    """Whether both quadratures scatter alike within sessions: a channel of other gain, or a column changed, does not.
+    """Check that both quadratures scatter alike within sessions.
+
+    A channel of other gain, or a changed column, fails.
 
     Source: [FOERSTNER16] chapter 4 (Fisher's test of two variances), both sides, at the kind's share of the level.
     """
     from scipy.stats import f as fisher
 
     on, name = fit.active[: len(z)], "quadratures: ratio of their scatters"
-    kept, groups = z[on], np.array(names)[on]
-    inner = kept - np.array([kept[groups == one].mean() for one in groups])
-    degrees = len(kept) - len(set(groups))
+    used_phasors, groups = z[on], np.array(names)[on]
+    inner = used_phasors - np.array([used_phasors[groups == one].mean() for one in groups])
+    degrees = len(used_phasors) - len(set(groups))
     squares = np.array([np.sum(inner.real**2), np.sum(inner.imag**2)])
     if degrees < 1 or not squares.all():
         return CheckOutcome(name, float("nan"), float("nan"), None, "too few buffers in a session to compare them")
@@ -109,7 +116,7 @@ def _quadratures_decision(fit: CalibrationFit, z: np.ndarray, names: tuple[str, 
 
 
 def _sessions_decision(sheet: LeakageSheet, sessions: int) -> CheckOutcome:
-    """Whether the sessions tell how the leakage differs from one to the next."""
+    """Check that the sessions determine the leakage's variation."""
     name = "sessions"
     if sheet.u_session_volt is not None:
         return CheckOutcome(name, float(sessions), float("nan"), None, "the sheet states how sessions differ")
@@ -126,7 +133,10 @@ def _sessions_decision(sheet: LeakageSheet, sessions: int) -> CheckOutcome:
 def _rows(
     readings: SheetReadings, fit: CalibrationFit, z: np.ndarray, names: tuple[str, ...]
 ) -> tuple[tuple[Cell, ...], ...]:
-    """Each buffer's phasor and residual in mV; statistic and state are those of its worse quadrature."""
+    """Table of buffers: phasor and residual in mV.
+
+    Statistic and state are those of the worse quadrature.
+    """
     m = len(z)
     residual = z - complex(*fit.x)
     statistic = np.abs(fit.statistic).reshape(2, m).max(axis=0)

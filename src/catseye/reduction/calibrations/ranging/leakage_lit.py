@@ -1,4 +1,6 @@
-"""Leakage with light: a retroreflector moved along a rail, whose phasors lie on a circle about the leakage.
+"""Leakage by a retroreflector moved along a rail.
+
+Its phasors lie on a circle about the leakage.
 
 Where the positions are known (column distance_m) each phasor is leakage + (g + h (D - mean)) exp(-2 pi i D / half):
 linear in three complex numbers, and a return that fades along the rail does no harm. Where they are not, the phasors
@@ -32,7 +34,7 @@ KIND = "leakage-lit"
 SCATTER = "scatter of one quadrature"
 ROUNDS = 20
 FEWEST_OF_ELLIPSE = 10  # phasors; five terms are fitted, as many remain
-SHORTEST_ARC = 0.5 * np.pi  # rad; a shorter one does not tell the centre from the radius in the face of small biases
+SHORTEST_ARC = 0.5 * np.pi  # rad; with a shorter one small biases make centre and radius inseparable
 
 
 class LitLeakageSheet(Sheet):
@@ -54,7 +56,7 @@ LAYOUT = SheetLayout(KIND, LitLeakageSheet, required={}, optional={"distance_m":
 
 
 def calibrate_lit_leakage(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """The leakage as the point about which a moving retroreflector's phasors turn.
+    """Leakage as the centre of a moving retroreflector's phasors.
 
     readings   columns real_volt, imaginary_volt (or amplitude_volt, phase_rad), perhaps distance_m; LitLeakageSheet
     reject     leave out what the tests reject
@@ -66,13 +68,16 @@ def calibrate_lit_leakage(readings: SheetReadings, reject: bool = False) -> Cali
     z = phasors(readings)
     fit, m = (_along(readings, z, reject), len(z)) if "distance_m" in readings.numbers else (None, len(z))
     if fit is not None:
-        return _calibration(readings, fit, z, np.abs(fit.statistic).reshape(2, m).max(axis=0), known=True)
+        return _calibration(readings, fit, z, np.abs(fit.statistic).reshape(2, m).max(axis=0), has_positions=True)
     fit = _circle(readings, z, reject)
-    return _calibration(readings, fit, z, fit.statistic, known=False)
+    return _calibration(readings, fit, z, fit.statistic, has_positions=False)
 
 
 def _along(readings: SheetReadings, z: np.ndarray, reject: bool) -> CalibrationFit:
-    """Known positions: real and imaginary parts are linear in leakage, light and its fading."""
+    """Fit with known positions.
+
+    Real and imaginary parts are linear in leakage, light and its fading.
+    """
     sheet, distance = readings.sheet, readings.get("distance_m")
     if sheet.group_index is None:
         raise refusal(readings.sheet_file, "group_index is missing (needed for the column distance_m)")
@@ -101,7 +106,7 @@ def _along(readings: SheetReadings, z: np.ndarray, reject: bool) -> CalibrationF
 
 
 def _circle(readings: SheetReadings, z: np.ndarray, reject: bool) -> CalibrationFit:
-    """Unknown positions: distances from a circle, linearised where the fit settles."""
+    """Fit with unknown positions: distances from a circle, linearised."""
     on = readings.active
     circle = circle_leakage(z[on], 1e-6 * float(np.median(np.abs(z[on]))))  # equal weights; their size is of no matter
     point = np.array([circle.phasor.real, circle.phasor.imag, float(np.mean(np.abs(z[on] - circle.phasor)))])
@@ -132,21 +137,26 @@ def _scatter(readings: SheetReadings, quadratures: int) -> ObservedScatter:
 
 
 def _explained(fit: CalibrationFit, z: np.ndarray) -> float:
-    """Share of the phasors' variance about their mean that the turning light explains."""
+    """Share of the phasors' variance explained by the turning light.
+
+    About their mean.
+    """
     on = fit.active[: len(z)]
     total = float(np.sum(np.abs(z[on] - z[on].mean()) ** 2))
     return 1.0 - float(np.sum(fit.residual[fit.active] ** 2)) / total if total > 0.0 else 0.0
 
 
 def _arc(arm: np.ndarray) -> float:
-    """Angle of the circle that phasors cover, rad: a turn less the largest gap."""
+    """Arc covered by the phasors, rad: a turn minus the largest gap."""
     angle = np.sort(np.mod(np.angle(arm), TWO_PI))
     gaps = np.diff(np.append(angle, angle[0] + TWO_PI))
     return float(TWO_PI - gaps.max())
 
 
 def _balance(fit: CalibrationFit, z: np.ndarray, leakage: complex) -> CheckOutcome:
-    """Whether the phasors turn on a circle and not on an ellipse, as quadratures of unequal gain or angle make it.
+    """Test of an ellipse against a circle.
+
+    Quadratures of unequal gain or angle make an ellipse.
 
     An ellipse of half axes r (1 + e) and r (1 - e) stands r e cos 2(t - t_0) off its circle, t the angle about the
     centre; the pair of terms is tested by Fisher's F.
@@ -160,18 +170,20 @@ def _balance(fit: CalibrationFit, z: np.ndarray, leakage: complex) -> CheckOutco
     arm = (z - leakage)[on]
     if len(arm) < FEWEST_OF_ELLIPSE:
         return CheckOutcome(name, float("nan"), float("nan"), None, "too few phasors to tell a circle from an ellipse")
-    way = arm / np.abs(arm)
+    direction = arm / np.abs(arm)
     residual = fit.residual[:m][on]
-    off = np.real((residual + 1j * fit.residual[m:][on]) * np.conj(way)) if len(fit.residual) > m else residual
-    twice = np.column_stack([np.ones(len(arm)), way.real, way.imag, (way**2).real, (way**2).imag])
-    found = np.linalg.lstsq(twice, off, rcond=None)[0]
-    left, degrees = float(np.sum((off - twice @ found) ** 2)), len(arm) - twice.shape[1]
+    off = np.real((residual + 1j * fit.residual[m:][on]) * np.conj(direction)) if len(fit.residual) > m else residual
+    twice = np.column_stack(
+        [np.ones(len(arm)), direction.real, direction.imag, (direction**2).real, (direction**2).imag]
+    )
+    terms = np.linalg.lstsq(twice, off, rcond=None)[0]
+    residual_squares, degrees = float(np.sum((off - twice @ terms) ** 2)), len(arm) - twice.shape[1]
     of_two = np.linalg.inv(twice.T @ twice)[3:, 3:]
-    squares = float(found[3:] @ np.linalg.solve(of_two, found[3:])) / 2.0
+    squares = float(terms[3:] @ np.linalg.solve(of_two, terms[3:])) / 2.0
     limit = float(fisher.isf(SCATTER_LIMIT, 2, degrees))
     radius = float(np.mean(np.abs(arm)))
-    share = float(np.hypot(*found[3:])) / radius
-    most = share * np.sqrt(limit * max(left, 1e-300) / degrees / max(squares, 1e-300))
+    share = float(np.hypot(*terms[3:])) / radius
+    most = share * np.sqrt(limit * max(residual_squares, 1e-300) / degrees / max(squares, 1e-300))
     text = "the phasors lie on a circle"
     if share > most:
         text = (
@@ -182,13 +194,16 @@ def _balance(fit: CalibrationFit, z: np.ndarray, leakage: complex) -> CheckOutco
 
 
 def _rows(
-    readings: SheetReadings, fit: CalibrationFit, z: np.ndarray, statistic: np.ndarray, *, known: bool
+    readings: SheetReadings, fit: CalibrationFit, z: np.ndarray, statistic: np.ndarray, *, has_positions: bool
 ) -> tuple[tuple[Cell, ...], ...]:
-    """Each reading's phasor and residual in mV, statistic and state; with known positions of its worse quadrature."""
+    """Table of readings: phasor and residual in mV, statistic and state.
+
+    With known positions of the worse quadrature.
+    """
     m = len(z)
-    states = fit.state(readings.left_out * (2 if known else 1))
+    states = fit.state(readings.left_out * (2 if has_positions else 1))
     states = tuple(b if b == "suspect" else a for a, b in zip(states[:m], states[-m:], strict=True))
-    residual = np.hypot(fit.residual[:m], fit.residual[m:]) if known else fit.residual
+    residual = np.hypot(fit.residual[:m], fit.residual[m:]) if has_positions else fit.residual
     return tuple(
         (
             readings.where[k],
@@ -203,7 +218,7 @@ def _rows(
 
 
 def _calibration(
-    readings: SheetReadings, fit: CalibrationFit, z: np.ndarray, statistic: np.ndarray, *, known: bool
+    readings: SheetReadings, fit: CalibrationFit, z: np.ndarray, statistic: np.ndarray, *, has_positions: bool
 ) -> Calibration:
     sheet = readings.sheet
     leakage = complex(fit.x[0], fit.x[1])
@@ -221,7 +236,7 @@ def _calibration(
         SHORTEST_ARC,
         arc >= SHORTEST_ARC,
         f"the phasors cover {np.degrees(arc):.0f}° of the circle"
-        + ("" if known else ", and its amplitude is taken to be constant"),
+        + ("" if has_positions else ", and its amplitude is taken to be constant"),
         least=True,
     )
     return Calibration(
@@ -231,7 +246,7 @@ def _calibration(
         quantities=calibrated,
         covariance=polar,
         columns=("reading", "real_mv", "imaginary_mv", "residual_mv", f"largest |{fit.test}|", "state"),
-        rows=_rows(readings, fit, z, statistic, known=known),
+        rows=_rows(readings, fit, z, statistic, has_positions=has_positions),
         decisions=(covered, *fit.decisions(), _balance(fit, z, leakage)),
         explained=_explained(fit, z),
         fit=fit,
@@ -253,7 +268,7 @@ def _calibration(
         "wavelength, the leakage stays. The point about which the phasors turn is the leakage: "
         + (
             "with the known distances it is a linear adjustment that allows for fading."
-            if known
+            if has_positions
             else "the centre of the circle that fits them best."
         ),
         record=leakage_record(calibrated, to_come),

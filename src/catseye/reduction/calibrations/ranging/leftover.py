@@ -1,4 +1,4 @@
-"""Leakage that is left over after its subtraction, as an effect on phases."""
+"""Residual leakage after its subtraction, as an effect on phases."""
 
 import numpy as np
 
@@ -11,7 +11,9 @@ NAMES = ("leakage left over, real part, V", "leakage left over, imaginary part, 
 
 
 def leakage_effects(readings: SheetReadings, u_leakage_volt: float) -> list[Effect]:
-    """What a leakage left over adds to the phase of the target, less that of the reference where there is one.
+    """Effects of residual leakage on the target's phase.
+
+    Minus that on the reference where there is one.
 
     readings         columns phase_target_rad and amplitude_target_volt; phase_reference_rad needs
                      amplitude_reference_volt: one leakage acts on both

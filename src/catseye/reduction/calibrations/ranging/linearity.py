@@ -1,4 +1,4 @@
-"""Zero and linearity: the ranger against an interferometer along a rail; offset, scale and cyclic terms jointly.
+"""Zero, scale and cyclic terms against an interferometer on a rail.
 
     range - D = zero + scale D + sum of cosine_k cos(k x) + sine_k sin(k x)
 
@@ -40,29 +40,30 @@ def calibrate_linearity(readings: SheetReadings, reject: bool = False) -> Calibr
     readings   columns range_m and interferometer_m or interferometer_vacuum_m, see LAYOUT; sheet LinearitySheet
     reject     leave out what the tests reject
 
-    Raises InputError for a sheet that lacks a value, EstimationError where the readings hold not even offset and scale.
+    Raises InputError for a sheet that lacks a value, EstimationError where the readings do not determine offset and
+    scale.
 
     Source: [PARKER04] chapters 7.5 and 8 name the measurement; [FOERSTNER16] chapter 4 (adjustment);
     [RUEGER90] (cyclic error of EDM instruments).
     """
     sheet, rail = readings.sheet, rail_of(readings)
-    kept, reason = _separable(rail, readings)
-    wanted = sheet.max_order if sheet.orders is None else sheet.orders
+    orders, reason = _separable(rail, readings)
+    requested = sheet.max_order if sheet.orders is None else sheet.orders
     effects = list(rail.effects)
-    if len(kept) < min(wanted, 2):  # what cannot be found stays a systematic effect of its prior size
-        missing = [k for k in (1, 2) if k not in kept and k <= wanted]
+    if len(orders) < min(requested, 2):  # terms that cannot be estimated stay a systematic effect of their prior size
+        missing = [k for k in (1, 2) if k not in orders and k <= requested]
         prior = cyclic_effects(rail.phase, sheet.u_cyclic_mm)
         effects += [e for e in prior if any(f"order {k}," in e.name for k in missing)]
     active = readings.active
     if reject:
-        active = _fit(rail, kept, effects, active, sheet.level, reject=True).active
-    chosen, decisions = _chosen(rail, kept, effects, active, sheet)
+        active = _fit(rail, orders, effects, active, sheet.level, reject=True).active
+    chosen, decisions = _chosen(rail, orders, effects, active, sheet)
     fit = _fit(rail, chosen, effects, active, sheet.level)
     return _calibration(readings, rail, fit, chosen, (*decisions, *fit.decisions()), reason)
 
 
 def _design(rail: Rail, orders: tuple[int, ...]) -> np.ndarray:
-    """(m, 2 + 2 K): offset at the mean length, scale about it, cosines, sines."""
+    """Design (m, 2 + 2 K): mean offset, scale, cosines, sines."""
     middle = rail.length - rail.length.mean()
     return np.column_stack([np.ones(len(middle)), middle, cyclic_design(rail.phase, orders)])
 
@@ -87,40 +88,45 @@ def _fit(
 
 
 def _separable(rail: Rail, readings: SheetReadings) -> tuple[tuple[int, ...], str]:
-    """Cyclic orders that the positions tell from offset and scale, and why others are not tried."""
+    """Cyclic orders that are separable, and the reason against others.
+
+    Separable from offset and scale by the positions.
+    """
     sheet = readings.sheet
-    wanted = sheet.max_order if sheet.orders is None else sheet.orders
+    requested = sheet.max_order if sheet.orders is None else sheet.orders
     on = readings.active
     length, phase = rail.length[on], rail.phase[on]
     span = float(np.ptp(length))
-    if wanted == 0:
+    if requested == 0:
         return (), ""
-    left = "left out: what there is of them stays in the offset" + (
+    omission = "left out: what there is of them stays in the offset" + (
         f", with u_cyclic_mm = {sheet.u_cyclic_mm:g} as prior" if sheet.u_cyclic_mm > 0.0 else ", and is not in its u"
     )
     if span < rail.half:
         return (), (
-            f"cyclic terms {left}, because the positions cover {span:.4g} m, less than half a modulation wavelength "
-            f"({rail.half:.4g} m); a longer rail tells them apart"
+            f"cyclic terms {omission}, because the positions cover {span:.4g} m, less than half a modulation "
+            f"wavelength ({rail.half:.4g} m); a longer rail separates them"
         )
     room = (int(on.sum()) - 4) // 2  # readings that are left over must tell the scatter
-    tried = min(wanted, max(room, 0))
-    others = np.column_stack([np.ones(len(length)), length - length.mean()])
-    separate = separable_orders(phase, tried, others=others).orders if tried else ()
+    tried = min(requested, max(room, 0))
+    columns = np.column_stack([np.ones(len(length)), length - length.mean()])
+    separate = separable_orders(phase, tried, others=columns).orders if tried else ()
     orders = tuple(k for k, got in zip(range(1, tried + 1), separate, strict=False) if k == got)
-    if len(orders) < wanted:
+    if len(orders) < requested:
         text = (
-            f"cyclic orders above {len(orders)} {left}, because {int(on.sum())} positions over {span:.4g} m do not "
-            "tell them apart"
+            f"cyclic orders above {len(orders)} {omission}, because {int(on.sum())} positions over {span:.4g} m do not "
+            "separate them"
         )
         return orders, text
     return orders, ""
 
 
 def _chosen(
-    rail: Rail, kept: tuple[int, ...], effects: list[Effect], active: np.ndarray, sheet: LinearitySheet
+    rail: Rail, candidates: tuple[int, ...], effects: list[Effect], active: np.ndarray, sheet: LinearitySheet
 ) -> tuple[tuple[int, ...], tuple[CheckOutcome, ...]]:
-    """The orders to keep: up to the highest whose pair of terms is significant, by the F test against one order less.
+    """Significant cyclic orders, by the F test against one order less.
+
+    Up to the highest whose pair of terms is significant.
 
     Each order is tested with the scatter of the longest series; [FOERSTNER16] chapter 4 (tests of hypotheses). The
     level is shared among the orders, so that any is taken in vain once in twenty times.
@@ -128,33 +134,33 @@ def _chosen(
     from scipy.stats import f as fisher
 
     if sheet.orders is not None:
-        return kept[: sheet.orders], ()
-    if not kept:
+        return candidates[: sheet.orders], ()
+    if not candidates:
         return (), ()
-    degrees = int(active.sum()) - 2 - 2 * len(kept)
+    degrees = int(active.sum()) - 2 - 2 * len(candidates)
     if degrees < 1:
         raise EstimationError(
             "no readings are left to test the cyclic orders: state `orders` in the sheet, or read more"
         )
-    longest = _fit(rail, kept, effects, active, sheet.level)
-    single = single_level(ORDER_LEVEL, len(kept))
+    longest = _fit(rail, candidates, effects, active, sheet.level)
+    single = single_level(ORDER_LEVEL, len(candidates))
     limit = float(fisher.isf(single, 2.0, degrees))
     highest, outcomes = 0, []
     weight = np.linalg.inv(_covariance(rail, longest)[np.ix_(active, active)])
-    squares = [_squares(rail, kept[:k], active, weight) for k in range(len(kept) + 1)]
+    squares = [_squares(rail, candidates[:k], active, weight) for k in range(len(candidates) + 1)]
     scale = max(squares[-1] / degrees, np.finfo(float).tiny)  # readings without any scatter are no division by zero
-    for k in range(1, len(kept) + 1):
+    for k in range(1, len(candidates) + 1):
         statistic = (squares[k - 1] - squares[k]) / 2.0 / scale
         significant = bool(statistic > limit)
         highest = k if significant else highest
-        found = "significant" if significant else "not significant"
-        text = f"{found} by the F test of its two terms at the level {single:.2g}"
+        verdict = "significant" if significant else "not significant"
+        text = f"{verdict} by the F test of its two terms at the level {single:.2g}"
         outcomes.append(CheckOutcome(f"cyclic order {k}: F", float(statistic), limit, None, text))
-    return kept[:highest], tuple(outcomes)
+    return candidates[:highest], tuple(outcomes)
 
 
 def _covariance(rail: Rail, fit: CalibrationFit) -> np.ndarray:
-    """Of the observed values with the scatter as a fit found it."""
+    """Covariance of the observed values by a fit's scatter."""
     return rail.scatter.claimed + sum(
         (fit.components[name] ** 2 * matrix for name, matrix in rail.scatter.unknown.items()),
         np.zeros_like(rail.scatter.claimed),
@@ -162,7 +168,10 @@ def _covariance(rail: Rail, fit: CalibrationFit) -> np.ndarray:
 
 
 def _squares(rail: Rail, orders: tuple[int, ...], active: np.ndarray, weight: np.ndarray) -> float:
-    """v' W v of the best fit; effects that the sought parameters do not absorb are far below the scatter."""
+    """Weighted squares v' W v of the best fit.
+
+    Effects that the free parameters do not absorb are far below the scatter.
+    """
     design, y = _design(rail, orders)[active], rail.observed[active]
     x = np.linalg.lstsq(design.T @ weight @ design, design.T @ weight @ y, rcond=None)[0]
     v = y - design @ x
@@ -170,7 +179,10 @@ def _squares(rail: Rail, orders: tuple[int, ...], active: np.ndarray, weight: np
 
 
 def _quantities(rail: Rail, orders: tuple[int, ...], absolute: bool) -> tuple[list, np.ndarray]:
-    """Keys, and the matrix that turns (offset at the mean, scale, cosines, sines) into the quantities."""
+    """Keys, and the matrix to the quantities.
+
+    From (offset at the mean, scale, cosines, sines).
+    """
     count = len(orders)
     turn = np.diag([1.0 / MILLIMETRE, 1.0 / PPM, *([1.0 / MILLIMETRE] * 2 * count)])
     middle = float(rail.length.mean())
@@ -190,7 +202,7 @@ def _quantities(rail: Rail, orders: tuple[int, ...], absolute: bool) -> tuple[li
 
 
 def _rows(readings: SheetReadings, rail: Rail, fit: CalibrationFit) -> tuple[tuple[Cell, ...], ...]:
-    """Each position of the carriage, what was read there, and how it fits."""
+    """Table of carriage positions: readings and residual."""
     micrometre = 1e-3 * MILLIMETRE
     residual = fit.residual / micrometre
     return tuple(
@@ -208,7 +220,10 @@ def _rows(readings: SheetReadings, rail: Rail, fit: CalibrationFit) -> tuple[tup
 
 
 def _line_decision(period: np.ndarray, height: np.ndarray, chance: np.ndarray) -> CheckOutcome:
-    """Whether a line stands out of the residuals' spectrum; periods and heights in m, and each line's probability."""
+    """Test for a line in the residuals' spectrum.
+
+    Periods and heights in m, and each line's probability.
+    """
     top = int(np.argmin(chance))
     return CheckOutcome(
         "spectrum of residuals: chance of the highest line",
@@ -224,7 +239,7 @@ def _line_decision(period: np.ndarray, height: np.ndarray, chance: np.ndarray) -
 def _notes(
     fit: CalibrationFit, calibrated: tuple[Quantity, ...], count: int, reason: str, *, chosen: bool
 ) -> tuple[str, ...]:
-    """What was modelled, and what its u holds.
+    """Notes on the model and the content of its u.
 
     count    of the cyclic orders modelled
     reason   for these
@@ -319,7 +334,10 @@ def _amplitude(calibrated: tuple[Quantity, ...], fit: CalibrationFit, k: int, co
 
 
 def _curve(rail: Rail, fit: CalibrationFit, orders: tuple[int, ...], at: np.ndarray, shift: float) -> np.ndarray:
-    """The fitted line in micrometres at lengths; `shift` is the mean effect of the systematic parameters."""
+    """Fitted line in micrometres at lengths.
+
+    `shift` is the mean effect of the systematic parameters.
+    """
     phase = np.interp(at, np.sort(rail.length), np.sort(rail.path))
     x = -TWO_PI * phase / rail.half
     design = np.column_stack([np.ones(len(at)), at - rail.length.mean(), cyclic_design(x, orders)])

@@ -1,4 +1,6 @@
-"""The oscillator test: phases of the internal cube at equal intervals to kinds of noise, spurs and what averaging buys.
+"""Oscillator test: noise kinds, spurs, and averaging.
+
+From phases of the internal cube at equal intervals.
 
 The readings are the phases of single cycles (SEQ) or of buffers of the reference cube, one after the other.
 """
@@ -17,7 +19,7 @@ from catseye.signal.drift.allan import allan_deviation, expected_variance
 from catseye.signal.drift.noise import FEWEST, NoiseSpectrum, noise_spectrum
 
 KIND = "oscillator"
-SHOWN = 5  # spurs listed
+LISTED_SPURS = 5  # spurs listed
 MRAD2 = 1e6  # mrad^2 in a rad^2
 
 
@@ -40,7 +42,9 @@ LAYOUT = SheetLayout(KIND, OscillatorSheet, required={"phase_rad": Within(-1e6, 
 
 
 def measure_oscillator(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """White, flicker and random-walk noise of the phase, its spurs, and the noise of one range that they make.
+    """Phase noise by kind, spurs, and the noise of one range.
+
+    White, flicker and random-walk noise.
 
     readings   column phase_rad at equal intervals; sheet OscillatorSheet
     reject     has no effect: a series with holes has no spectrum
@@ -67,7 +71,7 @@ def measure_oscillator(readings: SheetReadings, reject: bool = False) -> Calibra
     )  # fmt: skip
     time = allan.size * sheet.interval_s
     fitted = np.sqrt(expected_variance(allan.size, white=spectrum.white, flicker=spectrum.flicker, walk=spectrum.walk))
-    shown, line = allan.deviation > 0.0, fitted > 0.0  # what has a logarithm
+    positive, line = allan.deviation > 0.0, fitted > 0.0  # what has a logarithm
     return Calibration(
         kind=KIND,
         title=f"Oscillator test of {sheet.instrument}",
@@ -90,13 +94,13 @@ def measure_oscillator(readings: SheetReadings, reject: bool = False) -> Calibra
             *(
                 f"spur at {s.frequency_hz:.4g} Hz (u {s.u_frequency_hz:.2g}): amplitude {s.amplitude:.3g} rad "
                 f"(u {s.u_amplitude:.2g}), false alarm {s.false_alarm:.1g}"
-                for s in spectrum.spurs[:SHOWN]
+                for s in spectrum.spurs[:LISTED_SPURS]
             ),
             "spurs above half the sampling rate show folded below it",
             f"a drift of {spectrum.drift:+.3g} rad/s was taken out before the spectrum; the Allan deviation has it",
         ),
         curve={
-            "readings": (np.log10(time[shown]), np.log10(allan.deviation[shown])),
+            "readings": (np.log10(time[positive]), np.log10(allan.deviation[positive])),
             "fit": (np.log10(time[line]), np.log10(fitted[line])),
         },
         axes=("averaging time (log10 of s)", "Allan deviation (log10 of rad)"),
@@ -109,7 +113,10 @@ def measure_oscillator(readings: SheetReadings, reject: bool = False) -> Calibra
 
 
 def _quantities(spectrum: NoiseSpectrum, sheet: OscillatorSheet) -> tuple[tuple[Quantity, ...], np.ndarray]:
-    """Coefficients (mrad^2) and the white part of a range's noise, with covariance."""
+    """Coefficients (mrad^2) and the white part of a range's noise.
+
+    With covariance.
+    """
     per_range = (sheet.half_wavelength_mm * 1e3 / TWO_PI) / np.sqrt(sheet.cycles_per_range)
     slope = np.zeros((4, 3))
     slope[:3] = MRAD2 * np.eye(3)
@@ -130,7 +137,7 @@ def _quantities(spectrum: NoiseSpectrum, sheet: OscillatorSheet) -> tuple[tuple[
 
 
 def _lines(spectrum: NoiseSpectrum) -> str:
-    return "lines at " + ", ".join(f"{s.frequency_hz:.4g} Hz" for s in spectrum.spurs[:SHOWN])
+    return "lines at " + ", ".join(f"{s.frequency_hz:.4g} Hz" for s in spectrum.spurs[:LISTED_SPURS])
 
 
 RECIPE = CalibrationKind(

@@ -1,4 +1,4 @@
-"""Tables of phasors: as real and imaginary part, or as amplitude and phase."""
+"""Tables of phasors: real and imaginary part, or amplitude and phase."""
 
 import numpy as np
 
@@ -25,13 +25,16 @@ MILLIVOLT = 1e-3  # V
 
 
 def phasors(readings: SheetReadings) -> np.ndarray:
-    """(m,) V, complex; InputError unless exactly one pair of columns is there."""
+    """Phasors (m,) V, complex.
+
+    InputError unless exactly one pair of columns exists.
+    """
     pairs = [pair for pair in (CARTESIAN, POLAR) if all(name in readings.numbers for name in pair)]
-    given = [name for name in (*CARTESIAN, *POLAR) if name in readings.numbers]
-    if len(pairs) != 1 or len(given) != 2:
+    present = [name for name in (*CARTESIAN, *POLAR) if name in readings.numbers]
+    if len(pairs) != 1 or len(present) != 2:
         raise refusal(
             readings.file,
-            f"line 1, {', '.join(given) or 'no column of a phasor'} (expected {','.join(CARTESIAN)} or "
+            f"line 1, {', '.join(present) or 'no column of a phasor'} (expected {','.join(CARTESIAN)} or "
             f"{','.join(POLAR)})",
         )
     first, second = (readings.get(name) for name in pairs[0])
@@ -41,7 +44,10 @@ def phasors(readings: SheetReadings) -> np.ndarray:
 def polar_quantities(
     phasor: complex, covariance: np.ndarray, fit: CalibrationFit
 ) -> tuple[tuple[Quantity, ...], np.ndarray]:
-    """A leakage as amplitude and phase with their covariance, from its real and imaginary part."""
+    """Amplitude and phase of a leakage with covariance.
+
+    From its real and imaginary part.
+    """
     polar = polar_covariance(phasor, covariance)
     keys = [
         ("leakage_amplitude_volt", "V", "of the phasor that leaks into every shot"),
@@ -55,7 +61,7 @@ def polar_quantities(
 
 
 def leakage_record(leakage: tuple[Quantity, ...], u_volt: float) -> dict[str, RecordValue]:
-    """What goes into the ranger's record: one uncertainty of each quadrature."""
+    """Entries for the ranger's record: one u for each quadrature."""
     return {
         "leakage_amplitude_volt": leakage[0].value,
         "leakage_phase_rad": leakage[1].value,

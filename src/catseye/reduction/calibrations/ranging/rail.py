@@ -1,4 +1,4 @@
-"""What a table of a rail says: the interferometer's lengths in air, the ranger's phases, what is shared by all."""
+"""Rail table: interferometer lengths in air, phases, common effects."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -70,7 +70,7 @@ LAYOUT = SheetLayout(
 
 @dataclass(frozen=True, eq=False)
 class Rail:
-    """What the table says, in metres and radians.
+    """Rail table in metres and radians.
 
     length      (m,) interferometer's length from its zero, in air
     observed    (m,) range less length
@@ -91,7 +91,7 @@ class Rail:
 
 
 def rail_of(readings: SheetReadings) -> Rail:
-    """The rail of a table; InputError where table and sheet do not go together."""
+    """Rail of a table; InputError for a mismatch of table and sheet."""
     sheet = readings.sheet
     group = group_air(readings)
     range_ = readings.get("range_m")
@@ -126,7 +126,9 @@ def rail_of(readings: SheetReadings) -> Rail:
 
 
 def _in_air(readings: SheetReadings) -> tuple[np.ndarray, np.ndarray, Effect]:
-    """Length in air of a vacuum length V; what the sensors do to it, (3, m) m; and the formula's own effect.
+    """Length in air of a vacuum length V, with effects.
+
+    The sensors' effect on it, (3, m) m; and the formula's own effect.
 
     V = n (L + d) - n_0 d with the dead path d and the index n_0 at the first reading: L = V/n + d (n_0/n - 1).
     Range less length moves against the length: a length too short, as by an index too high, is an observed too long.
@@ -150,7 +152,7 @@ def _in_air(readings: SheetReadings) -> tuple[np.ndarray, np.ndarray, Effect]:
 
 
 def _scatter(readings: SheetReadings) -> ObservedScatter:
-    """Noise of one range and of one position, if known, and the walk of the ranger's drift in time."""
+    """Scatter by range, position and the ranger's drift in time."""
     sheet, m = readings.sheet, len(readings)
     claimed = np.zeros((m, m))
     if sheet.random_walk_mm_per_sqrt_hour > 0.0:

@@ -1,4 +1,6 @@
-"""Reference distance D0: from the scan point to the internal cube, from targets at known distances.
+"""Reference distance D0 from targets at known distances.
+
+From the scan point to the internal cube.
 
     D = L + D0 + Pc,  L = c / (2 n f) (N - phi~ / 2 pi),  phi~ = phi_target - phi_reference in [0, 2 pi)
 
@@ -85,7 +87,7 @@ LAYOUT = SheetLayout(
 
 
 def calibrate_reference_distance(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """D0 with its standard uncertainty, and the ranger's scale where the sheet asks for it.
+    """Reference distance D0 with u, and optionally the ranger's scale.
 
     readings   columns distance_m, phase_target_rad, phase_reference_rad, see LAYOUT; sheet ReferenceDistanceSheet
     reject     leave out what the tests reject
@@ -115,12 +117,18 @@ def calibrate_reference_distance(readings: SheetReadings, reject: bool = False) 
 
 
 def _design(scale: bool, length: np.ndarray) -> np.ndarray:
-    """y = D0 - s L: a ranger whose ranges are too long by the share s makes y too small."""
+    """Design of y = D0 - s L.
+
+    A ranger whose ranges are too long by the share s makes y too small.
+    """
     return np.column_stack([np.ones(len(length)), -length][: 1 + scale])
 
 
 def _scatter(readings: SheetReadings, half: np.ndarray) -> ObservedScatter:
-    """Of y: setting of the target and noise of the phases, as far as they are known; estimated if neither is."""
+    """Scatter of y: target setting and phase noise.
+
+    As far as they are known; estimated if neither is.
+    """
     m = len(readings)
     variance = np.zeros(m)
     if readings.has("u_distance_mm"):
@@ -137,7 +145,10 @@ def _scatter(readings: SheetReadings, half: np.ndarray) -> ObservedScatter:
 def _effects(
     readings: SheetReadings, length: np.ndarray, phase: np.ndarray, half: np.ndarray, ranger: list[Effect]
 ) -> list[Effect]:
-    """Everything that shifts y for all readings together; what makes the ranger read long makes y small."""
+    """Systematic effects on y.
+
+    An error that makes the ranger read long makes y small.
+    """
     sheet = readings.sheet
     ones = np.ones(len(length))
     effects = [
@@ -215,7 +226,10 @@ def _calibration(
 
 
 def _drawing_decision(sheet: ReferenceDistanceSheet, d0: Quantity) -> CheckOutcome:
-    """The D0 found against that of the drawing: both uncertainties together, three of them."""
+    """Check of D0 against the drawing's.
+
+    Both uncertainties together, three of them.
+    """
     off, u = d0.value - sheet.d0_nominal_mm, float(np.hypot(d0.u, sheet.u_d0_nominal_mm))
     return CheckOutcome(
         "D0 less the drawing's, size in mm",
@@ -227,7 +241,10 @@ def _drawing_decision(sheet: ReferenceDistanceSheet, d0: Quantity) -> CheckOutco
 
 
 def _cycles_decision(readings: SheetReadings, margin: np.ndarray, on: np.ndarray) -> CheckOutcome:
-    """Is the whole number of cycles of every reading used safe? The margin against the doubt of the coarse length."""
+    """Check of the whole cycles of every used reading.
+
+    The margin against the uncertainty of the coarse length.
+    """
     sheet = readings.sheet
     common = np.hypot(np.hypot(sheet.u_d0_nominal_mm, sheet.u_distance_common_mm), sheet.u_pc_mm)
     doubt = np.hypot(common, readings.get("distance_m") * sheet.u_distance_ppm * PPM / MILLIMETRE)

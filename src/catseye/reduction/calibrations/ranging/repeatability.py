@@ -1,4 +1,4 @@
-"""Repeatability: how ranges of one target scatter within a set and from set to set."""
+"""Repeatability of ranges to one target, within and between sets."""
 
 from typing import Annotated
 
@@ -30,7 +30,9 @@ LAYOUT = SheetLayout(KIND, RepeatabilitySheet, required={"set": TEXT, "range_m":
 
 
 def measure_repeatability(readings: SheetReadings, reject: bool = False) -> Calibration:
-    """Standard deviations of a range within and between sets, and whether the sets differ.
+    """Standard deviations within and between sets, with a test.
+
+    The test is whether the sets differ.
 
     readings   columns set (a day, a pointing, an operator) and range_m, all of one target; sheet RepeatabilitySheet
     reject     has no effect: wrong readings are left out by a reason in left_out
@@ -98,7 +100,9 @@ def measure_repeatability(readings: SheetReadings, reject: bool = False) -> Cali
 
 
 def _deviations(analysis: Repeatability) -> tuple[np.ndarray, np.ndarray]:
-    """Within, between and intermediate standard deviation, and their covariance to first order.
+    """Within, between and intermediate standard deviation, with covariance.
+
+    To first order.
 
     The mean squares are independent, each of variance 2 s^4 / v; between^2 is their difference over the size of a set.
     """

@@ -1,4 +1,4 @@
-"""Retroreflector offset: unknown retroreflectors and a known one, one after the other in the same seat.
+"""Retroreflector constants by exchange with a known one in the seat.
 
 The seat stays, so L_u + Pc_u = L_r + Pc_r with the measured lengths L: the unknown constant is
 Pc_u = Pc_r - (L_u - L_r). More glass makes the range longer and the constant more negative. The sequence A-B-A-B
@@ -98,10 +98,10 @@ def calibrate_retroreflector(readings: SheetReadings, reject: bool = False) -> C
 
 
 def _positions(readings: SheetReadings) -> tuple[np.ndarray, list[str]]:
-    """Number of each reading's position, and their names."""
-    given = readings.words.get("position", ("",) * len(readings))
-    names = sorted(set(given))
-    return np.array([names.index(p) for p in given]), names
+    """Position number of each reading, and the positions' names."""
+    names_typed = readings.words.get("position", ("",) * len(readings))
+    names = sorted(set(names_typed))
+    return np.array([names.index(p) for p in names_typed]), names
 
 
 def _parameters(readings: SheetReadings, unknown: list[str]) -> list[str]:
@@ -111,20 +111,26 @@ def _parameters(readings: SheetReadings, unknown: list[str]) -> list[str]:
 
 
 def _design(readings: SheetReadings, unknown: list[str]) -> np.ndarray:
-    """Columns: one a retroreflector, 1 where it was read; then level and drift (m/h) of each position."""
+    """Design: one column per retroreflector, then level and drift.
+
+    1 where it was read; drift in m/h of each position.
+    """
     which, hours = np.array(readings.words["retroreflector"]), readings.hours()
     position, names = _positions(readings)
     columns = [(which == name).astype(float) for name in unknown]
     for k in range(len(names)):
-        here = (position == k).astype(float)
-        columns.append(here)
+        at_position = (position == k).astype(float)
+        columns.append(at_position)
         if readings.sheet.drift:
-            columns.append(here * (hours - hours[position == k].mean()))
+            columns.append(at_position * (hours - hours[position == k].mean()))
     return np.column_stack(columns)
 
 
 def _seatings(readings: SheetReadings) -> np.ndarray:
-    """Number of each reading's seating: runs in time of one retroreflector at one position."""
+    """Seating number of each reading.
+
+    Runs in time of one retroreflector at one position.
+    """
     position, _ = _positions(readings)
     order = np.lexsort((readings.hours(), position))
     which = np.array(readings.words["retroreflector"])[order]
@@ -135,24 +141,27 @@ def _seatings(readings: SheetReadings) -> np.ndarray:
 
 
 def _scatter(readings: SheetReadings) -> ObservedScatter:
-    """Each reading's own, and one shift a seating; estimated where the sheet does not claim them."""
+    """Scatter of each reading, and one shift a seating.
+
+    Estimated where the sheet does not claim them.
+    """
     m, sheet = len(readings), readings.sheet
     seating = _seatings(readings)
-    same = (seating[:, None] == seating).astype(float)
+    same_seating = (seating[:, None] == seating).astype(float)
     claimed, unknown = np.zeros((m, m)), {}
     if readings.has("u_range_mm"):
         claimed += np.diag((readings.get("u_range_mm") * MILLIMETRE) ** 2)
     else:
         unknown[READING] = np.eye(m)
     if sheet.u_seating_mm is not None:
-        claimed += (sheet.u_seating_mm * MILLIMETRE) ** 2 * same
-    elif np.count_nonzero(same) > m or readings.has("u_range_mm"):
-        unknown[SEATING] = same
+        claimed += (sheet.u_seating_mm * MILLIMETRE) ** 2 * same_seating
+    elif np.count_nonzero(same_seating) > m or readings.has("u_range_mm"):
+        unknown[SEATING] = same_seating
     return ObservedScatter(claimed, unknown)
 
 
 def _rows(readings: SheetReadings, fit: CalibrationFit) -> tuple[tuple[Cell, ...], ...]:
-    """When and where each retroreflector was read, its range, and how it fits."""
+    """Table of readings: time, position, range, residual."""
     hours, range_ = readings.hours(), readings.get("range_m")
     positions = readings.words.get("position", ("",) * len(readings))
     return tuple(
@@ -170,7 +179,10 @@ def _rows(readings: SheetReadings, fit: CalibrationFit) -> tuple[tuple[Cell, ...
 
 
 def _seatings_decision(readings: SheetReadings, count: int) -> CheckOutcome:
-    """Whether each of the retroreflectors, `count` unknown ones and the reference, was seated more than once."""
+    """Check that each retroreflector was seated more than once.
+
+    `count` unknown ones and the reference.
+    """
     alternations = int(np.max(_seatings(readings))) + 1
     return CheckOutcome(
         "seatings",
@@ -194,9 +206,9 @@ def _calibration(readings: SheetReadings, fit: CalibrationFit, unknown: list[str
     calibrated = quantities(keys, values, covariance, fit=fit, turn=np.eye(len(fit.x))[:count] / MILLIMETRE)
     hours, on = readings.hours(), fit.active
     # What is drawn: each reading less the level of its position and the offset of its retroreflector; the drift stays.
-    held = fit.x.copy()
-    held[count + 1 :: 2] *= 0.0 if sheet.drift else 1.0
-    line = (fit.predicted - _design(readings, unknown) @ held) / micrometre
+    parameters = fit.x.copy()
+    parameters[count + 1 :: 2] *= 0.0 if sheet.drift else 1.0
+    line = (fit.predicted - _design(readings, unknown) @ parameters) / micrometre
     drawn = line + fit.residual / micrometre
     order = np.argsort(hours)
     drifts = fit.x[count + 1 :: 2] / micrometre if sheet.drift else np.zeros(0)

@@ -1,4 +1,7 @@
-"""The spectrum of residuals over unevenly spaced positions: is a period left that nobody modelled?"""
+"""Spectrum of residuals over unevenly spaced positions.
+
+For a period outside the model.
+"""
 
 import numpy as np
 
@@ -13,7 +16,9 @@ WORST_CONDITION = 1e6  # of the two waves of a period: a sine that vanishes at e
 def spectrum(
     position: np.ndarray, residual: np.ndarray, covariance: np.ndarray, *, half: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Period (k,) m, amplitude (k,) m of the best wave of each, and chance (k,) of as strong a line without a cause.
+    """Period (k,) m, amplitude (k,) m and chance probability (k,).
+
+    Amplitude of the best wave of each; chance of as strong a line without a cause.
 
     position     (m,) m
     residual     (m,) m
@@ -40,7 +45,7 @@ def spectrum(
     level /= np.linalg.norm(level)
 
     def white(values: np.ndarray) -> np.ndarray:
-        """Whitened, the mean taken out; (m, ...)."""
+        """Whitened values (m, ...), mean removed."""
         w = np.linalg.solve(lower, values)
         return w - np.tensordot(level, level @ w, axes=0)
 

@@ -1,1 +1,1 @@
-"""The air of a campaign: stations, sounded lines, a process in time, the field of all."""
+"""Air of a campaign: stations, sounded lines, process in time, field."""

@@ -1,7 +1,8 @@
-"""The air of a campaign: its stations' records, a line in height, a process in time, and offsets to be estimated.
+"""Air of a campaign as a field of the refractive index.
 
-Where sound measured the mean temperature of a line (path_temperatures.csv), that takes the thermometers' place in the
-index of the line's shots near in time; pressure and vapour stay the stations'.
+Made of the stations' records, a line in height, a process in time, and offsets to be estimated. Where sound
+measured the mean temperature of a line (path_temperatures.csv), it replaces the thermometers in the index of the
+line's shots near in time; pressure and vapour stay the stations'.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,28 +19,28 @@ from catseye.errors import InputError, ValidityError
 from catseye.records.night.campaign import ObservedSite
 from catseye.reduction.epoch.air.process import LEVEL_HEIGHT, U_LAG, U_RADIATION, USUAL, AirKnots
 from catseye.reduction.epoch.air.sounded import SoundedLine, sounded_lines
-from catseye.reduction.epoch.air.stations import StationRecord, states_at, sunshine, worth_of_others
+from catseye.reduction.epoch.air.stations import StationRecord, states_at, sunshine, temperature_equivalents
 from catseye.reduction.epoch.parameter import BEND, GRADIENT, Parameter, ParameterKind
 from catseye.reduction.epoch.settings import ReductionSettings
 
 DISTINCT_HEIGHTS = 5.0  # m, stations closer in height than this show no gradient
-MOST_KEPT = 64  # sets of times whose states are kept: one a ranger, and more
-MUCH_C = 2.0  # °C, an offset of a thermometer worth telling
+CACHED_STATES = 64  # sets of times with cached states: one per ranger, and more
+MUCH_C = 2.0  # °C, smallest reported offset of a thermometer
 LEAST_HPA = 600.0
 NODES = 5  # of the quadrature along a path: 1e-12 for straight profiles over 200 m
-FAIR_SHARE = 0.3  # of a station's temperature in a path's, of two stations, from which the path knows it
-HALF = 0.5  # °C on either side, over which slopes are taken
+FAIR_SHARE = 0.3  # of a station's temperature in a path's, of two stations, from which the path determines it
+HALF = 0.5  # °C, half the step of the numerical slopes
 
 
 @dataclass(frozen=True, eq=False)
 class PathAir:
-    """Group refractivity averaged along m paths, and its derivatives by the parameters of the air.
+    """Group refractivity averaged along m paths, with derivatives.
 
     refractivity     (m,) n_g - 1
-    slopes           (m, q) by those of `AirField.names`: per °C of a thermometer's offset (it reads too high), per °C
+    slopes           (m, q) by those of `AirField.names`: per °C of a thermometer's offset (positive: high), per °C
                      of bend (warmer half-way between the stations than on their line), per °C/m of gradient, or per °C
                      that the sound of a line reads too warm
-    columns          (m, w) further parameters that each path hangs on, counted in `AirField.parameters`, and
+    columns          (m, w) further parameters that each path depends on, counted in `AirField.parameters`, and
     column_slopes    (m, w) derivatives by them: per s of a thermometer's lag, per °C or °C/m of the process' knots
     """
 
@@ -51,18 +52,18 @@ class PathAir:
 
 @dataclass(frozen=True, eq=False)
 class AirField:
-    """Temperature, pressure and humidity around the site as functions of time and place.
+    """Temperature, pressure and humidity by time and place.
 
-    names     of the q lasting parameters: one thermometer offset a station, "bend" or "gradient", then sounded lines
-    sigmas    (q,) their standard uncertainties beforehand
+    names     of the q constant parameters: one thermometer offset a station, "bend" or "gradient", then sounded lines
+    sigmas    (q,) their prior standard uncertainties
     heights   (stations,) m, ground frame
-    places    (stations, 2) m, east and north; zero where site.toml does not say,
-    placed    (stations,) bool, which it does
+    places    (stations, 2) m, east and north; zero where site.toml gives no place
+    placed    (stations,) bool, True where it does
     records   of the stations
     knots     of the process in time
-    sun       (2, n) s and the sine of the Sun's altitude then, 0 below the horizon; (2, 0) of a night
+    sun       (2, n) s and the sine of the Sun's altitude then, 0 below the horizon; (2, 0) at night
     lines     where sound measured the temperature
-    sounded   (m,) index into `lines` of each path that `along` is asked for, -1 where none; None for no path at all
+    sounded   (m,) index into `lines` of each path given to `along`, -1 where none; None for no path at all
     """
 
     names: tuple[str, ...]
@@ -78,11 +79,11 @@ class AirField:
     model: str
     lines: tuple[SoundedLine, ...] = ()
     sounded: np.ndarray | None = None
-    _states: dict[bytes, np.ndarray] = field(default_factory=dict)  # times: what `states` gave
+    _states: dict[bytes, np.ndarray] = field(default_factory=dict)  # times: result of `states`
 
     @classmethod
     def of(cls, campaign: ObservedSite, settings: ReductionSettings) -> "AirField":
-        """The air of a campaign; heights in the ground frame."""
+        """Air of a campaign; heights in the ground frame."""
         weather, site = campaign.weather, campaign.site
         stations = site.weather_station
         where = np.array(weather.station)
@@ -109,7 +110,7 @@ class AirField:
                 (float(shots.min()), float(shots.max())),
                 len(shots),
                 [r.temperature_c for r in records],
-                worth_of_others(
+                temperature_equivalents(
                     records, float(shots.mean()), wavelength_um=site.ranging.wavelength_um, model=settings.air_model
                 ),
                 zeta=None if flat else _zeta(heights, heights),
@@ -123,8 +124,11 @@ class AirField:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """All parameters as values: those of `names` in their order, lags of thermometers, by day
-        what the Sun adds to them, knots of the process."""
+        """All parameters as values.
+
+        Those of `names` in their order, lags of thermometers, by day what the Sun adds to them, knots of the
+        process.
+        """
         return (
             *(Parameter(ParameterKind.THERMOMETER, station) for station in self.stations),
             GRADIENT if self.profile == "gradient" else BEND,
@@ -135,12 +139,12 @@ class AirField:
 
     @property
     def errors(self) -> tuple[ParameterKind, ...]:
-        """Kinds of error that each thermometer has beside its offset."""
+        """Kinds of error of each thermometer beside its offset."""
         return (ParameterKind.LAG, ParameterKind.RADIATION) if self.sun.shape[1] else (ParameterKind.LAG,)
 
     @property
     def first_knot(self) -> int:
-        """Where the process begins among the parameters."""
+        """Index of the process's first parameter."""
         return len(self.names) + len(self.errors) * len(self.heights)
 
     @property
@@ -155,13 +159,18 @@ class AirField:
 
     @property
     def line_of_first(self) -> SoundedLine | None:
-        """The line whose sound gives the temperature of the first path of `on_lines`; None where thermometers do."""
+        """Line whose sound gives the temperature of the first path.
+
+        The first path of `on_lines`; None where thermometers do.
+        """
         if self.sounded is None or self.sounded[0] < 0:
             return None
         return self.lines[self.sounded[0]]
 
     def on_lines(self, mjd_utc: np.ndarray, ends: Sequence[frozenset[str]]) -> "AirField":
-        """The same air for m paths in this order, each known by its two ends, so that sound can replace thermometers.
+        """Air for m paths identified by their two ends.
+
+        On such paths sound can replace thermometers.
 
         mjd_utc   (m,) time of the shot
         ends      (m) names of ranger and target
@@ -175,27 +184,30 @@ class AirField:
         return replace(self, sounded=sounded)
 
     def smoothed(self, mjd_utc: np.ndarray) -> np.ndarray:
-        """Temperature °C, pressure hPa, humidity % of each station: (m, stations, 3), by their records' states."""
+        """Weather of each station by its records' states.
+
+        Temperature °C, pressure hPa, humidity %: (m, stations, 3).
+        """
         times = np.asarray(mjd_utc, dtype=float)
-        asked = times.tobytes()  # pass after pass
-        if asked not in self._states:
-            if len(self._states) >= MOST_KEPT:
+        key = times.tobytes()  # the same in every pass
+        if key not in self._states:
+            if len(self._states) >= CACHED_STATES:
                 self._states.clear()
-            self._states[asked] = states_at(self.records, self.seconds(times))
-        return self._states[asked]
+            self._states[key] = states_at(self.records, self.seconds(times))
+        return self._states[key]
 
     def seconds(self, mjd_utc: np.ndarray) -> np.ndarray:
-        """Times as seconds since the first shot."""
+        """Times in seconds since the first shot."""
         return (np.asarray(mjd_utc, dtype=float) - self.start_mjd) * SECONDS_PER_DAY
 
     def along(self, mjd_utc: np.ndarray, a: np.ndarray, b: np.ndarray, parameters: np.ndarray) -> PathAir:
-        """Mean group refractivity of straight paths, by Gauss-Legendre quadrature along them.
+        """Mean group refractivity of straight paths, by Gauss-Legendre quadrature.
 
         mjd_utc      (m,) time of the shot
         a, b         (m, 3) ends in the ground frame, m
         parameters   (p,) values of `parameters`, or of the first of them: the others are zero
 
-        On a path of `sounded` lines the temperature is the sound's, everywhere along it: the mean of the index differs
+        On a path of `sounded` lines the sound's temperature applies everywhere along it: the mean of the index differs
         from the index of the mean by 4e-9 where the temperature scatters by 1 °C along the path.
 
         Source: README of the campaign layout: temperature linear between the stations and beyond, pressure falling
@@ -206,26 +218,29 @@ class AirField:
         values[: len(parameters)] = parameters
         m, q, s, first = len(mjd_utc), len(self.names), len(self.heights), self.first_knot
         columns, share = self.knots.columns(self.seconds(mjd_utc))
-        own = np.broadcast_to(np.arange(q, first), (m, first - q))
-        columns = np.concatenate([own, columns + first], axis=1)
+        process_columns = np.broadcast_to(np.arange(q, first), (m, first - q))
+        columns = np.concatenate([process_columns, columns + first], axis=1)
         path = PathAir(np.zeros(m), np.zeros((m, q)), columns, np.zeros(columns.shape))
         state = _Weather.of(self, np.asarray(mjd_utc, dtype=float), values, share)
-        every = np.arange(m)
+        all_rows = np.arange(m)
         try:
-            self._into(path, every, state, self._by_thermometers, a, b)
+            self._into(path, all_rows, state, self._by_thermometers, a, b)
         except ValidityError as problem:
             raise InputError(self._impossible(np.asarray(mjd_utc, dtype=float), values[: s + 1])) from problem
         for i, line in enumerate(self.lines if self.sounded is not None else ()):
             rows = np.flatnonzero(self.sounded == i)
             if len(rows):
-                warm, own = line.at(mjd_utc[rows])
-                warm = warm - own * values[s + 1 + i]
+                warm, process_columns = line.at(mjd_utc[rows])
+                warm = warm - process_columns * values[s + 1 + i]
                 by_sound = self._into(path, rows, state.of_rows(rows), partial(self._by_sound, warm), a[rows], b[rows])
-                path.slopes[rows, s + 1 + i] = -own * by_sound
+                path.slopes[rows, s + 1 + i] = -process_columns * by_sound
         return path
 
     def refractivity_of(self, *weather: np.ndarray, wavelength_um: float | None = None) -> np.ndarray:
-        """Group refractivity at temperature °C, pressure hPa, humidity %, by the campaign's formula and light."""
+        """Group refractivity by the campaign's formula and wavelength.
+
+        Temperature °C, pressure hPa, humidity %.
+        """
         light = self.wavelength_um if wavelength_um is None else wavelength_um
         return np.asarray(group_refractivity(*weather, wavelength_um=light, model=self.model))
 
@@ -235,14 +250,17 @@ class AirField:
         return self.first_knot + self.knots.count
 
     def u_unread(self, path: PathAir) -> np.ndarray:
-        """(m,) standard uncertainty of paths' refractivity by all errors in time, as experience has their strengths."""
+        """Standard uncertainty (m,) of paths' refractivity by all errors in time.
+
+        The strengths of these errors are those of experience.
+        """
         errors = self.first_knot - len(self.names)
         u = np.repeat([U_LAG, U_RADIATION][: len(self.errors)], len(self.heights))
         variance = np.sum((path.column_slopes[:, :errors] * u) ** 2, axis=1)
         between, across = self.knots.covariances(USUAL)
         columns, slopes = path.columns[:, errors:] - self.first_knot, path.column_slopes[:, errors:]
-        both = columns[:, :4, None], columns[:, None, :4]
-        variance += np.einsum("mi,mij,mj->m", slopes[:, :4], between[both], slopes[:, :4])
+        pairs = columns[:, :4, None], columns[:, None, :4]
+        variance += np.einsum("mi,mij,mj->m", slopes[:, :4], between[pairs], slopes[:, :4])
         for k in (4, 6):  # east, north
             at = columns[:, k : k + 2] - columns[:, k : k + 1] + self.knots.first_across(columns[:, k], k == 6)[:, None]
             variance += np.einsum(
@@ -259,7 +277,10 @@ class AirField:
         a: np.ndarray,
         b: np.ndarray,
     ) -> np.ndarray:
-        """Fill some rows of a path's refractivity and slopes; the mean slope by sound's temperature, or nothing."""
+        """Fill some rows of a path's refractivity and slopes.
+
+        Returns the mean slope by sound's temperature, or None.
+        """
         nodes = _Nodes.of(self, a, b)
         refractivity, per_c, *by_sound = index(state, nodes)
         s, weight = len(self.heights), nodes.weight
@@ -281,23 +302,23 @@ class AirField:
             np.sum(weighed * nodes.north, axis=1) - at_stations[:, 1],
         ]
         by_part = np.stack(parts, axis=1)
-        both = np.stack([by_part * (1.0 - state.share), by_part * state.share], axis=2)
-        path.column_slopes[np.ix_(rows, s * len(self.errors) + np.arange(8))] = both.reshape(len(rows), 8)
+        shares = np.stack([by_part * (1.0 - state.share), by_part * state.share], axis=2)
+        path.column_slopes[np.ix_(rows, s * len(self.errors) + np.arange(8))] = shares.reshape(len(rows), 8)
         return by_sound[0] @ weight if by_sound else np.zeros(0)
 
     def _impossible(self, mjd_utc: np.ndarray, parameters: np.ndarray) -> str:
-        """What the stations read at the shot's time where they are farthest from any air."""
+        """Station readings farthest from valid air, as an error text."""
         state, offsets = self.smoothed(mjd_utc), np.asarray(parameters[:-1])
         apart = np.ptp(state[..., 0] - offsets, axis=1) + 100.0 * np.any(state[..., 1] < LEAST_HPA, axis=1)
         k = int(np.argmax(apart))
-        each = "; ".join(
+        readings = "; ".join(
             f"{name} {t:.1f} °C, {p:.1f} hPa, {h:.0f} %"
-            + (f", which the ranges make {offset:+.1f} °C too warm" if abs(offset) > MUCH_C else "")
+            + (f", by the ranges {offset:+.1f} °C too warm" if abs(offset) > MUCH_C else "")
             for name, (t, p, h), offset in zip(self.stations, state[k], offsets, strict=True)
         )
         return (
-            f"weather.csv: at {mjd_utc[k]:.5f} the stations read {each}: along the paths that makes air for which no "
-            "index is known (see to these readings, or leave a station out of site.toml and weather.csv)"
+            f"weather.csv: at {mjd_utc[k]:.5f} the stations read {readings}: along the paths these exceed the limits "
+            "of the index formula (check these readings, or leave a station out of site.toml and weather.csv)"
         )
 
     def _by_thermometers(self, state: "_Weather", nodes: "_Nodes") -> tuple[np.ndarray, ...]:
@@ -312,10 +333,12 @@ class AirField:
         return index, above - below
 
     def _by_sound(self, warm: np.ndarray, state: "_Weather", nodes: "_Nodes") -> tuple[np.ndarray, ...]:
-        """The same at the temperature `warm` (m,) °C all along the path, and then its derivative by that temperature.
+        """Refractivity at nodes by the sound's temperature.
 
-        The vapour pressure stays what the stations' thermometers and hygrometers say: warming air does not wet it. In
-        fog a line that sound finds colder would be a little more than saturated; the formulas are smooth there.
+        `warm` (m,) °C applies all along the path; also returns both derivatives, by temperature and by `warm`.
+
+        The vapour pressure stays that of the stations' thermometers and hygrometers: warming adds no vapour. In fog
+        a line that is colder by sound would be a little more than saturated; the formulas are smooth there.
         """
         chosen = MODELS[self.model]
         chosen.check(temperature_c=warm)
@@ -330,9 +353,11 @@ class AirField:
         return index, partials.vapour_pressure_hpa * (above - below), partials.temperature_c
 
     def steepest(self, values: np.ndarray) -> float:
-        """Mean temperature gradient from lowest to highest station, °C/m; 0 at one height.
+        """Mean temperature gradient from lowest to highest station, °C/m.
 
-        values   of the thermometers' offsets, or of all `parameters`: what the site's own gradient makes goes off too
+        0 where all stations have one height.
+
+        values   of the thermometers' offsets, or of all `parameters`: then the site's estimated gradient is subtracted
         """
         if self.profile == "gradient":
             return 0.0
@@ -343,7 +368,10 @@ class AirField:
         return float((mean[high] - mean[low]) / (self.heights[high] - self.heights[low]))
 
     def seen_from(self, heights: np.ndarray) -> np.ndarray:
-        """(stations,) bool: whether paths at heights (k,) m have a fair share of each station's air."""
+        """True per station that contributes fairly to paths at these heights.
+
+        (stations,) bool; heights (k,) m.
+        """
         if not len(heights):
             return np.zeros(len(self.heights), dtype=bool)
         return np.asarray(
@@ -351,12 +379,18 @@ class AirField:
         )
 
     def across(self, values: np.ndarray) -> np.ndarray:
-        """(2,) °C/m, mean gradient towards the east and the north; values (p,) of `parameters`."""
+        """Mean gradient towards east and north, (2,) °C/m.
+
+        values (p,) of `parameters`.
+        """
         knots = values[self.first_knot :][-2 * len(self.knots.across) :]
         return np.asarray(knots.reshape(2, -1).mean(axis=1))
 
     def _shares(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How much each station counts at heights z (m, k): (m, k, stations); and the profile of the last parameter."""
+        """Weight of each station at heights z (m, k).
+
+        (m, k, stations); and the profile of the last parameter.
+        """
         middle, span = self.heights.mean(), np.ptp(self.heights)
         count = len(self.heights)
         if self.profile == "gradient":
@@ -370,7 +404,10 @@ class AirField:
 
 @dataclass(frozen=True, eq=False)
 class _Nodes:
-    """Nodes (m, k) of the quadrature along m paths: what counts there of stations and process."""
+    """Quadrature nodes (m, k) along m paths, with their weights.
+
+    The weights of stations and process at each node.
+    """
 
     z: np.ndarray
     east: np.ndarray
@@ -391,15 +428,15 @@ class _Nodes:
 
 @dataclass(frozen=True, eq=False)
 class _Weather:
-    """The stations' weather at m times, offsets and process applied.
+    """Stations' weather at m times, offsets and process applied.
 
-    temperature         (m, stations) °C, of the stations' own air brought to the middle of the site
+    temperature         (m, stations) °C, of the stations' air reduced to the middle of the site
     rate                (m, stations) °C/s
     pressure, humidity  (m,) hPa at the stations' mean height, %
     process             (m, 4) of `PARTS`
     sun                 (m,) sine of its altitude
-    profile             of the profile's parameter
-    share               (m, 4) how far each time is on the way to the next knot
+    profile             value of the profile's parameter
+    share               (m, 4) position of each time between its knot and the next, 0 to 1
     middle              m, mean height of the stations
     """
 
@@ -438,12 +475,12 @@ class _Weather:
         )
 
     def of_rows(self, rows: np.ndarray) -> "_Weather":
-        """The same at some of the times."""
-        own = {
+        """Weather at some of the times."""
+        selected = {
             n: getattr(self, n)[rows]
             for n in ("temperature", "rate", "pressure", "humidity", "process", "sun", "share")
         }
-        return replace(self, **own)
+        return replace(self, **selected)
 
     def at(self, nodes: _Nodes) -> tuple[np.ndarray, ...]:
         """Temperature °C, pressure hPa, humidity % at nodes (m, k)."""
@@ -455,5 +492,5 @@ class _Weather:
 
 
 def _zeta(z: np.ndarray, heights: np.ndarray) -> np.ndarray:
-    """Height in units of the slope's: 1 at the highest station, -1 at the lowest."""
+    """Height scaled to 1 at the highest station, -1 at the lowest."""
     return np.asarray((z - 0.5 * (heights.min() + heights.max())) / (0.5 * np.ptp(heights)))

@@ -1,13 +1,13 @@
-"""The air that no station reads, as a process in time: its level, its slope with height, its gradients across the site.
+"""Air that no station reads, as a process in time.
 
-Each is a chain of knots with straight lines between. What is known of it before a shot is fired is a covariance: what
-the stations' readings leave of their own air (`air.stations`), and the air between stations and paths, whose
-strengths the ranges tell.
+Its parts: level, slope with height, gradients across the site. Each is a chain of knots with straight lines
+between. Its prior is a covariance: what the stations' readings leave uncertain of their own air (`air.stations`),
+and the air between stations and paths, whose strengths follow from the ranges.
 
     temperature(x, y, z, t) = line through the stations + level(t) + slope(t) zeta(z) + east(t) x + north(t) y
 
-with zeta 0 half-way between the lowest and the highest station and 1 at the highest. The site lives in the level and
-the slope as a process of some minutes; across it, in hours.
+with zeta 0 half-way between the lowest and the highest station and 1 at the highest. Level and slope vary within
+minutes, the gradients across the site within hours.
 
 Source: piecewise-linear offsets with constrained rates, as the analysis of very long baseline interferometry treats
 troposphere and clocks.
@@ -20,8 +20,8 @@ import numpy as np
 
 from catseye.estimation.series.trend import Trend
 
-LEVEL_TIME, FAST_TIME, ACROSS_TIME = 900.0, 100.0, 1800.0  # s, in which parts of the process forget
-LEVEL_STEP, SLOPE_STEP, ACROSS_STEP = 75.0, 150.0, 300.0  # s between knots at least: a quarter of the shortest waves
+LEVEL_TIME, FAST_TIME, ACROSS_TIME = 900.0, 100.0, 1800.0  # s, correlation times of the parts
+LEVEL_STEP, SLOPE_STEP, ACROSS_STEP = 75.0, 150.0, 300.0  # s, least distance of knots: a quarter of the shortest waves
 SHOTS_A_KNOT, FEWEST_KNOTS, MOST_KNOTS = 30, 2, 400
 LEVEL_HEIGHT = 50.0  # m, of zeta = 1 where all stations are at one height
 PARTS = ("level", "slope", "east", "north")
@@ -44,16 +44,16 @@ class AirStrength:
 
 
 USUAL = AirStrength()
-WIDE = AirStrength(0.3, 0.1, 0.15, 0.05, 0.006)  # where nothing is known yet: rather too much than too little
+WIDE = AirStrength(0.3, 0.1, 0.15, 0.05, 0.006)  # before any estimate: rather too large than too small
 LEAST = AirStrength(0.003, 0.002, 0.003, 0.002, 1e-4)
-MOST = AirStrength(3.0, 1.0, 1.0, 0.5, 0.05)  # more in minutes, or across a site, no air holds
+MOST = AirStrength(3.0, 1.0, 1.0, 0.5, 0.05)  # upper limits of real air
 
 
 @dataclass(frozen=True, eq=False)
 class AirKnots:
-    """Where the process has its knots, and what the stations' readings leave unknown of it.
+    """Knots of the process, and their uncertainty by the stations' readings.
 
-    level, slope, across   (k,), (l,), (j,) s; across both of east and north
+    level, slope, across   (k,), (l,), (j,) s; across for east and north alike
     record                 (k + l, k + l) °C^2, of levels then slopes: errors of the stations' records
     """
 
@@ -67,15 +67,15 @@ class AirKnots:
         span: tuple[float, float],
         shots: int,
         temperatures: Sequence[Trend],
-        others: Sequence[tuple[Trend, float]],
+        other_trends: Sequence[tuple[Trend, float]],
         *,
         zeta: np.ndarray | None,
     ) -> "AirKnots":
-        """Knots over a span of time that so many shots can tell apart.
+        """Knots over a span that so many shots can resolve.
 
         span           s, of the shots
         temperatures   of the stations
-        others         pressures and humidities, and what a unit of each is worth in °C of the level
+        other_trends   pressures and humidities, and the equivalent of a unit of each in °C of the level
         zeta           (stations,) heights in units of the slope's; None where they stand at one height
         """
         seconds, most = span[1] - span[0], int(np.clip(shots // SHOTS_A_KNOT, FEWEST_KNOTS, MOST_KNOTS))
@@ -88,20 +88,23 @@ class AirKnots:
         k, times = len(level), np.concatenate([level, slope])
         part = np.repeat([0, 1], [k, len(slope)])
         record = np.zeros((len(times), len(times)))
-        for own, trend in zip(gain.T, temperatures, strict=True):
-            by = np.append(own, 0.0)[part]
+        for station_gain, trend in zip(gain.T, temperatures, strict=True):
+            by = np.append(station_gain, 0.0)[part]
             record += by[:, None] * by * trend.covariance(times)
-        for trend, worth in others:
+        for trend, worth in other_trends:
             record[:k, :k] += (worth / len(temperatures)) ** 2 * trend.covariance(level)
         return AirKnots(level, slope, across, record)
 
     @property
     def count(self) -> int:
-        """Parameters of the process: level, slope, east, north."""
+        """Number of parameters: level, slope, east, north."""
         return len(self.level) + len(self.slope) + 2 * len(self.across)
 
     def first_across(self, columns: np.ndarray, north: bool) -> np.ndarray:
-        """Knots of a gradient, counted from its own first, by columns of the process."""
+        """Knots of a gradient by columns of the process.
+
+        Counted from the gradient's first.
+        """
         return columns - len(self.level) - len(self.slope) - (len(self.across) if north else 0)
 
     @property
@@ -114,30 +117,42 @@ class AirKnots:
         ]
 
     def shapes(self) -> tuple[list[np.ndarray], np.ndarray]:
-        """Covariances of unit strength: of levels and slopes by each of the first four, and (j, j) across the site."""
-        k, both = len(self.level), len(self.level) + len(self.slope)
+        """Covariances of unit strength.
+
+        Of levels and slopes by each of the first four strengths, and (j, j) across the site.
+        """
+        k, level_and_slope = len(self.level), len(self.level) + len(self.slope)
         shapes = []
         for time in (LEVEL_TIME, FAST_TIME):
-            for knots, part in ((self.level, slice(0, k)), (self.slope, slice(k, both))):
-                shape = np.zeros((both, both))
+            for knots, part in ((self.level, slice(0, k)), (self.slope, slice(k, level_and_slope))):
+                shape = np.zeros((level_and_slope, level_and_slope))
                 shape[part, part] = _forgetting(knots, time)
                 shapes.append(shape)
         return shapes, _forgetting(self.across, ACROSS_TIME) + 1e-9 * np.eye(len(self.across))
 
     def covariances(self, strength: AirStrength) -> tuple[np.ndarray, np.ndarray]:
-        """Prior of levels and slopes, °C^2, and (j, j) of each gradient, (°C/m)^2."""
+        """Prior of levels and slopes, °C^2, and of each gradient.
+
+        The gradient's is (j, j), (°C/m)^2.
+        """
         shapes, across = self.shapes()
-        *own, by_metre = astuple(strength)
-        prior = self.known + sum(s**2 * shape for s, shape in zip(own, shapes, strict=True))
+        *level_and_slope, by_metre = astuple(strength)
+        prior = self.record_covariance + sum(s**2 * shape for s, shape in zip(level_and_slope, shapes, strict=True))
         return prior, by_metre**2 * across
 
     @property
-    def known(self) -> np.ndarray:
-        """°C^2, of levels and slopes, what the readings leave alone; 0.1 mK more, which keeps it positive definite."""
+    def record_covariance(self) -> np.ndarray:
+        """Covariance of levels and slopes by the readings alone, °C^2.
+
+        Plus 0.1 mK, which keeps it positive definite.
+        """
         return self.record + 1e-8 * np.eye(len(self.record))
 
     def columns(self, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Parameters (m, 8) on which each time hangs, two knots a part in the order of `PARTS`, and shares (m, 4)."""
+        """Parameters (m, 8) of each time, and shares (m, 4).
+
+        Two knots per part in the order of `PARTS`.
+        """
         columns, shares, begin = [], [], 0
         for knots in (self.level, self.slope, self.across, self.across):
             first, share = hats(knots, seconds)
@@ -151,7 +166,10 @@ U_LAG, U_RADIATION = 60.0, 0.5  # s, of a thermometer in its shield: 0 to 120 s;
 
 
 def hats(knots: np.ndarray, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Knot before each time (m,), the last but one at most, and how far on the way to the next it is, 0 to 1."""
+    """Knot before each time (m,) and position towards the next, 0 to 1.
+
+    The last knot but one at most.
+    """
     first = np.clip(np.searchsorted(knots, seconds, side="right") - 1, 0, len(knots) - 2)
     span = np.maximum(knots[first + 1] - knots[first], 1e-9)
     return first, np.clip((seconds - knots[first]) / span, 0.0, 1.0)

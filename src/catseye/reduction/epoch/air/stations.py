@@ -1,4 +1,7 @@
-"""The weather stations' records as states in time: temperature, pressure and humidity with their covariance."""
+"""Weather stations' records as states in time.
+
+Temperature, pressure and humidity with their covariance.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,23 +13,23 @@ from catseye.constants import DEGREE, SECONDS_PER_DAY
 from catseye.estimation.series.trend import Trend, TrendStrength, trend_of, trend_strength
 from catseye.records.site.site import Location
 
-GRID = 60.0  # s between the states kept beside the readings
+GRID = 60.0  # s between additional states beside the readings
 MOST_STATES = 2000  # of them at most
 NAMES = ("temperature", "pressure", "humidity")
-# Of records too short to tell: a reading's scatter, as the campaign layout says, and air of an ordinary night.
+# For records too short for an estimate: scatter by the campaign layout, and air of an ordinary night.
 USUAL = (
     TrendStrength(0.05, 0.3 / 60.0, 1e-6),  # °C; 0.3 °C per root hour
     TrendStrength(0.05, 0.2 / 60.0, 1e-6),  # hPa
     TrendStrength(0.5, 2.0 / 60.0, 1e-5),  # %
 )
 DAY = (3.0, 21.0)  # hours of local mean solar time, outside which no Sun stands above 60° of latitude's horizon
-STEP = 0.5  # °C, hPa, % on either side, over which slopes are taken
+STEP = 0.5  # °C, hPa, %: half the step of the numerical slopes
 LEAST_NOISE = (0.003, 0.003, 0.03)  # of a reading, as files round it: 0.01 °C, 0.01 hPa, 0.1 %
 
 
 @dataclass(frozen=True, eq=False)
 class StationRecord:
-    """What one station read, as states in time.
+    """One station's readings as states in time.
 
     temperature_c, pressure_hpa, humidity_percent   levels with their covariance
     """
@@ -37,7 +40,10 @@ class StationRecord:
 
     @staticmethod
     def of(seconds: np.ndarray, readings: np.ndarray) -> "StationRecord":
-        """The record of n readings; seconds (n,), readings (n, 3): °C, hPa, %."""
+        """Record of n readings.
+
+        seconds (n,), readings (n, 3): °C, hPa, %.
+        """
         step = max(GRID, float(np.ptp(seconds)) / MOST_STATES)
         grid = np.arange(seconds.min(), seconds.max(), step)
         trends = []
@@ -58,9 +64,10 @@ class StationRecord:
 
 
 def states_at(records: Sequence[StationRecord], seconds: np.ndarray) -> np.ndarray:
-    """Temperature °C, pressure hPa, humidity % of each station at times (m,): (m, stations, 3).
+    """Weather of each station at times (m,).
 
-    Humidity stays within 0 to 100 %: a trend through readings near an end, or rounding in fog, leads beyond.
+    Temperature °C, pressure hPa, humidity %: (m, stations, 3). Humidity stays within 0 to 100 %: a trend through
+    readings near an end, or rounding in fog, leads beyond.
     """
     state = np.stack([np.stack([t.at(seconds) for t in r.trends], axis=-1) for r in records], axis=-2)
     state[..., 2] = np.clip(state[..., 2], 0.0, 100.0)
@@ -68,7 +75,10 @@ def states_at(records: Sequence[StationRecord], seconds: np.ndarray) -> np.ndarr
 
 
 def sunshine(where: Location, mjd_utc: np.ndarray, start: float) -> np.ndarray:
-    """(2, n) s since the start and sine of the Sun's altitude, 0 below the horizon; (2, 0) where it is night."""
+    """Sine of the Sun's altitude in time, 0 below the horizon.
+
+    (2, n): s since the start and the sine; (2, 0) at night.
+    """
     hours = 24.0 * (mjd_utc + where.longitude_deg / 360.0) % 24.0
     if np.all((hours < DAY[0]) | (hours > DAY[1])):
         return np.zeros((2, 0))
@@ -81,10 +91,13 @@ def sunshine(where: Location, mjd_utc: np.ndarray, start: float) -> np.ndarray:
     return np.stack([(times - start) * SECONDS_PER_DAY, np.maximum(high, 0.0)])
 
 
-def worth_of_others(
+def temperature_equivalents(
     records: Sequence[StationRecord], seconds: float, *, wavelength_um: float, model: str
 ) -> list[tuple[Trend, float]]:
-    """Pressure and humidity records, and what a hPa or a % of each is worth in °C: the same change of the index."""
+    """Pressure and humidity records with their temperature equivalents.
+
+    °C per hPa or per %: the same change of the index.
+    """
     state = states_at(records, np.array([seconds]))[0].mean(axis=0)
     light = {"wavelength_um": wavelength_um, "model": model}
     by = []
