@@ -230,11 +230,11 @@ def test_the_band_is_what_is_asked():
         ({"weighting": "whitened", "noise": np.ones(100)}, "too few"),
         ({"weighting": "whitened", "noise": np.zeros(9000)}, "silent"),
         ({"band_hz": (20e3, 21e3)}, "no signal in the band"),
-        ({"expected": 0.0}, "reaches out of the recording"),
-        ({"expected": np.nan}, "reaches out of the recording"),
-        ({"expected": 0.199}, "reaches out of the recording"),
+        ({"expected": 0.0}, "extends past the recording"),
+        ({"expected": np.nan}, "extends past the recording"),
+        ({"expected": 0.199}, "extends past the recording"),
         ({"recordings": np.zeros(300)}, "shorter than template and window"),
-        ({"recordings": np.zeros(9600, complex)}, "no row of integers or floats"),
+        ({"recordings": np.zeros(9600, complex)}, "not a row of integers or floats"),
     ],
 )
 def test_what_cannot_be_sought_is_refused(wrong, said):
@@ -289,7 +289,7 @@ def test_a_chirp_has_its_frequencies_where_they_belong():
     ("kind", "values", "said"),
     [
         ("bogus", {}, "not one of chirp"),
-        ("chirp", {**CHIRP, "stop_hz": 25e3}, "not held by"),
+        ("chirp", {**CHIRP, "stop_hz": 25e3}, "not below half of"),
         ("chirp", {**CHIRP, "duration": 1e4}, "samples; take a shorter"),
         ("chirp", {**CHIRP, "taper": 0.6}, "taper"),
         ("pulse", {"centre_hz": -1.0, "duration": 1e-3}, "centre_hz -1"),

@@ -70,7 +70,7 @@ def test_a_three_per_cent_beam_is_good_and_its_uncertainty_tells():
     assert u[1] / u[0] == pytest.approx(1 / 0.03, rel=0.25)  # 127 degrees of freedom each: 9 %, at 2.8 sigma
     asked = inspect_buffers([shot(seed=1), shot(0.03 * USUAL, seed=2)], 64, VOLTS, weakest=0.15)
     assert asked.status.tolist() == [BufferStatus.GOOD, BufferStatus.WEAK]
-    assert asked.text(1) == "weak: amplitude 0.09012 V is below the limit of 0.15 V"
+    assert asked.text(1) == "weak: amplitude 0.09012 V is below the limit 0.15 V"
 
 
 def test_the_number_of_cycles_can_be_demanded():
@@ -132,9 +132,9 @@ def test_a_live_sine_of_some_codes_is_never_stuck(amplitude):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ({"samples_per_cycle": 2}, "2 samples a cycle do not show a phase"),
+        ({"samples_per_cycle": 2}, "2 samples a cycle do not determine a phase"),
         ({"samples_per_cycle": 64, "weakest": -1.0}, "weakest amplitude -1.0 V"),
-        ({"samples_per_cycle": 64, "cycles": 0}, "0 cycles are no buffer"),
+        ({"samples_per_cycle": 64, "cycles": 0}, "0 cycles are not a buffer"),
         ({"samples_per_cycle": 64, "volts_per_code": 0.0}, "volts per code 0.0 V"),
         ({"samples_per_cycle": 64, "harmonics": (1,)}, "harmonics [1]"),
     ],

@@ -151,7 +151,7 @@ def test_a_buffer_with_a_hole_is_nan_and_spoils_no_other():
 @pytest.mark.parametrize(
     ("samples", "n", "volts", "text"),
     [
-        (np.zeros(64), 2, 1.0, "2 samples a cycle do not show a phase; at least 3 do"),
+        (np.zeros(64), 2, 1.0, "2 samples a cycle do not determine a phase; at least 3 do"),
         (np.zeros(64), 6.5, 1.0, "6.5 samples a cycle"),
         (np.zeros(65), 64, 1.0, "a buffer of 65 samples is not a whole number of cycles of 64 samples"),
         (np.zeros(0), 64, 1.0, "a buffer of 0 samples"),

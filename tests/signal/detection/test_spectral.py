@@ -100,7 +100,7 @@ def test_a_buffer_without_a_tone_is_nan_and_spoils_no_other():
 @pytest.mark.parametrize(
     ("call", "text"),
     [
-        (lambda: bin_phasor(np.zeros(64), 2), "2 samples a cycle do not show a phase"),
+        (lambda: bin_phasor(np.zeros(64), 2), "2 samples a cycle do not determine a phase"),
         (lambda: bin_phasor(np.zeros(65), 64), "a buffer of 65 samples is not a whole number of cycles of 64"),
         (lambda: bin_phasor(np.float64(1.0), 64), "in 0 dimensions"),
         (lambda: strongest_tone(np.zeros(15), 1.0), "a buffer of 15 samples shows no tone of unknown frequency"),

@@ -121,7 +121,7 @@ def test_a_batch_is_its_buffers_and_bad_ones_are_nan():
 @pytest.mark.parametrize(
     ("call", "text"),
     [
-        (lambda: crossing_phase(np.zeros(64), 2), "2 samples a cycle do not show a phase"),
+        (lambda: crossing_phase(np.zeros(64), 2), "2 samples a cycle do not determine a phase"),
         (lambda: crossing_phase(np.zeros(65), 64), "a buffer of 65 samples is not a whole number of cycles of 64"),
         (lambda: crossing_phase(np.zeros(0), 64), "a buffer of 0 samples"),
         (lambda: crossing_phase(np.zeros(64, dtype=complex), 64), "samples of type complex128"),

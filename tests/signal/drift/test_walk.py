@@ -145,7 +145,7 @@ def test_the_longest_gap_is_the_inverse_and_by_hand():
         (
             lambda: walk_test(np.arange(2.0), np.zeros(2), np.ones(2), random_walk=1.0, series=["a", "b"]),
             EstimationError,
-            "no two reference shots",
+            "no series has two reference shots",
         ),
         (lambda: longest_gap(1e-4, WALK, 1e-3), ValidityError, "what two references give at best"),
         (lambda: longest_gap(1e-4, 0.0, 1e-3), ValidityError, "sets no gap"),

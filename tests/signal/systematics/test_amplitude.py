@@ -124,5 +124,5 @@ def test_bad_input_is_refused_in_one_line():
         amplitude_phase([1.0, 0.0], 1.0, 1e-3)
     with pytest.raises(ValidityError, match=r"reference amplitude -1\.0 V is not above 0"):
         amplitude_phase(1.0, -1.0, 1e-3)
-    with pytest.raises(EstimationError, match="3 readings do not tell 2 coefficients apart"):
+    with pytest.raises(EstimationError, match="3 readings do not separate 2 coefficients"):
         fit_amplitude_phase([1.0, 1.0, 1.0], np.zeros(3), 1e-4, reference_amplitude=1.0)

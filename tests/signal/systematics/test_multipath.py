@@ -91,7 +91,7 @@ def test_the_cats_eye_is_cyclic_in_the_phase(beyond):
     x = 2 * np.pi * np.arange(64) / 64
     counted = -x / (2 * np.pi) * HALF  # the phase falls as the distance grows
     exact = cats_eye_error(5 * HALF + counted + beyond, q, WAVELENGTH)
-    cosine, sine = cats_eye_cyclic(q, WAVELENGTH, orders, beyond=beyond)
+    cosine, sine = cats_eye_cyclic(q, WAVELENGTH, orders, extra_path=beyond)
     np.testing.assert_allclose(cyclic_range(x, cosine, sine), exact, rtol=0, atol=q**11 * 0.016)
     _, c, s = cyclic_orders(exact, 4)
     np.testing.assert_allclose(np.concatenate([c, s]), [*cosine[:4], *sine[:4]], rtol=0, atol=1e-15)
@@ -117,7 +117,7 @@ def test_the_detector_may_reflect_the_limit_over_the_rest_of_the_way():
         (lambda: multipath_error([-0.1], [0.1], 0.2), "below 0"),
         (lambda: cats_eye_error(1.0, 1.0, 0.2), "sum to 1 or more"),
         (lambda: share_a_pass(0.1, 1.2, 0.5), r"recollected part 1\.2 is not within 0 to 1"),
-        (lambda: largest_share(0.0, 0.2), "not within 0 to an eighth wavelength"),
+        (lambda: largest_share(0.0, 0.2), "not within 0 to an eighth of a wavelength"),
     ],
 )
 def test_bad_input_is_refused_in_one_line(call, message):

@@ -59,10 +59,10 @@ def test_a_buffers_mean_is_undone_where_it_can_be():
     y = np.mean(1e-4 * np.cos(2 * np.pi * f * (t[:, None] + within)), axis=1)
     found = spectrum([t], [y], stretch=100.0)
     power = [s.density[:, 0][np.abs(s.frequency_hz - f) < 0.1].sum() * s.frequency_hz[0]
-             for s in (found, found.before_the_mean(window))]  # fmt: skip
+             for s in (found, found.without_averaging(window))]  # fmt: skip
     assert power[1] == pytest.approx(0.5e-8, rel=2e-3)
     assert power[0] / power[1] == pytest.approx(np.sinc(f * window) ** 2, rel=2e-3)
-    high = Spectrum(np.array([7.8]), np.ones((1, 1, 1), complex), 2.0, 0.1, np.array([20.0])).before_the_mean(window)
+    high = Spectrum(np.array([7.8]), np.ones((1, 1, 1), complex), 2.0, 0.1, np.array([20.0])).without_averaging(window)
     assert np.isnan(high.density).all()
 
 
@@ -117,7 +117,7 @@ def test_what_is_no_series_is_refused():
     for times, samples, more, expected in (
         ([t], [t[:5]], {}, "expected both"),
         ([t], [], {}, "channels"),
-        ([t[::-1]], [t], {}, "do not rise"),
+        ([t[::-1]], [t], {}, "do not increase"),
         ([t], [np.full(20, np.nan)], {}, "not finite"),
         ([t], [t], {"stretch": 100.0}, "no longer"),
         ([t], [t], {"stretch": 4.0}, "holds 8 samples"),
