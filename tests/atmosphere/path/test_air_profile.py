@@ -186,7 +186,7 @@ def test_a_sensor_that_gave_nothing_is_as_if_it_were_not_there():
     assert np.all(np.abs(less.refractivity - more.refractivity) < 1e-7)  # humidity is worth 0.008 ppm a per cent
     none = WeatherReadings(*(getattr(broken, f) for f in ("seconds", "z", "station", "temperature_c", "pressure_hpa")),
                            np.full(whole.z.shape, np.nan), whole.count)  # fmt: skip
-    with pytest.raises(EstimationError, match="humidity_percent was read by no station"):
+    with pytest.raises(EstimationError, match="humidity_percent was not read by any station"):
         AirProfile.of(none, ground=GROUND)
 
 

@@ -272,7 +272,7 @@ def test_leaving_out_wild_readings_by_turns_is_the_profile_without_them():
 
 def test_what_cannot_be_is_refused():
     some = readings([0.0, 60.0], [2.0], [[15.0], [15.0]])
-    with pytest.raises(EstimationError, match="no reading at all"):
+    with pytest.raises(EstimationError, match="no readings; priors alone"):
         Profile.of(ProfileReadings(*(np.zeros(0) for _ in range(5))), TEMPERATURE, ground=0.0)
     with pytest.raises(ValidityError, match="height above the ground -1 m"):
         Profile.of(some, TEMPERATURE, ground=3.0)

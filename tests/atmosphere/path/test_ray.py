@@ -247,5 +247,5 @@ def test_a_path_over_a_mirage_is_a_status_and_spoils_no_other():
 
 
 def test_a_path_of_no_length_is_refused():
-    with pytest.raises(ValidityError, match=r"path 1 from .* is no path"):
+    with pytest.raises(ValidityError, match=r"path 1 from .* has zero length"):
         bent_ray(layered(hot_ground), np.ones((2, 3)), np.array([[2.0, 1, 1], [1, 1, 1]]))

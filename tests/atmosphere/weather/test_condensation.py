@@ -101,7 +101,7 @@ def test_perfectly_dry_air_leaves_every_surface_clear():
     )
     assert np.all(np.isinf(found.margin_k))
     assert found.probability.tolist() == [0.0, 0.0]
-    assert found.lines() == ["clear: the air holds no vapour"] * 2
+    assert found.lines() == ["clear: the air has no vapour"] * 2
 
 
 def test_a_sky_warmer_than_a_black_body_is_refused():
@@ -158,7 +158,7 @@ def test_glass_under_a_clear_sky_is_several_kelvin_below_the_air_and_gold_is_not
         (lambda: condensation(np.nan, 10.0, 933.0, humidity_percent=75.0), "surface temperature is not a number"),
         (
             lambda: condensation(5.0, 10.0, 933.0, humidity_percent=75.0, u=CondensationSpread(surface_c=-1.0)),
-            "u_surface_c = -1 is not a standard unc",
+            "u_surface_c = -1 is invalid as a standard unc",
         ),
         (
             lambda: condensation(

@@ -149,7 +149,7 @@ def test_both_bulbs_at_zero_celsius_are_legal_over_water_and_over_ice():
 
 
 def test_a_mirror_below_zero_must_say_what_it_carries():
-    with pytest.raises(ValidityError, match="mirror at -10 °C may carry dew or frost; say which") as refused:
+    with pytest.raises(ValidityError, match="mirror at -10 °C may carry dew or frost; give deposit") as refused:
         hygrometer.of_mirror([5.0, -10.0], 933.0)
     assert refused.value.mask.tolist() == [False, True]
     dew, frost = (hygrometer.of_mirror(-10.0, 933.0, deposit=d).vapour_pressure_hpa for d in ("dew", "frost"))

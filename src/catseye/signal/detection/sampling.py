@@ -82,7 +82,7 @@ class SamplingPlan:
 
     @property
     def sample_rate_hz(self) -> float:
-        """Samples a second."""
+        """Sampling rate, samples a second."""
         return self.samples_per_cycle * self.intermediate_hz
 
     @property
