@@ -254,7 +254,7 @@ def test_the_servo_margin_covers_any_error_of_that_size():
 @pytest.mark.parametrize(
     ("act", "said"),
     [
-        (lambda: ConeZone([0, 0, 0], 0.1), "points somewhere"),
+        (lambda: ConeZone([0, 0, 0], 0.1), "non-zero vector"),
         (lambda: ConeZone([0, 0, 1], 5.0), "check its unit"),
         (lambda: BoxZone([0, 0, 0], [1, -1, 1]), "sizes"),
         (lambda: BoxZone([0, 0], [1, 1, 1]), "box"),

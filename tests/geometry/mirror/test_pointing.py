@@ -203,7 +203,7 @@ def test_the_compiled_form_keeps_quadrants_axes_and_batch_shapes():
     plain, fast = (counts(flat, axes, compiled=choice) for choice in (False, True))
     assert fast.shape == (2, 9, 2)
     np.testing.assert_allclose(fast, plain, rtol=0, atol=1e-9)
-    with pytest.raises(ValidityError, match="go in pairs"):
+    with pytest.raises(ValidityError, match="are in pairs"):
         counts(stations(5, np.random.default_rng(0)), np.zeros((5, 3)), compiled=True)
 
 

@@ -100,7 +100,7 @@ def test_batches_carry_and_give_single_instants():
         (lambda: TimeTag(52889, 2**64 - 1), "is too large"),
         (lambda: TimeTag(2**64 - 1, 0), "is too large"),
         (lambda: TimeTag(1, 0).text(31), "decimals = 31"),
-        (lambda: TimeTag(np.array([1, 2]), 0).text(), "no one text"),
+        (lambda: TimeTag(np.array([1, 2]), 0).text(), "no single text"),
         (lambda: tag_step(-1), "decimals = -1"),
     ],
 )
