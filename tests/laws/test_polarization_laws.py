@@ -76,7 +76,7 @@ def test_a_third_of_a_turn_changes_nothing_but_the_axes(n, tilt, azimuth):
 @given(st.floats(0.01, 1.0), st.floats(1.05, 3.0))
 def test_a_surface_reflects_from_behind_with_the_opposite_sign(cosine, n):
     inner = np.sqrt(1 - (1 - cosine**2) / n**2)
-    forth, back = reflection(cosine, inside=1.0, behind=n), reflection(inner, inside=n, behind=1.0)
+    forth, back = reflection(cosine, inside=1.0, outside=n), reflection(inner, inside=n, outside=1.0)
     for a, b in zip(forth, back, strict=True):
         assert abs(a + b) < ROUNDING  # Stokes' relation
 

@@ -165,7 +165,7 @@ def test_what_has_no_meaning_is_refused():
         (lambda: response(named("gold", 0.78), 0.78, 1.6), "right angle"),
         (lambda: response(named("gold", 0.78), 0.5), "outside 0.6168-1.088 um"),
         (lambda: named("copper", 0.78), "expected one of gold"),
-        (lambda: index("unobtainium", 0.78), "is not known"),
+        (lambda: index("unobtainium", 0.78), "is unknown"),
         (lambda: response(named("gold", 0.78), 0.78, medium=1.5 - 0.1j), "absorbs"),
         (lambda: response(Coating(((1.5, -0.1),), 1.5), 0.78), "thickness"),
         (lambda: response(named("gold", 0.78), 0.78, polarization="x"), "not 's' or 'p'"),

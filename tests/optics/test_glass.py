@@ -163,9 +163,9 @@ def test_a_value_outside_is_refused_with_value_and_limits():
 
 
 def test_an_unknown_glass_is_refused_with_those_known():
-    with pytest.raises(ValidityError, match="glass 'BK7' is not known; known are BK7-old, N-BK7, fused-silica"):
+    with pytest.raises(ValidityError, match="glass 'BK7' is unknown; known are BK7-old, N-BK7, fused-silica"):
         group_index(0.780, "BK7")
-    with pytest.raises(ValidityError, match="glass 'BK7' is not known"):
+    with pytest.raises(ValidityError, match="glass 'BK7' is unknown"):
         absolute_index(0.780, "BK7")
 
 
