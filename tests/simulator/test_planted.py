@@ -145,7 +145,7 @@ def test_what_cannot_be_is_refused_in_one_line():
         SimulatedTelescope(elevation_deg=3)
     with pytest.raises(InputError, match="unknown effect 'gravity'"):
         Planted(ignore={"gravity"})
-    with pytest.raises(InputError, match="no such point"):
+    with pytest.raises(InputError, match="unknown point"):
         simulate_night(1, planted=Planted(shifts={"DP999": (0, 0, 1)}))
     with pytest.raises(InputError, match="expected a ranger"):
         simulate_night(1, planted=Planted(d0_error_mm={"DP001": 1.0}))

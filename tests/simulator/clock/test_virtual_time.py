@@ -105,7 +105,7 @@ def test_a_loop_in_which_nothing_can_happen_says_so(loop):
     async def story():
         await loop.create_future()
 
-    with pytest.raises(CatseyeError, match="nothing can happen any more"):
+    with pytest.raises(CatseyeError, match="no timer is set and nothing is ready"):
         loop.run_until_complete(story())
     for task in asyncio.all_tasks(loop):
         task.cancel()

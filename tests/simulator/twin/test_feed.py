@@ -191,7 +191,7 @@ def test_the_32_clients_hear_the_same_and_a_33rd_is_turned_away():
 
 def test_a_port_that_is_taken_and_a_weather_without_pause_are_refused():
     async def story(feed, world, network):
-        with pytest.raises(InputError, match=r"feed: 127\.0\.0\.1 port 5250 cannot be had"):
+        with pytest.raises(InputError, match=r"feed: 127\.0\.0\.1 port 5250 is not available"):
             await SiteFeed("gbt", [], world, feed.clock, network=network).start(LOOPBACK, 5250)
 
     run(story)

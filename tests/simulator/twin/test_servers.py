@@ -124,7 +124,7 @@ def test_only_the_heads_given_are_served_and_a_stranger_is_refused(few):
         "ZY102": ("127.0.0.1", 24_120, 24_121),
         "ZY104": ("127.0.0.1", 24_140, 24_141),
     }
-    with pytest.raises(InputError, match="ZY999 is no ranger"):
+    with pytest.raises(InputError, match="ZY999 is not a ranger"):
         TwinSite(few, {"ZY999": None}, world_faults=FaultBoard(), seconds=lambda: 0.0)
 
 

@@ -99,8 +99,8 @@ def test_prisms_of_the_dish_move_along_its_normals_by_the_low_orders():
     made = twin("fixed 0 80", planted=only("gravity"))
     standing, surface, retro = made.standing(0.0), made.scene._surface, made.scene.retros["DP20P10"]
     turn, shift = standing.bodies["dish"]
-    moved = turn[0].T @ (made.point("DP20P10", 0.0)[0] - shift[0]) - retro.rest
-    xy = retro.rest[None, :2]
+    moved = turn[0].T @ (made.point("DP20P10", 0.0)[0] - shift[0]) - retro.rest_place
+    xy = retro.rest_place[None, :2]
     expected = (low_orders(xy, surface.centre, surface.radius) @ standing.orders[0])[0] * surface.up(xy)[0]
     assert moved == pytest.approx(expected, abs=1e-11)
     assert np.linalg.norm(expected) > 20e-6
