@@ -49,7 +49,7 @@ def test_a_small_retroreflector_sends_back_an_airy_disc():
     assert found == pytest.approx(hit * airy, rel=1e-3)  # phase across the small aperture: a^2/(R wavelength) = 1e-3
 
 
-def test_what_returns_is_never_more_than_what_hits():
+def test_the_returned_share_never_exceeds_the_incident_share():
     for distance in (60.0, 400.0):
         hit = float(share_within(0.019, radius(distance, waist=0.01, wavelength=LIGHT)))
         back = returned_share(distance, aperture=0.019, receiver=0.05, waist=0.01, wavelength=LIGHT)

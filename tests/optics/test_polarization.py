@@ -245,6 +245,6 @@ def test_ellipses():
         (lambda: sector_shares(solid_corner(1.5), 1.3, aperture=0.01, height=0.03), "no part of the face"),
     ],
 )
-def test_what_cannot_be_is_refused(call, said):
+def test_invalid_values_are_refused(call, said):
     with pytest.raises(ValidityError, match=said.replace("+", r"\+")):
         call()

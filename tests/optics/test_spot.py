@@ -108,6 +108,6 @@ def test_the_gaussian_that_matches_falls_to_half_where_the_spot_does():
         (lambda: matched_radius(100.0, **GBT, share=1.0), "share 1.0 of a peak"),
     ],
 )
-def test_what_is_no_beam_is_refused(call, message):
+def test_invalid_beams_are_refused(call, message):
     with pytest.raises(ValidityError, match=message):
         call()

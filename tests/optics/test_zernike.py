@@ -120,6 +120,6 @@ def test_on_dense_prisms_the_orthonormal_ones_are_zernikes():
         (lambda: orthonormal(np.ones((5, 2)), np.ones(5)), "function 2 of 2"),
     ],
 )
-def test_what_cannot_be_is_refused(call, said):
+def test_invalid_values_are_refused(call, said):
     with pytest.raises(ValidityError, match=said):
         call()

@@ -171,7 +171,7 @@ def test_covariance_is_positive_and_a_path_is_itself_from_either_end():
     assert same[0, 1] == pytest.approx(same[0, 0], rel=1e-12)
 
 
-def test_a_sensor_that_gave_nothing_is_as_if_it_were_not_there():
+def test_a_sensor_without_readings_is_ignored():
     world = BoundaryLayer(10)
     whole = weather(world)
     gone = whole.station == 2

@@ -119,6 +119,6 @@ def test_broadcasting_keeps_shapes():
         (lambda: axis_terms([1.0, 2.0]), "expected"),
     ],
 )
-def test_what_means_nothing_is_refused(made, said):
+def test_meaningless_input_is_refused(made, said):
     with pytest.raises(ValidityError, match=said):
         made()

@@ -186,7 +186,7 @@ def test_claimed_covariance_of_a_ray_is_its_scatter():
     np.testing.assert_allclose(scattered / np.outer(scale, scale), claimed / np.outer(scale, scale), atol=5 * 0.0045)
 
 
-def test_the_compiled_form_gives_what_the_plain_form_gives():
+def test_the_compiled_form_agrees_with_the_plain_form():
     rng = np.random.default_rng(8)
     station = stations(7, rng)
     points = np.concatenate([rng.uniform(-60, 60, (999, 3)), station.scan_point[:1]])  # one in a scan point

@@ -284,7 +284,7 @@ def test_the_sweep_s_distance_is_where_it_reaches_its_limit():
     assert far < hazard_zone(beam, eye_limits(0.78, 100.0))[1]
 
 
-def test_what_comes_back_is_what_the_unfolded_beam_would_bring():
+def test_the_returned_power_equals_that_of_the_unfolded_beam():
     # a large cube sends the beam on as if it had gone on: 1 - exp(-2 a^2/w^2) at twice the distance
     beam = LaserBeam.gaussian(0.01, 0.78, 0.008)
     w = float(gaussian_beam.radius(200.0, waist=0.008, wavelength=0.78e-6))
@@ -318,7 +318,7 @@ def test_what_comes_back_is_what_the_unfolded_beam_would_bring():
         (lambda: Viewer("glass", magnification=0.5), "glass: entrance inf m, magnification 0.5"),
     ],
 )
-def test_what_is_outside_is_refused_with_value_and_limit(call, said):
+def test_values_outside_are_refused_with_value_and_limit(call, said):
     with pytest.raises(ValidityError) as caught:
         call()
     assert said in str(caught.value)

@@ -100,7 +100,7 @@ def test_a_table_is_a_lot_too():
     assert inspect_buffers([], 64).status.tolist() == []
 
 
-def test_what_was_detected_before_can_be_judged():
+def test_earlier_detections_get_a_status():
     table = np.stack([shot(), shot(4 * USUAL)])
     assert status_of(detect(table, 64, VOLTS)).tolist() == [BufferStatus.GOOD, BufferStatus.CLIPPED]
     assert status_of(detect(table[0], 64, VOLTS), weakest=5.0) == BufferStatus.WEAK

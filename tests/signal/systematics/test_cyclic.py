@@ -44,7 +44,7 @@ def test_one_term_by_hand():
 
 
 @given(coefficients, st.floats(-50, 50))
-def test_a_whole_turn_of_phase_changes_nothing(terms, x):
+def test_a_full_turn_of_phase_changes_nothing(terms, x):
     assert abs(cyclic_range(x, *terms) - cyclic_range(x + 2 * np.pi, *terms)) <= 1e-16  # 50 rad, five orders of 0.1 mm
 
 
@@ -128,7 +128,7 @@ def test_orders_are_the_integrals_of_fourier():
         np.testing.assert_allclose([cosine[k - 1], sine[k - 1]], by_hand, rtol=0, atol=1e-13)
 
 
-def test_a_fit_finds_what_was_planted_beside_zero_and_scale():
+def test_a_fit_recovers_planted_terms_with_zero_and_scale():
     distance = 20.0 + np.linspace(0.0, 0.35, 60)
     x = fraction(-4 * np.pi * distance / WAVELENGTH, 0.0)
     cosine, sine = [4e-6, -1e-6], [-2e-6, 3e-6]
@@ -156,7 +156,7 @@ def test_the_claimed_covariance_is_the_scatter_with_correlated_readings():
     assert np.mean([f.variance_factor for f in fits]) == pytest.approx(1.0, abs=0.02)
 
 
-def test_a_short_rail_does_not_tell_order_one_from_the_zero():
+def test_a_short_rail_does_not_separate_order_one_from_zero():
     x = fraction(-4 * np.pi * np.linspace(0.0, 0.02, 40) / WAVELENGTH, 0.0)  # a fifth of a cycle
     found = separable_orders(x, 2)
     assert found.orders == ()
@@ -168,7 +168,7 @@ def test_a_short_rail_does_not_tell_order_one_from_the_zero():
 
 
 @pytest.mark.parametrize(("points", "orders"), [(3, (1,)), (4, (1,)), (5, (1, 2)), (7, (1, 2, 3))])
-def test_evenly_spaced_phases_do_not_tell_order_k_from_n_less_k(points, orders):
+def test_evenly_spaced_phases_do_not_separate_order_k_from_n_minus_k(points, orders):
     x = np.tile(2 * np.pi * np.arange(points) / points, 3)
     found = separable_orders(x, 3)
     assert found.orders == orders
@@ -177,7 +177,7 @@ def test_evenly_spaced_phases_do_not_tell_order_k_from_n_less_k(points, orders):
         fit_cyclic(x, np.zeros(len(x)), 1e-6, orders=len(orders) + 1)
 
 
-def test_what_is_estimated_besides_counts():
+def test_nuisance_columns_affect_separability():
     x = fraction(-4 * np.pi * np.linspace(0.0, 0.11, 50) / WAVELENGTH, 0.0)
     slope = np.stack([np.ones(50), np.linspace(-1, 1, 50)], axis=1)
     assert separable_orders(x, 1, others=slope).inflation[0] > separable_orders(x, 1).inflation[0] > 1.0

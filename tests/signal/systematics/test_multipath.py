@@ -42,7 +42,7 @@ def measured(path, shares, excess):
 @pytest.mark.parametrize(
     ("shares", "excess"), [([0.01], [0.05]), ([0.01], [0.31]), ([0.2, 0.1, 0.05], [0.02, 0.13, 7.7])]
 )
-def test_it_is_what_the_samples_of_all_returns_give(path, shares, excess):
+def test_error_equals_that_of_summed_return_samples(path, shares, excess):
     # rounding of 1e9 cycles a second times microseconds: 1e-13 cycles of 0.1 m, and 100 m of path
     assert float(multipath_error(shares, excess, WAVELENGTH)) == pytest.approx(
         measured(path, shares, excess), abs=1e-12
@@ -58,7 +58,7 @@ def test_the_cats_eye_is_a_series_of_rounds(path):
     assert float(multipath_error(shares, excess, WAVELENGTH)) == pytest.approx(expected, abs=1e-12)
 
 
-def test_light_that_comes_a_little_later_reads_longer_by_its_mean_delay():
+def test_slightly_delayed_light_lengthens_the_range_by_its_mean_delay():
     # shares 0.1 and 0.2, detours 10 and 40 um: (1 + 8) um/1.3, halved; the next term has the detour's cube
     assert float(multipath_error([0.1, 0.2], [10e-6, 40e-6], WAVELENGTH)) == pytest.approx(9e-6 / 2.6, rel=1e-6)
 

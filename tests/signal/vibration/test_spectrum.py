@@ -39,7 +39,7 @@ def test_the_integral_of_the_density_is_the_variance():
         assert found.density.sum() * found.frequency_hz[0] == pytest.approx(1e-8, rel=0.03)
 
 
-def test_confidence_bands_hold_the_truth_as_often_as_they_say():
+def test_confidence_bands_have_their_stated_coverage():
     rng, t, inside, levels = np.random.default_rng(3), np.arange(1024) / RATE, [], []
     truth = 2.0 * 1e-8 / RATE
     for _ in range(60):
@@ -95,7 +95,7 @@ def test_a_wave_above_half_the_rate_is_named_with_all_it_may_be_and_other_rhythm
 
 
 @draws(60)
-def test_a_shape_comes_back_with_the_scatter_it_claims(runs):
+def test_a_shape_is_recovered_with_its_claimed_scatter(runs):
     rng, t = np.random.default_rng(6), np.arange(2000) / RATE
     truth, off = np.array([1.0, -0.5, 0.2, 0.0]), []
     for _ in range(runs):
@@ -112,7 +112,7 @@ def test_a_shape_comes_back_with_the_scatter_it_claims(runs):
     assert found.rms[0] == pytest.approx(np.std(band), rel=0.3)
 
 
-def test_what_is_no_series_is_refused():
+def test_invalid_series_are_refused():
     t = np.arange(20.0)
     for times, samples, more, expected in (
         ([t], [t[:5]], {}, "expected both"),

@@ -130,7 +130,7 @@ def test_an_identified_axis_is_tuned_as_the_true_one():
     assert np.allclose(chosen.values[:3], ideal.values[:3], rtol=0.03)
 
 
-def test_moves_that_tell_nothing_are_refused():
+def test_uninformative_moves_are_refused():
     still = AxisTrace(np.arange(9) * SAMPLE_TIME, *(np.zeros((5, 9))))
     with pytest.raises(EstimationError, match="do not separate"):
         identify(still)

@@ -32,7 +32,7 @@ def test_certified_distances_hold_within_their_uncertainty():
     assert rms(z) == pytest.approx(1.0, abs=0.25)  # 60 draws: 9 %
 
 
-def test_typing_and_surface_are_off_by_what_is_said():
+def test_typing_and_surface_errors_have_their_stated_size():
     true, typed = twin(at=whole_site()), twin(at=whole_site(), planted=STILL)
     names = [n for n in whole_site().targets if n.startswith("DP")]
     away = np.array([true.scene.retros[n].rest_place - typed.scene.retros[n].rest_place for n in names])

@@ -63,7 +63,7 @@ def test_low_orders_have_rms_one_over_the_aperture_and_do_not_mix():
     assert shapes.T @ shapes / len(shapes) == pytest.approx(np.eye(6), abs=0.02)
 
 
-def test_encoders_lie_by_some_arc_seconds_and_their_rates_are_those_of_what_they_tell():
+def test_encoders_err_by_arc_seconds_and_rates_match_their_angles():
     true, told = twin("slew 0 10 300 80", planted=STILL), twin("slew 0 10 300 80", planted=only("encoder"))
     t = np.linspace(0.0, 500.0, 20_001)
     for axis in (0, 1):

@@ -413,8 +413,8 @@ def _edges(at: NDArray, half: NDArray, length: float) -> tuple[NDArray, NDArray]
                 ends[0, axis], ends[1, axis] = max(a[axis] - half[axis], -reach), min(a[axis] + half[axis], reach)
                 if room > 0.0 and ends[0, axis] <= ends[1, axis] and np.all(np.any(ends != 0.0, axis=-1)):
                     directions.append(ends / np.linalg.norm(ends, axis=-1, keepdims=True))
-    ends = np.array(directions).reshape(-1, 2, 3)
-    return ends[:, 0], ends[:, 1]
+    pairs = np.array(directions).reshape(-1, 2, 3)
+    return pairs[:, 0], pairs[:, 1]
 
 
 def _angle_to_rim(d: NDArray, at: NDArray, half: NDArray, axis: int, length: float) -> NDArray[np.float64]:

@@ -40,15 +40,15 @@ class DelayStatus(IntEnum):
 class PeakSearch(NamedTuple):
     """Signal, spectral lines and window of a search.
 
-    omega       (l,) rad a sample, of the lines used
-    template    (l,) spectrum of the signal
-    weight      (l,) W; for the phase transform 1 for lines used, else 0
-    phases      True for the weights of the phase transform
+    omega             (l,) rad a sample, of the lines used
+    template          (l,) spectrum of the signal
+    weight            (l,) W; for the phase transform 1 for lines used, else 0
+    phases            True for the weights of the phase transform
     autocorrelation   of the signal, 1 in its middle, by steps of 1/FINE sample
-    first       number of the first line used
-    stretch     samples of a segment
-    half        the window has 2 half + 1 lags
-    least_snr   below it an arrival is in the threshold region
+    first             number of the first line used
+    stretch           samples of a segment
+    half              the window has 2 half + 1 lags
+    least_snr         below it an arrival is in the threshold region
     """
 
     omega: NDArray[np.float64]

@@ -30,12 +30,12 @@ PRISM_RADIUS, BALL_RADIUS = 0.045, 0.050  # m: largest offset of a returned beam
 class BodyRetroreflector:
     """Retroreflector in the frame of its body.
 
-    kind     "prism", "ball" or "hollow"
-    body     "ground", "alidade", "dish" or "arm"
+    kind         "prism", "ball" or "hollow"
+    body         "ground", "alidade", "dish" or "arm"
     rest_place   (3,) m, true
-    facing   (3,) unit vector: outward normal of the entry face, a ball's axis; None: any way
-    sizes    m, true: height of the prism; both radii of the ball
-    volts    limits of its usual amplitude
+    facing       (3,) unit vector: outward normal of the entry face, a ball's axis; None: any direction
+    sizes        m, true: height of the prism; both radii of the ball
+    volts        limits of its usual amplitude
     """
 
     kind: str
