@@ -12,7 +12,7 @@ from repository import ROOT
 EXAMPLES = ROOT / "examples"
 LINE = re.compile(r"^(humidity(?:_flipped)?_percent = )([0-9.]+)", re.MULTILINE)
 INLINE = re.compile(r"(humidity_percent = )([0-9.]+)")
-SAID = "is below what hygrometers resolve; as a fraction it would be"
+SAID = "is below hygrometers' resolution; as a fraction it would be"
 
 
 def _hundredths(text, pattern):

@@ -51,7 +51,7 @@ def test_an_index_of_glass_changes_by_the_integral_of_its_slopes(glass, um, cold
 
 
 @given(glasses, st.floats(0.42, 1.0), st.floats(-100.0, 140.0), st.floats(5.0, 100.0))
-def test_what_the_command_says_of_a_glass_agrees_with_itself(glass, um, temperature_c, height_mm):
+def test_the_command_is_consistent_about_a_glass(glass, um, temperature_c, height_mm):
     found = glass_object(glass, um, temperature_c, height_mm=height_mm)
     own, h = found["prism"], height_mm * 1e-3 * (1.0 + found["expansion_per_c"] * (temperature_c - 20.0))
     n = own["group_index_over_air"]

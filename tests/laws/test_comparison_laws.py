@@ -85,7 +85,7 @@ def test_every_common_point_has_a_displacement_a_covariance_and_a_test(seed, kin
 
 
 @draws(450)
-def test_what_did_not_move_is_called_moved_at_the_level(runs):
+def test_stable_points_are_flagged_at_the_test_level(runs):
     """All kinds and datums alike; beside one that moved the rest is left alone as often: it is tested once more."""
     alarms, beside, still, more = 0, 0, 0, 0
     for seed in range(runs):

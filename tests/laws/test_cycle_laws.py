@@ -32,7 +32,7 @@ def test_a_worse_coarse_length_is_never_surer(length, half, share, u, more):
 
 
 @given(half_wavelengths, shares, st.floats(0.001, 20.0), st.floats(0.1, 10.0))
-def test_the_probability_of_a_slip_knows_no_unit_and_no_direction(half, share, u, scale):
+def test_the_probability_of_a_slip_is_independent_of_unit_and_direction(half, share, u, scale):
     one = slip_probability(share * half, u * half, half)
     assert 0.0 <= one <= 1.0
     np.testing.assert_allclose(slip_probability(-share * half, u * half, half), one, rtol=1e-6, atol=1e-12)

@@ -62,7 +62,7 @@ def test_runs_of_a_plan_scatter_as_it_claims_over_the_coordinates_that_there_are
 
 
 @pytest.mark.parametrize("dimension", ["1", "2", "mixed"])
-def test_what_does_not_exist_is_null_and_an_empty_cell_everywhere(tmp_path, dimension):
+def test_missing_values_are_null_and_empty_cells_everywhere(tmp_path, dimension):
     made = scene(9, dimension, "held")
     ours = adjust(written(tmp_path, made, "held"))
     catseye.save(ours, tmp_path / "out")

@@ -34,19 +34,19 @@ def test_total_reflection_loses_nothing(n, tilt, azimuth):
 
 
 @given(metals, st.floats(0.0, 0.55), azimuths)
-def test_the_way_back_is_the_transpose(metal, tilt, azimuth):
+def test_the_return_path_is_the_transpose(metal, tilt, azimuth):
     jones = sector_jones(hollow_corner(metal), tilt, azimuth)
     assert bends(jones[list(REVERSED)], np.swapaxes(jones, 1, 2)) < ROUNDING
 
 
 @given(glasses, metals, tilts, azimuths, st.booleans())
-def test_the_way_back_through_glass_is_the_transpose(n, metal, tilt, azimuth, bare):
+def test_the_return_path_through_glass_is_the_transpose(n, metal, tilt, azimuth, bare):
     jones = sector_jones(solid_corner(n, metal, bare_face=bare), tilt, azimuth)
     assert bends(jones[list(REVERSED)], np.swapaxes(jones, 1, 2)) < ROUNDING
 
 
 @given(glasses, tilts, azimuths, azimuths, azimuths)
-def test_what_passes_an_analyser_and_what_it_stops_are_the_whole(n, tilt, azimuth, light, analyser):
+def test_light_passed_and_stopped_by_an_analyser_sum_to_one(n, tilt, azimuth, light, analyser):
     jones = sector_jones(solid_corner(n), tilt, azimuth)
     field = retarder(1.0, 0.3) @ linear(light)
     parts = [returned_power(jones, field, analyser=linear(analyser + turn)) for turn in (0.0, np.pi / 2)]
@@ -76,7 +76,7 @@ def test_a_third_of_a_turn_changes_nothing_but_the_axes(n, tilt, azimuth):
 @given(st.floats(0.01, 1.0), st.floats(1.05, 3.0))
 def test_a_surface_reflects_from_behind_with_the_opposite_sign(cosine, n):
     inner = np.sqrt(1 - (1 - cosine**2) / n**2)
-    forth, back = reflection(cosine, inside=1.0, behind=n), reflection(inner, inside=n, behind=1.0)
+    forth, back = reflection(cosine, inside=1.0, outside=n), reflection(inner, inside=n, outside=1.0)
     for a, b in zip(forth, back, strict=True):
         assert abs(a + b) < ROUNDING  # Stokes' relation
 

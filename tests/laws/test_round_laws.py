@@ -287,7 +287,7 @@ covariances = st.lists(st.floats(-1, 1), min_size=9, max_size=9).map(lambda v: n
 
 
 @given(covariances, directions, st.floats(1e-3, 2.0))
-def test_what_a_range_teaches_is_what_the_information_matrix_says(root, direction, sigma):
+def test_information_of_a_range_agrees_with_the_information_matrix(root, direction, sigma):
     before = root @ root.T + 0.05 * np.eye(3)
     e = np.array(direction) / np.linalg.norm(direction)
     know = Knowledge(("A",), before)

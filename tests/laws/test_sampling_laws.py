@@ -43,7 +43,7 @@ def test_a_sampling_keeps_the_instruments_limits_or_is_refused(n, m, f):
 
 
 @given(samplings, st.floats(-100.0, 100.0), phases, st.floats(0.01, 10.0))
-def test_a_tone_of_any_frequency_is_detected_as_its_response_says(sampling, x, phase, amplitude):
+def test_a_tone_of_any_frequency_is_detected_with_its_predicted_response(sampling, x, phase, amplitude):
     turns = x * np.arange(sampling.samples) / sampling.samples_per_cycle
     found = detect(amplitude * np.cos(2 * np.pi * turns - phase), sampling.samples_per_cycle).phasor
     response = tone_response(sampling, x * sampling.intermediate_hz)

@@ -98,7 +98,7 @@ def test_phase_lies_in_one_turn_and_clipping_is_a_count(case):
 
 
 @given(codes, st.integers(1, 5))
-def test_the_same_cycles_in_another_order_say_the_same(case, seed):
+def test_cycle_order_does_not_matter(case, seed):
     n, samples = case
     shuffled = np.random.default_rng(seed).permutation(samples.reshape(-1, n)).reshape(-1)
     one, other = detect(samples, n), detect(shuffled, n)
@@ -137,7 +137,7 @@ def test_a_step_beyond_the_margin_changes_the_cycle_and_a_step_within_does_not(c
 
 
 @given(st.floats(0.0, 500.0), half_wavelengths, any_angle)
-def test_a_length_comes_back_from_its_phase_and_itself(length, half, reference):
+def test_a_length_is_recovered_from_its_phase_and_itself(length, half, reference):
     phase = fraction(reference - 2 * np.pi * length / half, reference)
     found, _ = whole_cycles(length, phase, half)
     # phases of 3e5 rad are rounded to 1e-10 of a turn

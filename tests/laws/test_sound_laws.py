@@ -28,7 +28,7 @@ def test_sound_is_faster_in_moister_air(t, p, h, model):
 
 
 @given(temperatures, pressures)
-def test_dry_sound_of_the_notes_knows_no_pressure(t, p):
+def test_dry_sound_of_the_notes_is_independent_of_pressure(t, p):
     state = sound(t, p, 0.0)
     assert state.speed == sound(t, 700.0, 0.0).speed
     assert state.sensitivity.pressure_hpa == 0.0
@@ -57,13 +57,13 @@ def test_an_array_of_weather_gives_what_each_weather_gives(t, p, h, model):
 
 
 @given(st.floats(0.0, 30.0), st.floats(750.0, 1020.0), humidities)
-def test_todays_models_agree_within_what_they_claim(t, p, h):
+def test_todays_models_agree_within_their_uncertainties(t, p, h):
     one, other = sound(t, p, h, model="cramer1993"), sound(t, p, h, model="real_gas")
     assert abs(one.speed - other.speed) < 2.0 * np.hypot(one.standard_uncertainty, other.standard_uncertainty)
 
 
 @given(st.floats(0.1, 3000.0), st.floats(300.0, 360.0), winds, winds)
-def test_a_pair_gives_wind_and_speed_exactly_whatever_the_wind(length, c, along, across):
+def test_a_pair_gives_wind_and_speed_exactly_for_any_wind(length, c, along, across):
     times = travel_time(length, c, along, across), travel_time(length, c, -along, across)
     found = pair(*times, length)
     assert found.wind == pytest.approx(along, abs=1e-10)
@@ -79,7 +79,7 @@ def test_seen_from_the_other_end_the_wind_turns_its_sign_and_the_speed_stays(c, 
 
 
 @given(st.floats(1.0, 500.0), st.floats(300.0, 360.0), st.floats(1e-6, 10.0))
-def test_a_bent_ray_is_never_late_and_knows_no_sign_of_the_gradient(length, c, gradient):
+def test_a_bent_ray_is_never_late_for_either_sign_of_the_gradient(length, c, gradient):
     early = bent_ray_excess(length, c, gradient)
     assert 0.0 <= early <= (gradient * length / c) ** 2 / 24.0 * (1.0 + 1e-12)
     assert early == bent_ray_excess(length, c, -gradient)

@@ -97,8 +97,8 @@ def test_the_waist_behind_a_lens_is_where_the_closed_form_has_it(waist, distance
     assert abcd.radius(at_waist, LIGHT, quality) == pytest.approx(float(size), rel=1e-6)
 
 
-def test_what_is_no_beam_and_no_lens_is_refused():
-    with pytest.raises(ValidityError, match="below 1, which no beam has"):
+def test_invalid_beams_and_lenses_are_refused():
+    with pytest.raises(ValidityError, match="below 1, the limit of an ideal beam"):
         abcd.beam_at_waist(0.01, LIGHT, 0.9)
     with pytest.raises(ValidityError, match="focal length 0"):
         abcd.thin_lens(0.0)

@@ -46,7 +46,7 @@ def test_a_stack_does_what_another_program_computes(case):
 
 
 @given(layers, indices, angles, polarizations, st.floats(0.5, 1.1))
-def test_what_is_reflected_absorbed_and_let_through_is_all_there_was(films, substrate, angle, polarization, wavelength):
+def test_reflectance_absorptance_and_transmittance_sum_to_one(films, substrate, angle, polarization, wavelength):
     found = response(Coating(films, substrate), wavelength, angle, polarization=polarization)
     assert found.reflectance + found.transmittance + found.absorptance == pytest.approx(1.0, abs=1e-9)
     assert found.absorptance >= -1e-9
@@ -160,12 +160,12 @@ def test_indices_are_the_tables_they_come_from():
     assert complex(index("MgF2", 0.5876)).real == pytest.approx(1.37774, abs=2e-5)  # n_d of the data sheets
 
 
-def test_what_has_no_meaning_is_refused():
+def test_meaningless_input_is_refused():
     for call, text in (
         (lambda: response(named("gold", 0.78), 0.78, 1.6), "right angle"),
         (lambda: response(named("gold", 0.78), 0.5), "outside 0.6168-1.088 um"),
         (lambda: named("copper", 0.78), "expected one of gold"),
-        (lambda: index("unobtainium", 0.78), "is not known"),
+        (lambda: index("unobtainium", 0.78), "is unknown"),
         (lambda: response(named("gold", 0.78), 0.78, medium=1.5 - 0.1j), "absorbs"),
         (lambda: response(Coating(((1.5, -0.1),), 1.5), 0.78), "thickness"),
         (lambda: response(named("gold", 0.78), 0.78, polarization="x"), "not 's' or 'p'"),

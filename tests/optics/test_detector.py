@@ -119,7 +119,7 @@ def test_quadrants_share_the_light_as_drawn_photons_do():
     assert quadrant_signals(30e-6, -20e-6, 100e-6).sum() == pytest.approx(1.0)
 
 
-def test_what_is_no_diode_is_refused():
+def test_invalid_diodes_are_refused():
     with pytest.raises(ValidityError, match="sheet_resistance 0"):
         Photodiode(radius=1e-4, sheet_resistance=0.0, capacitance=1e-12)
     with pytest.raises(ValidityError, match="is not on a disc"):

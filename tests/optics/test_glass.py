@@ -123,7 +123,7 @@ def test_the_makers_air_is_todays_dry_air(wavelength_um):
     assert float(found.group) == pytest.approx(float(today.group_index), abs=2e-7)
 
 
-def test_dividing_by_the_air_twice_costs_what_the_module_says():
+def test_dividing_by_the_air_twice_has_the_documented_effect():
     """The memo's index ratio, by the notes' air; 38.4 mm prism and the ball of its table."""
     about = air(20.0, 933.0, 50.0, wavelength_um=0.780, model="rueger1990")
     true = float(index_over_air(0.780, air_phase=about.phase_index, air_group=about.group_index).group)
@@ -163,9 +163,9 @@ def test_a_value_outside_is_refused_with_value_and_limits():
 
 
 def test_an_unknown_glass_is_refused_with_those_known():
-    with pytest.raises(ValidityError, match="glass 'BK7' is not known; known are BK7-old, N-BK7, fused-silica"):
+    with pytest.raises(ValidityError, match="glass 'BK7' is unknown; known are BK7-old, N-BK7, fused-silica"):
         group_index(0.780, "BK7")
-    with pytest.raises(ValidityError, match="glass 'BK7' is not known"):
+    with pytest.raises(ValidityError, match="glass 'BK7' is unknown"):
         absolute_index(0.780, "BK7")
 
 

@@ -62,7 +62,7 @@ def test_the_garnet_turns_at_two_wavelengths_in_the_ratio_of_its_tabulated_const
     assert faraday_turn(0.6328) / faraday_turn(1.064) == pytest.approx(134.0 / 40.0, rel=0.05)
 
 
-def test_what_is_no_isolator_is_refused():
+def test_invalid_isolators_are_refused():
     with pytest.raises(ValidityError, match=r"leak 1\.5"):
         Isolator(leak=1.5)
     with pytest.raises(ValidityError, match=r"transmission 0\.0"):

@@ -57,7 +57,7 @@ def by_rotations(n, order_sign):
 @pytest.mark.parametrize("degrees", [45.0, 48.617, 54.7356, 60.0, 80.0])
 def test_phases_of_total_reflection_are_the_printed_ones(degrees):
     cosine = np.cos(np.radians(degrees))
-    s, p = reflection(cosine, inside=1.5112, behind=1.0)
+    s, p = reflection(cosine, inside=1.5112, outside=1.0)
     expected = printed_phases(cosine, 1.5112)
     assert [np.angle(s), np.angle(p)] == pytest.approx(expected, abs=1e-12)
     assert [abs(s), abs(p)] == pytest.approx([1.0, 1.0], abs=1e-14)
@@ -77,9 +77,9 @@ def test_fresnel_s_rhomb_turns_linear_light_round():
 
 
 def test_brewster_and_the_critical_angle():
-    _, p = reflection(np.cos(np.arctan(1.5)), inside=1.0, behind=1.5)
+    _, p = reflection(np.cos(np.arctan(1.5)), inside=1.0, outside=1.5)
     assert abs(p) < 1e-15
-    s, p = reflection(np.sqrt(1 - 1.5**-2), inside=1.5, behind=1.0)
+    s, p = reflection(np.sqrt(1 - 1.5**-2), inside=1.5, outside=1.0)
     assert [complex(s), complex(p)] == pytest.approx([1.0, 1.0], abs=1e-7)  # the root of a rounding
     assert np.isnan(total_reflection_retardance(0.99, 1.5))
 
@@ -87,14 +87,14 @@ def test_brewster_and_the_critical_angle():
 def test_powers_are_those_of_the_retroreflectors_formula():
     cosine = np.linspace(0.0, 1.0, 50)
     for ratio in (1.5, 1 / 1.5):
-        s, p = reflection(cosine, inside=1.0, behind=ratio)
+        s, p = reflection(cosine, inside=1.0, outside=ratio)
         assert np.allclose(np.abs(s) ** 2, fresnel(cosine, ratio)[0], atol=1e-12)
         assert np.allclose(np.abs(p) ** 2, fresnel(cosine, ratio)[1], atol=1e-12)
 
 
 def test_a_metal_straight_on():
     # ((n-1)^2 + k^2) / ((n+1)^2 + k^2), any textbook
-    s, p = reflection(1.0, inside=1.0, behind=GOLD)
+    s, p = reflection(1.0, inside=1.0, outside=GOLD)
     assert abs(s) ** 2 == pytest.approx((0.85**2 + 4.7**2) / (1.15**2 + 4.7**2))
     assert complex(p) == pytest.approx(-complex(s))
 
@@ -104,7 +104,7 @@ def test_a_bare_metal_is_the_same_surface_by_the_thin_films_matrix():
     metal = np.conj(complex(index("aluminium", 0.78)))
     for medium in (1.0, 1.5112):
         films = coated(Coating((), "aluminium"), 0.78, medium=medium)(cosine)
-        assert np.allclose(films, reflection(cosine, inside=medium, behind=metal), atol=1e-12)
+        assert np.allclose(films, reflection(cosine, inside=medium, outside=metal), atol=1e-12)
 
 
 def test_a_mirror_turns_the_field_by_half_a_turn_about_its_normal():
@@ -112,7 +112,7 @@ def test_a_mirror_turns_the_field_by_half_a_turn_about_its_normal():
     k = rng.normal(size=(20, 3))
     k /= np.linalg.norm(k, axis=1, keepdims=True)
     n = np.array([0.6, 0.0, 0.8])
-    to, p = reflection_matrix(k, n, surface(inside=1.0, behind=PERFECT))
+    to, p = reflection_matrix(k, n, surface(inside=1.0, outside=PERFECT))
     field = np.cross(k, rng.normal(size=(20, 3)))  # square to k
     after = np.einsum("rij,rj->ri", p, field)
     assert np.allclose(after, 2.0 * (field @ n)[:, None] * n - field, **SQUARE)
@@ -235,9 +235,9 @@ def test_ellipses():
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda: reflection(1.2, inside=1.5, behind=1.0), "cosine of incidence 1.2"),
-        (lambda: reflection(0.5, inside=0.0, behind=1.0), "index inside 0"),
-        (lambda: reflection(0.5, inside=1.0, behind=0.2 - 4j), "expected n + ik"),
+        (lambda: reflection(1.2, inside=1.5, outside=1.0), "cosine of incidence 1.2"),
+        (lambda: reflection(0.5, inside=0.0, outside=1.0), "index inside 0"),
+        (lambda: reflection(0.5, inside=1.0, outside=0.2 - 4j), "expected n + ik"),
         (lambda: solid_corner(0.9), "index 0.9"),
         (lambda: sector_jones(solid_corner(1.5), 1.6), "incidence 1.6 rad"),
         (lambda: sector_jones(hollow_corner(GOLD), 0.7, np.pi), "no longer meets all three faces"),
@@ -245,6 +245,6 @@ def test_ellipses():
         (lambda: sector_shares(solid_corner(1.5), 1.3, aperture=0.01, height=0.03), "no part of the face"),
     ],
 )
-def test_what_cannot_be_is_refused(call, said):
+def test_invalid_values_are_refused(call, said):
     with pytest.raises(ValidityError, match=said.replace("+", r"\+")):
         call()

@@ -78,7 +78,7 @@ def test_the_point_about_which_the_traced_range_is_flat_is_the_flat_depth():
 
 @pytest.mark.parametrize("degrees", [0.0, 15.0, 30.0])
 @pytest.mark.parametrize("phase", [1.0, PHASE])
-def test_what_enters_and_leaves_by_the_face_is_the_clear_share(degrees, phase):
+def test_light_through_the_face_twice_is_the_clear_share(degrees, phase):
     aperture, n = 0.0254, 40_000
     rng = np.random.default_rng(3)
     u = towards(np.radians(degrees), 1.1)
@@ -187,7 +187,7 @@ def test_a_ray_that_misses_or_cannot_leave_is_nan_and_spoils_no_other():
     assert np.isnan(behind).all()
 
 
-def test_what_is_no_direction_is_refused():
+def test_invalid_directions_are_refused():
     with pytest.raises(ValidityError, match="direction to the ranger has the length 2"):
         beam([0.0, 0.0, 2.0], np.zeros(3))
     with pytest.raises(ValidityError, match="dihedral errors"):

@@ -102,12 +102,12 @@ def test_the_gaussian_that_matches_falls_to_half_where_the_spot_does():
     [
         (lambda: offset_share(0.0, -1.0, **GBT), "distance = -1.0 is not above 0"),
         (lambda: offset_share(np.nan, 1.0, **GBT), "offset nan m is not finite"),
-        (lambda: offset_share(0.0, 1.0, **GBT), "more than is followed"),
+        (lambda: offset_share(0.0, 1.0, **GBT), "too much to integrate"),
         (lambda: offset_range(0.0, 100.0, **GBT, modulation_hz=0.0), "modulation_hz = 0.0"),
         (lambda: reach(1.0, 0.0), "share 0.0 of a peak"),
         (lambda: matched_radius(100.0, **GBT, share=1.0), "share 1.0 of a peak"),
     ],
 )
-def test_what_is_no_beam_is_refused(call, message):
+def test_invalid_beams_are_refused(call, message):
     with pytest.raises(ValidityError, match=message):
         call()

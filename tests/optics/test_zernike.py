@@ -111,15 +111,15 @@ def test_on_dense_prisms_the_orthonormal_ones_are_zernikes():
     ("call", "said"),
     [
         (lambda: term(0, "noll"), "below 1"),
-        (lambda: term(1, "fringe"), "not known"),
-        (lambda: number(Term(3, 2), "noll"), "no Zernike term"),
+        (lambda: term(1, "fringe"), "is unknown"),
+        (lambda: number(Term(3, 2), "noll"), "not a Zernike term"),
         (lambda: terms(0, "ansi"), "expected 1 to 500"),
         (lambda: disk_quadrature(-1), "below zero"),
         (lambda: orthonormal(np.ones((3, 1)), [0.0, 0.0, 0.0]), "not all 0"),
-        (lambda: orthonormal(np.ones((3, 4)), [1.0, 1.0, 1.0]), "3 points do not hold 4"),
+        (lambda: orthonormal(np.ones((3, 4)), [1.0, 1.0, 1.0]), "3 points do not determine 4"),
         (lambda: orthonormal(np.ones((5, 2)), np.ones(5)), "function 2 of 2"),
     ],
 )
-def test_what_cannot_be_is_refused(call, said):
+def test_invalid_values_are_refused(call, said):
     with pytest.raises(ValidityError, match=said):
         call()

@@ -140,12 +140,12 @@ def test_small_and_large_networks_are_made_too():
     assert {f"TR{i:02d}" for i in range(1, 13)} == {t.name for t in large.telescope.triplets}
 
 
-def test_what_cannot_be_is_refused_in_one_line():
+def test_invalid_values_are_refused_in_one_line():
     with pytest.raises(ValidityError, match="elevation 3 deg is outside"):
         SimulatedTelescope(elevation_deg=3)
     with pytest.raises(InputError, match="unknown effect 'gravity'"):
         Planted(ignore={"gravity"})
-    with pytest.raises(InputError, match="no such point"):
+    with pytest.raises(InputError, match="unknown point"):
         simulate_night(1, planted=Planted(shifts={"DP999": (0, 0, 1)}))
     with pytest.raises(InputError, match="expected a ranger"):
         simulate_night(1, planted=Planted(d0_error_mm={"DP001": 1.0}))

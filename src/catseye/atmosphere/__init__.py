@@ -1,1 +1,1 @@
-"""What the light travels through: moist air, its index for light, and its mean along a path."""
+"""Moist air: index of refraction, speed of sound, means along a path."""

@@ -1,4 +1,4 @@
-"""Limits of what a formula of the air is good for, and of how far the uncertainties of its inputs may go."""
+"""Validity limits of formulas of the air, and limits of input uncertainties."""
 
 from dataclasses import dataclass
 
@@ -11,13 +11,13 @@ GREATEST_SPREAD = 1e4  # standard uncertainties, in each quantity's unit
 
 @dataclass(frozen=True)
 class ValidInterval:
-    """The closed interval in which a formula holds for one quantity.
+    """Closed interval in which a formula holds for one quantity.
 
-    quantity   the word for it in messages
+    quantity   its name in messages
     unit       its unit in messages
     lower      least legal value
     upper      greatest legal value
-    source     the bibliography's key of who says so, or what the limit follows from
+    source     bibliography key or reason of the limit
     places     decimals to print the limits with
     """
 
@@ -29,7 +29,10 @@ class ValidInterval:
     places: int = 0
 
     def check(self, value) -> None:
-        """Raise ValidityError naming the first value that is outside or not a number, with the mask of all of them."""
+        """Raise ValidityError naming the first value outside, with the mask of all.
+
+        NaN counts as outside.
+        """
         values = np.asarray(value, float)
         outside = ~((values >= self.lower) & (values <= self.upper))
         if not np.any(outside):
@@ -37,8 +40,8 @@ class ValidInterval:
         at = int(np.flatnonzero(outside)[0])
         first = float(values.flat[at])
         count = int(np.count_nonzero(outside))
-        others = f", and {count - 1} more" if count > 1 else ""
-        where = f" (element {at} of {values.size}{others})" if values.ndim else ""
+        remainder = f", and {count - 1} more" if count > 1 else ""
+        where = f" (element {at} of {values.size}{remainder})" if values.ndim else ""
         span = f"{self.lower:.{self.places}f}{'-' if self.lower >= 0 else ' to '}{self.upper:.{self.places}f}"
         mask = outside if values.ndim else None
         if np.isnan(first):
@@ -51,8 +54,8 @@ class ValidInterval:
 
 
 def check_spreads(**spreads) -> None:
-    """Raise ValidityError for a standard uncertainty, by name, that is below zero, no number or without end."""
+    """Raise ValidityError for a standard uncertainty below zero, infinite or not a number."""
     for name, value in spreads.items():
         ValidInterval(
-            name, "of its quantity's unit", 0.0, GREATEST_SPREAD, "the notion of a standard uncertainty"
+            name, "of its quantity's unit", 0.0, GREATEST_SPREAD, "the definition of a standard uncertainty"
         ).check(value)

@@ -1,1 +1,1 @@
-"""Frames of reference, and where the mirrors stand in them: rotations, transforms, the Kelvin mount, the antenna."""
+"""Frames of reference, rotations, Kelvin mounts, mirrors, the antenna."""

@@ -1,4 +1,6 @@
-"""A wire that hangs between two marks: from its length, weight, stretch and tension to the straight distance.
+"""Hanging wire between two marks: straight distance from its length.
+
+Weight, stretch and tension are included.
 
 With s the unstretched length from the end A where the tension acts, H the horizontal and V(s) = V_A + w s the vertical
 part of the force and T its size, dx = (H/T + H/EA) ds and dz = (V/T + V/EA) ds; both integrate in closed form.
@@ -21,7 +23,7 @@ def span(
     stiffness: ArrayLike,
     height_difference: ArrayLike = 0.0,
 ) -> NDArray[np.float64]:
-    """Horizontal distance between the ends of an elastic wire that hangs freely, in metres.
+    """Horizontal distance between ends of a hanging elastic wire, m.
 
     length              m, above 0: unstretched, at its temperature
     tension             N, above 0: on the end A, along the wire there
@@ -29,7 +31,7 @@ def span(
     stiffness           N, above 0: modulus of elasticity times area, E A
     height_difference   m: the other end above A
 
-    Raises ValidityError for sizes without meaning, and where the wire cannot reach so high.
+    Raises ValidityError for invalid sizes, and where the wire cannot reach so high.
 
     Source: [IRVINE81] section 1.4, solved for a given tension at one end. Exact for a wire without bending stiffness;
     its sag is the familiar -w^2 L^3 / 24 T^2 to first order, its stretch T L / E A.
@@ -47,26 +49,28 @@ def span(
         raise ValidityError(f"weight {np.min(w)} N/m of the wire is below 0")
     vertical = h / s * force - 0.5 * w * s
     for _ in range(ITERATIONS):
-        other = np.sqrt(np.maximum(force**2 + 2.0 * vertical * w * s + (w * s) ** 2, 0.0))  # tension at the far end
-        rise = (vertical * s + 0.5 * w * s**2) / ea + (2.0 * vertical * s + w * s**2) / (other + force)
-        step = (h - rise) / (s / ea + s / np.maximum(other, 1e-9 * force))
+        far_tension = np.sqrt(
+            np.maximum(force**2 + 2.0 * vertical * w * s + (w * s) ** 2, 0.0)
+        )  # tension at the far end
+        rise = (vertical * s + 0.5 * w * s**2) / ea + (2.0 * vertical * s + w * s**2) / (far_tension + force)
+        step = (h - rise) / (s / ea + s / np.maximum(far_tension, 1e-9 * force))
         vertical = vertical + step
         if np.all(np.abs(step) <= SETTLED * force):
             break
     if not np.all(np.abs(vertical) < force):
         raise ValidityError(
-            f"a wire of {np.max(s)} m under {np.min(force)} N does not join ends {np.max(np.abs(h))} m apart in height"
+            f"a wire of {np.max(s)} m under {np.min(force)} N cannot join ends {np.max(np.abs(h))} m apart in height"
         )
-    other = np.sqrt(force**2 + 2.0 * vertical * w * s + (w * s) ** 2)
+    far_tension = np.sqrt(force**2 + 2.0 * vertical * w * s + (w * s) ** 2)
     level = np.sqrt((force - vertical) * (force + vertical))
     # H/w (asinh(V_B/H) - asinh(V_A/H)) without its cancellation for light wires
-    turned = s * (force - vertical * (2.0 * vertical + w * s) / (other + force)) / level**2
+    turned = s * (force - vertical * (2.0 * vertical + w * s) / (far_tension + force)) / level**2
     bent = np.where(w > 0.0, np.arcsinh(w * turned) / np.where(w > 0.0, w, 1.0), turned)
     return level * s / ea + level * bent
 
 
 def unstretched(certified: float, *, tension: float, weight_per_metre: float, stiffness: float, hanging: bool) -> float:
-    """Unstretched length, in metres, of a wire whose certificate gives its length under a tension.
+    """Unstretched length of a wire certified under tension, m.
 
     certified           m, above 0: the certificate's
     tension             N, above 0, at calibration
@@ -96,13 +100,13 @@ def unstretched(certified: float, *, tension: float, weight_per_metre: float, st
 
 
 def expanded(length: ArrayLike, temperature_c: ArrayLike, expansion_per_c: ArrayLike) -> NDArray[np.float64]:
-    """Length at a temperature of something that has the given length at 20 °C, in the unit of that length.
+    """Length at a temperature from length at 20 °C, same unit.
 
     length            at 20 °C
     temperature_c     °C
     expansion_per_c   1/°C: 11.5e-6 steel, 0.6e-6 Invar, say
 
-    Source: definition of the mean coefficient; [ISO22] for 20 °C. As good as the coefficient is constant.
+    Source: definition of the mean coefficient; [ISO22] for 20 °C. Valid for a constant coefficient.
 
     >>> round(float(expanded(100.0, 23.0, 11.5e-6)), 5)
     100.00345

@@ -1,1 +1,1 @@
-"""What the light meets: glass, cube-corner prisms, the cat's-eye ball."""
+"""Optics: glass, retroreflectors, beams, detectors, laser safety."""

@@ -1,8 +1,10 @@
-"""Paraxial optics in matrices: rays and Gaussian beams through lenses, mirrors, plates and space, plane by plane.
+"""Paraxial optics in matrices: rays and Gaussian beams through systems.
+
+Through lenses, mirrors, plates and space, plane by plane.
 
 A ray is (height, index times slope): every matrix has determinant 1 and a flat interface is the identity. A beam is
 1/q = 1/R - i M^2 wavelength/(pi w^2), with R the wavefront's radius over the index, above zero where it spreads, and
-the wavelength that of vacuum. The two planes of an elliptical or astigmatic beam go through matrices of their own.
+the wavelength that of vacuum. The two planes of an elliptical or astigmatic beam have separate matrices.
 """
 
 import numpy as np
@@ -15,7 +17,7 @@ Complex = NDArray[np.complex128]
 
 
 def free_space(length: ArrayLike, index: ArrayLike = 1.0) -> Array:
-    """Matrix (..., 2, 2) of a way through a medium.
+    """Matrix (..., 2, 2) of propagation through a medium.
 
     length   (...) m
     index    (...) phase index
@@ -41,10 +43,10 @@ def thin_lens(focal_length: ArrayLike) -> Array:
     return _matrix(1.0, 0.0, -1.0 / f, 1.0)
 
 
-def interface(before: ArrayLike, behind: ArrayLike, radius: ArrayLike = np.inf) -> Array:
-    """Matrix (..., 2, 2) of a spherical surface between two media, at normal incidence.
+def interface(before: ArrayLike, after: ArrayLike, radius: ArrayLike = np.inf) -> Array:
+    """Matrix (..., 2, 2) of a spherical interface at normal incidence.
 
-    before, behind   (...) phase indices
+    before, after    (...) phase indices
     radius           (...) m, above zero where the centre lies behind the surface; infinite for a plane
 
     Source: [SIEGMAN86] ch. 15, with reduced slopes.
@@ -52,11 +54,11 @@ def interface(before: ArrayLike, behind: ArrayLike, radius: ArrayLike = np.inf) 
     >>> interface(1.0, 1.5, 0.1).round(9).tolist()
     [[1.0, 0.0], [-5.0, 1.0]]
     """
-    return _matrix(1.0, 0.0, (np.asarray(before, float) - np.asarray(behind, float)) / np.asarray(radius, float), 1.0)
+    return _matrix(1.0, 0.0, (np.asarray(before, float) - np.asarray(after, float)) / np.asarray(radius, float), 1.0)
 
 
 def thick_lens(r1: ArrayLike, r2: ArrayLike, *, thickness: ArrayLike, index: ArrayLike) -> Array:
-    """Matrix (..., 2, 2) of a lens in air, from its first to its last vertex.
+    """Matrix (..., 2, 2) of a lens in air, vertex to vertex.
 
     r1, r2      (...) m, radii, above zero where the centre lies behind the surface: a biconvex lens has r1 > 0 > r2
     thickness   (...) m
@@ -74,7 +76,7 @@ def mirror(radius: ArrayLike = np.inf, incidence: ArrayLike = 0.0, *, in_plane: 
 
     radius      (...) m, above zero for a hollow mirror, which collects; infinite for a flat one
     incidence   (...) rad, 0 to below a right angle
-    in_plane    of rays in the plane of incidence: focal length R cos/2; across it: R/(2 cos)
+    in_plane    True for rays in the plane of incidence: focal length R cos/2; across it: R/(2 cos)
 
     Source: [SIEGMAN86] ch. 15.
     """
@@ -87,15 +89,15 @@ def mirror(radius: ArrayLike = np.inf, incidence: ArrayLike = 0.0, *, in_plane: 
 def plate(thickness: ArrayLike, index: ArrayLike, incidence: ArrayLike = 0.0, *, in_plane: bool = True) -> Array:
     """Matrix (..., 2, 2) of a plane-parallel plate in air, along the refracted axis.
 
-    thickness   (...) m, of the plate, not of the way in it
+    thickness   (...) m, of the plate, not of the path in it
     index       (...) phase index over that of the air
     incidence   (...) rad, 0 to below a right angle
-    in_plane    of rays in the plane of incidence or across it
+    in_plane    True for rays in the plane of incidence, else across it
 
     A tilted plate makes a converging beam astigmatic.
 
-    Source: derived: the way in it is t n/root, root = sqrt(n^2 - sin^2); across, the reduced way is t/root; in the
-    plane both faces squeeze the beam, t cos^2 n^2/root^3.
+    Source: derived: the path in it is t n/root, root = sqrt(n^2 - sin^2); across, the reduced path is t/root; in the
+    plane both faces narrow the beam, t cos^2 n^2/root^3.
 
     >>> round(float(plate(0.003, 1.5)[0, 1]), 9)
     0.002
@@ -106,15 +108,17 @@ def plate(thickness: ArrayLike, index: ArrayLike, incidence: ArrayLike = 0.0, *,
 
 
 def through(*elements: Array) -> Array:
-    """Matrix (..., 2, 2) of elements in the order in which the light meets them."""
-    whole = np.eye(2)
+    """Matrix (..., 2, 2) of elements in the order of the light."""
+    total = np.eye(2)
     for element in elements:
-        whole = element @ whole
-    return whole
+        total = element @ total
+    return total
 
 
 def beam_at_waist(waist: ArrayLike, wavelength: ArrayLike, quality: ArrayLike = 1.0) -> Complex:
-    """Complex parameter q (...), m, of a beam at its waist: i times its Rayleigh range.
+    """Complex parameter q (...), m, of a beam at its waist.
+
+    It is i times the Rayleigh range.
 
     waist        (...) m, above 0: radius at 1/e^2 of the intensity
     wavelength   m, above 0, in vacuum
@@ -129,12 +133,12 @@ def beam_at_waist(waist: ArrayLike, wavelength: ArrayLike, quality: ArrayLike = 
     if not (np.all((w > 0.0) & (w < np.inf)) and np.all((light > 0.0) & (light < np.inf))):
         raise ValidityError(f"waist {w} m or wavelength {light} m is not above 0 and finite")
     if not np.all(m >= 1.0):
-        raise ValidityError(f"beam quality M^2 {m} is below 1, which no beam has")
+        raise ValidityError(f"beam quality M^2 {m} is below 1, the limit of an ideal beam")
     return 1j * np.pi * w**2 / (m * light)
 
 
 def onward(q: ArrayLike, matrix: Array) -> Complex:
-    """Complex parameter (...), m, behind an element or a row of them.
+    """Complex parameter (...), m, after an element or a system.
 
     q        (...) m
     matrix   (..., 2, 2)
@@ -163,7 +167,9 @@ def radius(q: ArrayLike, wavelength: ArrayLike, quality: ArrayLike = 1.0) -> Arr
 
 
 def wavefront_curvature(q: ArrayLike) -> Array:
-    """Curvature 1/R (...), 1/m, of the wavefront in air: above zero where the beam spreads, 0 at a waist.
+    """Curvature 1/R (...), 1/m, of the wavefront in air.
+
+    Above zero where the beam spreads, 0 at a waist.
 
     q   (...) m
 
@@ -173,7 +179,7 @@ def wavefront_curvature(q: ArrayLike) -> Array:
 
 
 def waist_ahead(q: ArrayLike) -> Array:
-    """Way (...), m, in air to the waist; below zero where it lies behind.
+    """Distance (...), m, in air to the waist; below zero behind.
 
     q   (...) m
 

@@ -1,4 +1,4 @@
-"""What a reflector's shape does to its gain: half-path errors, illumination, Ruze.
+"""Effect of a reflector's shape on its gain: half-path errors, Ruze.
 
 A surface displaced by d along its normal, towards the focus, shortens the path from aperture plane over surface to
 focus by 2 d cos i, i the incidence: both the incoming and the outgoing ray meet the normal under i. Half of it,
@@ -15,7 +15,9 @@ DEEPEST_DB = 60.0  # of an edge taper
 
 
 def cos_incidence(x: ArrayLike, y: ArrayLike, focal_length: float) -> NDArray[np.float64]:
-    """Cosine of the incidence of light along a paraboloid's axis, of the shape of x and y.
+    """Cosine of incidence on a paraboloid, shaped as x and y.
+
+    The light runs along the axis.
 
     x, y           m, from the axis
     focal_length   m
@@ -30,7 +32,9 @@ def cos_incidence(x: ArrayLike, y: ArrayLike, focal_length: float) -> NDArray[np
 
 
 def half_path(deviation: ArrayLike, x: ArrayLike, y: ArrayLike, *, focal_length: float) -> NDArray[np.float64]:
-    """Half of what normal deviations shorten the path to the focus by, m.
+    """Half of the shortening of the path to the focus, m.
+
+    By normal deviations.
 
     deviation      m, along the normal, above zero towards the focus
     x, y           m, from the axis
@@ -45,12 +49,14 @@ def half_path(deviation: ArrayLike, x: ArrayLike, y: ArrayLike, *, focal_length:
 
 
 def taper(rho: ArrayLike, edge_db: float) -> NDArray[np.float64]:
-    """Amplitude of a Gaussian illumination over that at the centre: 10^(-edge_db rho^2 / 20).
+    """Amplitude of a Gaussian illumination over that at the centre.
+
+    It is 10^(-edge_db rho^2 / 20).
 
     rho       distance from the aperture's centre over its radius
-    edge_db   how much less power falls on the edge, 0 to 60 dB
+    edge_db   edge power below that at the centre, 0 to 60 dB
 
-    It is the amplitude, not the power, that weighs a phase in the gain: G is |sum A exp(i phi)|^2 / |sum A|^2, which
+    The amplitude, not the power, is the weight of a phase in the gain: G is |sum A exp(i phi)|^2 / |sum A|^2, which
     for small phases is one less their variance under the weight A. Source: [RUZE66]. Raises ValidityError for
     another edge_db.
 
@@ -65,7 +71,8 @@ def taper(rho: ArrayLike, edge_db: float) -> NDArray[np.float64]:
 def ruze_gain(variance: ArrayLike, wavelength: float) -> NDArray[np.float64]:
     """Gain over that of the perfect surface, exp(-(4 pi / wavelength)^2 variance).
 
-    variance     m^2, of half-path errors under the illumination; what a noise is subtracted from may be below zero
+    variance     m^2, of half-path errors under the illumination; may be below zero after subtraction of a noise
+                 variance
     wavelength   m
 
     Source: [RUZE66]. Exact for errors of normal distribution, many and independent over the aperture; for few and
@@ -78,7 +85,9 @@ def ruze_gain(variance: ArrayLike, wavelength: float) -> NDArray[np.float64]:
 
 
 def coherent_gain(error: ArrayLike, weights: ArrayLike, wavelength: float) -> float:
-    """Gain over that of the perfect surface, from half-path errors themselves: |mean of exp(4 pi i error / lambda)|^2.
+    """Gain over that of the perfect surface, from half-path errors.
+
+    |mean of exp(4 pi i error / lambda)|^2.
 
     error        (k,) m, half-path
     weights      (k,) amplitude times area; taken as shares of their sum
@@ -94,14 +103,14 @@ def coherent_gain(error: ArrayLike, weights: ArrayLike, wavelength: float) -> fl
 
 
 def cells(points: ArrayLike, *, edge_db: float, rings: int = 60) -> NDArray[np.float64]:
-    """What share of the illumination is nearest to each point, (k,), summing to 1: the weights of an aperture average.
+    """Aperture weights (k,): share of illumination nearest to each point, sum 1.
 
     points    (k, 2), in units of the aperture's radius, from its centre
     edge_db   of the illumination, as `taper` takes it
     rings     of the quadrature over the circle; 60 make 14 000 nodes
 
-    Where points lie dense each counts less; one beyond the edge counts by the part of the aperture nearest to it,
-    perhaps by nothing. Raises ValidityError for another edge_db.
+    Dense points have smaller weights; a point beyond the edge has the weight of the part of the aperture nearest to it,
+    possibly 0. Raises ValidityError for another edge_db.
 
     >>> cells([[0.5, 0.0], [-0.5, 0.0]], edge_db=12.0).round(3).tolist()
     [0.5, 0.5]

@@ -1,9 +1,11 @@
-"""Metal films and stacks of thin films: reflectance, phase and delay of the light, by angle and polarization.
+"""Metal films and thin-film stacks: reflectance, phase and group delay.
+
+By angle and polarization.
 
 Waves go as exp(i(wt - kz)): an absorbing medium has the index n - ik, a delay turns a phase backwards. Amplitudes are
 of the tangential electric field, so that s and p are alike at normal incidence.
 
-What a range notices is not the phase on reflection but its slope by frequency, the delay of the modulation: below a
+A range depends not on the phase on reflection but on its slope by frequency, the delay of the modulation: below a
 tenth of a micrometre for a bare metal, 0.3 to 1 um for a quarter-wave mirror, more at the edge of its band. Mirror
 surfaces are surveyed on the outer face of the coating, which is the reference here.
 """
@@ -54,10 +56,10 @@ METALS: Mapping[str, tuple[str, tuple[tuple[float, float, float], ...]]] = Mappi
 
 @dataclass(frozen=True)
 class Coating:
-    """What lies on what.
+    """Layers on a substrate.
 
     layers      from the outer face inwards: material, thickness in um
-    substrate   beneath them
+    substrate   material beneath them
     """
 
     layers: tuple[Layer, ...]
@@ -66,10 +68,10 @@ class Coating:
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """What a coating does with a plane wave; all (...).
+    """Response of a coating to a plane wave; all (...).
 
     r, t             amplitudes, reflected and into the substrate
-    reflectance, transmittance, absorptance   of power, each on its own formula; their sum is 1
+    reflectance, transmittance, absorptance   of power, each by a separate formula; their sum is 1
     """
 
     r: Complex
@@ -85,7 +87,7 @@ def index(material: Material, wavelength_um: ArrayLike) -> Complex:
     material        "gold", "silver", "aluminium", "Ta2O5", "SiO2", "MgF2", "air", a name of `glass.GLASSES`; a number
     wavelength_um   um: 0.617 to 1.033 for metals, 0.6 to 1.1 for Ta2O5, 0.2 to 7 for MgF2
 
-    Raises ValidityError outside, and for a name that is not known.
+    Raises ValidityError outside, and for an unknown name.
 
     Source: metals [JOHNSON72] and [RAKIC95], splines through their tables, good to 0.02 in n and 0.03 in k; films
     from one laboratory differ from another's by more. Ta2O5 a fit to [GAO12], within 1e-6 of it; MgF2 [DODGE84], the
@@ -119,7 +121,7 @@ def index(material: Material, wavelength_um: ArrayLike) -> Complex:
     name = "fused-silica" if material == "SiO2" else material
     if name not in GLASSES:
         raise ValidityError(
-            f"material {material!r} is not known (expected a number or one of "
+            f"material {material!r} is unknown (expected a number or one of "
             f"{', '.join([*METALS, 'Ta2O5', 'SiO2', 'MgF2', 'air', *GLASSES])})"
         )
     return phase_index(wavelength, name).astype(complex)
@@ -152,18 +154,18 @@ def response(
     """
     wavelength, angle = np.broadcast_arrays(np.asarray(wavelength_um, float), np.asarray(incidence, float))
     if not np.all((angle >= 0.0) & (angle < 0.5 * np.pi)):
-        raise ValidityError(f"incidence {float(np.ravel(angle)[0]):g} rad is not within 0 and a right angle")
+        raise ValidityError(f"incidence {float(np.ravel(angle)[0]):g} rad is outside 0 to a right angle")
     if polarization not in ("s", "p"):
         raise ValidityError(f"polarization {polarization!r} is not 's' or 'p'")
     front = index(medium, wavelength)
     if np.any(front.imag != 0.0):
-        raise ValidityError(f"medium {medium} absorbs: no angle of incidence in it (expected a real index)")
+        raise ValidityError(f"medium {medium} absorbs: an angle of incidence needs a real index")
     along = front.real * np.sin(angle)
 
     def admittance(material: Material) -> tuple[Complex, Complex]:
         n = index(material, wavelength)
         across = np.sqrt(n**2 - along**2 + 0j)
-        across = np.where(across.imag > 0.0, -across, across)  # the wave that dies away inwards
+        across = np.where(across.imag > 0.0, -across, across)  # the wave that decays inwards
         return across, across if polarization == "s" else n**2 / across
 
     (_, first), (_, last) = admittance(medium), admittance(coating.substrate)
@@ -175,12 +177,12 @@ def response(
         delta = TWO_PI * across * thickness_um / wavelength
         cosine, sine = np.cos(delta), 1j * np.sin(delta)
         b, c = cosine * b + sine / eta * c, eta * sine * b + cosine * c
-    whole = first * b + c
-    power = 4.0 * first.real / np.abs(whole) ** 2
+    total = first * b + c
+    power = 4.0 * first.real / np.abs(total) ** 2
     return Response(
-        r=(first * b - c) / whole,
-        t=2.0 * first / whole,
-        reflectance=np.abs((first * b - c) / whole) ** 2,
+        r=(first * b - c) / total,
+        t=2.0 * first / total,
+        reflectance=np.abs((first * b - c) / total) ** 2,
         transmittance=power * last.real,
         absorptance=power * (b * np.conj(c) - last).real,
     )
@@ -194,12 +196,14 @@ def group_path(
     polarization: Polarization = "s",
     medium: Material = 1.0,
 ) -> Array:
-    """Path (...), m, that a reflection adds to the modulation, against one at the coating's outer face.
+    """Path (...), m, that a reflection adds to the modulation.
+
+    Against a reflection at the coating's outer face.
 
     coating, wavelength_um, incidence, polarization, medium   as for `response`
 
     A ranger meets its mirror on the way out and on the way back and halves the sum: its range grows by this much. The
-    slope is taken at a fixed angle, as for a collimated beam; the beam's shift along the face is in it.
+    slope is taken at a fixed angle, as for a collimated beam; the beam's shift along the face is included.
 
     Source: -d arg r/dk, by a central difference. To 1e-12 m away from zeros of r.
 
@@ -216,7 +220,7 @@ def group_path(
 
 
 def quarter_wave(material: Material, wavelength_um: float, incidence: float = 0.0, *, medium: Material = 1.0) -> Layer:
-    """A layer of a quarter wave for light that comes at an angle.
+    """Quarter-wave layer for light at an angle.
 
     material        of the layer, without absorption
     wavelength_um   um
@@ -241,11 +245,11 @@ def quarter_wave_mirror(
     low: Material = "SiO2",
     substrate: Material = "N-BK7",
 ) -> Coating:
-    """The mirror (HL)^pairs H of quarter waves, the high index outside.
+    """Mirror (HL)^pairs H of quarter waves, the high index outside.
 
     pairs           0 or more
-    wavelength_um   um, that it is for
-    incidence       rad, in air, that it is for
+    wavelength_um   um, of the design
+    incidence       rad, in air, of the design
     high, low, substrate   materials
 
     Source: [MACLEOD10] ch. 6.
@@ -264,7 +268,9 @@ def quarter_wave_group_path(
     low: tuple[float, float],
     medium: float = 1.0,
 ) -> Array:
-    """Path, m, that an endless quarter-wave mirror adds at the middle of its band, at normal incidence.
+    """Path, m, of an endless quarter-wave mirror at its band centre.
+
+    At normal incidence.
 
     wavelength   m
     high, low    phase and group index of the layers; the high one is outside
@@ -284,7 +290,7 @@ def quarter_wave_group_path(
 
 
 def named(coating: str, wavelength_um: float, incidence: float = 0.0) -> Coating:
-    """A coating by its name, made for a wavelength and an angle.
+    """Coating by name, designed for a wavelength and an angle.
 
     coating         "gold", "silver", "aluminium" (bare and opaque), "protected-aluminium" (half a wave of SiO2 on it),
                     "protected-silver" (the same), "dielectric" (`quarter_wave_mirror` of 10 pairs),
@@ -305,7 +311,7 @@ def named(coating: str, wavelength_um: float, incidence: float = 0.0) -> Coating
         return Coating((quarter_wave("MgF2", wavelength_um, incidence),), "N-BK7")
     if coating == "uncoated":
         return Coating((), "N-BK7")
-    raise ValidityError(f"coating {coating!r} is not known (expected one of {', '.join(NAMES)})")
+    raise ValidityError(f"coating {coating!r} is unknown (expected one of {', '.join(NAMES)})")
 
 
 NAMES: Sequence[str] = (

@@ -1,4 +1,6 @@
-"""Where the image falls on a photodiode changes the phase: the notes' second subtlety, with a stated model.
+"""Phase of a photodiode signal against the place of the image.
+
+The notes' second subtlety, with a stated model.
 
 The model: carriers arrive at a thin resistive layer (sheet resistance) above a distributed capacitance, and run
 through it to a ring contact at the rim. The middle lies behind more resistance: its signal comes later. With kappa^2 =
@@ -6,7 +8,7 @@ i w R C/area, the share of a current put in at r that reaches the ring is I0(kap
 diffusion equation that is 1 at the rim, by reciprocity. The carriers' transit is the same at all places and drops out.
 Real diodes have other contacts and a bias that is not even: scan yours with a small spot and fit the resistance.
 
-Ranges are differences to the internal reference: only what the two images differ in matters.
+Ranges are differences to the internal reference: only differences between the two images matter.
 """
 
 from dataclasses import dataclass
@@ -19,14 +21,14 @@ from catseye.errors import ValidityError
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-RINGS = 64  # of the quadrature over a spot
-REACH = 3.5  # radii of a spot: exp(-24) of the light is beyond
+RINGS = 64  # nodes of the quadrature over a spot
+REACH = 3.5  # radii of a spot: exp(-24) of the light is outside
 STEEPEST = 24.0  # w R C/pi: up to it the middle's phase is within half a turn of the rim's
 
 
 @dataclass(frozen=True)
 class Photodiode:
-    """A round photodiode with a ring contact.
+    """Round photodiode with a ring contact.
 
     radius             m, of the active disc
     sheet_resistance   ohm per square of the layer that carries the current to the ring
@@ -44,12 +46,14 @@ class Photodiode:
 
     @property
     def delay_per_area(self) -> float:
-        """s/m^2: by how much less the signal is delayed for each square of the distance from the centre."""
+        """Decrease of delay per square of the distance from the centre, s/m^2."""
         return self.sheet_resistance * self.capacitance / (4.0 * np.pi * self.radius**2)
 
 
 def place_response(place: ArrayLike, diode: Photodiode, modulation_hz: float = 1500e6) -> Complex:
-    """Complex share (...) of a current at a place that reaches the ring contact; its phase below zero is a delay.
+    """Complex share (...) of a local current that reaches the ring contact.
+
+    Its phase below zero is a delay.
 
     place           (...) m, from the centre, 0 to the radius
     diode           the photodiode
@@ -73,7 +77,9 @@ def place_response(place: ArrayLike, diode: Photodiode, modulation_hz: float = 1
 
 
 def spot_response(offset: ArrayLike, spot: float, diode: Photodiode, *, modulation_hz: float = 1500e6) -> Complex:
-    """Complex share (...) of a Gaussian spot's signal that comes out; light beside the disc counts as nothing.
+    """Complex share (...) of a Gaussian spot's signal at the output.
+
+    Light beside the disc is ignored.
 
     offset          (...) m, 0 or more: of the spot's centre from the disc's
     spot            m, above 0: radius at 1/e^2
@@ -97,13 +103,15 @@ def spot_response(offset: ArrayLike, spot: float, diode: Photodiode, *, modulati
 
 
 def spot_range(offset: ArrayLike, spot: float, diode: Photodiode, *, modulation_hz: float = 1500e6) -> Array:
-    """Metres that a range reads too long because of the diode's own delay for a spot at a place.
+    """Range error from the diode's delay for a spot, m.
+
+    Positive where too long.
 
     offset, spot, diode, modulation_hz   as for `spot_response`
 
-    Longest in the middle; the difference to the reference's spot counts. For small delays c/2 R C/(4 pi a^2) (a^2 -
-    d^2 - w^2/2). NaN where no light falls on the disc. Raises ValidityError for a diode so slow that its phase goes
-    round, w R C/pi above 24.
+    Longest in the middle; only the difference to the reference's spot matters. For small delays c/2 R C/(4 pi a^2) (a^2
+    - d^2 - w^2/2). NaN where no light falls on the disc. Raises ValidityError for a diode so slow that its phase
+    wraps, w R C/pi above 24.
 
     Source: the phase of `spot_response` by c/(4 pi f).
 
@@ -123,13 +131,13 @@ def spot_range(offset: ArrayLike, spot: float, diode: Photodiode, *, modulation_
 
 
 def spot_range_uncertainty(offset: ArrayLike, u_place: ArrayLike, diode: Photodiode) -> Array:
-    """Standard uncertainty (...), m, of a range from a spot whose place on the diode is not certain.
+    """Standard uncertainty (...), m, of a range from the spot's place.
 
     offset    (...) m, of the spot's mean place from the centre
     u_place   (...) m, of each of its two coordinates, independent
     diode     the photodiode
 
-    Grows with the offset: an image servo that holds the middle leaves only the second order.
+    Grows with the offset: with an image servo on the middle only the second order remains.
 
     Source: range = -K (x^2 + y^2) with K = c/2 of `delay_per_area`; variance 4 K^2 d^2 u^2 + 4 K^2 u^4, exact for
     normal scatter and small delays; [JCGM100] 5.1.2 with its second-order note.
@@ -143,7 +151,9 @@ def spot_range_uncertainty(offset: ArrayLike, u_place: ArrayLike, diode: Photodi
 
 
 def image_offset(angle: ArrayLike, focal_length: ArrayLike) -> Array:
-    """Place, m, of the image of light that arrives at an angle to the axis: why short focal lengths help.
+    """Image position, m, of light at an angle to the axis.
+
+    It is smaller for short focal lengths.
 
     angle          rad
     focal_length   m
@@ -155,13 +165,15 @@ def image_offset(angle: ArrayLike, focal_length: ArrayLike) -> Array:
 
 
 def quadrant_signals(x: ArrayLike, y: ArrayLike, spot: float, gap: float = 0.0) -> Array:
-    """Shares (..., 4) of a Gaussian spot on the quadrants, counter-clockwise from that of positive x and y.
+    """Shares (..., 4) of a Gaussian spot on the quadrants, counter-clockwise.
+
+    From that of positive x and y.
 
     x, y   (...) m, of the spot's centre
     spot   m, above 0: radius at 1/e^2
     gap    m, 0 or more: dead width between the quadrants
 
-    What an image servo sees through a beam splitter; `quadrant_position` turns it into a place.
+    Signals of an image servo behind a beam splitter; `quadrant_position` converts them to a place.
 
     Source: integrals of a Gaussian. Exact.
 
@@ -176,12 +188,12 @@ def quadrant_signals(x: ArrayLike, y: ArrayLike, spot: float, gap: float = 0.0) 
         at = np.asarray(place, dtype=float)
         return ndtr((at - 0.5 * gap) * 2.0 / spot), ndtr((-at - 0.5 * gap) * 2.0 / spot)
 
-    (right, left), (up, down) = sides(x), sides(y)
-    return np.stack(np.broadcast_arrays(right * up, left * up, left * down, right * down), axis=-1)
+    (right_half, left_half), (up, down) = sides(x), sides(y)
+    return np.stack(np.broadcast_arrays(right_half * up, left_half * up, left_half * down, right_half * down), axis=-1)
 
 
 def quadrant_position(signals: ArrayLike, *, slope: float, u_signal: float = 0.0) -> tuple[Array, Array]:
-    """Place of the spot (..., 2), m, on a quadrant detector, and its covariance (..., 2, 2) m^2.
+    """Place of the spot (..., 2), m, with covariance (..., 2, 2) m^2.
 
     signals    (..., 4), any unit: quadrants counter-clockwise from that of positive x and y
     slope      m: the spot's place over the difference of halves over the sum, small against the spot; for a Gaussian

@@ -1,7 +1,7 @@
-"""A Gaussian beam on its way to a retroreflector and back: radius, share that hits, share that returns.
+"""Gaussian beam to a retroreflector and back: radius and power shares.
 
-Scalar and paraxial. A retroreflector sends back what falls on its aperture, turned about its centre, with the same
-curvature: beyond it the light spreads by what it had spread and by diffraction at the aperture.
+Scalar and paraxial. A retroreflector returns the light on its aperture, turned about its centre, with the same
+curvature: after it the light spreads by its divergence and by diffraction at the aperture.
 """
 
 from collections.abc import Sequence
@@ -11,24 +11,24 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.errors import ValidityError
 
-NODES_PER_FRINGE = 12.0  # of the quadrature over an aperture, for each zone of Fresnel
+NODES_PER_FRINGE = 12.0  # nodes of the quadrature over an aperture, for each Fresnel zone
 FEWEST_NODES, MOST_NODES = 200, 20_000
-CHORDS_PER_RADIAN = 0.85  # over a whole chord, for each radian that the phase runs from its middle to its end
+CHORDS_PER_RADIAN = 0.85  # nodes over a full chord, for each radian of phase from its middle to its end
 FEWEST_CHORDS, MOST_CHORDS = 16, 320
-WIDE = 4.5  # beam radii: exp(-40) of the light is beyond
-WIDEST = 6.0  # the same where 1e-12 counts
-# rad, k a r/B: beyond, an edge of radius a sends 2/(pi spread) = 0.5 % of the light, lit evenly; fewer where more are
-# more than is followed
+WIDE = 4.5  # beam radii: exp(-40) of the light is outside
+WIDEST = 6.0  # the same for 1e-12
+# rad, k a r/B: an edge of radius a, lit evenly, sends 2/(pi spread) = 0.5 % of the light beyond; fewer for more discs
+# beyond it the integration is refused
 SPREADS = (120.0, 60.0, 30.0, 15.0)
 
 
 def radius(distance: ArrayLike, *, waist: ArrayLike, wavelength: ArrayLike, quality: ArrayLike = 1.0) -> NDArray:
-    """Radius at 1/e^2 of the intensity, in metres.
+    """Radius at 1/e^2 of the intensity, m.
 
     distance     m from the waist, any sign
     waist        m, above 0: the radius there
     wavelength   m, above 0, of the light
-    quality      M^2, at least 1: how much more the beam spreads than an ideal one
+    quality      M^2, at least 1: spread over that of an ideal beam
 
     Source: [SIEGMAN86] eq. 17.5, with M^2. Exact for a paraxial beam.
 
@@ -41,7 +41,7 @@ def radius(distance: ArrayLike, *, waist: ArrayLike, wavelength: ArrayLike, qual
 
 
 def share_within(aperture: ArrayLike, beam_radius: ArrayLike, offset: ArrayLike = 0.0) -> NDArray:
-    """Share of a Gaussian beam's power that falls on a circular aperture.
+    """Share of a Gaussian beam's power on a circular aperture.
 
     aperture      m, its radius, 0 or more
     beam_radius   m, above 0, at 1/e^2
@@ -66,7 +66,7 @@ def share_within(aperture: ArrayLike, beam_radius: ArrayLike, offset: ArrayLike 
 
 
 def returned_share(distance: float, *, aperture: float, receiver: float, waist: float, wavelength: float) -> float:
-    """Share of a beam's power that a centred retroreflector sends back into a centred receiver.
+    """Share of power returned by a centred retroreflector to a centred receiver.
 
     distance     m, above 0: from the waist, which lies at the receiver, to the retroreflector
     aperture     m, above 0: radius of the retroreflector's
@@ -76,7 +76,7 @@ def returned_share(distance: float, *, aperture: float, receiver: float, waist: 
 
     Source: Fresnel's integral in polar form, [GOODMAN05] eq. 4-17 with the Gaussian field of [SIEGMAN86] eq. 17.4 on
     the aperture. Exact in the paraxial approximation, by Gauss-Legendre quadrature to some 1e-6. Raises ValidityError
-    where an aperture is so wide or so near that its Fresnel zones are more than the quadrature follows.
+    where an aperture is so wide or so near that its Fresnel zones are too many for the quadrature.
 
     >>> round(returned_share(100.0, aperture=0.019, receiver=0.05, waist=0.010, wavelength=0.78e-6), 4)
     0.9988
@@ -85,10 +85,10 @@ def returned_share(distance: float, *, aperture: float, receiver: float, waist: 
     wave_number = 2.0 * np.pi / wavelength
     rayleigh = 0.5 * wave_number * waist**2
     curvature = distance / (distance**2 + rayleigh**2)  # 1/R of the wave that arrives
-    here = float(radius(distance, waist=waist, wavelength=wavelength))
+    beam_radius = float(radius(distance, waist=waist, wavelength=wavelength))
     inner, inner_weight = _quadrature(aperture, wave_number * aperture * (aperture + 2.0 * receiver) / distance)
     outer, outer_weight = _quadrature(receiver, 2.0 * wave_number * receiver * aperture / distance)
-    field = np.sqrt(2.0 / np.pi) / here * np.exp(-((inner / here) ** 2))
+    field = np.sqrt(2.0 / np.pi) / beam_radius * np.exp(-((inner / beam_radius) ** 2))
     field = field * np.exp(0.5j * wave_number * inner**2 * (curvature + 1.0 / distance)) * inner * inner_weight
     from scipy.special import j0
 
@@ -102,7 +102,7 @@ def returned_share(distance: float, *, aperture: float, receiver: float, waist: 
 
 
 def share_within_ellipse(aperture: ArrayLike, radius_x: ArrayLike, radius_y: ArrayLike) -> NDArray:
-    """Share of an elliptical Gaussian beam's power that falls on a centred circular aperture.
+    """Share of an elliptical Gaussian beam's power on a centred round aperture.
 
     aperture             m, its radius, 0 or more
     radius_x, radius_y   m, above 0, of the beam at 1/e^2 in its two planes
@@ -133,7 +133,7 @@ def share_within_ellipse(aperture: ArrayLike, radius_x: ArrayLike, radius_y: Arr
 def imaged_waist(
     distance: ArrayLike, *, focal_length: ArrayLike, waist: ArrayLike, wavelength: ArrayLike, quality: ArrayLike = 1.0
 ) -> tuple[NDArray, NDArray]:
-    """Where a thin lens puts the next waist, m behind it, and the radius there, m.
+    """Distance, m, and radius, m, of the next waist after a thin lens.
 
     distance       m, from the waist to the lens; below zero where the beam meets the lens before its waist
     focal_length   m, not 0
@@ -152,13 +152,15 @@ def imaged_waist(
     _positive(waist=waist, wavelength=wavelength)
     f, w = np.asarray(focal_length, float), np.asarray(waist, float)
     rayleigh = np.pi * w**2 / (np.asarray(quality, float) * np.asarray(wavelength, float))
-    beyond = np.asarray(distance, float) - f
-    shrunk = f**2 / (beyond**2 + rayleigh**2)
-    return f + beyond * shrunk, w * np.sqrt(shrunk)
+    from_focus = np.asarray(distance, float) - f
+    shrunk = f**2 / (from_focus**2 + rayleigh**2)
+    return f + from_focus * shrunk, w * np.sqrt(shrunk)
 
 
 def waist_for(distance: ArrayLike, wavelength: ArrayLike, quality: ArrayLike = 1.0) -> NDArray:
-    """Waist, m, at the head that makes the beam smallest at a distance: there it is wider by the root of 2.
+    """Waist, m, at the head for the smallest beam at a distance.
+
+    The beam there is wider by the root of 2.
 
     distance     m, above 0
     wavelength   m, above 0
@@ -174,7 +176,7 @@ def waist_for(distance: ArrayLike, wavelength: ArrayLike, quality: ArrayLike = 1
 
 
 def farthest_waist(lens_radius: ArrayLike, wavelength: ArrayLike, quality: ArrayLike = 1.0) -> NDArray:
-    """Distance, m, beyond which no lens that the beam fills to a radius can put a waist.
+    """Largest distance, m, of a waist for a given radius on the lens.
 
     lens_radius   m, above 0: radius of the beam on the lens at 1/e^2
     wavelength    m, above 0
@@ -194,20 +196,22 @@ def farthest_waist(lens_radius: ArrayLike, wavelength: ArrayLike, quality: Array
 def powers_through(
     q: ArrayLike, *, wavelengths: ArrayLike, discs: Sequence[float], systems: Sequence[ArrayLike]
 ) -> NDArray[np.float64]:
-    """Shares (d,) of a beam's power within round apertures one behind the other, each lit by what the last let pass.
+    """Shares (d,) of a beam's power within successive round apertures.
+
+    Each is lit by the light passed by the one before.
 
     q             (2,) complex parameters of the beam in the first aperture, m, in its two planes: see `abcd`
     wavelengths   (2,) m: of the light times M^2 of each plane
     discs         (d,) m, above 0: radii of the apertures, centred
     systems       (d - 1, 2, 2, 2) matrices from one aperture to the next, in the two planes; their B not 0
 
-    An aperture wider than the light on it is followed as far as that (`lit_edges`); what is beyond falls with
+    An aperture wider than the light on it is integrated only so far (`lit_edges`); the rest falls with
     1/radius, as the rings of every edge do ([BORN99] section 8.5.2).
 
     M^2 above 1 is an ideal beam of that longer wavelength: exact as long as nothing clips it; diffraction by an edge
-    is then M^2 times too wide, so that what returns is rather too small.
+    is then M^2 times too wide, so that the returned share is rather too small.
 
-    Raises ValidityError where fringes are too many to follow (wide apertures close together).
+    Raises ValidityError where fringes are too many to integrate (wide apertures close together).
 
     Source: the diffraction integral of an ABCD system, [COLLINS70]; [SIEGMAN86] ch. 20. Each disc is cut into
     chords; Gauss-Legendre to some 1e-6 of the power.
@@ -226,11 +230,11 @@ def powers_through(
     field = np.sqrt(2.0 / (np.pi * w[0] * w[1])) * np.exp(-chirp[0] * outer[:, None] ** 2 - chirp[1] * inner**2)
     shares = [float(np.sum(area * np.abs(field) ** 2))]
     axes = np.array([0, 1])  # of the outer and of the inner coordinate
-    for edge, whole, count, step in zip(edges[1:], discs[1:], counts[1:], steps, strict=True):
+    for edge, disc, count, step in zip(edges[1:], discs[1:], counts[1:], steps, strict=True):
         (a, _, _, d), rates = step[axes].reshape(2, 4).T, k[axes] / step[axes, 0, 1]
         chirped = np.exp(-0.5j * (rates[0] * a[0] * outer[:, None] ** 2 + rates[1] * a[1] * inner**2))
         lit = field * chirped * area * np.sqrt(np.abs(rates[0] * rates[1])) / (2.0 * np.pi)
-        far_outer, far_inner, far_area = _chords(edge, count)  # its outer coordinate is the inner one of here
+        far_outer, far_inner, far_area = _chords(edge, count)  # its outer coordinate is the inner one of this disc
         field = np.zeros(far_inner.shape, dtype=complex)
         for row, x, y in zip(lit, outer, inner, strict=True):
             field += (row @ np.cos(rates[1] * np.outer(y, far_outer)))[:, None] * np.cos(rates[0] * x * far_inner)
@@ -238,7 +242,7 @@ def powers_through(
         field *= np.exp(-0.5j * bend)
         outer, inner, area, axes = far_outer, far_inner, far_area, axes[::-1]
         within = float(np.sum(area * np.abs(field) ** 2))
-        shares.append(within + (1.0 - edge / whole) * max(shares[-1] - within, 0.0))
+        shares.append(within + (1.0 - edge / disc) * max(shares[-1] - within, 0.0))
     return np.array(shares)
 
 
@@ -250,7 +254,9 @@ def lit_edges(
     systems: Sequence[ArrayLike],
     spread: float = SPREADS[0],
 ) -> NDArray[np.float64]:
-    """Radii (d,), m, of apertures as far as light falls on them: rays of the first, and diffraction by all before.
+    """Radii (d,), m, of apertures as far as they are lit.
+
+    Lit by rays of the first, and by diffraction at all before.
 
     spread   rad, of diffraction by each edge: see SPREADS
     others   as of `powers_through`
@@ -277,7 +283,7 @@ def lit_edges(
 def _followed(
     discs: NDArray[np.float64], q: NDArray[np.complex128], steps: NDArray[np.float64], k: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], list[int]]:
-    """Radii (d,), m, of the discs as far as they are followed, and nodes on half a chord of each."""
+    """Integration radii (d,), m, of the discs, and nodes on half chords."""
     light = {"wavelengths": 2.0 * np.pi / k, "discs": discs.tolist(), "systems": steps}
     for spread in SPREADS:
         edges = lit_edges(q, **light, spread=spread)
@@ -292,22 +298,22 @@ def _followed(
 def _chord_counts(
     edges: NDArray[np.float64], curvature: NDArray[np.float64], steps: NDArray[np.float64], k: NDArray[np.float64]
 ) -> list[int]:
-    """Nodes on half a chord of each disc, enough for the phase that comes in and the one that is put on to go on."""
+    """Nodes on half a chord of each disc, for incoming and outgoing phase."""
     bends, spread, counts = curvature, 0.0, []
     for i, edge in enumerate(edges):
         run = 0.0
         if i < len(steps):
             a, b = steps[i][:, 0, 0], steps[i][:, 0, 1]
             if np.any(b == 0.0):
-                raise ValidityError("apertures that are images of each other (expected way between them: B not 0)")
+                raise ValidityError("apertures are images of each other (expected a distance between them: B not 0)")
             run = float(np.max(k * (0.5 * edge**2 * np.abs(a / b + bends) + edge * edges[i + 1] / np.abs(b))))
             bends = steps[i][:, 1, 1] / b
         run = max(run + edge * spread, 2.0 * edge * spread)  # the power's fringes are twice as fine as the field's
         count = FEWEST_CHORDS + int(0.5 * CHORDS_PER_RADIAN * run)
         if count > MOST_CHORDS:
             raise ValidityError(
-                f"the light's phase runs over {run:.0f} rad of an aperture of {edge:.4g} m, more than is followed "
-                "(expected smaller apertures or more way between them)"
+                f"the light's phase runs over {run:.0f} rad of an aperture of {edge:.4g} m, too much to integrate "
+                "(expected smaller apertures or more distance between them)"
             )
         counts.append(count)
         spread = float(np.max(k * edge / np.abs(b))) if i < len(steps) else 0.0
@@ -315,7 +321,10 @@ def _chord_counts(
 
 
 def _chords(edge: float, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Places on a quarter of a disc, outer (c,) and inner (c, c), and the area of all four that each stands for."""
+    """Places on a quarter of a disc, outer (c,), inner (c, c), with areas.
+
+    The area is that of all four quarters.
+    """
     node, weight = np.polynomial.legendre.leggauss(2 * count)
     node, weight = node[count:], weight[count:]
     along, chord = edge * np.sin(0.5 * np.pi * node), edge * np.cos(0.5 * np.pi * node)[:, None]
@@ -323,12 +332,12 @@ def _chords(edge: float, count: int) -> tuple[NDArray[np.float64], NDArray[np.fl
 
 
 def _quadrature(edge: float, phase: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Nodes on 0 to `edge` and their weights, dense enough for a phase that runs so far."""
+    """Nodes on 0 to `edge` and their weights, for a phase range."""
     count = int(FEWEST_NODES + NODES_PER_FRINGE * phase / (2.0 * np.pi))
     if count > MOST_NODES:
         raise ValidityError(
-            f"an aperture of {edge} m spans {phase / np.pi:.0f} Fresnel zones, more than the quadrature follows "
-            "(expected a smaller one or a longer distance; there the share that hits is what returns)"
+            f"an aperture of {edge} m spans {phase / np.pi:.0f} Fresnel zones, too many for the quadrature "
+            "(expected a smaller one or a longer distance; there the returned share is the share on the aperture)"
         )
     pieces = max(1, count // 64)  # Gauss-Legendre of 64 points piece by piece
     x, w = np.polynomial.legendre.leggauss(64)
@@ -339,7 +348,7 @@ def _quadrature(edge: float, phase: float) -> tuple[NDArray[np.float64], NDArray
 
 def _positive(**values: ArrayLike) -> None:
     for name, value in values.items():
-        given = np.asarray(value, dtype=float)
-        if not np.all((given > 0.0) & (given < np.inf)):
-            wrong = given[~((given > 0.0) & (given < np.inf))].flat[0]
+        sizes = np.asarray(value, dtype=float)
+        if not np.all((sizes > 0.0) & (sizes < np.inf)):
+            wrong = sizes[~((sizes > 0.0) & (sizes < np.inf))].flat[0]
             raise ValidityError(f"{name} = {wrong} m is not above 0 and finite")

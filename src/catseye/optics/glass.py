@@ -1,10 +1,11 @@
-"""Phase and group index of optical glass: against standard air, against vacuum, against the air that is there.
+"""Phase and group index of optical glass over air or vacuum.
 
-The makers' formulas give the index relative to air at 20 to 25 °C and 1013.25 hPa, at the wavelength in that air. The
-notes and the memo take them as relative to vacuum and divide by the index of air once more: n = 1.527463/1.00025324 =
-1.527077, 4.3e-4 below what `index_over_air` gives for the same glass and air. That makes the range constant of a
-38.4 mm prism 24 um and of the ball 63 um less negative than it is, a range as much too long. A campaign keeps
-what its certificates say; a zero found on a baseline with the same kind of target takes up its own part of it.
+The reference is standard air, vacuum or the actual air. The makers' formulas give the index relative to air at 20 to 25
+°C and 1013.25 hPa, at the wavelength in that air. The notes and the memo take them as relative to vacuum and divide by
+the index of air once more: n = 1.527463/1.00025324 = 1.527077, 4.3e-4 below what `index_over_air` gives for the same
+glass and air. That makes the range constant of a 38.4 mm prism 24 um and of the ball 63 um less negative than it is,
+and a range too long by that. A campaign keeps the values of its certificates; a zero from a baseline with the same kind
+of target absorbs its part.
 
 In glass the phase travels at c over the phase index, the modulation at c over the group index. Going from air to
 vacuum multiplies both: k_glass = n_rel(k_air) k_air gives dk_glass/dk = n_g,rel n_g,air, exactly.
@@ -50,7 +51,7 @@ class Index(NamedTuple):
 
 
 class GlassSlopes(NamedTuple):
-    """Derivatives of phase and group index, by what the function that gives them says."""
+    """Derivatives of phase and group index, by the variable of the function."""
 
     phase: Array
     group: Array
@@ -64,7 +65,7 @@ def phase_index(wavelength_um: ArrayLike, glass: str = "BK7-old") -> Array:
 
     Source: [PARKER04] eq. 1.40 with 1.44 (BK7-old); each glass's own in GLASSES. Good to 5e-6 for the glass that was
     fitted (fused silica 1e-5); one melt differs from the next by up to 5e-4. The makers' coefficients are relative to
-    air [TIE29]: see the module for what the notes make of them.
+    air [TIE29]: see the module for their use in the notes.
 
     >>> round(float(phase_index(0.780)), 8)
     1.51118682
@@ -79,8 +80,8 @@ def group_index(wavelength_um: ArrayLike, glass: str = "BK7-old") -> Array:
     glass            a name in GLASSES
 
     Source: [PARKER04] eq. 1.42 and 1.43. The old BK 7 series lies 1.15e-5 below N-BK7 at 0.780 um (and 3.5e-6 above it
-    in phase index), which shows what a differentiated fit is worth: `retroreflector.prism.wrong_glass` says what it
-    costs. A target's record says which glass it has.
+    in phase index), which shows the limit of a differentiated fit: `retroreflector.prism.wrong_glass` gives its
+    effect. A target's record names its glass.
 
     >>> round(float(group_index(0.780)), 8)
     1.52746375
@@ -91,7 +92,7 @@ def group_index(wavelength_um: ArrayLike, glass: str = "BK7-old") -> Array:
 
 
 def slopes(wavelength_um: ArrayLike, glass: str = "BK7-old") -> GlassSlopes:
-    """Derivatives of phase and group index, relative to standard air, by the wavelength, 1/um.
+    """Derivatives of both indices over standard air by wavelength, 1/um.
 
     wavelength_um    wavelength in air, um
     glass            a name in GLASSES
@@ -109,7 +110,7 @@ def slopes(wavelength_um: ArrayLike, glass: str = "BK7-old") -> GlassSlopes:
 
 
 def group_wavelength(frequency: ArrayLike, wavelength_um: ArrayLike, glass: str = "BK7-old") -> Array:
-    """Wavelength of the modulation in a glass, in metres.
+    """Wavelength of the modulation in a glass, m.
 
     frequency        Hz, above 0, of the modulation
     wavelength_um    wavelength of the light in air, um
@@ -127,13 +128,13 @@ def group_wavelength(frequency: ArrayLike, wavelength_um: ArrayLike, glass: str 
 
 
 def reference_air(vacuum_um: ArrayLike, temperature_c: ArrayLike = 20.0) -> Index:
-    """Index of the dry air at 1013.25 hPa that the makers' indices are relative to.
+    """Index of the makers' reference air, dry at 1013.25 hPa.
 
     vacuum_um       wavelength in vacuum, um, 0.2 to 4
     temperature_c   °C, -40 to 80
 
     Source: [TIE19], the makers' own air (Edlén's dispersion of 1953). Within 2e-7 of [CIDDOR96] and
-    [CIDDOR99]; it is their reference, and so it stands here instead of a better one.
+    [CIDDOR99]; it is their reference, hence used here instead of a better one.
 
     >>> [round(float(n - 1) * 1e6, 2) for n in reference_air(0.780)]
     [270.46, 275.56]
@@ -147,7 +148,7 @@ def reference_air(vacuum_um: ArrayLike, temperature_c: ArrayLike = 20.0) -> Inde
 
 
 def absolute_index(vacuum_um: ArrayLike, glass: str = "BK7-old", temperature_c: ArrayLike | None = None) -> Index:
-    """Phase and group index of a glass relative to vacuum, at its temperature.
+    """Phase and group index of a glass relative to vacuum.
 
     vacuum_um       wavelength in vacuum, um
     glass           a name in GLASSES
@@ -155,25 +156,25 @@ def absolute_index(vacuum_um: ArrayLike, glass: str = "BK7-old", temperature_c: 
 
     Raises ValidityError outside.
 
-    Source: [TIE29] section 1 (relative to air), [TIE19] (its change with temperature). As good as the maker's
+    Source: [TIE29] section 1 (relative to air), [TIE19] (its change with temperature). Limited by the maker's
     formula; the change to 5e-7 a kelvin (1e-6 for fused silica).
 
     >>> [round(float(n), 6) for n in absolute_index(0.780)]
     [1.5116, 1.527894]
     """
-    known = glass_named(glass)
-    vacuum = _within(np.asarray(vacuum_um, dtype=float), glass, known)
-    air = reference_air(vacuum, known.reference_c)
-    here = vacuum / air.phase
-    phase, group = phase_index(here, glass) * air.phase, group_index(here, glass) * air.group
+    entry = glass_named(glass)
+    vacuum = _within(np.asarray(vacuum_um, dtype=float), glass, entry)
+    air = reference_air(vacuum, entry.reference_c)
+    in_air = vacuum / air.phase
+    phase, group = phase_index(in_air, glass) * air.phase, group_index(in_air, glass) * air.group
     if temperature_c is None:
         return Index(phase, group)
-    warmed = _warmed(vacuum, phase, phase - group, known, np.asarray(temperature_c, dtype=float))
+    warmed = _warmed(vacuum, phase, phase - group, entry, np.asarray(temperature_c, dtype=float))
     return Index(phase + warmed.phase, group + warmed.group)
 
 
 def temperature_slopes(vacuum_um: ArrayLike, glass: str = "BK7-old", temperature_c: ArrayLike = 20.0) -> GlassSlopes:
-    """Derivatives of the absolute phase and group index by the temperature, 1/K.
+    """Derivatives of the absolute phase and group index by temperature, 1/K.
 
     vacuum_um       wavelength in vacuum, um
     glass           a name in GLASSES
@@ -191,7 +192,7 @@ def temperature_slopes(vacuum_um: ArrayLike, glass: str = "BK7-old", temperature
 
 
 def difference_ends(temperature_c: ArrayLike, glass: str) -> tuple[Array, Array]:
-    """Temperatures, °C, between which a derivative by the temperature is taken, within the limits of the formula.
+    """Temperatures, °C, for a difference quotient within the formula's limits.
 
     temperature_c   °C, -100 to 140
     glass           a name in GLASSES
@@ -204,10 +205,10 @@ def difference_ends(temperature_c: ArrayLike, glass: str) -> tuple[Array, Array]
 
 
 def wavelength_in_air_um(vacuum_um: ArrayLike, glass: str = "BK7-old") -> Array:
-    """Wavelength, um, in the air that the maker's index is relative to: the argument of `phase_index`.
+    """Wavelength, um, in the maker's reference air, for `phase_index`.
 
     vacuum_um   wavelength in vacuum, um
-    glass       a name in GLASSES, whose maker says the air's temperature
+    glass       a name in GLASSES, whose maker gives the air's temperature
 
     Source: [TIE29] section 1. At 0.780 um it is 0.21 nm shorter, which raises the group index of BK 7 by 9.1e-6.
 
@@ -226,7 +227,7 @@ def index_over_air(
     air_phase: ArrayLike,
     air_group: ArrayLike,
 ) -> Index:
-    """Phase and group index of a glass over those of the air about it: the n of prisms and balls.
+    """Phase and group index of a glass over the actual air.
 
     vacuum_um       wavelength in vacuum, um
     glass           a name in GLASSES
@@ -234,8 +235,8 @@ def index_over_air(
     air_phase       phase index of that air
     air_group       group index of that air
 
-    Source: [GOLDMAN00] eq. D.1, with the glass's index truly against vacuum. The memo's 1.527077 divides an index that
-    is relative to air by the air again: 4.3e-4 too low (see the module).
+    Source: [GOLDMAN00] eq. D.1, with the glass's index truly against vacuum. The memo's 1.527077 divides an index
+    relative to air by the air again: 4.3e-4 too low (see the module).
 
     >>> n = index_over_air(0.780, air_phase=1.000248531, air_group=1.000253247)
     >>> [round(float(v), 6) for v in n]
@@ -246,14 +247,14 @@ def index_over_air(
 
 
 def glass_named(name: str) -> Glass:
-    """The glass of that name; ValidityError with those known if there is none."""
+    """Glass by name; ValidityError with the known names if unknown."""
     if name not in GLASSES:
-        raise ValidityError(f"glass '{name}' is not known; known are {', '.join(GLASSES)}")
+        raise ValidityError(f"glass '{name}' is unknown; known are {', '.join(GLASSES)}")
     return GLASSES[name]
 
 
 def _warmed(wavelength: Array, phase: Array, first: Array, glass: Glass, temperature_c: Array) -> Index:
-    """Change of absolute phase and group index from the reference temperature; `first` is l dn/dl."""
+    """Change of absolute indices from the reference temperature; `first` is l dn/dl."""
     _refuse_temperature(temperature_c, glass)
     k, t = glass.thermal, temperature_c - glass.reference_c
     off = wavelength**2 - k.resonance_um**2
@@ -265,7 +266,7 @@ def _warmed(wavelength: Array, phase: Array, first: Array, glass: Glass, tempera
 
 
 def _refuse_temperature(temperature_c: Array, glass: Glass) -> None:
-    """ValidityError where a temperature is outside the limits of the makers' formula."""
+    """Raise ValidityError for a temperature outside the makers' formula."""
     outside = ~((temperature_c >= SUPPORT_C[0]) & (temperature_c <= SUPPORT_C[1]))
     if outside.any():
         raise ValidityError(
@@ -275,7 +276,7 @@ def _refuse_temperature(temperature_c: Array, glass: Glass) -> None:
 
 
 def _schott(l2: Array, coefficients: tuple[float, ...]) -> tuple[Array, Array, Array]:
-    """The old power series of Schott, eq. 1.40; see `_series`."""
+    """Old power series of Schott, eq. 1.40; see `_series`."""
     powers = (0, 1, -1, -2, -3, -4)  # of l^2
     terms = np.array([a * l2 ** float(p) for a, p in zip(coefficients, powers, strict=True)])
     double = 2.0 * np.array(powers).reshape((-1,) + (1,) * l2.ndim)
@@ -283,7 +284,7 @@ def _schott(l2: Array, coefficients: tuple[float, ...]) -> tuple[Array, Array, A
 
 
 def _sellmeier(l2: Array, coefficients: tuple[float, ...]) -> tuple[Array, Array, Array]:
-    """Three resonances; see `_series`."""
+    """Sellmeier series of three resonances; see `_series`."""
     pairs = list(zip(coefficients[:3], coefficients[3:], strict=True))
     square = 1.0 + np.sum([b * l2 / (l2 - c) for b, c in pairs], axis=0)
     first = -2.0 * np.sum([b * c * l2 / (l2 - c) ** 2 for b, c in pairs], axis=0)
@@ -297,14 +298,14 @@ FORMULAS: dict[str, Callable[[Array, tuple[float, ...]], tuple[Array, Array, Arr
 
 
 def _series(wavelength_um: ArrayLike, name: str) -> tuple[Array, Array, Array]:
-    """n^2, and l d/dl of it, once and twice."""
+    """Series n^2, and l d/dl of it, once and twice."""
     glass = glass_named(name)
     wavelength = _within(np.asarray(wavelength_um, dtype=float), name, glass)
     return FORMULAS[glass.formula](wavelength**2, glass.coefficients)
 
 
 def _within(wavelength: Array, name: str, glass: Glass) -> Array:
-    """The wavelengths, um, refused where one is outside the glass's limits."""
+    """Wavelengths, um; raises for one outside the glass's limits."""
     outside = ~((wavelength >= glass.shortest_um) & (wavelength <= glass.longest_um))
     if outside.any():
         raise ValidityError(

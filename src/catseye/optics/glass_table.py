@@ -1,4 +1,4 @@
-"""The glasses that catseye knows: dispersion, temperature, expansion, each number with its source.
+"""Table of glasses: dispersion, temperature, expansion, with sources.
 
 A new glass is one entry here and one line of tests against its maker's sheet.
 """
@@ -13,7 +13,7 @@ SUPPORT_C = (-100.0, 140.0)  # where the makers' temperature formula holds
 
 @dataclass(frozen=True)
 class Thermal:
-    """Constants of the makers' formula for the change of the absolute index with temperature.
+    """Constants of the makers' temperature formula of the absolute index.
 
     d0, d1, d2     1/K, 1/K^2, 1/K^3
     e0, e1         um^2/K, um^2/K^2
@@ -32,7 +32,7 @@ class Thermal:
 
 @dataclass(frozen=True)
 class Glass:
-    """A glass and the dispersion formula that its maker gives, relative to air of 1013.25 hPa.
+    """Glass with its maker's dispersion formula, over air of 1013.25 hPa.
 
     formula         "schott": n^2 = A0 + A1 l^2 + A2 l^-2 + A3 l^-4 + A4 l^-6 + A5 l^-8;
                     "sellmeier": n^2 = 1 + sum B_i l^2 / (l^2 - C_i), with l the wavelength in um
@@ -43,7 +43,7 @@ class Glass:
     thermal         change with temperature
     expansion       1/K, linear, -30 to 70 °C
     reference_c     °C, of glass and air, at which the formula gives the index
-    what            for whom it stands here
+    what            its use here
     """
 
     formula: Literal["schott", "sellmeier"]
@@ -70,7 +70,7 @@ GLASSES: Mapping[str, Glass] = MappingProxyType(
             thermal=BK7_THERMAL,  # of N-BK7, the same crown without arsenic; the notes give none
             expansion=7.1e-6,
             reference_c=20.0,
-            what="borosilicate crown as the notes have it: the GBT's prisms and balls",
+            what="borosilicate crown of the notes: the GBT's prisms and balls",
         ),
         "N-BK7": Glass(
             formula="sellmeier",
@@ -81,7 +81,7 @@ GLASSES: Mapping[str, Glass] = MappingProxyType(
             thermal=BK7_THERMAL,
             expansion=7.1e-6,
             reference_c=20.0,
-            what="borosilicate crown of today: prisms bought since about 2000",
+            what="present borosilicate crown: prisms bought since about 2000",
         ),
         "fused-silica": Glass(
             formula="sellmeier",
@@ -92,7 +92,7 @@ GLASSES: Mapping[str, Glass] = MappingProxyType(
             thermal=Thermal(2.06e-5, 2.51e-8, -2.47e-11, 3.12e-7, 4.22e-10, 0.16, "[SCHOTT17], LITHOSIL-Q"),
             expansion=0.5e-6,
             reference_c=20.0,
-            what="prisms that must not mind heat or ultraviolet light",
+            what="prisms that resist heat and ultraviolet light",
         ),
         "S-LAH79": Glass(
             formula="sellmeier",
@@ -103,7 +103,7 @@ GLASSES: Mapping[str, Glass] = MappingProxyType(
             thermal=Thermal(6.01e-6, 1.31e-8, -3.15e-11, 1.12e-6, 1.27e-9, 0.26, "[OHARA17]"),
             expansion=6.0e-6,
             reference_c=25.0,
-            what="lanthanum flint of index 2: whole balls that focus on their own back",
+            what="lanthanum flint of index 2: full balls that focus on their own back",
         ),
     }
 )

@@ -1,8 +1,8 @@
-"""A Faraday isolator: what it lets out, and what of the light that returns gets back into the laser.
+"""Faraday isolator: transmitted light, and return into the laser.
 
 Two polarizers with a rotator between them that turns the light the same way in both directions. In fixed transverse
-axes the way out is P(second) R(turn) P(first), the way back P(first) R(turn) P(second): that is what is not reciprocal.
-What limits it is a turn that is not 45 degrees (wavelength, temperature), and what polarizers leak.
+axes the outward path is P(second) R(turn) P(first), the return path P(first) R(turn) P(second): this is not reciprocal.
+Limits are a turn other than 45 degrees (wavelength, temperature), and leakage of the polarizers.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ DESIGN_TURN = 0.25 * np.pi
 
 @dataclass(frozen=True)
 class Isolator:
-    """An isolator. The laser's field lies along the first polarizer.
+    """Faraday isolator; the laser's field lies along the first polarizer.
 
     turn           rad, of the field by the rotator
     second         rad, of the second polarizer from the first
@@ -42,10 +42,10 @@ class Isolator:
 def faraday_turn(
     wavelength_um: ArrayLike, temperature_c: ArrayLike = 20.0, *, design_um: float = 0.780, design_c: float = 20.0
 ) -> Array:
-    """Turn, rad, of a rotator of terbium gallium garnet that turns by 45 degrees where it was made for.
+    """Turn, rad, of a terbium gallium garnet rotator, 45 degrees by design.
 
-    wavelength_um, temperature_c   where it is used; um, above 0.4, and °C, -40 to 80
-    design_um, design_c            where it turns by 45 degrees
+    wavelength_um, temperature_c   in use; um, above 0.4, and °C, -40 to 80
+    design_um, design_c            of the design, where it turns by 45 degrees
 
     1/(l^2 - 0.258^2) by wavelength and 1/T by absolute temperature: 0.34 % or 0.15 degrees for each °C.
 
@@ -66,7 +66,9 @@ def faraday_turn(
 
 
 def jones_out(isolator: Isolator) -> Array:
-    """Jones matrix (2, 2) of the way out, in fixed axes, the first along the first polarizer.
+    """Jones matrix (2, 2) of the outward path, in fixed axes.
+
+    The first axis is along the first polarizer.
 
     isolator   its turn, polarizers, losses
 
@@ -77,7 +79,7 @@ def jones_out(isolator: Isolator) -> Array:
 
 
 def jones_back(isolator: Isolator) -> Array:
-    """Jones matrix (2, 2) of the way back, in the same fixed axes.
+    """Jones matrix (2, 2) of the return path, in the same axes.
 
     isolator   its turn, polarizers, losses
 
@@ -99,13 +101,13 @@ def forward_share(isolator: Isolator) -> float:
 
 
 def back_share(isolator: Isolator, returned: ArrayLike | None = None) -> float:
-    """Share of returned power that gets back into the laser's own polarization.
+    """Share of returned power back into the laser's polarization.
 
     isolator   its turn, polarizers, losses
-    returned   (2,) Jones vector of the returned light in the same axes, any length above 0; None for the worst there is
+    returned   (2,) Jones vector of the returned light in the same axes, any length above 0; None for the worst case
 
-    Light that returns as it left is held back by the turn alone, sin^2 of what the two angles miss a right angle by
-    (and what the leaks of both polarizers make together); light across it passes by the leak of the second polarizer.
+    Light returned in its own polarization is blocked by the turn alone, sin^2 of the deviation of the two angles from a
+    right angle (and the product of both leaks); light across it passes by the leak of the second polarizer.
     A corner cube without coating mixes the two.
 
     Raises ValidityError for no light.
@@ -127,7 +129,7 @@ def back_share(isolator: Isolator, returned: ArrayLike | None = None) -> float:
 
 
 def isolation_db(isolator: Isolator, returned: ArrayLike | None = None) -> float:
-    """Isolation, dB, its plain losses included.
+    """Isolation, dB, with plain losses included.
 
     isolator, returned   as for `back_share`
 
@@ -139,7 +141,7 @@ def isolation_db(isolator: Isolator, returned: ArrayLike | None = None) -> float
 
 
 def _polarizer(angle: float, leak: float) -> Array:
-    """The crossed field passes with the root of the leak."""
+    """Polarizer matrix; the crossed field passes with the root of the leak."""
     along = np.array([np.cos(angle), np.sin(angle)])
     across = np.array([-np.sin(angle), np.cos(angle)])
     return np.outer(along, along) + np.sqrt(leak) * np.outer(across, across)

@@ -1,6 +1,6 @@
-"""Polarized light as Jones vectors, and what a surface does to it in three dimensions.
+"""Polarized light as Jones vectors, and reflection in three dimensions.
 
-Time runs as exp(-i w t): a phase that lags has a positive angle, an absorbing index is n + ik. s lies across the plane
+Time runs as exp(-i w t): a lagging phase has a positive angle, an absorbing index is n + ik. s lies across the plane
 of incidence, p = k x s in it, k the direction of travel before or after. So a mirror in air has r_s = -1, r_p = +1, and
 straight on r_p = -r_s for every surface: the same field, since p turns with k.
 """
@@ -19,17 +19,17 @@ Surface = Callable[[Array], tuple[Complex, Complex]]  # cosine of incidence -> r
 STRAIGHT = 1e-9  # sine of an incidence below which any s does: r_p = -r_s there
 
 
-def reflection(cosine: ArrayLike, *, inside: float, behind: complex) -> tuple[Complex, Complex]:
-    """Amplitudes (r_s, r_p) that a surface reflects.
+def reflection(cosine: ArrayLike, *, inside: float, outside: complex) -> tuple[Complex, Complex]:
+    """Amplitude reflection coefficients (r_s, r_p) of a surface.
 
     cosine   (...) of the angle of incidence, 0 to 1
-    inside   index of the medium that the light comes from, above 0
-    behind   index n + ik of the medium behind, k 0 or more; infinite for a perfect conductor
+    inside   index of the medium of the incoming light, above 0
+    outside  index n + ik of the other medium, k 0 or more; infinite for a perfect conductor
 
     Source: [BORN99] section 1.5.2, eq. 21 with eq. 13 of section 14.2 for metals; beyond the critical angle the
     same with an imaginary cosine. Exact for a clean flat surface.
 
-    >>> [round(float(r.real), 4) for r in reflection(1.0, inside=1.0, behind=1.5)]
+    >>> [round(float(r.real), 4) for r in reflection(1.0, inside=1.0, outside=1.5)]
     [-0.2, 0.2]
     """
     c = np.asarray(cosine, dtype=float)
@@ -39,37 +39,39 @@ def reflection(cosine: ArrayLike, *, inside: float, behind: complex) -> tuple[Co
     if not (0.0 < inside < np.inf):
         raise ValidityError(f"index inside {inside:g} is not above 0 and finite")
     one = np.ones(c.shape, dtype=complex)
-    if np.isinf(behind):
+    if np.isinf(outside):
         return -one, one
-    ratio = complex(behind) / inside
+    ratio = complex(outside) / inside
     if not (ratio.real >= 0.0 and ratio.imag >= 0.0 and abs(ratio) > 0.0):
-        raise ValidityError(f"index behind {behind} has a part below 0 (expected n + ik, both 0 or more)")
+        raise ValidityError(f"index behind {outside} has a part below 0 (expected n + ik, both 0 or more)")
     across = ratio**2 - (1.0 - np.minimum(c, 1.0) ** 2)
     inner = np.sqrt(across + 0j)  # (n behind / n inside) cos: real, or imaginary above 0, so that the wave dies out
     return (c - inner) / (c + inner) * one, (ratio**2 * c - inner) / (ratio**2 * c + inner) * one
 
 
-def surface(*, inside: float, behind: complex) -> Surface:
-    """`reflection` of one surface, as a function of the cosine alone; a coating of thin films is another such function.
+def surface(*, inside: float, outside: complex) -> Surface:
+    """Reflection of one surface as a function of the cosine alone.
 
-    inside, behind   as for `reflection`
+    A coating of thin films is another such function.
+
+    inside, outside   as for `reflection`
 
     Source: as `reflection`.
 
-    >>> [float(r.real) for r in surface(inside=1.0, behind=complex("inf"))(np.array(0.5))]
+    >>> [float(r.real) for r in surface(inside=1.0, outside=complex("inf"))(np.array(0.5))]
     [-1.0, 1.0]
     """
-    return lambda cosine: reflection(cosine, inside=inside, behind=behind)
+    return lambda cosine: reflection(cosine, inside=inside, outside=outside)
 
 
 def coated(coating: Coating, wavelength_um: float, *, medium: float = 1.0) -> Surface:
-    """A surface under thin films, as a function of the cosine of incidence.
+    """Surface under thin films, as a function of cosine of incidence.
 
     coating         layers and substrate, from the side of the light
     wavelength_um   um
     medium          index in front: 1 for a hollow corner, that of the glass for a prism's metal
 
-    Source: `coating.response`, whose time runs the other way and whose p is alike to s straight on.
+    Source: `coating.response`, with the opposite sign of time and p equal to s at normal incidence.
 
     >>> from catseye.optics.coating import named
     >>> r_s, r_p = coated(named("gold", 0.780), 0.780)(np.array(1.0))
@@ -87,7 +89,9 @@ def coated(coating: Coating, wavelength_um: float, *, medium: float = 1.0) -> Su
 
 
 def total_reflection_retardance(cosine: ArrayLike, index: ArrayLike) -> Array:
-    """Phase (...), rad, by which s lags p when glass reflects totally, the angle of r_s/r_p; NaN where it does not.
+    """Phase (...), rad, by which s lags p in total reflection.
+
+    The angle of r_s/r_p; NaN where reflection is not total.
 
     cosine   of the angle of incidence inside, 0 to 1
     index    phase index of the glass over that of the medium outside, above 1
@@ -107,17 +111,17 @@ def total_reflection_retardance(cosine: ArrayLike, index: ArrayLike) -> Array:
 
 
 def reflection_matrix(direction: ArrayLike, normal: ArrayLike, mirror: Surface) -> tuple[Array, Complex]:
-    """Direction (..., 3) after a reflection, and the matrix (..., 3, 3) that takes the field before into that after.
+    """Direction (..., 3) after a reflection, and field matrix (..., 3, 3).
 
     direction   (..., 3) unit vectors of travel
     normal      (3,) unit vector, either way
     mirror      what the surface reflects, see `surface`
 
-    The matrix takes the direction of travel into the new one besides, so that matrices of surfaces in a row multiply.
+    The matrix also maps the direction of travel to the new one, so that matrices of successive surfaces multiply.
 
     Source: [YUN11] eqs. 8 to 11. Exact for plane waves.
 
-    >>> to, p = reflection_matrix([0.0, 0.0, -1.0], [0.0, 0.0, 1.0], surface(inside=1.0, behind=complex("inf")))
+    >>> to, p = reflection_matrix([0.0, 0.0, -1.0], [0.0, 0.0, 1.0], surface(inside=1.0, outside=complex("inf")))
     >>> p.real.round(12) + 0.0
     array([[-1.,  0.,  0.], [ 0., -1.,  0.], [ 0.,  0., -1.]])
     """
@@ -130,7 +134,9 @@ def reflection_matrix(direction: ArrayLike, normal: ArrayLike, mirror: Surface) 
 
 
 def transfer(before: Array, after: Array, s: Array, gain_s: ArrayLike, gain_p: ArrayLike) -> Complex:
-    """Matrix (..., 3, 3) of a surface that turns `before` into `after` and multiplies the s and p parts of the field.
+    """Matrix (..., 3, 3) of a surface from s and p gains.
+
+    It turns `before` into `after` and multiplies the s and p parts of the field.
 
     before, after    (..., 3) unit vectors of travel
     s                (..., 3) unit vectors across both
@@ -147,7 +153,7 @@ def transfer(before: Array, after: Array, s: Array, gain_s: ArrayLike, gain_p: A
 
 
 def linear(azimuth: ArrayLike) -> Complex:
-    """Jones vector (..., 2) of light polarized linearly.
+    """Jones vector (..., 2) of linearly polarized light.
 
     azimuth   (...) rad, of the field from the first axis towards the second
 
@@ -161,12 +167,14 @@ def linear(azimuth: ArrayLike) -> Complex:
 
 
 def retarder(retardance: ArrayLike, azimuth: ArrayLike) -> Complex:
-    """Jones matrix (..., 2, 2) of a wave plate, alike in both directions in axes that stay.
+    """Jones matrix (..., 2, 2) of a wave plate, in fixed axes.
+
+    The same in both directions.
 
     retardance   (...) rad, slow axis behind the fast one: pi/2 a quarter, pi a half wave
     azimuth      (...) rad, of the fast axis
 
-    Source: [CHIPMAN18] section 5.4 (with the sign of exp(-i w t)); the phase that both axes share is left out.
+    Source: [CHIPMAN18] section 5.4 (with the sign of exp(-i w t)); the common phase of both axes is omitted.
 
     >>> light = retarder(np.pi / 2, np.pi / 4) @ linear(0.0)  # round
     >>> round(float(np.angle(light[1] / light[0]) / np.pi), 6)
@@ -178,12 +186,14 @@ def retarder(retardance: ArrayLike, azimuth: ArrayLike) -> Complex:
 
 
 def retardance(jones: ArrayLike) -> Array:
-    """Retardance (...), rad, 0 to pi, of the plate that a lossless matrix is, but for turns before and after.
+    """Retardance (...), rad, 0 to pi, of a lossless matrix.
+
+    The plate is combined with turns before and after.
 
     jones   (..., 2, 2), unitary but for a factor
 
-    For a reflector in axes that stay a mirror is no retarder. In axes (s, k x s), which follow the light, one that
-    reflects an odd number of times has pi less this.
+    In fixed axes a mirror is not a retarder. In axes (s, k x s), which follow the light, an odd number of
+    reflections gives pi less this.
 
     Source: [PLAYER88]: every lossless matrix is a turn, a linear retarder and a turn. With J = A D B, A and B turns,
     J^T J = B^T D^2 B has the eigenvalues exp(-+i d) of one factor: its trace over 2 det J is cos d. Exact.
@@ -197,7 +207,9 @@ def retardance(jones: ArrayLike) -> Array:
 
 
 def ellipse(field: ArrayLike) -> tuple[Array, Array]:
-    """Azimuth, rad within a quarter turn either way, and ellipticity angle, rad within an eighth, of Jones vectors.
+    """Azimuth and ellipticity angle, rad, of Jones vectors.
+
+    Azimuth is within a quarter turn either way, ellipticity within an eighth.
 
     field   (..., 2)
 
@@ -218,12 +230,12 @@ def ellipse(field: ArrayLike) -> tuple[Array, Array]:
 
 
 def _dyad(out: NDArray, into: NDArray, gain: ArrayLike) -> Complex:
-    """The Jones matrix gain * out into^T."""
+    """Jones matrix gain * out into^T."""
     return np.asarray(gain, dtype=complex)[..., None, None] * out[..., :, None] * into[..., None, :]
 
 
 def _across(k: Array, n: Array) -> Array:
-    """Unit vectors across the plane of incidence; straight on, any across the direction."""
+    """Unit vectors across the plane of incidence; any at normal incidence."""
     s = np.cross(k, np.broadcast_to(n, k.shape))
     size = np.linalg.norm(s, axis=-1, keepdims=True)
     spare = np.cross(k, np.eye(3)[np.argmin(np.abs(k), axis=-1)])

@@ -1,11 +1,13 @@
-"""Exact rays in three dimensions through planes and spheres: batches of them, a status for each.
+"""Exact rays in three dimensions through planes and spheres.
+
+Batches of rays, with a status for each.
 
 Light bends with the phase index and is delayed with the group index: at a surface Snell's law in vectors takes the
 ratio of phase indices, along a leg the optical path grows by the group index times its length. Nothing is paraxial and
-no formula of the retroreflectors' own files is used, so that these can be checked against it.
+no formula of the retroreflector files is used, so that they can be checked against it.
 
 Paths are of light that goes from a plane across its direction through a chosen point to the retroreflector and back to
-the same plane: `half_path` is how much further than that point the light seems to have been, one way.
+the same plane: `half_path` is the apparent distance beyond that point, one way.
 """
 
 from collections.abc import Sequence
@@ -17,12 +19,12 @@ from numpy.typing import ArrayLike, NDArray
 from catseye.errors import ValidityError
 
 Array = NDArray[np.float64]
-AWAY = 1e-12  # m: a ray that starts on a surface does not meet it again at once
+AWAY = 1e-12  # m: a ray that starts on a surface does not hit it again immediately
 
 
 @dataclass(frozen=True)
 class Plane:
-    """A flat surface.
+    """Flat surface by point and normal.
 
     point    (3,) m, on it
     normal   (3,) unit vector, either way
@@ -32,11 +34,14 @@ class Plane:
     normal: tuple[float, float, float]
 
     def distance(self, position: Array, direction: Array) -> Array:
-        """Way (r,) along the rays to the surface, m; NaN where they run along it or it lies behind."""
+        """Distance (r,), m, along the rays to the surface.
+
+        NaN where they run along it or it lies behind.
+        """
         towards = direction @ np.asarray(self.normal)
         with np.errstate(divide="ignore", invalid="ignore"):
-            way = -((position - np.asarray(self.point)) @ np.asarray(self.normal)) / towards
-        return np.where(np.isfinite(way) & (way > AWAY), way, np.nan)
+            travel = -((position - np.asarray(self.point)) @ np.asarray(self.normal)) / towards
+        return np.where(np.isfinite(travel) & (travel > AWAY), travel, np.nan)
 
     def normals(self, position: Array) -> Array:
         """Unit normals (r, 3) at points on the surface."""
@@ -45,7 +50,7 @@ class Plane:
 
 @dataclass(frozen=True)
 class SphericalSurface:
-    """A round surface.
+    """Spherical surface by centre and radius.
 
     centre   (3,) m
     radius   m, above 0
@@ -57,14 +62,14 @@ class SphericalSurface:
     far: bool = False
 
     def distance(self, position: Array, direction: Array) -> Array:
-        """Way (r,) along the rays to the surface, m; NaN where they miss it or it lies behind."""
+        """Distance (r,), m, along the rays; NaN on a miss or behind."""
         from_centre = position - np.asarray(self.centre)
         middle = -np.sum(from_centre * direction, axis=-1)
         off = from_centre + middle[..., None] * direction  # the point nearest to the centre
         square = self.radius**2 - np.sum(off**2, axis=-1)
         half = np.sqrt(np.where(square >= 0.0, square, np.nan))
-        way = middle + half if self.far else middle - half
-        return np.where(way > AWAY, way, np.nan)
+        travel = middle + half if self.far else middle - half
+        return np.where(travel > AWAY, travel, np.nan)
 
     def normals(self, position: Array) -> Array:
         """Unit normals (r, 3) at points on the surface."""
@@ -76,7 +81,7 @@ Surface = Plane | SphericalSurface
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """A batch of rays; NaN for one that missed a surface or was reflected totally where it should have left.
+    """Batch of rays; NaN after a miss or unwanted total reflection.
 
     position    (r, 3) m
     direction   (r, 3) unit vectors
@@ -88,47 +93,47 @@ class Rays:
     path: Array
 
     def to(self, surface: Surface, group: float) -> "Rays":
-        """On to a surface through a medium of group index `group`."""
-        way = surface.distance(self.position, self.direction)
-        return replace(self, position=self.position + way[:, None] * self.direction, path=self.path + group * way)
+        """Propagate to a surface through a medium of group index `group`."""
+        travel = surface.distance(self.position, self.direction)
+        return replace(self, position=self.position + travel[:, None] * self.direction, path=self.path + group * travel)
 
     def refracted(self, surface: Surface, ratio: float) -> "Rays":
-        """Through the surface they stand on; `ratio` is the phase index before over the one behind."""
+        """Refract at the current surface; `ratio` is the phase index before over after."""
         normal = surface.normals(self.position)
         cosine = np.sum(self.direction * normal, axis=-1, keepdims=True)
-        rest = 1.0 - ratio**2 * (1.0 - cosine**2)
-        behind = np.copysign(np.sqrt(np.where(rest >= 0.0, rest, np.nan)), cosine)
-        return replace(self, direction=ratio * self.direction + (behind - ratio * cosine) * normal)
+        square = 1.0 - ratio**2 * (1.0 - cosine**2)
+        cosine_after = np.copysign(np.sqrt(np.where(square >= 0.0, square, np.nan)), cosine)
+        return replace(self, direction=ratio * self.direction + (cosine_after - ratio * cosine) * normal)
 
     def reflected(self, surface: Surface) -> "Rays":
-        """Back from the surface they stand on."""
+        """Reflect at the current surface."""
         normal = surface.normals(self.position)
         along = np.sum(self.direction * normal, axis=-1, keepdims=True)
         return replace(self, direction=self.direction - 2.0 * along * normal)
 
     def reflected_in(self, planes: Sequence[Plane], group: float) -> "Rays":
-        """Back from whichever of the planes each ray meets first, through a medium of group index `group`."""
-        ways = np.array([plane.distance(self.position, self.direction) for plane in planes])
-        first = np.argmin(np.where(np.isnan(ways), np.inf, ways), axis=0)
-        way = np.take_along_axis(ways, first[None], axis=0)[0]
+        """Reflect at the first plane on each ray, through group index `group`."""
+        travels = np.array([plane.distance(self.position, self.direction) for plane in planes])
+        first = np.argmin(np.where(np.isnan(travels), np.inf, travels), axis=0)
+        travel = np.take_along_axis(travels, first[None], axis=0)[0]
         normal = np.array([plane.normal for plane in planes])[first]
         along = np.sum(self.direction * normal, axis=-1, keepdims=True)
         return Rays(
-            self.position + way[:, None] * self.direction,
+            self.position + travel[:, None] * self.direction,
             self.direction - 2.0 * along * normal,
-            self.path + group * way,
+            self.path + group * travel,
         )
 
 
 def corner(apex: ArrayLike, azimuth: float = 0.0, errors: Sequence[float] = (0.0, 0.0, 0.0)) -> tuple[Plane, ...]:
-    """The three faces of a cube corner that opens towards +z; their normals point into the opening.
+    """Faces of a cube corner open to +z; normals point inwards.
 
     apex      (3,) m
     azimuth   rad: of the first edge, seen along z; the others follow at 120 deg
-    errors    rad, three: how much the angle between faces 2 and 3, 3 and 1, 1 and 2 exceeds a right angle
+    errors    rad, three: excess of the angles between faces 2 and 3, 3 and 1, 1 and 2 over a right angle
 
     Source: geometry. Faces at an angle a have normals at pi - a: exact for errors as the square root of the normals'
-    Gram matrix, which turns the three as little as can be.
+    Gram matrix, which turns the three least.
     """
     around = azimuth + np.arange(3) * 2.0 * np.pi / 3.0
     edges = np.stack([np.cos(around), np.sin(around), np.full(3, np.sqrt(0.5))], axis=-1) * np.sqrt(2.0 / 3.0)
@@ -143,7 +148,7 @@ def corner(apex: ArrayLike, azimuth: float = 0.0, errors: Sequence[float] = (0.0
 
 
 def beam(to_ranger: ArrayLike, offsets: ArrayLike, start: float = 1.0) -> Rays:
-    """Parallel rays that come from a ranger far away.
+    """Parallel rays from a distant ranger.
 
     to_ranger   (3,) unit vector from the retroreflector
     offsets     (r, 3) m: points that the rays would pass through, undisturbed
@@ -160,15 +165,15 @@ def beam(to_ranger: ArrayLike, offsets: ArrayLike, start: float = 1.0) -> Rays:
 
 
 def half_path(rays: Rays, to_ranger: ArrayLike, point: ArrayLike, *, start: float = 1.0) -> Array:
-    """How much further than a point the light of returned rays seems to have been, (r,) m, one way.
+    """Apparent distance of returned rays beyond a point, (r,) m, one way.
 
-    rays        from `beam`, out in the air again; each is taken on to the plane across its own direction
+    rays        from `beam`, out in the air again; each is propagated to the plane across its own direction
     to_ranger   (3,) as given to `beam`
     point       (3,) m
     start       m, as given to `beam`
 
     Source: definition. For a wave that returns exactly the way it came it is half the group path from a plane through
-    the point and back to it, which minus the range constant of a retroreflector must be.
+    the point and back to it, which must equal minus the range constant of a retroreflector.
     """
     towards, at = np.asarray(to_ranger, dtype=float), np.asarray(point, dtype=float)
     out = start - towards @ at
@@ -185,7 +190,9 @@ def through_prism(
     azimuth: float = 0.0,
     errors: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> Rays:
-    """Through a solid cube corner, face z = 0 and corner at z = -height, and out again: three reflections.
+    """Trace a solid cube corner and out again: three reflections.
+
+    Face at z = 0, corner at z = -height.
 
     height         m
     phase, group   index of the glass over that of the air; 1, 1 for a hollow corner behind its clear face
@@ -201,7 +208,7 @@ def through_prism(
 
 
 def through_ball(rays: Rays, *, r1: float, r2: float, phase: float, group: float) -> Rays:
-    """Through a cat's-eye about the origin: in by the sphere r1, back from the sphere r2, out by r1.
+    """Trace a cat's-eye about the origin: in by r1, back from r2, out by r1.
 
     r1, r2         m
     phase, group   index of the glass over that of the air

@@ -1,4 +1,4 @@
-"""From light on a lens and a photodiode to a signal of some amplitude, its delay, and the noise that comes with it."""
+"""Receiver: signal, delay and noise from light on lens and photodiode."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -8,10 +8,10 @@ BOLTZMANN = 1.380649e-23  # J/K, exact (SI)
 
 
 def signal_current(power: ArrayLike, *, depth: ArrayLike, responsivity: ArrayLike) -> NDArray[np.float64]:
-    """Amplitude of the photocurrent at the modulation frequency, in amperes.
+    """Amplitude of the photocurrent at the modulation frequency, A.
 
     power          W, mean, on the detector
-    depth          modulation depth of the light where it arrives, 0 to 1
+    depth          modulation depth of the arriving light, 0 to 1
     responsivity   A/W of the diode at that frequency
 
     Source: definition of the depth: P(t) = P (1 + depth cos wt). Exact.
@@ -33,7 +33,7 @@ def noise_density(
     temperature_k: ArrayLike = 293.15,
     intensity_noise_db_hz: ArrayLike = -np.inf,
 ) -> NDArray[np.float64]:
-    """One-sided density of the detector's noise current about the modulation frequency, in A^2/Hz.
+    """One-sided noise current density at the modulation frequency, A^2/Hz.
 
     power, background       W on the detector: the laser's, and daylight's
     responsivity            A/W
@@ -56,11 +56,11 @@ def noise_density(
 
 
 def u_phase(amplitude: ArrayLike, density: ArrayLike, duration: ArrayLike) -> NDArray[np.float64]:
-    """Standard uncertainty of the phase of a tone in white noise, in radians.
+    """Standard uncertainty of a tone's phase in white noise, rad.
 
     amplitude   of the tone, any unit
     density     one-sided density of the noise, that unit squared per Hz
-    duration    s that are averaged
+    duration    s, averaging time
 
     Source: the Cramér-Rao bound sqrt(2/N) sigma/A of [RIFE74] with sigma^2 = density * rate/2 and N = rate * duration.
     Exact for small u.
@@ -72,7 +72,9 @@ def u_phase(amplitude: ArrayLike, density: ArrayLike, duration: ArrayLike) -> ND
 
 
 def lens_group_lag(height: ArrayLike, powers: ArrayLike, phase: ArrayLike, *, group: ArrayLike) -> NDArray[np.float64]:
-    """Path (...), m, by which the modulation through a lens at a height comes later than on the axis: below zero.
+    """Modulation path through a lens at a height less the axis, m.
+
+    Below zero: later on the axis.
 
     height   (...) m, from the axis
     powers   1/m, (e,) or one number: of each thin element, their sum 1/focal length
@@ -80,7 +82,7 @@ def lens_group_lag(height: ArrayLike, powers: ArrayLike, phase: ArrayLike, *, gr
     group    (e,) group indices
 
     All rays of a sharp image take the same time for the wave (Fermat). The modulation is slower by n_g - n_p in glass,
-    and a collecting lens is thickest in its middle: by the group index it is the middle that comes late [BOR88], not
+    and a collecting lens is thickest in its middle: by the group index the middle is late [BOR88], not
     the outer rays as [PARKER04] chapter 6, item 1, has it. Outer rays can be late by the lens's own spherical
     aberration, which is the same for wave and modulation: see `traced_lens`. A lens of two glasses whose focal length
     does not change with the wavelength has no lag: the sum below is h^2/2 of wavelength times change of power. A
@@ -99,7 +101,9 @@ def lens_group_lag(height: ArrayLike, powers: ArrayLike, phase: ArrayLike, *, gr
 def lens_group_range(
     aperture: ArrayLike, beam_radius: ArrayLike, *, powers: ArrayLike, phase: ArrayLike, group: ArrayLike
 ) -> NDArray[np.float64]:
-    """Metres that a range reads short (below zero) by `lens_group_lag`, against light on the axis of the lens.
+    """Range error by `lens_group_lag`, m, below zero where short.
+
+    Against light on the axis of the lens.
 
     aperture              (...) m, above 0: radius of the receiving lens
     beam_radius           (...) m, above 0: of the light on it at 1/e^2; infinite for even light
@@ -126,16 +130,18 @@ def lens_group_range(
 def traced_lens(
     heights: ArrayLike, *, r1: float, r2: float, thickness: float, phase: float, group: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Paths (r,), m, of wave and modulation through a lens to the plane of its paraxial focus, less the axis'.
+    """Paths (r,), m, of wave and modulation through a lens, less the axis.
+
+    To the plane of its paraxial focus.
 
     heights        (r,) m, of rays parallel to the axis
     r1, r2         m, radii, above zero where the centre lies behind the surface; infinite for a plane
     thickness      m, on the axis
     phase, group   indices of the glass over those of the air
 
-    The first is the lens's spherical aberration on a flat detector there, the second has the group lag besides. At f/4
-    a plano-convex lens with its flat side to the target has +181 um at the edge and -51 um of lag; the right way round
-    it is +43 and -50. NaN for a ray that misses.
+    The first is the lens's spherical aberration on a flat detector there, the second also has the group lag. At f/4
+    a plano-convex lens with its flat side to the target has +181 um at the edge and -51 um of lag; the correct way
+    round it is +43 and -50. NaN for a ray that misses.
 
     Source: exact rays, see `ray_trace`.
     """
@@ -147,8 +153,8 @@ def traced_lens(
             return Plane((0.0, 0.0, vertex), (0.0, 0.0, 1.0))
         return SphericalSurface((0.0, 0.0, vertex + radius), abs(radius), far=radius < 0.0)
 
-    whole = thick_lens(r1, r2, thickness=thickness, index=phase)
-    image = Plane((0.0, 0.0, thickness - float(whole[0, 0] / whole[1, 0])), (0.0, 0.0, 1.0))
+    matrix = thick_lens(r1, r2, thickness=thickness, index=phase)
+    image = Plane((0.0, 0.0, thickness - float(matrix[0, 0] / matrix[1, 0])), (0.0, 0.0, 1.0))
     h = np.concatenate([[0.0], np.ravel(np.asarray(heights, float))])
     front, back, start = surface(0.0, r1), surface(thickness, r2), -1.0
     position = np.stack([h, np.zeros_like(h), np.full_like(h, start)], axis=-1)

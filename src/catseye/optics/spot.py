@@ -1,8 +1,8 @@
-"""What comes back from a retroreflector that the beam does not meet in its centre: the spot that a scan shows.
+"""Spot of a scan: return from a retroreflector against beam offset.
 
-A beam off by d from the centre comes back turned about that centre: its own axis lands 2 d off the lens's. It loses
-what passes the retroreflector on one side, and then what passes the lens. The phase of what returns, averaged over the
-lens, changes by micrometres at most, since a corner cube makes the way of every ray of a plane wave equally long.
+A beam off by d from the centre comes back turned about that centre: its axis is 2 d off the lens's axis. Light is
+lost first beside the retroreflector, then beside the lens. The phase of what returns, averaged over the
+lens, changes by micrometres at most, since a corner cube gives all rays of a plane wave equal paths.
 
 The electric signal grows with the power. Amplitudes in volt therefore have the shape of shares of power.
 """
@@ -17,14 +17,14 @@ from catseye.optics.gaussian_beam import radius as beam_radius
 Array = NDArray[np.float64]
 FEWEST_NODES, MOST_NODES = 32, 400
 NODES_PER_RADIAN = 0.85  # of phase from middle to edge; the angle of a chord runs pi/2 faster, which needs 0.8
-NOTHING = 6.0  # beam radii from its axis: exp(-72) of the light
-FALLS = 1.5  # how much further out is tried next
+NEGLIGIBLE = 6.0  # beam radii from its axis: exp(-72) of the light
+FALLS = 1.5  # factor to the next trial distance
 
 
 def offset_share(
     offset: ArrayLike, distance: float, *, aperture: float, receiver: float, waist: float, wavelength: float
 ) -> Array:
-    """Share (...) of a beam's power that comes back into the receiver when the beam misses the centre by `offset`.
+    """Share (...) of power returned to the receiver at a beam offset.
 
     offset       (...) m, any sign: beam axis from the retroreflector's centre
     distance     m, above 0: from the waist, which lies at the receiver, to the retroreflector
@@ -35,7 +35,7 @@ def offset_share(
 
     Source: Fresnel's integral, [GOODMAN05] eq. 4-17, of the Gaussian field of [SIEGMAN86] eq. 17.4 turned about the
     retroreflector's centre. Exact in the paraxial approximation, to some 1e-5. At offset 0 it is
-    `gaussian_beam.returned_share`. Raises ValidityError where the fringes are too many to follow.
+    `gaussian_beam.returned_share`. Raises ValidityError where the fringes are too many to integrate.
 
     >>> offset_share([0.0, 0.0084], 120.0, aperture=0.0254, receiver=0.05, waist=0.010, wavelength=0.78e-6).round(4)
     array([1.    , 0.9989])
@@ -47,7 +47,7 @@ def offset_share(
     w = float(beam_radius(distance, waist=waist, wavelength=wavelength))
     power = []
     for d in off.flat:
-        if d - aperture > NOTHING * w:
+        if d - aperture > NEGLIGIBLE * w:
             power.append(0.0)
             continue
         field, area = _in_lens(float(d), k, nodes_for=k, **named)
@@ -65,13 +65,15 @@ def offset_range(
     wavelength: float,
     modulation_hz: float = 1500e6,
 ) -> Array:
-    """How much longer (...), m, the range becomes by diffraction when the beam misses the centre, against a hit.
+    """Range change (...), m, by diffraction at a beam offset.
+
+    Against a centred beam, positive where longer.
 
     offset, distance, ...   as for `offset_share`
     modulation_hz           Hz, above 0
 
     The photocurrent at the modulation is the beat of carrier and sideband over the lens; half its phase in metres. The
-    steering changes the range besides, see `steering_range`.
+    steering also changes the range, see `steering_range`.
 
     Source: as `offset_share`, for two wavelengths a modulation apart. To some 1e-9 m.
 
@@ -94,7 +96,9 @@ def offset_range(
 
 
 def steering_range(offset: ArrayLike, distance: ArrayLike) -> Array:
-    """Change (...), m, of a range when the beam is steered past the target by `offset`: never above zero.
+    """Range change (...), m, from steering the beam off the target.
+
+    Never above zero.
 
     offset     (...) m
     distance   (...) m, above 0
@@ -119,16 +123,19 @@ def gaussian_spot(
     background: ArrayLike,
     flatness: ArrayLike = 1.0,
 ) -> Array:
-    """Amplitude (...) at places (x, y) about the centre of a round spot, background + peak exp(-2 (r/radius)^(2 f)).
+    """Amplitude (...) of a round spot at (x, y).
+
+    background + peak exp(-2 (r/radius)^(2 f)).
 
     x, y          any unit, one for both, from the centre
     peak          V, above the background
-    radius        that unit, above 0: where the peak has fallen to 1/e^2
+    radius        that unit, above 0: at 1/e^2 of the peak
     background    V
     flatness      f, 1 or more: 1 a Gaussian, more a flat top with steep sides, as of a retroreflector wider than the
                   beam
 
-    Source: definition; a Gaussian is what two Gaussian apertures in a row give. See `matched_radius` for real ones.
+    Source: definition; a Gaussian is the result of two Gaussian apertures in series. See `matched_radius` for real
+    ones.
 
     >>> float(gaussian_spot(0.0, 0.0, peak=4.0, radius=1.0, background=0.5))
     4.5
@@ -142,7 +149,9 @@ def gaussian_spot(
 
 
 def reach(radius: ArrayLike, share: ArrayLike) -> Array:
-    """How far (...) from the centre of a Gaussian spot there is still a given share of its peak; the unit of `radius`.
+    """Radius (...) at a share of a Gaussian spot's peak.
+
+    In the unit of `radius`.
 
     radius   above 0, at 1/e^2
     share    above 0 to 1
@@ -161,7 +170,7 @@ def reach(radius: ArrayLike, share: ArrayLike) -> Array:
 def matched_radius(
     distance: float, *, aperture: float, receiver: float, waist: float, wavelength: float, share: float = 0.5
 ) -> float:
-    """Radius, m at the target, of the Gaussian spot that falls to `share` of its peak where the real one does.
+    """Radius, m at the target, of the Gaussian spot matched at `share`.
 
     distance, aperture, receiver, waist, wavelength   as for `offset_share`
     share    above 0, below 1: of the peak; half by default
@@ -201,11 +210,11 @@ def _refuse(offset: ArrayLike, **named: float) -> None:
 def _in_lens(
     d: float, k: float, *, nodes_for: float, distance: float, aperture: float, receiver: float, waist: float
 ) -> tuple[NDArray[np.complex128], Array]:
-    """Field at places across the lens and the area of each, for a beam off by d along x.
+    """Field across the lens and the areas, for a beam offset d along x.
 
     Both discs are cut into chords: x = a sin(alpha) along one, y = a cos(alpha) eta across, so that the integrands are
-    smooth and Gauss-Legendre converges. All is even in y: half of either serves. The phase that all light shares is
-    left out.
+    smooth and Gauss-Legendre converges. All is even in y, so half of either is used. The common phase is
+    omitted.
     """
     rayleigh = 0.5 * k * waist**2
     bend = distance / (distance**2 + rayleigh**2)  # 1/R of the wave that arrives
@@ -229,11 +238,14 @@ def _in_lens(
 
 
 def _nodes(run: float) -> tuple[Array, Array, Array, Array]:
-    """Gauss-Legendre on -pi/2..pi/2 and on -1..1, nodes and weights; the phase runs so far from middle to edge."""
+    """Gauss-Legendre nodes and weights on -pi/2..pi/2 and -1..1.
+
+    Their number follows from the phase range from middle to edge.
+    """
     count = FEWEST_NODES + 2 * int(0.5 * NODES_PER_RADIAN * run)  # even: none in the middle
     if count > MOST_NODES:
         raise ValidityError(
-            f"the light's phase runs over {run:.0f} rad of an aperture, more than is followed (expected a smaller "
+            f"the light's phase runs over {run:.0f} rad of an aperture, too much to integrate (expected a smaller "
             "one or a longer distance)"
         )
     node, weight = np.polynomial.legendre.leggauss(count)

@@ -1,4 +1,6 @@
-"""Zernike polynomials by Noll's and ANSI's numbers, quadrature over their circle, and orthonormal ones on any points.
+"""Zernike polynomials by Noll or ANSI number, and orthonormal functions.
+
+With a quadrature over their circle.
 
 Azimuth counts from +x towards +y: cosines have m above zero, sines below. Each has rms 1 over the unit circle, the
 first one (piston) apart from mean 0; so a coefficient is the rms that its term makes.
@@ -14,7 +16,7 @@ from catseye.errors import ValidityError
 Numbering = Literal["noll", "ansi"]
 NUMBERINGS: tuple[Numbering, ...] = ("noll", "ansi")
 LARGEST = 500  # terms: radial order 30, to which rounding stays below 1e-12
-DEPENDENT = 1e-9  # of a column's length: what is left of it beside the columns before it
+DEPENDENT = 1e-9  # of a column's length: remainder after projection on earlier columns
 NAMES = {
     (0, 0): "piston", (1, 1): "tilt x", (1, -1): "tilt y", (2, 0): "defocus", (2, 2): "astigmatism 0°",
     (2, -2): "astigmatism 45°", (3, 1): "coma x", (3, -1): "coma y", (3, 3): "trefoil 0°", (3, -3): "trefoil 30°",
@@ -24,19 +26,19 @@ NAMES = {
 
 
 class Term(NamedTuple):
-    """Radial order n, azimuthal frequency m; n - |m| even and not below zero."""
+    """Radial order n, azimuthal frequency m; n - |m| even, not negative."""
 
     n: int
     m: int
 
     @property
     def name(self) -> str:
-        """What opticians call the term."""
+        """Optical name of the term."""
         return NAMES.get((self.n, self.m), f"order {self.n}, {'cosine' if self.m >= 0 else 'sine'} {abs(self.m)}")
 
 
 def term(number: int, numbering: Numbering) -> Term:
-    """The term that bears a number.
+    """Zernike term with a number.
 
     number      from 1 as Noll counts, from 0 as ANSI does
     numbering   "noll" or "ansi"
@@ -47,7 +49,7 @@ def term(number: int, numbering: Numbering) -> Term:
     (Term(n=2, m=2), Term(n=2, m=2))
     """
     if numbering not in NUMBERINGS:
-        raise ValidityError(f"numbering {numbering!r} is not known (expected {' or '.join(NUMBERINGS)})")
+        raise ValidityError(f"numbering {numbering!r} is unknown (expected {' or '.join(NUMBERINGS)})")
     first = 1 if numbering == "noll" else 0
     if number < first:
         raise ValidityError(f"Zernike number {number} is below {first}, where {numbering} begins")
@@ -61,19 +63,19 @@ def term(number: int, numbering: Numbering) -> Term:
 
 
 def number(of: Term, numbering: Numbering) -> int:
-    """The number that a term bears.
+    """Number of a Zernike term.
 
     of          n - |m| even and not below zero
     numbering   "noll" or "ansi"
 
-    Source: [NOLL76] table I; [THIBOS02]. Raises ValidityError for what is no term.
+    Source: [NOLL76] table I; [THIBOS02]. Raises ValidityError for an invalid term.
 
     >>> number(Term(4, 0), "noll"), number(Term(4, 0), "ansi")
     (11, 12)
     """
     n, m = of
     if n < abs(m) or (n - m) % 2:
-        raise ValidityError(f"n = {n}, m = {m} is no Zernike term (expected n - |m| even and not below zero)")
+        raise ValidityError(f"n = {n}, m = {m} is not a Zernike term (expected n - |m| even and not below zero)")
     row = n * (n + 1) // 2
     candidates = range(row, row + n + 1)
     first = 1 if numbering == "noll" else 0
@@ -81,7 +83,7 @@ def number(of: Term, numbering: Numbering) -> int:
 
 
 def terms(count: int, numbering: Numbering) -> tuple[Term, ...]:
-    """The first so many terms, in the order of their numbers.
+    """First terms, in the order of their numbers.
 
     count       1 to 500
     numbering   "noll" or "ansi"
@@ -94,10 +96,12 @@ def terms(count: int, numbering: Numbering) -> tuple[Term, ...]:
     return tuple(term(first + k, numbering) for k in range(count))
 
 
-def zernike(wanted: tuple[Term, ...], x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
-    """Values of Zernike terms, (..., k): the radial part by Jacobi's recurrence, rms 1 over the unit circle.
+def zernike(selection: tuple[Term, ...], x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
+    """Values (..., k) of Zernike terms, rms 1 over the unit circle.
 
-    wanted   k terms
+    The radial part by Jacobi's recurrence.
+
+    selection   k terms
     x, y     in units of the circle's radius, from its centre; outside the circle the polynomials go on
 
     R_n^m(r) = r^m P_j^(0,m)(2 r^2 - 1), j = (n - m)/2, times sqrt(n + 1), and sqrt(2) where m is not zero.
@@ -110,8 +114,8 @@ def zernike(wanted: tuple[Term, ...], x: ArrayLike, y: ArrayLike) -> NDArray[np.
 
     x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
     r2, angle = x * x + y * y, np.arctan2(y, x)
-    terms = np.empty((*x.shape, len(wanted)))
-    for k, (n, m) in enumerate(wanted):
+    terms = np.empty((*x.shape, len(selection)))
+    for k, (n, m) in enumerate(selection):
         size = abs(m)
         radial = np.sqrt(r2) ** size * eval_jacobi((n - size) // 2, 0, size, 2.0 * r2 - 1.0)
         wave = np.sqrt(2.0) * (np.cos(size * angle) if m > 0 else np.sin(size * angle)) if m else 1.0
@@ -120,7 +124,9 @@ def zernike(wanted: tuple[Term, ...], x: ArrayLike, y: ArrayLike) -> NDArray[np.
 
 
 def disk_quadrature(degree: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Points (q, 2) of the unit circle and weights (q,) that average polynomials over it; the weights sum to 1.
+    """Points (q, 2) of the unit circle, weights (q,) for polynomial averages.
+
+    The weights sum to 1.
 
     degree   to which it is exact, 0 or more
 
@@ -141,14 +147,16 @@ def disk_quadrature(degree: int) -> tuple[NDArray[np.float64], NDArray[np.float6
 
 
 def orthonormal(values: ArrayLike, weights: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Functions made orthonormal on points with weights, each from itself and those before it (Gram and Schmidt by QR).
+    """Functions made orthonormal on weighted points.
+
+    Each from itself and those before it (Gram and Schmidt by QR).
 
     values    (k, t), t functions at k points
     weights   (k,) 0 or more; taken as shares of their sum
 
     Returns the basis (k, t), whose weighted products average to the unit matrix, and the matrix (t, t), upper
     triangular with diagonal above zero: basis = values @ matrix. Raises ValidityError for weights below zero or none,
-    and for functions that these points do not tell apart.
+    and for functions that these points do not separate.
     """
     values, weights = np.asarray(values, dtype=float), np.asarray(weights, dtype=float)
     if (weights < 0.0).any() or not (total := float(weights.sum())) > 0.0:
@@ -158,15 +166,15 @@ def orthonormal(values: ArrayLike, weights: ArrayLike) -> tuple[NDArray[np.float
     root = np.sqrt(weights / total)[:, None]
     points, count = values.shape
     if points < count:
-        raise ValidityError(f"{points} points do not hold {count} functions (expected as many points at least)")
+        raise ValidityError(f"{points} points do not determine {count} functions (expected as many points at least)")
     triangle = np.linalg.qr(root * values, mode="r")
     size = np.linalg.norm(root * values, axis=0)
     poor = np.flatnonzero(np.abs(np.diag(triangle)) <= DEPENDENT * size)
     if len(poor):
         raise ValidityError(
-            f"function {poor[0] + 1} of {count} is not told apart from those before it on these {points} points; "
+            f"function {poor[0] + 1} of {count} is not separable from those before it on these {points} points; "
             "ask for fewer terms"
         )
     signs = np.sign(np.diag(triangle))
     matrix = np.linalg.solve(triangle * signs[:, None], np.eye(count))
-    return values @ matrix, matrix  # not by the orthogonal factor, which says nothing where a weight is zero
+    return values @ matrix, matrix  # not by the orthogonal factor, which is undefined where a weight is zero

@@ -1,1 +1,1 @@
-"""From the converter's samples to a phasor, a phase and whole cycles."""
+"""Signal processing: converter samples to phasor, phase and whole cycles."""

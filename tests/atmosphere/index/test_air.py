@@ -113,7 +113,7 @@ def test_vapour_that_cannot_be_is_refused(function):
         function(20.0, 933.0, float("nan"))
 
 
-def test_carbon_dioxide_that_a_model_does_not_have_is_told_not_used():
+def test_carbon_dioxide_not_in_a_model_is_reported_and_not_used():
     assert air(**GOOD, co2_ppm=600.0).co2_ppm == 600.0
     for model, fixed in (("rueger1990", 300.0), ("iag1999_closed", 375.0), ("barrell_sears1963", 300.0)):
         told = air(**GOOD, model=model, co2_ppm=600.0)
@@ -122,7 +122,7 @@ def test_carbon_dioxide_that_a_model_does_not_have_is_told_not_used():
         assert told.group_refractivity == air(**GOOD, model=model).group_refractivity
 
 
-def test_a_modulation_of_nothing_is_refused():
+def test_a_modulation_of_zero_is_refused():
     with pytest.raises(ValidityError, match="modulation frequency 0 Hz"):
         air(20.0, 933.0, 50.0, modulation_hz=0.0)
 

@@ -155,7 +155,7 @@ def test_threads_share_the_states_without_seams(name, monkeypatch):
         assert not compiled(name, spoilt)[1]
 
 
-def test_the_saturation_polynomial_follows_its_formula_over_the_whole_interval(name):
+def test_the_saturation_polynomial_follows_its_formula_over_the_full_interval(name):
     found = (rueger1990_kernel if name == "rueger1990" else ciddor_hill1999_kernel).SATURATION
     limit = MODELS[name].limits["temperature_c"]
     t = np.linspace(limit.lower, limit.upper, 20_001)

@@ -79,7 +79,7 @@ def test_a_helium_neon_laser_has_its_known_wavelength_in_standard_air():
     assert float(got) * 1e3 == pytest.approx(632.816, abs=6e-4)
 
 
-def test_a_wavelength_that_is_none_and_a_modulation_in_megahertz_are_refused():
+def test_an_invalid_wavelength_and_a_modulation_in_megahertz_are_refused():
     with pytest.raises(ValidityError, match="wavelength"):
         wavelength.air_wavelength_um(780.0, *STATE)
     with pytest.raises(ValidityError, match="modulation frequency 1500 Hz"):

@@ -171,7 +171,7 @@ def test_covariance_is_positive_and_a_path_is_itself_from_either_end():
     assert same[0, 1] == pytest.approx(same[0, 0], rel=1e-12)
 
 
-def test_a_sensor_that_gave_nothing_is_as_if_it_were_not_there():
+def test_a_sensor_without_readings_is_ignored():
     world = BoundaryLayer(10)
     whole = weather(world)
     gone = whole.station == 2
@@ -186,7 +186,7 @@ def test_a_sensor_that_gave_nothing_is_as_if_it_were_not_there():
     assert np.all(np.abs(less.refractivity - more.refractivity) < 1e-7)  # humidity is worth 0.008 ppm a per cent
     none = WeatherReadings(*(getattr(broken, f) for f in ("seconds", "z", "station", "temperature_c", "pressure_hpa")),
                            np.full(whole.z.shape, np.nan), whole.count)  # fmt: skip
-    with pytest.raises(EstimationError, match="humidity_percent was read by no station"):
+    with pytest.raises(EstimationError, match="humidity_percent was not read by any station"):
         AirProfile.of(none, ground=GROUND)
 
 

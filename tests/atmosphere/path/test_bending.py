@@ -68,14 +68,14 @@ def test_one_kelvin_a_metre_over_120_m_does_not_matter_to_a_range_but_turns_the_
     assert float(bending.excess_bound(bending.steepest_gradient(0.2e-6, 120.0), 120.0)) == pytest.approx(0.2e-6)
 
 
-def test_what_no_air_has_is_refused():
+def test_gradients_beyond_any_air_are_refused():
     with pytest.raises(ValidityError, match="gradient of the index 1 1/m is outside"):
         bending.excess_bound(1.0, 10.0)
-    with pytest.raises(ValidityError, match="no chord so long"):
+    with pytest.raises(ValidityError, match="the chord is too long"):
         bending.excess_bound(0.01, 300.0)
 
 
-def test_what_is_no_length_or_excess_is_refused():
+def test_invalid_lengths_and_excesses_are_refused():
     with pytest.raises(ValidityError, match="excess -1e-06 m is outside"):
         bending.steepest_gradient(-1e-6, 120.0)
     with pytest.raises(ValidityError, match="length -1 m is outside"):

@@ -14,7 +14,7 @@ def test_the_notes_lapse_is_the_hydrostatic_one_at_the_site():
 
 
 @pytest.mark.parametrize(("temperature_c", "within"), [(20.0, 0.2), (0.0, 0.7), (30.0, 0.6), (-20.0, 1.6)])
-def test_the_constant_lapse_is_as_good_as_its_docstring_says(temperature_c, within):
+def test_the_constant_lapse_has_its_documented_accuracy(temperature_c, within):
     apart = path.pressure_at(933.0, 0.0, 100.0) - path.hydrostatic_pressure_hpa(933.0, temperature_c, 0.0, z_to=100.0)
     assert abs(float(apart)) < within
 

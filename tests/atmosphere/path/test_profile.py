@@ -126,7 +126,7 @@ def test_without_time_and_offsets_it_is_the_weighted_straight_line():
     )  # priors of 300 °C and 10 °C/m beside 0.1 °C and 0.003 °C/m
 
 
-def test_one_station_says_nothing_of_the_gradient_but_the_prior_does():
+def test_one_station_leaves_the_gradient_to_the_prior():
     still = np.arange(0.0, 3600.0, 60.0)
     profile = Profile.of(readings(still, [2.0], np.full((60, 1), 15.0)), TEMPERATURE, ground=0.0)
     np.testing.assert_allclose(profile.at([1800.0] * 3, [2.0, 20.0, 52.0]), 15.0, atol=1e-3)  # prior: no gradient
@@ -232,7 +232,7 @@ def test_honest_stations_are_not_accused():
 
 
 @pytest.mark.parametrize("liar", range(4))
-def test_a_station_that_lies_is_named_with_its_lie(liar):
+def test_a_biased_station_is_named_with_its_bias(liar):
     wrong = np.zeros((60, 4))
     wrong[:, liar] = 4.0
     found = suspect_readings(Profile.of(scene(3, wrong), TEMPERATURE, ground=0.0))
@@ -270,9 +270,9 @@ def test_leaving_out_wild_readings_by_turns_is_the_profile_without_them():
     np.testing.assert_allclose(found.w[kept], again.w, atol=0.02)
 
 
-def test_what_cannot_be_is_refused():
+def test_invalid_values_are_refused():
     some = readings([0.0, 60.0], [2.0], [[15.0], [15.0]])
-    with pytest.raises(EstimationError, match="no reading at all"):
+    with pytest.raises(EstimationError, match="no readings; priors alone"):
         Profile.of(ProfileReadings(*(np.zeros(0) for _ in range(5))), TEMPERATURE, ground=0.0)
     with pytest.raises(ValidityError, match="height above the ground -1 m"):
         Profile.of(some, TEMPERATURE, ground=3.0)

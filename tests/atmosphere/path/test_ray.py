@@ -122,7 +122,7 @@ def test_in_shells_n_r_cos_elevation_is_the_same_at_both_ends():
 
 
 @pytest.mark.parametrize("k", [0.13, 0.5, -1.0])
-def test_the_velocity_corrections_make_the_chord_of_what_the_ray_shows(k):
+def test_the_velocity_corrections_turn_the_ray_length_into_the_chord(k):
     """`atmosphere.sound.velocity`, index of the ends: its second correction and its arc to chord, against this ray."""
     d = 20_000.0
     drop = EARTH_RADIUS - np.sqrt(EARTH_RADIUS**2 - d**2 / 4)  # ends on one level surface, the chord's middle below it
@@ -208,7 +208,7 @@ def test_no_air_bends_the_optical_path_beyond_the_bound_nor_above_the_chords(see
 
 @examples(6)
 @given(st.integers(0, 10_000))
-def test_a_ray_goes_back_the_way_it_came_and_knows_no_directions_of_the_compass(seed):
+def test_a_ray_is_reversible_and_independent_of_azimuth(seed):
     air, _ = waves(seed)
     rng = np.random.default_rng(seed)
     a, b = rng.uniform(-50, 50, (2, 3, 3))
@@ -247,5 +247,5 @@ def test_a_path_over_a_mirage_is_a_status_and_spoils_no_other():
 
 
 def test_a_path_of_no_length_is_refused():
-    with pytest.raises(ValidityError, match=r"path 1 from .* is no path"):
+    with pytest.raises(ValidityError, match=r"path 1 from .* has zero length"):
         bent_ray(layered(hot_ground), np.ones((2, 3)), np.array([[2.0, 1, 1], [1, 1, 1]]))

@@ -131,7 +131,7 @@ def test_the_notes_ratio_of_specific_heats_of_water_costs_half_a_metre_per_secon
     )
 
 
-def test_the_real_gas_agrees_with_cramer_within_what_both_claim():
+def test_the_real_gas_agrees_with_cramer_within_their_uncertainties():
     t, p, h = np.meshgrid(np.linspace(0, 30, 16), np.linspace(750, 1020, 7), np.linspace(0, 100, 6), indexing="ij")
     e = humidity.vapour_pressure_hpa(t, p, h, "ciddor")
     departure = 1e6 * (sound_real_gas.speed(t, p, e, 400.0) / sound_cramer1993.speed(t, p, e, 400.0) - 1.0)
@@ -140,13 +140,13 @@ def test_the_real_gas_agrees_with_cramer_within_what_both_claim():
     assert departure.max() < -28.0
 
 
-def test_carbon_dioxide_slows_sound_as_cramer_says():
+def test_carbon_dioxide_slows_sound_as_in_cramer():
     ours = sound_real_gas.partials(15.0, 1000.0, 0.0, 400.0).co2_ppm
     assert ours == pytest.approx(float(sound_cramer1993.partials(15.0, 1000.0, 0.0, 400.0).co2_ppm), rel=0.03)
 
 
 @pytest.mark.parametrize("model", sorted(MODELS))
-def test_temperature_comes_back_from_speed(model):
+def test_temperature_is_recovered_from_speed(model):
     t = np.linspace(0.0, 30.0, 7)
     for p, h in ((1013.0, 0.0), (800.0, 100.0)):
         state = sound(t, p, h, model=model)
@@ -227,7 +227,7 @@ def test_a_bent_ray_arrives_early_by_the_time_along_its_circle(gradient):
     assert sound_path.bent_ray_excess(length, c0, gradient) == pytest.approx(1.0 - time * c0 / length, rel=1e-6)
 
 
-def test_what_a_path_averages_is_the_harmonic_mean_of_speed_and_wind():
+def test_a_path_averages_the_harmonic_mean_of_speed_and_wind():
     s = (np.arange(200_000) + 0.5) / 200_000
     kelvin, wind = 293.15 + 3.0 * np.sin(7 * np.pi * s) + 2.0 * s, 1.5 * np.cos(11 * np.pi * s)
     c = 20.05 * np.sqrt(kelvin)
@@ -259,7 +259,7 @@ def test_zero_degrees_and_zero_percent_are_legal():
         (([20.0, 60.0], 933.0, 50.0), "temperature 60 C (element 1 of 2)"),
     ],
 )
-def test_what_is_outside_is_refused_by_name_value_and_limit(weather, complaint):
+def test_values_outside_are_refused_with_name_value_and_limit(weather, complaint):
     with pytest.raises(ValidityError) as caught:
         sound(*weather, model="real_gas")
     assert complaint in str(caught.value)

@@ -68,12 +68,12 @@ def test_thinner_air_than_the_reference_makes_lengths_longer():
 
 
 @given(st.floats(1.0, 1e5), st.floats(1.0001, 1.0004), st.floats(1.0001, 1.0004))
-def test_correcting_there_and_back_is_nothing(length, first, second):
+def test_correcting_in_both_directions_cancels(length, first, second):
     there = length + first_velocity_correction(length, first, second)
     assert there + first_velocity_correction(there, second, first) == pytest.approx(length, rel=1e-14)
 
 
-def test_at_baseline_lengths_the_bent_ray_is_nothing():
+def test_at_baseline_lengths_ray_bending_is_negligible():
     assert abs(second_velocity_correction(510.0)) < 1e-7
     assert abs(arc_to_chord_correction(510.0)) < 1e-8
 

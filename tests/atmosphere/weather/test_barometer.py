@@ -42,7 +42,7 @@ def test_the_smithsonian_formula_lies_within_11_milligal_of_todays(latitude, ele
 
 
 @given(st.floats(-np.pi / 2, np.pi / 2), st.floats(0.0, 5000.0))
-def test_gravity_falls_with_height_as_free_air_says(latitude, elevation):
+def test_gravity_falls_with_height_as_in_free_air(latitude, elevation):
     for formula in barometer.GRAVITY_FORMULAS:
         low, high = (barometer.normal_gravity(latitude, elevation + s, formula=formula) for s in (-50.0, 50.0))
         # the second order takes 1.5e-12/s² a metre off
@@ -203,6 +203,6 @@ def test_carried_pressures_uncertainty_is_the_scatter_of_a_monte_carlo():
         (lambda: carried_pressure(933.0, 20.0, 0.0, z_to=1.0, vapour_pressure_hpa=1000.0), "vapour's share"),
     ],
 )
-def test_what_is_out_of_range_is_refused_by_name_value_and_limit(call, text):
+def test_values_out_of_range_are_refused_with_name_value_and_limit(call, text):
     with pytest.raises(ValidityError, match=text):
         call()

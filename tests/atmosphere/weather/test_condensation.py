@@ -101,7 +101,7 @@ def test_perfectly_dry_air_leaves_every_surface_clear():
     )
     assert np.all(np.isinf(found.margin_k))
     assert found.probability.tolist() == [0.0, 0.0]
-    assert found.lines() == ["clear: the air holds no vapour"] * 2
+    assert found.lines() == ["clear: the air has no vapour"] * 2
 
 
 def test_a_sky_warmer_than_a_black_body_is_refused():
@@ -110,7 +110,7 @@ def test_a_sky_warmer_than_a_black_body_is_refused():
         radiative_depression_k(40.0, 39.0, 1000.0)
 
 
-def test_lines_say_deposit_margin_point_and_probability():
+def test_lines_contain_deposit_margin_point_and_probability():
     found = condensation(
         np.array([5.0, 8.0, -3.5, -1.0]), np.array([10.0, 10.0, -2.0, 8.0]), 933.0,
         humidity_percent=np.array([75.0, 75.0, 90.0, 70.0]),
@@ -158,7 +158,7 @@ def test_glass_under_a_clear_sky_is_several_kelvin_below_the_air_and_gold_is_not
         (lambda: condensation(np.nan, 10.0, 933.0, humidity_percent=75.0), "surface temperature is not a number"),
         (
             lambda: condensation(5.0, 10.0, 933.0, humidity_percent=75.0, u=CondensationSpread(surface_c=-1.0)),
-            "u_surface_c = -1 is not a standard unc",
+            "u_surface_c = -1 is invalid as a standard unc",
         ),
         (
             lambda: condensation(
@@ -172,6 +172,6 @@ def test_glass_under_a_clear_sky_is_several_kelvin_below_the_air_and_gold_is_not
         (lambda: radiative_depression_k(10.0, 2.0, emissivity=90.0), "emissivity 90"),
     ],
 )
-def test_what_is_out_of_range_is_refused_by_name_value_and_limit(call, text):
+def test_values_out_of_range_are_refused_with_name_value_and_limit(call, text):
     with pytest.raises(ValidityError, match=text):
         call()

@@ -27,13 +27,13 @@ def test_buck_is_the_notes_formula_digit_by_digit():
 @pytest.mark.parametrize(
     ("temperature_c", "within"), [(50.0, 1e-3), (20.0, 1e-3), (0.0, 1e-3), (-20.0, 1e-3), (-40.0, 9e-3)]
 )
-def test_buck_is_as_good_as_its_docstring_says(temperature_c, within):
+def test_buck_has_its_documented_accuracy(temperature_c, within):
     moist = murphy_koop_hpa(temperature_c) * humidity.enhancement_factor(temperature_c, 933.0)
     assert float(humidity.saturation_pressure_hpa(temperature_c, 933.0) / moist) == pytest.approx(1.0, abs=within)
 
 
 @pytest.mark.parametrize(("temperature_c", "within"), [(30.0, 2.5e-4), (0.0, 2.5e-4), (-20.0, 4e-4), (-40.0, 2.5e-3)])
-def test_iapws_is_as_good_as_its_docstring_says_in_supercooled_water(temperature_c, within):
+def test_iapws_has_its_documented_accuracy_in_supercooled_water(temperature_c, within):
     ratio = humidity.iapws_saturation_pressure_hpa(temperature_c) / murphy_koop_hpa(temperature_c)
     assert float(ratio) == pytest.approx(1.0, abs=within)
 
@@ -66,7 +66,7 @@ def test_dew_point_is_the_notes_equation_1_7():
 
 
 @pytest.mark.parametrize("formula", FORMULAS)
-def test_perfectly_dry_air_has_no_dew_point_and_says_nan_without_a_warning(formula):
+def test_perfectly_dry_air_has_nan_dew_point_without_a_warning(formula):
     got = humidity.dew_point_c(np.array([0.0, 5e-324, 1e-3, 10.0]), 933.0, formula)
     np.testing.assert_array_equal(np.isnan(got), [True, True, False, False])
 
@@ -89,7 +89,7 @@ def murphy_koop_ice_hpa(temperature_c):
 
 
 @pytest.mark.parametrize(("temperature_c", "within"), [(0.0, 1e-6), (-20.0, 1.5e-4), (-40.0, 2.5e-4), (-80.0, 6.5e-4)])
-def test_sublimation_is_as_good_as_its_docstring_says(temperature_c, within):
+def test_sublimation_has_its_documented_accuracy(temperature_c, within):
     ratio = humidity.sublimation_pressure_hpa(temperature_c) / murphy_koop_ice_hpa(temperature_c)
     assert float(ratio) == pytest.approx(1.0, abs=within)
 
@@ -110,7 +110,7 @@ VIRIAL = [
 
 
 @pytest.mark.parametrize(("pressure_hpa", "temperature_c", "expected"), VIRIAL)
-def test_the_enhancement_over_ice_is_as_good_as_its_docstring_says(pressure_hpa, temperature_c, expected):
+def test_the_enhancement_over_ice_has_its_documented_accuracy(pressure_hpa, temperature_c, expected):
     moist = humidity.ice_saturation(temperature_c, pressure_hpa, "iapws").pressure_hpa
     factor = moist / humidity.sublimation_pressure_hpa(temperature_c)
     below = expected - float(factor)
@@ -118,7 +118,7 @@ def test_the_enhancement_over_ice_is_as_good_as_its_docstring_says(pressure_hpa,
     assert below == pytest.approx(2e-4 - 1e-5 * temperature_c, abs=1e-4)
 
 
-def test_both_formulas_over_ice_agree_as_the_docstring_says():
+def test_both_formulas_over_ice_agree_as_documented():
     t = np.linspace(-40.0, 0.0, 41)
     for p in (500.0, 933.0, 1100.0):
         ratio = humidity.ice_saturation(t, p, "buck").pressure_hpa / humidity.ice_saturation(t, p, "iapws").pressure_hpa
@@ -213,7 +213,7 @@ def test_relative_humidity_over_ice_is_the_higher_number_for_the_same_vapour():
 
 
 @pytest.mark.parametrize("formula", ["buck", "iapws"])
-def test_moist_or_perfectly_dry_air_has_no_frost_point_and_says_nan_without_a_warning(formula):
+def test_moist_or_perfectly_dry_air_has_nan_frost_point_without_a_warning(formula):
     got = humidity.frost_point_c(np.array([0.0, 1e-3, 3.0, 6.2, 20.0]), 933.0, formula)
     np.testing.assert_array_equal(np.isnan(got), [True, False, False, True, True])
 
@@ -233,7 +233,7 @@ def test_moist_or_perfectly_dry_air_has_no_frost_point_and_says_nan_without_a_wa
         (lambda: humidity.relative_humidity_percent(1.0, 20.0, 933.0, over_ice=True), "temperature of ice 20", None),
     ],
 )
-def test_what_is_out_of_range_is_refused_by_name_value_and_limit(call, text, mask):
+def test_values_out_of_range_are_refused_with_name_value_and_limit(call, text, mask):
     with pytest.raises(ValidityError, match=text) as refused:
         call()
     assert mask == (None if refused.value.mask is None else refused.value.mask.tolist())
@@ -261,6 +261,6 @@ def test_zero_celsius_is_a_legal_dew_and_frost_point():
         (humidity.vapour_pressure_hpa, (20.0, np.nan, 50.0), "pressure is not a number"),
     ],
 )
-def test_what_cannot_be_is_refused_by_every_converter(function, arguments, said):
+def test_invalid_values_are_refused_by_every_converter(function, arguments, said):
     with pytest.raises(ValidityError, match=said):
         function(*arguments)

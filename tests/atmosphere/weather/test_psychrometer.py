@@ -25,7 +25,7 @@ EITHER = [(row, False) for row in ASHRAE_WATER] + [(row, True) for row in ASHRAE
 
 
 @pytest.mark.parametrize(("row", "over_ice"), EITHER)
-def test_it_agrees_with_the_adiabatic_wet_bulb_to_what_tells_the_two_apart(row, over_ice):
+def test_it_agrees_with_the_adiabatic_wet_bulb_within_their_difference(row, over_ice):
     t, wet, p, expected = row
     got = float(psychrometer.vapour_pressure_of_wet_bulb_hpa(t, wet, p, over_ice=over_ice))
     saturated = humidity.ice_saturation if over_ice else humidity.saturation
@@ -148,8 +148,8 @@ def test_both_bulbs_at_zero_celsius_are_legal_over_water_and_over_ice():
 # instruments
 
 
-def test_a_mirror_below_zero_must_say_what_it_carries():
-    with pytest.raises(ValidityError, match="mirror at -10 °C may carry dew or frost; say which") as refused:
+def test_a_mirror_below_zero_needs_its_deposit():
+    with pytest.raises(ValidityError, match="mirror at -10 °C may carry dew or frost; give deposit") as refused:
         hygrometer.of_mirror([5.0, -10.0], 933.0)
     assert refused.value.mask.tolist() == [False, True]
     dew, frost = (hygrometer.of_mirror(-10.0, 933.0, deposit=d).vapour_pressure_hpa for d in ("dew", "frost"))

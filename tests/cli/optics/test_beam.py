@@ -43,7 +43,7 @@ def test_a_directory_appears_whole_or_not_at_all(catseye, train, tmp_path):
     status, said, complained = catseye("beam", train, "--out", tmp_path / "other")
     assert (status, said) == (1, "")
     assert complained.count("\n") == 1
-    assert "glass 'ice' is not known" in complained
+    assert "glass 'ice' is unknown" in complained
     assert not (tmp_path / "other").exists()
 
 

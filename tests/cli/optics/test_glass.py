@@ -95,7 +95,7 @@ def test_the_other_glass_is_reckoned_at_the_wavelength_asked_for(asked):
 @pytest.mark.parametrize(
     ("arguments", "status", "said"),
     [
-        (("BK8",), 1, "glass 'BK8' is not known; known are BK7-old, N-BK7, fused-silica, S-LAH79"),
+        (("BK8",), 1, "glass 'BK8' is unknown; known are BK7-old, N-BK7, fused-silica, S-LAH79"),
         (("N-BK7", "--wavelength-um", 10.6), 1, "wavelength 10.6"),
         (("N-BK7", "--temperature-c", 500), 1, "temperature 500"),
         (("N-BK7", "--height-mm", 0), 2, "not a prism's height"),

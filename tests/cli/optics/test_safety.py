@@ -112,7 +112,7 @@ def test_a_focused_beam_says_where_the_hazard_begins(catseye):
         (("--wavelength-um", 1.55), "wavelength 1.55 um is outside 0.4-1.4 um"),
         (("--wavelength-um", "nan"), "wavelength nan um"),
         (("--power-mw", 0), "power = 0 W is not above 0"),
-        (("--divergence-mrad", 0.01), "is no beam of light"),
+        (("--divergence-mrad", 0.01), "away is impossible"),
         (("--duration-s", 1e6), "duration 1e+06 s is outside"),
         (("--scan-rad-per-s", 0), "rate = 0 rad/s is not above 0"),
         (("--power-mw", 1e-4, "--scan-rad-per-s", -3), "rate = -3 rad/s is not above 0"),

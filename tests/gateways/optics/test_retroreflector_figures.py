@@ -64,7 +64,7 @@ def test_other_targets_are_drawn_and_nonsense_is_refused():
     assert other["total_reflection_to_deg"] == pytest.approx(16.5, abs=0.05)
     with pytest.raises(ValidityError, match="beam_radius = 0 m"):
         aberration_plot(beam_radius=0.0)
-    with pytest.raises(ValidityError, match="glass 'oak' is not known"):
+    with pytest.raises(ValidityError, match="glass 'oak' is unknown"):
         return_plot(Dimensions(glass="oak"))
     with pytest.raises(ValidityError, match="height = -1 m"):
         return_plot(Dimensions(height=-1.0))

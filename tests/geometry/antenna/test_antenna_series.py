@@ -55,7 +55,7 @@ def test_azimuth_turns_clockwise_and_elevation_lifts_as_another_library_has_it()
     np.testing.assert_allclose(ground_from_reflector_at(a, e).rotation, expected.as_matrix(), rtol=0, atol=1e-15)
 
 
-def test_strangers_and_wrong_shapes_are_refused():
+def test_unknown_frames_and_wrong_shapes_are_refused():
     with pytest.raises(FrameError, match="'alidade' is not 'reflector'"):
         ground_from_alidade_at([0.0, 1.0]) @ reflector_from_feed_arm()
     with pytest.raises(ValidityError, match="expected"):

@@ -104,7 +104,7 @@ def test_the_tilts_are_the_planes_through_those_ways():
     np.testing.assert_allclose(found, plane[1:], rtol=0.01)  # scatter of a hundred and fifty thousand points
 
 
-def test_every_ray_has_the_same_way_at_rest():
+def test_every_ray_has_the_same_path_at_rest():
     p, f2 = SUB.reflections(GBT), SUB.second_focus(FOCUS)
     way = np.linalg.norm(p - FOCUS, axis=1) + np.linalg.norm(p - f2, axis=1)
     np.testing.assert_allclose(way, SUB.interfocal / SUB.eccentricity, rtol=1e-13)
@@ -151,6 +151,6 @@ def test_turning_all_that_is_behind_the_focus_about_it_does_nothing():
         lambda: Gregorian(eccentricity=1.2).reflections(GBT),
     ],
 )
-def test_what_is_no_telescope_is_refused(made):
+def test_invalid_telescopes_are_refused(made):
     with pytest.raises(ValidityError, match="expected"):
         made()

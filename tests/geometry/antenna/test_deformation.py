@@ -100,7 +100,7 @@ def test_the_ends_of_the_range_belong_to_it():
 
 
 def test_knots_that_do_not_rise_are_refused():
-    with pytest.raises(ValidityError, match="do not rise"):
+    with pytest.raises(ValidityError, match="do not increase"):
         KnotTable(np.array([0.0, 0.5, 0.4]), np.array([15.0]))
 
 

@@ -101,7 +101,7 @@ def test_quarter_turns_carry_gauges_round_and_come_back():
     assert all(np.cross([*a, 0], [*b, 0])[2] > 0.0 for a, b in pairwise(there))
 
 
-def test_what_one_placement_sees_depends_on_what_is_known_of_the_shaft():
+def test_observable_heights_depend_on_measured_shaft_freedoms():
     square = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * 0.075
     assert observed_freedoms(square, tilt_known=False, height_known=True) == 2
     assert observed_freedoms(square[:3], tilt_known=False, height_known=False) == 0

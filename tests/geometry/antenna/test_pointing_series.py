@@ -113,12 +113,12 @@ def test_broadcasting_keeps_shapes():
     ("made", "said"),
     [
         (lambda: PointingSeries(("IA", "XX"), np.zeros(2), np.zeros((2, 2))), "'XX' is none of"),
-        (lambda: PointingSeries(("IA", "IA"), np.zeros(2), np.zeros((2, 2))), "twice"),
+        (lambda: PointingSeries(("IA", "IA"), np.zeros(2), np.zeros((2, 2))), "repeated"),
         (lambda: PointingSeries(("IA",), np.zeros(2), np.zeros((2, 2))), r"expected \(1,\)"),
         (lambda: published().encoders(0.0, np.pi / 2), "zenith"),
         (lambda: axis_terms([1.0, 2.0]), "expected"),
     ],
 )
-def test_what_means_nothing_is_refused(made, said):
+def test_meaningless_input_is_refused(made, said):
     with pytest.raises(ValidityError, match=said):
         made()

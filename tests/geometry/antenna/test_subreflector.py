@@ -29,7 +29,7 @@ def test_the_order_is_x_then_y_then_z_of_axes_that_stay(angles):
 
 
 @given(SHIFTS, ANGLES, SHIFTS)
-def test_a_position_comes_back_about_any_pivot(shift, angles, pivot):
+def test_a_position_is_recovered_about_any_pivot(shift, angles, pivot):
     there = prime_focus_from_subreflector(shift, angles, pivot=pivot, home=HOME)
     found = position_of(there, pivot=pivot, home=HOME)
     np.testing.assert_allclose(found[0], shift, rtol=0, atol=1e-13)  # rounding of metres

@@ -73,7 +73,7 @@ def test_many_mounts_at_once():
     np.testing.assert_allclose(misaim(swing, tip, towards=towards), 0.0, rtol=0, atol=1e-14)
 
 
-def test_what_no_angle_reaches_is_refused():
+def test_aim_points_out_of_reach_are_refused():
     with pytest.raises(ValidityError, match="nearer to the outer axis than the sight's offset x"):
         aim_angles([0.0, 50.0, 0.0])
     with pytest.raises(ValidityError, match="nearer to the trunnions than the sight's offset y"):

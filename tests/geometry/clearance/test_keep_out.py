@@ -41,7 +41,7 @@ def test_a_cone_by_hand():
     assert cone.clearance(d) / DEGREE == pytest.approx([-5, -2, 0, 60, 175], abs=1e-6)
 
 
-def test_a_moving_cone_is_at_both_ends_in_time_and_no_faster_than_it_says():
+def test_a_moving_cone_reaches_both_ends_within_its_stated_rate():
     a, b = unit(np.array([1.0, 0, 0])), unit(np.array([np.cos(0.3), np.sin(0.3), 0]))
     cone = ConeZone(a, 0.0, b)
     assert cone.clearance(a, 0.0) == 0
@@ -165,7 +165,7 @@ def test_a_slew_over_a_cone_enters_when_it_reaches_the_edge():
     assert found.zone == 0
 
 
-def test_what_passes_beside_a_cone_is_free_and_what_starts_inside_says_so():
+def test_paths_beside_a_cone_are_free_and_starts_inside_are_reported():
     ne = STATION.zeros[1] + 12_500
     beside = ray(STATION, [20_000, ne + 5.01 / 720 * 1e5]).direction
     move = straight([0, ne], [40_000, ne], 40.0)
@@ -254,7 +254,7 @@ def test_the_servo_margin_covers_any_error_of_that_size():
 @pytest.mark.parametrize(
     ("act", "said"),
     [
-        (lambda: ConeZone([0, 0, 0], 0.1), "points somewhere"),
+        (lambda: ConeZone([0, 0, 0], 0.1), "non-zero vector"),
         (lambda: ConeZone([0, 0, 1], 5.0), "check its unit"),
         (lambda: BoxZone([0, 0, 0], [1, -1, 1]), "sizes"),
         (lambda: BoxZone([0, 0], [1, 1, 1]), "box"),
@@ -263,6 +263,6 @@ def test_the_servo_margin_covers_any_error_of_that_size():
         (lambda: first_entry(STATION[None], trapezoid([0, 0], [1, 1], PACE), []), "one ranger"),
     ],
 )
-def test_nonsense_is_refused(act, said):
+def test_invalid_input_is_refused(act, said):
     with pytest.raises(ValidityError, match=said):
         act()

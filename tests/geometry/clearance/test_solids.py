@@ -125,6 +125,6 @@ def test_a_path_that_begins_inside_hits_at_once_and_one_that_ends_before_does_no
         (lambda: Dish(1.0, (0, 0), 1, below=-1.0), "thickness"),
     ],
 )
-def test_what_is_no_solid_is_refused(make, message):
+def test_invalid_solids_are_refused(make, message):
     with pytest.raises(ValidityError, match=message):
         make()

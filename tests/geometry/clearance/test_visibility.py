@@ -68,7 +68,7 @@ def _inside(solid, x):
     return np.all(np.abs(own) < np.asarray(solid.size) / 2, axis=1)
 
 
-def test_what_is_near_the_ends_is_not_in_the_way():
+def test_objects_near_the_ends_do_not_obstruct():
     wall = SolidBox((5.0, 0.0, 0.0), (1.0, 10.0, 10.0))
     s, t = [[4.2, 0.0, 0.0]], [[5.0, 0.0, 0.0], [9.0, 0.0, 0.0]]
     assert first_obstruction(s, t, [wall])[0].tolist() == [[0, 0]]

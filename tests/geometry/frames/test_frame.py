@@ -14,7 +14,7 @@ def alidade_from_ground():
     return Transform("alidade", "ground", rz(0.3), np.array([1.0, 2.0, 3.0]))
 
 
-def test_strangers_are_refused_by_name():
+def test_unknown_frames_are_refused_by_name():
     dish_from_ground = Transform("dish", "ground", np.eye(3), np.zeros(3))
     with pytest.raises(FrameError) as caught:
         alidade_from_ground() @ dish_from_ground
@@ -47,7 +47,7 @@ def test_directions_are_turned_but_not_moved():
         (np.eye(2), r"shapes \(2, 2\) and \(3,\)"),
     ],
 )
-def test_what_is_no_rotation_is_refused(rotation, text):
+def test_invalid_rotations_are_refused(rotation, text):
     with pytest.raises(ValidityError, match=f"dish_from_ground: .*{text}"):
         Transform("dish", "ground", rotation, np.zeros(3))
 

@@ -85,7 +85,7 @@ def test_state_plane_scale_and_convergence_are_snyder_s():
     assert at_pintle.scale == pytest.approx(0.99993507, abs=1e-8)
 
 
-def test_a_short_line_is_as_long_and_lies_as_grid_and_elevation_factors_say():
+def test_a_short_line_agrees_with_grid_and_elevation_factors():
     ends = np.array([[-200.0, -150.0, 0.0], [200.0, 150.0, 0.0]])
     plane = FRAME.state_plane(ends)
     run = (plane[1] - plane[0])[:2]
@@ -139,12 +139,12 @@ def test_z_is_zero_at_a_tooling_ball_off_the_axis():
 
 
 @given(x=st.floats(-2000, 2000), y=st.floats(-2000, 2000), z=st.floats(-50, 200), xi=st.floats(-1e-4, 1e-4))
-def test_any_point_comes_back_through_any_system(x, y, z, xi):
+def test_any_point_is_recovered_through_any_system(x, y, z, xi):
     frame = LocalFrame(PINTLE_LATITUDE, PINTLE_LONGITUDE, HEIGHT, xi=xi, eta=-0.5 * xi, geoid_height=-31.0, plumb=True)
     np.testing.assert_allclose(frame.from_state_plane(frame.state_plane([x, y, z])), [x, y, z], rtol=0, atol=1e-8)
 
 
-def test_what_cannot_be_meant_is_refused():
+def test_implausible_values_are_refused():
     with pytest.raises(ValidityError, match="US survey feet"):
         FRAME.from_state_plane([701_288.69 / FOOT, 159_695.25 / FOOT, 807.0])
     with pytest.raises(ValidityError, match=r"latitude 38\.43"):

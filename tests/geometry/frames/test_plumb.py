@@ -61,7 +61,7 @@ def test_mount_axes_by_scipy_are_the_notes_matrix_and_its_angles_come_back():
         mount_angles(np.eye(2))
 
 
-def test_a_leaning_theodolite_reads_what_the_formula_says():
+def test_a_leaning_theodolite_reads_as_the_formula():
     level = np.eye(3)
     for bearing in np.radians([0.0, 80.0, 200.0, 310.0]):
         for zenith in np.radians([30.0, 52.0, 88.0, 100.0]):

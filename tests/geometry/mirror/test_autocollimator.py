@@ -99,7 +99,7 @@ def test_a_tilted_face_moves_the_zero_one_way_direct_and_the_other_in_prime():
     assert zero((0, 0), axis_tilt=1e-4) == pytest.approx(+1e-4, abs=1e-9)
 
 
-def test_the_axes_of_the_autocollimator_are_a_rotation_whose_last_row_leans_as_told():
+def test_the_axes_of_the_autocollimator_are_a_rotation_with_the_given_lean():
     axes = autocollimator_axes(np.array([[1e-3, 2e-3, 0.3]]))[0]
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-15)
     np.testing.assert_allclose(axes[2, :2], [1e-3, 2e-3], rtol=1e-5)

@@ -60,7 +60,7 @@ def test_both_stops_are_allowed_and_nothing_beyond_them():
 
 
 @given(azimuths, st.floats(-25e3, 25e3), azimuths, st.integers(0, 200_000), st.booleans(), azimuths)
-def test_what_is_chosen_never_leaves_the_stops(na, ne, low, span, standing, current):
+def test_the_chosen_counts_are_within_the_stops(na, ne, low, span, standing, current):
     prime = np.stack(encoder.prime_counts(na, ne, 100.0))
     where = np.array([current, 0.0]) if standing else None
     chosen = encoder.choice([na, ne], prime, low=low, high=low + span, current=where)

@@ -152,7 +152,7 @@ def test_batches_broadcast_and_agree_with_their_elements():
     np.testing.assert_array_equal(slope, slopes[3, 4])
 
 
-def test_what_cannot_be_is_refused_or_nan():
+def test_invalid_values_are_refused_or_nan():
     with pytest.raises(ValidityError, match=r"distance 0\.1800 m is not above 0\.4000 m, by which"):
         path_change(0.0, np.pi, [1.0, 0.18], [0.0, 0.2, 0.0, 0.0])
     with pytest.raises(ValidityError, match=r"offsets has shape \(3,\), expected \(..., 4\)"):

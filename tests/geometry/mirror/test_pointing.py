@@ -186,7 +186,7 @@ def test_claimed_covariance_of_a_ray_is_its_scatter():
     np.testing.assert_allclose(scattered / np.outer(scale, scale), claimed / np.outer(scale, scale), atol=5 * 0.0045)
 
 
-def test_the_compiled_form_gives_what_the_plain_form_gives():
+def test_the_compiled_form_agrees_with_the_plain_form():
     rng = np.random.default_rng(8)
     station = stations(7, rng)
     points = np.concatenate([rng.uniform(-60, 60, (999, 3)), station.scan_point[:1]])  # one in a scan point
@@ -203,7 +203,7 @@ def test_the_compiled_form_keeps_quadrants_axes_and_batch_shapes():
     plain, fast = (counts(flat, axes, compiled=choice) for choice in (False, True))
     assert fast.shape == (2, 9, 2)
     np.testing.assert_allclose(fast, plain, rtol=0, atol=1e-9)
-    with pytest.raises(ValidityError, match="go in pairs"):
+    with pytest.raises(ValidityError, match="are in pairs"):
         counts(stations(5, np.random.default_rng(0)), np.zeros((5, 3)), compiled=True)
 
 

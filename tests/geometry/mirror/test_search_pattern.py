@@ -117,7 +117,7 @@ def test_the_spirals_steps_along_its_arc_are_even():
         (lambda: spiral_offsets(1e-3, 0.0), "reach 0.0 is not above 0"),
     ],
 )
-def test_what_cannot_be_searched_is_refused(call, message):
+def test_invalid_searches_are_refused(call, message):
     with pytest.raises(ValidityError, match=message):
         call()
 

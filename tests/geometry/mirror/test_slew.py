@@ -115,6 +115,6 @@ def test_straight_is_eq_2_45():
         (lambda: trapezoid([0, np.nan], [1, 0], PACE), "finite"),
     ],
 )
-def test_nonsense_is_refused(act, said):
+def test_invalid_input_is_refused(act, said):
     with pytest.raises(ValidityError, match=said):
         act()

@@ -24,7 +24,7 @@ from catseye.geometry.mirror.track import (
 STATION = MirrorStation([112.99, 44.28, 0.0], [-1.1973, 1.6e-5, -4e-6], [0.0, 0.2475, 0.0], [-5e-4, 9e-5], [2691, 1434])
 
 
-def test_a_count_is_as_large_as_the_manual_says():
+def test_a_count_has_the_size_in_the_manual():
     np.testing.assert_allclose(BEAM_PER_COUNT / ARCSECOND, [12.96, 25.92], rtol=1e-12)
     np.testing.assert_allclose(BEAM_PER_COUNT * 120e3, [7.5, 15.1], atol=0.05)  # mm at 120 m
 
@@ -169,6 +169,6 @@ def test_the_longest_interval_shrinks_towards_the_azimuth_axis_and_is_zero_on_it
         (lambda: line_bound([0, 120.0, 0], 1.0, 0.02, interval=-0.128), r"interval -0\.128"),
     ],
 )
-def test_what_cannot_be_is_refused(call, message):
+def test_invalid_values_are_refused(call, message):
     with pytest.raises(ValidityError, match=message):
         call()

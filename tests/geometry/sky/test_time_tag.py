@@ -36,7 +36,7 @@ def test_fourteen_decimals_are_read_back_without_loss(day, ns):
 
 
 @given(days, st.integers(0, 86_400_000_000 - 1))
-def test_eleven_decimals_tell_every_microsecond_apart(day, us):
+def test_eleven_decimals_separate_every_microsecond(day, us):
     tag = TimeTag(day, 1000 * us)
     back = TimeTag.parse(tag.text())
     assert round(int(back.nanoseconds) / 1000) == us or back.day > tag.day
@@ -60,7 +60,7 @@ def test_a_float_goes_in_as_what_it_is(mjd):
     assert abs(exact(TimeTag.from_mjd(mjd)) - Fraction(mjd)) * PER_DAY <= Fraction(1, 2) + Fraction(1, 10**9)
 
 
-def test_eight_decimals_cost_what_the_manual_says():
+def test_eight_decimals_have_the_error_in_the_manual():
     assert tag_step(8) == pytest.approx(0.864e-3, rel=1e-12)
     assert np.spacing(52889.0) * 86400 == pytest.approx(0.63e-6, rel=0.01)  # a double
     tag = TimeTag(52889, 10_800 * 10**9 + 431_000)
@@ -100,11 +100,11 @@ def test_batches_carry_and_give_single_instants():
         (lambda: TimeTag(52889, 2**64 - 1), "is too large"),
         (lambda: TimeTag(2**64 - 1, 0), "is too large"),
         (lambda: TimeTag(1, 0).text(31), "decimals = 31"),
-        (lambda: TimeTag(np.array([1, 2]), 0).text(), "no one text"),
+        (lambda: TimeTag(np.array([1, 2]), 0).text(), "no single text"),
         (lambda: tag_step(-1), "decimals = -1"),
     ],
 )
-def test_what_is_no_instant_is_refused(call, message):
+def test_invalid_instants_are_refused(call, message):
     with pytest.raises(ValidityError, match=message):
         call()
 

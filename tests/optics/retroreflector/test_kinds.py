@@ -234,7 +234,7 @@ def test_the_mean_over_a_beam_is_that_of_many_random_rays():
     assert BALL.mean_path_change(0.010) * 1e6 == pytest.approx(4.61, abs=0.01)  # the memo's index, within 15 mm
 
 
-def test_what_comes_back_to_a_receiver_is_the_share_of_random_rays():
+def test_the_collected_share_agrees_with_random_rays():
     rng = np.random.default_rng(12)
     height = np.hypot(*rng.normal(scale=0.010 / 2, size=(2, 200_000)))
     height = height[height < BALL.aperture]
@@ -306,7 +306,7 @@ def test_three_arcseconds_spread_the_light_and_leave_the_range():
         (lambda: dihedral.on_axis_share(1e-5, aperture=0.0, beam_radius=1.0, wavelength=1e-6), "aperture = 0.0 m"),
     ],
 )
-def test_what_is_no_retroreflector_is_refused(call, message):
+def test_invalid_retroreflectors_are_refused(call, message):
     with pytest.raises(ValidityError, match=message):
         call()
 

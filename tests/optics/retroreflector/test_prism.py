@@ -98,7 +98,7 @@ def test_rounding_above_one_counts_as_normal_incidence():
     assert float(obliquity_correction(H, N, 1.0 + 2e-16)) == 0.0
 
 
-def test_what_is_no_cosine_or_index_is_refused():
+def test_invalid_cosines_and_indices_are_refused():
     with pytest.raises(ValidityError, match=r"cosine of incidence 1\.5 is outside -1 to 1"):
         obliquity_correction(H, N, [0.3, 1.5])
     with pytest.raises(ValidityError, match=r"index ratio 1\.0 is not above 1"):

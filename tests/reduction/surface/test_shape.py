@@ -142,7 +142,7 @@ def test_orthonormal_terms_sum_up_to_the_mean_square():
 
 
 def test_too_few_prisms_are_refused():
-    with pytest.raises(EstimationError, match="15 Zernike terms: 14 points do not hold 15"):
+    with pytest.raises(EstimationError, match="15 Zernike terms: 14 points do not determine 15"):
         shape_of(prisms(np.zeros(2209), rows=np.arange(0, 2209, 160)), APERTURE)
     rows = np.arange(0, 2209, 100)
     one, two = prisms(np.zeros(2209), rows=rows), prisms(np.zeros(2209), rows=rows[:5])

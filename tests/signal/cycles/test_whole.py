@@ -20,7 +20,7 @@ HALF = 0.099905518  # m, half a modulation wavelength in air of 20 °C, 933 hPa,
 
 
 @pytest.mark.parametrize("tiny", [-1e-17, -5e-324, -1e-300, -1e-16])
-def test_a_tiny_negative_difference_does_not_become_a_whole_turn(tiny):
+def test_a_tiny_negative_difference_does_not_become_a_full_turn(tiny):
     assert 0.0 <= float(fraction(tiny, 0.0)) < 2 * np.pi
     assert 0.0 <= float(fraction(2 * np.pi + tiny, 2 * np.pi)) < 2 * np.pi
 
@@ -67,7 +67,7 @@ def test_the_probability_of_a_slip_is_the_sum_over_all_other_integers(share):
     np.testing.assert_allclose(slip_probability(misfit, share * HALF, HALF), expected, rtol=1e-8, atol=1e-14)
 
 
-def test_half_way_between_two_integers_either_is_as_likely():
+def test_midway_between_two_integers_both_are_equally_likely():
     assert float(slip_probability(0.5 * HALF, 1e-4, HALF)) == pytest.approx(0.5, abs=1e-12)
     assert float(slip_probability(0.05, 0.0, 0.1)) == 0.5
 
@@ -155,7 +155,7 @@ def test_the_memos_rule_is_right_where_its_coarse_length_is_exact():
     np.testing.assert_allclose(unwrapped_length(memo, target - zrg, HALF)[away], true[away], rtol=0, atol=1e-9)
 
 
-def test_the_memos_rule_refuses_what_it_does_not_hold_for():
+def test_the_memos_rule_refuses_values_outside_its_limits():
     for coarse, phase, half in ((10.0, 7.0, HALF), (-1.0, 0.0, HALF), (10.0, 0.0, 0.0)):
         with pytest.raises(ValidityError):
             memo_whole_cycles(coarse, phase, half)

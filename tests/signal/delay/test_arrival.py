@@ -57,7 +57,7 @@ def test_a_parabola_through_three_samples_has_a_floor_of_hundreds_of_nanoseconds
 
 
 @given(st.floats(0.0485, 0.0515), st.floats(0.01, 1e4), st.floats(-5.0, 5.0))
-def test_the_delay_is_found_whatever_the_gain_and_the_offset(arrival, gain, offset):
+def test_delay_is_independent_of_gain_and_offset(arrival, gain, offset):
     row = gain * (heard(arrival, noise=1e-3)[0] + offset)
     found, bare = plan()(row, 0.05), plan()(heard(arrival, noise=1e-3)[0], 0.05)
     assert found.delay == pytest.approx(arrival, abs=1e-6)
@@ -128,7 +128,7 @@ def test_integer_samples_are_taken_as_they_are():
     assert plan()(codes, 0.05).delay == pytest.approx(0.0501, abs=2e-8)  # rounding: 0.3 codes of 3000
 
 
-def test_silence_clipping_and_what_is_no_number_have_their_status():
+def test_silence_clipping_and_non_finite_samples_have_their_status():
     rows = np.stack([heard(0.05, noise=0.01)[0]] * 4)
     rows[0] = 3.0
     rows[1, 2500] = np.inf
@@ -146,7 +146,7 @@ def test_silence_clipping_and_what_is_no_number_have_their_status():
     assert plan()(codes, 0.05).status == DelayStatus.CLIPPED
 
 
-def test_noise_alone_is_in_the_threshold_region_and_claims_nothing():
+def test_noise_alone_is_in_the_threshold_region_without_uncertainty():
     rows = np.random.default_rng(2).standard_normal((200, 9600))
     found = plan()(rows, 0.05)
     assert (found.status >= DelayStatus.THRESHOLD).all()
@@ -154,13 +154,13 @@ def test_noise_alone_is_in_the_threshold_region_and_claims_nothing():
     assert "too weak" in found.text(int(np.argmax(found.status == DelayStatus.THRESHOLD)))
 
 
-def test_an_arrival_at_the_edge_of_the_window_is_not_believed():
+def test_an_arrival_at_the_window_edge_is_rejected():
     found = plan()(heard([0.05304, 0.04696, 0.0529], noise=1e-3), 0.05)
     assert (found.status[:2] == DelayStatus.EDGE).all()
     assert found.status[2] == DelayStatus.GOOD
 
 
-def test_two_arrivals_alike_are_ambiguous_and_a_weaker_one_is_an_echo():
+def test_two_equal_arrivals_are_ambiguous_and_a_weaker_one_is_an_echo():
     direct = heard(0.05, noise=1e-3)[0]
     late = heard(0.0517)[0]
     found = plan()(np.stack([direct + share * late for share in (0.0, 0.05, 0.3, 0.95, -0.3)]), 0.0505)
@@ -209,7 +209,7 @@ def test_phat_keeps_the_peak_where_a_loudspeaker_colours_the_signal():
     assert plan(weighting="phat")(bent[0], 0.05).delay == pytest.approx(0.05, abs=1e-6)
 
 
-def test_the_band_is_what_is_asked():
+def test_the_band_is_the_requested_one():
     narrow = plan(band_hz=(3e3, 5e3))
     assert 3e3 < narrow.bandwidth / (2 * np.pi) < 5e3
     hum = 5.0 * np.sin(2 * np.pi * 6.5e3 * TIME)
@@ -230,14 +230,14 @@ def test_the_band_is_what_is_asked():
         ({"weighting": "whitened", "noise": np.ones(100)}, "too few"),
         ({"weighting": "whitened", "noise": np.zeros(9000)}, "silent"),
         ({"band_hz": (20e3, 21e3)}, "no signal in the band"),
-        ({"expected": 0.0}, "reaches out of the recording"),
-        ({"expected": np.nan}, "reaches out of the recording"),
-        ({"expected": 0.199}, "reaches out of the recording"),
+        ({"expected": 0.0}, "extends past the recording"),
+        ({"expected": np.nan}, "extends past the recording"),
+        ({"expected": 0.199}, "extends past the recording"),
         ({"recordings": np.zeros(300)}, "shorter than template and window"),
-        ({"recordings": np.zeros(9600, complex)}, "no row of integers or floats"),
+        ({"recordings": np.zeros(9600, complex)}, "not a row of integers or floats"),
     ],
 )
-def test_what_cannot_be_sought_is_refused(wrong, said):
+def test_invalid_templates_and_recordings_are_refused(wrong, said):
     template = sampled("chirp", FS, **CHIRP)
     values = {"recordings": heard(0.05)[0], "template": template, "sampling_hz": FS, "expected": 0.05, "window": 3e-3}
     values |= wrong
@@ -269,7 +269,7 @@ def test_a_noise_spectrum_is_that_of_the_filter_which_made_it():
 
 
 @pytest.mark.parametrize("order", range(3, 13))
-def test_a_maximum_length_sequence_correlates_with_nothing_but_itself(order):
+def test_a_maximum_length_sequence_correlates_only_with_itself(order):
     chips = maximum_length_chips(order)
     own = np.fft.ifft(np.abs(np.fft.fft(chips)) ** 2).real
     assert own[0] == pytest.approx(2**order - 1)
@@ -289,7 +289,7 @@ def test_a_chirp_has_its_frequencies_where_they_belong():
     ("kind", "values", "said"),
     [
         ("bogus", {}, "not one of chirp"),
-        ("chirp", {**CHIRP, "stop_hz": 25e3}, "not held by"),
+        ("chirp", {**CHIRP, "stop_hz": 25e3}, "not below half of"),
         ("chirp", {**CHIRP, "duration": 1e4}, "samples; take a shorter"),
         ("chirp", {**CHIRP, "taper": 0.6}, "taper"),
         ("pulse", {"centre_hz": -1.0, "duration": 1e-3}, "centre_hz -1"),

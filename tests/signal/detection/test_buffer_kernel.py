@@ -45,7 +45,7 @@ STYLES = ("strong", "weak", "half dark", "overdriven", "dark", "steps")
 
 @settings(max_examples=150)
 @given(n=st.integers(3, 64), m=st.integers(2, 17), style=st.sampled_from(STYLES), seed=st.integers(0, 10**6))
-def test_it_gives_what_the_plain_form_gives(n, m, style, seed):
+def test_it_agrees_with_the_plain_form(n, m, style, seed):
     samples = codes(np.random.default_rng(seed), n, m, style)
     out, still = found(samples, n)
     plain = detect(samples[None], n, 1.0, converter_ends=ENDS, compiled=False)

@@ -70,7 +70,7 @@ def test_a_three_per_cent_beam_is_good_and_its_uncertainty_tells():
     assert u[1] / u[0] == pytest.approx(1 / 0.03, rel=0.25)  # 127 degrees of freedom each: 9 %, at 2.8 sigma
     asked = inspect_buffers([shot(seed=1), shot(0.03 * USUAL, seed=2)], 64, VOLTS, weakest=0.15)
     assert asked.status.tolist() == [BufferStatus.GOOD, BufferStatus.WEAK]
-    assert asked.text(1) == "weak: amplitude 0.09012 V is below the limit of 0.15 V"
+    assert asked.text(1) == "weak: amplitude 0.09012 V is below the limit 0.15 V"
 
 
 def test_the_number_of_cycles_can_be_demanded():
@@ -100,7 +100,7 @@ def test_a_table_is_a_lot_too():
     assert inspect_buffers([], 64).status.tolist() == []
 
 
-def test_what_was_detected_before_can_be_judged():
+def test_earlier_detections_get_a_status():
     table = np.stack([shot(), shot(4 * USUAL)])
     assert status_of(detect(table, 64, VOLTS)).tolist() == [BufferStatus.GOOD, BufferStatus.CLIPPED]
     assert status_of(detect(table[0], 64, VOLTS), weakest=5.0) == BufferStatus.WEAK
@@ -132,9 +132,9 @@ def test_a_live_sine_of_some_codes_is_never_stuck(amplitude):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ({"samples_per_cycle": 2}, "2 samples a cycle do not show a phase"),
+        ({"samples_per_cycle": 2}, "2 samples a cycle do not determine a phase"),
         ({"samples_per_cycle": 64, "weakest": -1.0}, "weakest amplitude -1.0 V"),
-        ({"samples_per_cycle": 64, "cycles": 0}, "0 cycles are no buffer"),
+        ({"samples_per_cycle": 64, "cycles": 0}, "0 cycles are not a buffer"),
         ({"samples_per_cycle": 64, "volts_per_code": 0.0}, "volts per code 0.0 V"),
         ({"samples_per_cycle": 64, "harmonics": (1,)}, "harmonics [1]"),
     ],

@@ -27,7 +27,7 @@ def assert_same(one, other):
     st.lists(st.integers(0, 400), max_size=8),
     st.sampled_from([np.int16, np.int32, np.float64]),
 )
-def test_a_stream_is_the_batch_whatever_the_chunks(channels, n, cycles, cuts, dtype):
+def test_a_stream_equals_the_batch_for_any_chunks(channels, n, cycles, cuts, dtype):
     total = 400
     samples = np.random.default_rng(channels).integers(-30_000, 30_000, size=(total, channels)).astype(dtype)
     stream = ChannelStream(channels, n, cycles, 1e-3)

@@ -98,7 +98,7 @@ def test_a_weak_beam_is_not_taken_for_dropouts():
     assert np.count_nonzero(shots.scatter.dropped) == 0
 
 
-def test_with_a_few_cycles_no_dropout_is_told():
+def test_with_few_cycles_no_dropout_is_reported():
     single = np.ones(7, dtype=complex)
     single[2] = 0.0
     assert int(detect(made(single, 16), 16).scatter.dropped) == 0

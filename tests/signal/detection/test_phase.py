@@ -151,7 +151,7 @@ def test_a_buffer_with_a_hole_is_nan_and_spoils_no_other():
 @pytest.mark.parametrize(
     ("samples", "n", "volts", "text"),
     [
-        (np.zeros(64), 2, 1.0, "2 samples a cycle do not show a phase; at least 3 do"),
+        (np.zeros(64), 2, 1.0, "2 samples a cycle do not determine a phase; at least 3 do"),
         (np.zeros(64), 6.5, 1.0, "6.5 samples a cycle"),
         (np.zeros(65), 64, 1.0, "a buffer of 65 samples is not a whole number of cycles of 64 samples"),
         (np.zeros(0), 64, 1.0, "a buffer of 0 samples"),
@@ -161,7 +161,7 @@ def test_a_buffer_with_a_hole_is_nan_and_spoils_no_other():
         (np.zeros(64, dtype=complex), 64, 1.0, "samples are of type complex128"),
     ],
 )
-def test_what_is_no_buffer_is_refused(samples, n, volts, text):
+def test_invalid_buffers_are_refused(samples, n, volts, text):
     with pytest.raises(ValidityError) as caught:
         detect(samples, n, volts)
     assert text in str(caught.value)
@@ -227,7 +227,7 @@ def test_clipping_makes_the_amplitude_smaller_by_fouriers_integral():
 
 
 @pytest.mark.parametrize("n", [16, 64])
-def test_clipping_moves_the_phase_only_by_what_folds_back(n):
+def test_clipping_moves_the_phase_only_by_aliased_harmonics(n):
     """The phasor from the harmonics p n - 1 and p n + 1 of the clipped wave, by numpy's FFT of 2^16 points."""
     dense = np.fft.rfft(np.minimum(np.cos(2 * np.pi * np.arange(2**16) / 2**16), 0.7)).real * 2 / 2**16
     phases = np.linspace(0.0, 2 * np.pi, 401, endpoint=False)
@@ -255,7 +255,7 @@ def test_harmonics_come_with_their_phases():
 
 
 @pytest.mark.parametrize("orders", [(1,), (0, 2), (2.5,), (-2,)])
-def test_what_is_no_harmonic_is_refused(orders):
+def test_invalid_harmonics_are_refused(orders):
     with pytest.raises(ValidityError, match=r"harmonics .* are not whole numbers of at least 2"):
         detect(waveform(8, 2), 8, harmonics=orders)
 
@@ -283,7 +283,7 @@ def test_along_and_across_are_the_scatter_of_amplitude_and_phase():
     assert float(both) == pytest.approx(2 * float(shot.u_phasor) ** 2, rel=1e-12)
 
 
-def test_a_single_cycle_claims_alike_along_and_across():
+def test_a_single_cycle_has_equal_uncertainty_along_and_across():
     shot = detect(waveform(32, 1, 2.0) + 0.1 * np.random.default_rng(4).normal(size=32), 32)
     assert float(shot.u_amplitude) == pytest.approx(float(shot.u_phasor), rel=1e-14)
     assert float(shot.u_phase) == pytest.approx(float(shot.u_phasor / shot.amplitude), rel=1e-14)
@@ -345,7 +345,7 @@ def test_two_gigabytes_need_little_memory(tmp_path):
 
 
 @pytest.mark.parametrize("n", [8, 9, 16, 64])
-def test_clipping_moves_the_phase_no_more_than_the_module_says(n):
+def test_clipping_moves_the_phase_within_the_stated_bound(n):
     phases = np.linspace(0.0, 2 * np.pi, 721)
     wave = np.cos(2 * np.pi * np.arange(n) / n - phases[:, None])
     worst = {}

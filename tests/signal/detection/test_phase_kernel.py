@@ -23,7 +23,7 @@ def codes(n, m, count=12):
 
 
 @pytest.mark.parametrize(("n", "m"), SHAPES)
-def test_the_compiled_form_gives_what_the_plain_form_gives(n, m):
+def test_the_compiled_form_agrees_with_the_plain_form(n, m):
     samples = codes(n, m)
     plain, fast = (detect(samples, n, 1e-3, harmonics=(2, 5), compiled=choice) for choice in (False, True))
     scale = 32.768
@@ -64,7 +64,7 @@ def test_layouts_that_are_not_contiguous_are_the_same():
 @pytest.mark.parametrize(
     "samples", [np.zeros((2, 64)), np.zeros((2, 16), dtype=np.int16), np.zeros((2, 64), dtype=">i2")]
 )
-def test_what_the_compiled_form_cannot_do_is_refused_when_asked_for(samples):
+def test_unsupported_samples_are_refused_by_the_compiled_form(samples):
     with pytest.raises(ValidityError, match="the compiled form serves native int16 buffers of two cycles and more"):
         detect(samples, 16, compiled=True)
 

@@ -62,7 +62,7 @@ def test_the_sign_of_the_run_is_that_of_a_growing_phase():
     assert wrong == pytest.approx(abs(np.sin(x) / x), abs=1.05 * 2 * 0.03 / (4 * np.pi))
 
 
-def test_what_leaks_turns_the_phase_of_a_running_return_unless_it_is_taken_out():
+def test_leakage_biases_the_phase_of_a_running_return_unless_subtracted():
     leak = 0.05 * np.exp(0.7j)
     codes = moving(64, 128, phase=1.0, run=0.02, leak=leak)
     with_leak, without = (running_phasor(codes, 64, 1.0, run=0.02, leaked=each).phasor for each in (0.0, leak))

@@ -64,7 +64,7 @@ def test_the_notes_numbers_come_out():
     assert plan.phase_gradient() == pytest.approx(-4 * math.pi * 1.5e9 / SPEED_OF_LIGHT, rel=1e-14)  # 5.9 and 5.14
 
 
-def test_a_distance_comes_back_through_the_reduction():
+def test_a_distance_is_recovered_through_the_reduction():
     plan, distance = FrequencyPlan(), 123.456789
     half = plan.half_wavelength(N_AIR)
     phase = plan.phase(distance, N_AIR)
@@ -149,7 +149,7 @@ def test_two_modulations_make_a_longer_one():
         ),
     ],
 )
-def test_what_the_instrument_cannot_do_is_refused_in_one_line(make, text):
+def test_settings_beyond_the_instrument_are_refused_in_one_line(make, text):
     with pytest.raises(ValidityError) as caught:
         make()
     assert text in str(caught.value)
@@ -193,7 +193,7 @@ def test_the_mean_over_a_buffer_agrees_with_mpmath(n, m):
 
 
 @pytest.mark.parametrize(("n", "m"), [(3, 2), (4, 9), (16, 8), (64, 128)])
-def test_any_tone_is_detected_as_its_response_says(n, m):
+def test_any_tone_is_detected_with_its_predicted_response(n, m):
     sampling = SamplingPlan(n, m, 1000.0)
     rng = np.random.default_rng(n)
     for f in (0.0, 57.0, 999.9, 1000.0, 1000.37, 2000.0, 31_999.0, 63_000.0, 65_017.0, *rng.uniform(0, 1e5, 10)):
@@ -218,7 +218,7 @@ def test_a_signal_off_its_lock_has_the_phase_of_the_middle_and_a_cyclic_bias():
     assert np.max(np.abs(bias)) == pytest.approx(exact, rel=0.01)
 
 
-def test_harmonics_vanish_or_alias_as_said():
+def test_harmonics_vanish_or_alias_as_documented():
     for n in (3, 4, 5, 16, 64):
         sampling = SamplingPlan(n, 4, 100.0)
         seen = [k for k in range(2, 200) if abs(detect(tone(sampling, 100.0 * k, 0.3), n).phasor) > 1e-9]
@@ -248,7 +248,7 @@ def test_the_bound_of_a_spur_is_reached_and_never_passed():
     assert detect(signal, 16).phase == pytest.approx(1.0)
 
 
-def test_a_line_in_the_phase_is_averaged_as_said():
+def test_a_line_in_the_phase_is_averaged_as_predicted():
     depth, n = 1e-3, 64
     for m, line in ((128, 57.0), (128, 60.0), (16, 57.0), (1000, 57.0)):
         sampling = SamplingPlan(n, m)
@@ -294,7 +294,7 @@ def test_jitter_of_four_samples_a_cycle_depends_on_the_phase():
 
 @pytest.mark.parametrize("side", ["above", "below"])
 @pytest.mark.parametrize(("speed", "acceleration"), [(0.01, 0.0), (-0.05, 0.0), (0.3, 0.0), (0.002, 0.05)])
-def test_a_moving_target_reads_as_said(side, speed, acceleration):
+def test_a_moving_target_reads_as_predicted(side, speed, acceleration):
     plan, sampling = FrequencyPlan(oscillator=side), SamplingPlan()
     effect = motion_effect(plan, sampling, range_rate=speed, acceleration=acceleration, group_index=N_AIR)
     t = np.arange(sampling.samples) / sampling.sample_rate_hz

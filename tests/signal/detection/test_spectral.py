@@ -35,7 +35,7 @@ def test_blocks_do_not_show():
 
 
 @pytest.mark.parametrize("frequency", [1000.0, 1003.9, 996.2, 1007.8125, 12_345.678])
-def test_an_unlocked_signal_is_found_whatever_its_place_between_the_bins(frequency):
+def test_an_unlocked_signal_is_found_anywhere_between_the_bins(frequency):
     rate, length = 64e3, 8192
     t = np.arange(length) / rate
     wave = 0.8 + 2.5 * np.cos(2 * np.pi * frequency * t - 4.0)
@@ -100,7 +100,7 @@ def test_a_buffer_without_a_tone_is_nan_and_spoils_no_other():
 @pytest.mark.parametrize(
     ("call", "text"),
     [
-        (lambda: bin_phasor(np.zeros(64), 2), "2 samples a cycle do not show a phase"),
+        (lambda: bin_phasor(np.zeros(64), 2), "2 samples a cycle do not determine a phase"),
         (lambda: bin_phasor(np.zeros(65), 64), "a buffer of 65 samples is not a whole number of cycles of 64"),
         (lambda: bin_phasor(np.float64(1.0), 64), "in 0 dimensions"),
         (lambda: strongest_tone(np.zeros(15), 1.0), "a buffer of 15 samples shows no tone of unknown frequency"),
@@ -108,7 +108,7 @@ def test_a_buffer_without_a_tone_is_nan_and_spoils_no_other():
         (lambda: strongest_tone(np.zeros(64, dtype="U1"), 1.0), "samples of type <U1"),
     ],
 )
-def test_what_is_no_buffer_is_refused(call, text):
+def test_invalid_buffers_are_refused(call, text):
     with pytest.raises(ValidityError) as caught:
         call()
     assert text in str(caught.value)

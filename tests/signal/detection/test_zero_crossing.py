@@ -20,7 +20,7 @@ def turned(phase, other):
     return np.angle(np.exp(1j * (np.asarray(phase) - other)))
 
 
-def test_a_line_between_two_samples_errs_as_its_equation_says():
+def test_linear_interpolation_has_the_error_of_its_equation():
     for n in (16, 64):
         step = 2 * np.pi / n
         places = np.linspace(0.0, 1.0, 101)[1:-1]  # of the crossing between two samples
@@ -45,7 +45,7 @@ def test_clipping_on_top_moves_one_edge_by_the_lowered_level(cut):
 
 @pytest.mark.parametrize(("order", "lag"), [(2, 0.3), (2, 1.5), (3, 0.0), (3, 0.7), (3, np.pi / 2), (5, -1.0)])
 @pytest.mark.parametrize("level", [0.0, -0.1])
-def test_harmonics_move_the_edges_as_the_roots_say(order, lag, level):
+def test_harmonics_move_the_edges_as_the_exact_roots(order, lag, level):
     def height(x):
         return np.cos(x) + 0.02 * np.cos(order * x - lag) - level
 
@@ -121,7 +121,7 @@ def test_a_batch_is_its_buffers_and_bad_ones_are_nan():
 @pytest.mark.parametrize(
     ("call", "text"),
     [
-        (lambda: crossing_phase(np.zeros(64), 2), "2 samples a cycle do not show a phase"),
+        (lambda: crossing_phase(np.zeros(64), 2), "2 samples a cycle do not determine a phase"),
         (lambda: crossing_phase(np.zeros(65), 64), "a buffer of 65 samples is not a whole number of cycles of 64"),
         (lambda: crossing_phase(np.zeros(0), 64), "a buffer of 0 samples"),
         (lambda: crossing_phase(np.zeros(64, dtype=complex), 64), "samples of type complex128"),
@@ -129,7 +129,7 @@ def test_a_batch_is_its_buffers_and_bad_ones_are_nan():
         (lambda: phase_between(np.zeros(64), np.zeros(65)), "shapes (64,) and (65,)"),
     ],
 )
-def test_what_has_no_crossings_to_take_is_refused(call, text):
+def test_samples_without_crossings_are_refused(call, text):
     with pytest.raises(ValidityError) as caught:
         call()
     assert text in str(caught.value)

@@ -65,7 +65,7 @@ def test_degrees_of_freedom_are_those_of_the_scatter(kind, rel):
     assert np.mean(degrees, axis=0) == pytest.approx(seen, rel=rel)
 
 
-def test_an_interval_holds_the_truth_as_often_as_it_says():
+def test_an_interval_has_its_stated_coverage():
     rng = np.random.default_rng(8)
     held = 0
     for _ in range(1000):

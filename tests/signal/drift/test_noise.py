@@ -35,16 +35,16 @@ def check_scatter(runs, rel):
     assert squares.std(axis=0) == pytest.approx(u, rel=rel)
 
 
-def test_parts_of_a_mixture_scatter_as_their_covariance_says():
+def test_parts_of_a_mixture_scatter_as_their_covariance():
     check_scatter(100, 0.25)
 
 
 @pytest.mark.slow
-def test_parts_of_a_mixture_scatter_as_their_covariance_says_in_a_thousand_runs():
+def test_parts_of_a_mixture_scatter_as_their_covariance_in_a_thousand_runs():
     check_scatter(1000, 0.10)
 
 
-def test_what_is_not_there_comes_out_as_nothing_and_noise_is_no_spur():
+def test_absent_parts_are_zero_and_noise_is_not_a_spur():
     squares, _, spurs = scatter(200, 1.0, 0.0, 0.0)
     assert squares[:, 0].mean() == pytest.approx(1.0, abs=0.01)
     assert squares[:, 2].mean() < 1e-4
@@ -85,7 +85,7 @@ def test_two_lines_come_strongest_first_and_the_rest_is_the_noise():
     assert all(s.false_alarm < 1e-6 for s in found.spurs)
 
 
-def test_spectrum_and_allan_deviation_tell_one_story():
+def test_spectrum_and_allan_deviation_agree():
     rng = np.random.default_rng(14)
     k = np.arange(2**16)
     y = made(rng, 2**16, 1.0, 0.2, 0.01) + 0.4 * np.sin(2 * np.pi * 0.057 * k)
@@ -126,7 +126,7 @@ def test_a_steady_drift_is_neither_a_walk_nor_a_spur():
         assert found.drift - still.drift == pytest.approx(drift / 0.001, rel=1e-9)
 
 
-def test_no_two_spurs_stand_at_one_place_and_rounding_is_none():
+def test_spurs_are_distinct_and_rounding_is_not_a_spur():
     turn = np.arange(256)
     bent = 1e-4 * (turn - 128.0) ** 2 + 1e-3 * np.random.default_rng(17).normal(size=256)
     for y in (bent, np.sin(2 * np.pi * turn / 16), (turn // 2 % 2) * 1e-3):

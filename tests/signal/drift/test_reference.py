@@ -39,7 +39,7 @@ def smoothed(reference_time, phase, variance, time, walk):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_it_is_what_a_kalman_smoother_says(seed):
+def test_it_agrees_with_a_kalman_smoother(seed):
     t, phase, variance = references(seed)
     time = np.random.default_rng(seed + 100).uniform(-100, 800, 20)  # before, between and after
     mean, covariance = drift_at(t, phase, variance, time=time, random_walk=WALK)
@@ -50,7 +50,7 @@ def test_it_is_what_a_kalman_smoother_says(seed):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_it_is_what_dense_conditioning_says_correlations_included(seed):
+def test_it_agrees_with_dense_conditioning_correlations_included(seed):
     t, phase, variance = references(seed)
     time = np.random.default_rng(seed + 200).uniform(-100, 800, 12)
     mean, covariance = drift_at(t, phase, variance, time=time, random_walk=WALK)
@@ -136,7 +136,7 @@ def test_the_order_of_references_and_of_times_is_irrelevant(seed):
     np.testing.assert_allclose(its, covariance[np.ix_(b, b)], rtol=1e-7, atol=1e-16)
 
 
-def test_no_times_give_nothing():
+def test_no_times_give_empty_results():
     mean, covariance = drift_at(np.zeros(1), np.zeros(1), np.ones(1), time=np.zeros(0), random_walk=WALK)
     assert mean.shape == (0,)
     assert covariance.shape == (0, 0)
@@ -172,14 +172,14 @@ def test_the_surprise_of_a_reference_is_its_distance_from_the_smoother_without_i
         assert uncertainty[k] == pytest.approx(np.sqrt(spread[0] + variance[k]), rel=1e-4)
 
 
-def test_a_single_reference_surprises_nobody():
+def test_a_single_reference_has_no_prediction_error():
     difference, uncertainty = reference_surprise(np.zeros(1), np.zeros(1), np.ones(1), random_walk=WALK)
     assert np.isnan(difference).all()
     assert np.isnan(uncertainty).all()
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_short_way_along_is_the_diagonal_of_the_long_one(seed):
+def test_drift_along_is_the_diagonal_of_drift_at(seed):
     t, phase, variance = references(seed)
     variance[seed] = 0.0  # one exact reference
     shuffled = np.random.default_rng(seed).permutation(6)
@@ -191,7 +191,7 @@ def test_the_short_way_along_is_the_diagonal_of_the_long_one(seed):
     np.testing.assert_allclose(u**2, np.diag(covariance), rtol=1e-6, atol=1e-6 * WALK**2)
 
 
-def test_the_short_way_takes_half_a_million_shots_and_thousands_of_references():
+def test_drift_along_handles_half_a_million_shots_and_thousands_of_references():
     rng = np.random.default_rng(5)
     t = np.sort(rng.uniform(0, 1e5, 3000))
     phase = np.cumsum(rng.standard_normal(3000)) * WALK * 5
@@ -205,7 +205,7 @@ def test_the_short_way_takes_half_a_million_shots_and_thousands_of_references():
     np.testing.assert_allclose(u[some] ** 2, np.diag(covariance), rtol=5e-6)
 
 
-def test_without_a_walk_the_short_way_is_the_weighted_mean():
+def test_without_a_walk_drift_along_is_the_weighted_mean():
     t, phase, variance = references(3)
     mean, u = drift_along(t, phase, variance, time=np.array([-1e4, t[2], 1e4]), random_walk=0.0)
     np.testing.assert_allclose(mean, (phase / variance).sum() / (1 / variance).sum(), rtol=1e-9)

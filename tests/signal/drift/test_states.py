@@ -43,7 +43,7 @@ def test_weak_modes_left_to_the_shots_keep_every_variance_and_all_but_their_corr
     assert whole.without(0.0) is whole
 
 
-def test_the_strongest_modes_hold_what_a_bridges_series_says():
+def test_the_strongest_modes_agree_with_the_series_of_a_bridge():
     """Of a bridge the first sine has 6/pi^2 = 61 % of the mean variance, three 83 %."""
     t = np.linspace(0.0, 100.0, 402)[1:-1]
     states = drift_states(np.array([0.0, 100.0]), np.full(2, 1e-12), time=t, random_walk=WALK, noise=np.ones(400))

@@ -77,7 +77,7 @@ def test_the_estimates_uncertainty_is_the_scatter_and_its_interval_holds_the_tru
 
 
 @draws(150)
-def test_walk_and_white_noise_are_told_apart_with_their_covariance(runs):
+def test_walk_and_white_noise_are_separated_with_their_covariance(runs):
     rng = np.random.default_rng(23)
     nights = [series_of(rng, WALK, (1e-3) ** 2, rangers=6, references=12, white=4e-3) for _ in range(runs)]
     found = [estimate_walk(t, phase, variance, series=name, white=True) for t, phase, variance, name in nights]
@@ -97,7 +97,7 @@ def test_noise_enough_to_explain_everything_leaves_no_walk():
     assert found.interval() == (0.0, np.inf)
 
 
-def test_the_test_of_a_walk_alarms_as_often_as_it_says_and_on_either_side():
+def test_the_test_of_a_walk_has_its_false_alarm_rate_on_either_side():
     rng = np.random.default_rng(24)
     fates = {1.0: [], 1.4: [], 0.7: []}
     for _ in range(600):
@@ -111,7 +111,7 @@ def test_the_test_of_a_walk_alarms_as_often_as_it_says_and_on_either_side():
 
 
 @pytest.mark.parametrize("u_reference", [0.0, 1e-3, 5e-3])
-def test_the_middle_of_a_gap_is_as_uncertain_as_the_covariance_says(u_reference):
+def test_the_middle_of_a_gap_agrees_with_the_covariance(u_reference):
     alone = drift_at(
         np.array([0.0, 100.0]), np.zeros(2), np.full(2, u_reference**2), time=np.array([50.0]), random_walk=WALK
     )
@@ -145,7 +145,7 @@ def test_the_longest_gap_is_the_inverse_and_by_hand():
         (
             lambda: walk_test(np.arange(2.0), np.zeros(2), np.ones(2), random_walk=1.0, series=["a", "b"]),
             EstimationError,
-            "no two reference shots",
+            "no series has two reference shots",
         ),
         (lambda: longest_gap(1e-4, WALK, 1e-3), ValidityError, "what two references give at best"),
         (lambda: longest_gap(1e-4, 0.0, 1e-3), ValidityError, "sets no gap"),

@@ -19,7 +19,7 @@ couplings = st.floats(-0.01, 0.01)
 
 
 @given(volts, volts, couplings, couplings, st.floats(-10, 10))
-def test_what_is_added_can_be_taken_off(amplitude, reference, coefficient, quadratic, phase):
+def test_coupling_added_can_be_removed(amplitude, reference, coefficient, quadratic, phase):
     measured = phase + amplitude_phase(amplitude, reference, coefficient, quadratic=quadratic)
     back = remove_amplitude_phase(measured, amplitude, reference, coefficient=coefficient, quadratic=quadratic)
     assert abs(back - phase) <= 1e-14
@@ -59,14 +59,14 @@ def test_the_fit_is_numpys_polynomial(quadratic):
 
 
 @pytest.mark.parametrize("start", [0.0, 1e-4, 3.0, 2 * np.pi - 1e-4, 100.0])
-def test_phases_on_both_sides_of_a_whole_turn_are_one_phase(start):
+def test_phases_across_a_full_turn_are_combined(start):
     phase = np.mod(start + amplitude_phase(LADDER, 2.0, 3e-3), 2 * np.pi)
     found = fit_amplitude_phase(LADDER, phase, 1e-4, reference_amplitude=2.0)
     assert found.coefficient == pytest.approx(3e-3, abs=1e-13)
     assert np.cos(found.phase - start) == pytest.approx(1.0, abs=1e-15)
 
 
-def test_a_drift_besides_is_solved_for():
+def test_a_drift_column_is_estimated():
     time = np.linspace(-1, 1, 13)
     phase = 2.0 + amplitude_phase(LADDER, 2.0, 2e-3) + 1e-3 * time
     deceived = fit_amplitude_phase(LADDER, phase, 1e-5, reference_amplitude=2.0)
@@ -80,7 +80,7 @@ def test_a_drift_besides_is_solved_for():
     assert found.covariance.shape == (2, 2)
 
 
-def test_claimed_uncertainty_is_scatter_and_the_test_alarms_as_often_as_it_says():
+def test_claimed_uncertainty_equals_scatter_and_the_test_has_its_false_alarm_rate():
     rng = np.random.default_rng(11)
     u = 3e-4 / LADDER
     fits = []
@@ -105,7 +105,7 @@ def test_a_bend_fails_the_line_and_the_quadratic_term_finds_it():
     assert abs(bent.coefficient - 2e-3) < 4 * bent.u_coefficient
 
 
-def test_what_is_left_of_a_leakage_passes_for_coupling_and_the_test_says_so():
+def test_residual_leakage_looks_like_coupling_and_fails_the_test():
     phase = np.angle(LADDER * np.exp(1j) + 0.01 * np.exp(1j * (1 + np.pi / 2)))
     found = fit_amplitude_phase(LADDER, phase, 1e-4, reference_amplitude=2.0)
     assert found.coefficient < -1e-3
@@ -124,5 +124,5 @@ def test_bad_input_is_refused_in_one_line():
         amplitude_phase([1.0, 0.0], 1.0, 1e-3)
     with pytest.raises(ValidityError, match=r"reference amplitude -1\.0 V is not above 0"):
         amplitude_phase(1.0, -1.0, 1e-3)
-    with pytest.raises(EstimationError, match="3 readings do not tell 2 coefficients apart"):
+    with pytest.raises(EstimationError, match="3 readings do not separate 2 coefficients"):
         fit_amplitude_phase([1.0, 1.0, 1.0], np.zeros(3), 1e-4, reference_amplitude=1.0)

@@ -32,7 +32,7 @@ def modulated(contrast, theta, psi, depth):
 
 @pytest.mark.parametrize("theta", [0.0, 1.0, np.pi])
 @pytest.mark.parametrize("psi", [0.4, 1.6, 3.0, 5.0])
-def test_interference_is_what_the_product_of_the_fields_gives(theta, psi):
+def test_interference_equals_the_product_of_the_fields(theta, psi):
     got = float(interference_phase(0.05, theta, psi))
     assert got == pytest.approx(modulated(0.05, theta, psi, 1e-4), abs=1e-8)
     # [interference_phase] says deep modulation makes up to 8 % more of it
@@ -47,7 +47,7 @@ def test_interference_to_first_order_by_hand():
     assert -phase * 0.199811 / (4 * np.pi) == pytest.approx(15.9e-6, abs=0.05e-6)
 
 
-def test_half_a_wavelength_of_light_is_a_whole_fringe():
+def test_half_a_wavelength_of_light_is_one_fringe():
     assert float(optical_phase(1.0 + LIGHT / 2, LIGHT) - optical_phase(1.0, LIGHT)) == pytest.approx(
         2 * np.pi, rel=1e-8
     )
@@ -90,7 +90,7 @@ def test_the_claimed_uncertainty_of_a_mean_of_shots_is_the_scatter(u_displacemen
     assert float(claimed) == pytest.approx(np.std(phase.mean(axis=1)), rel=0.02)  # four of 40 000 draws
 
 
-def test_one_shot_has_the_arcsine_distributions_uncertainty_and_rest_averages_nothing():
+def test_one_shot_has_arcsine_uncertainty_and_a_fixed_path_averages_nothing():
     assert float(fringe_uncertainty(1e-3)) == pytest.approx(1e-3 / np.sqrt(2))
     assert float(fringe_uncertainty(1e-3, shots=100)) == pytest.approx(1e-3 / np.sqrt(2))
     assert float(fringe_uncertainty(1e-3, shots=100, correlation=0.0)) == pytest.approx(1e-4 / np.sqrt(2))

@@ -212,15 +212,23 @@ def test_a_small_disturbance_of_any_phase_is_its_share_over_root_two():
     [
         (lambda: worst_range_error(1.01, 0.2), ValidityError, "not within 0 to 1"),
         (lambda: rms_range_error(-0.1, 0.2), ValidityError, "not within 0 to 1"),
-        (lambda: blocked_leakage([0.1, 0.2]), EstimationError, "2 buffers in one session show no scatter"),
-        (lambda: blocked_leakage(np.ones(9), [0] * 5 + [1] * 4), EstimationError, "2 sessions show no scatter"),
-        (lambda: circle_leakage(np.ones(3), 1e-3), EstimationError, "3 phasors do not show a circle"),
-        (lambda: circle_leakage(np.arange(9) + 0j, 1e-3), EstimationError, "show no circle"),
-        (lambda: circle_leakage(np.ones(5) + 0j, 1e-3), EstimationError, "show no circle"),
+        (lambda: blocked_leakage([0.1, 0.2]), EstimationError, "2 buffers in one session do not determine the scatter"),
+        (
+            lambda: blocked_leakage(np.ones(9), [0] * 5 + [1] * 4),
+            EstimationError,
+            "2 sessions do not determine the scatter",
+        ),
+        (lambda: circle_leakage(np.ones(3), 1e-3), EstimationError, "3 phasors do not determine a circle"),
+        (lambda: circle_leakage(np.arange(9) + 0j, 1e-3), EstimationError, "do not form a circle"),
+        (lambda: circle_leakage(np.ones(5) + 0j, 1e-3), EstimationError, "do not form a circle"),
         (lambda: circle_leakage(np.ones(5), 0.0), ValidityError, "not above 0"),
         (lambda: circle_leakage([1, 2, np.nan, 1j, 2j], 1e-3), ValidityError, "phasor 2 is .*nan.* V"),
         (lambda: blocked_leakage([1, 2, np.inf, 1j]), ValidityError, "phasor 2 is .*inf.* V"),
-        (lambda: rail_leakage(np.ones(5), np.full(5, 0.3), 1e-3), EstimationError, "do not tell leakage from light"),
+        (
+            lambda: rail_leakage(np.ones(5), np.full(5, 0.3), 1e-3),
+            EstimationError,
+            "do not separate leakage from light",
+        ),
     ],
 )
 def test_bad_input_is_refused_in_one_line(call, error, message):

@@ -42,7 +42,7 @@ def measured(path, shares, excess):
 @pytest.mark.parametrize(
     ("shares", "excess"), [([0.01], [0.05]), ([0.01], [0.31]), ([0.2, 0.1, 0.05], [0.02, 0.13, 7.7])]
 )
-def test_it_is_what_the_samples_of_all_returns_give(path, shares, excess):
+def test_error_equals_that_of_summed_return_samples(path, shares, excess):
     # rounding of 1e9 cycles a second times microseconds: 1e-13 cycles of 0.1 m, and 100 m of path
     assert float(multipath_error(shares, excess, WAVELENGTH)) == pytest.approx(
         measured(path, shares, excess), abs=1e-12
@@ -58,7 +58,7 @@ def test_the_cats_eye_is_a_series_of_rounds(path):
     assert float(multipath_error(shares, excess, WAVELENGTH)) == pytest.approx(expected, abs=1e-12)
 
 
-def test_light_that_comes_a_little_later_reads_longer_by_its_mean_delay():
+def test_slightly_delayed_light_lengthens_the_range_by_its_mean_delay():
     # shares 0.1 and 0.2, detours 10 and 40 um: (1 + 8) um/1.3, halved; the next term has the detour's cube
     assert float(multipath_error([0.1, 0.2], [10e-6, 40e-6], WAVELENGTH)) == pytest.approx(9e-6 / 2.6, rel=1e-6)
 
@@ -91,7 +91,7 @@ def test_the_cats_eye_is_cyclic_in_the_phase(beyond):
     x = 2 * np.pi * np.arange(64) / 64
     counted = -x / (2 * np.pi) * HALF  # the phase falls as the distance grows
     exact = cats_eye_error(5 * HALF + counted + beyond, q, WAVELENGTH)
-    cosine, sine = cats_eye_cyclic(q, WAVELENGTH, orders, beyond=beyond)
+    cosine, sine = cats_eye_cyclic(q, WAVELENGTH, orders, extra_path=beyond)
     np.testing.assert_allclose(cyclic_range(x, cosine, sine), exact, rtol=0, atol=q**11 * 0.016)
     _, c, s = cyclic_orders(exact, 4)
     np.testing.assert_allclose(np.concatenate([c, s]), [*cosine[:4], *sine[:4]], rtol=0, atol=1e-15)
@@ -117,7 +117,7 @@ def test_the_detector_may_reflect_the_limit_over_the_rest_of_the_way():
         (lambda: multipath_error([-0.1], [0.1], 0.2), "below 0"),
         (lambda: cats_eye_error(1.0, 1.0, 0.2), "sum to 1 or more"),
         (lambda: share_a_pass(0.1, 1.2, 0.5), r"recollected part 1\.2 is not within 0 to 1"),
-        (lambda: largest_share(0.0, 0.2), "not within 0 to an eighth wavelength"),
+        (lambda: largest_share(0.0, 0.2), "not within 0 to an eighth of a wavelength"),
     ],
 )
 def test_bad_input_is_refused_in_one_line(call, message):

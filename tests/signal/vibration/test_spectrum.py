@@ -39,7 +39,7 @@ def test_the_integral_of_the_density_is_the_variance():
         assert found.density.sum() * found.frequency_hz[0] == pytest.approx(1e-8, rel=0.03)
 
 
-def test_confidence_bands_hold_the_truth_as_often_as_they_say():
+def test_confidence_bands_have_their_stated_coverage():
     rng, t, inside, levels = np.random.default_rng(3), np.arange(1024) / RATE, [], []
     truth = 2.0 * 1e-8 / RATE
     for _ in range(60):
@@ -59,10 +59,10 @@ def test_a_buffers_mean_is_undone_where_it_can_be():
     y = np.mean(1e-4 * np.cos(2 * np.pi * f * (t[:, None] + within)), axis=1)
     found = spectrum([t], [y], stretch=100.0)
     power = [s.density[:, 0][np.abs(s.frequency_hz - f) < 0.1].sum() * s.frequency_hz[0]
-             for s in (found, found.before_the_mean(window))]  # fmt: skip
+             for s in (found, found.without_averaging(window))]  # fmt: skip
     assert power[1] == pytest.approx(0.5e-8, rel=2e-3)
     assert power[0] / power[1] == pytest.approx(np.sinc(f * window) ** 2, rel=2e-3)
-    high = Spectrum(np.array([7.8]), np.ones((1, 1, 1), complex), 2.0, 0.1, np.array([20.0])).before_the_mean(window)
+    high = Spectrum(np.array([7.8]), np.ones((1, 1, 1), complex), 2.0, 0.1, np.array([20.0])).without_averaging(window)
     assert np.isnan(high.density).all()
 
 
@@ -95,7 +95,7 @@ def test_a_wave_above_half_the_rate_is_named_with_all_it_may_be_and_other_rhythm
 
 
 @draws(60)
-def test_a_shape_comes_back_with_the_scatter_it_claims(runs):
+def test_a_shape_is_recovered_with_its_claimed_scatter(runs):
     rng, t = np.random.default_rng(6), np.arange(2000) / RATE
     truth, off = np.array([1.0, -0.5, 0.2, 0.0]), []
     for _ in range(runs):
@@ -112,12 +112,12 @@ def test_a_shape_comes_back_with_the_scatter_it_claims(runs):
     assert found.rms[0] == pytest.approx(np.std(band), rel=0.3)
 
 
-def test_what_is_no_series_is_refused():
+def test_invalid_series_are_refused():
     t = np.arange(20.0)
     for times, samples, more, expected in (
         ([t], [t[:5]], {}, "expected both"),
         ([t], [], {}, "channels"),
-        ([t[::-1]], [t], {}, "do not rise"),
+        ([t[::-1]], [t], {}, "do not increase"),
         ([t], [np.full(20, np.nan)], {}, "not finite"),
         ([t], [t], {"stretch": 100.0}, "no longer"),
         ([t], [t], {"stretch": 4.0}, "holds 8 samples"),

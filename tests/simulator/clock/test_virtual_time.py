@@ -101,11 +101,11 @@ def test_time_stands_still_while_something_outside_is_awaited(loop):
     loop.run_until_complete(story())
 
 
-def test_a_loop_in_which_nothing_can_happen_says_so(loop):
+def test_a_deadlocked_loop_is_reported(loop):
     async def story():
         await loop.create_future()
 
-    with pytest.raises(CatseyeError, match="nothing can happen any more"):
+    with pytest.raises(CatseyeError, match="no timer is set and nothing is ready"):
         loop.run_until_complete(story())
     for task in asyncio.all_tasks(loop):
         task.cancel()
@@ -114,7 +114,7 @@ def test_a_loop_in_which_nothing_can_happen_says_so(loop):
 
 
 @pytest.mark.parametrize("latency", [0.0, 0.25])
-def test_what_is_written_arrives_in_order_after_the_latency(loop, latency):
+def test_written_data_arrive_in_order_after_the_latency(loop, latency):
     async def story():
         near, far = await pair(MemoryNetwork(latency))
         for k in range(50):

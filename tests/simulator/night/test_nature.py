@@ -208,7 +208,7 @@ def test_a_path_through_eddies_is_their_mean_along_it():
     assert eddies.mean_c(RIM, LOW, 777.0) == pytest.approx(eddies.temperature_c(on, 777.0).mean(), abs=1e-7)
 
 
-def test_what_warms_the_air_does_not_wet_it():
+def test_warming_adds_no_vapour():
     warm = Nature(waves=(AirWave(2.0, 4000.0),))
     t, _, h = NaturalAir(NIGHT, 1.0, warm).weather_at(np.zeros(3), 1000.0)
     t0, _, h0 = TrueAir(NIGHT).weather_at(np.zeros(3), 1000.0)
@@ -407,7 +407,7 @@ def test_a_night_takes_its_neighbours_from_its_nature():
         (lambda: Nature(neighbours=1.5), "neighbours = 1.5"),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_line(make, message):
+def test_invalid_values_are_refused_in_one_line(make, message):
     with pytest.raises(ValidityError, match=message) as refused:
         make()
     assert "\n" not in str(refused.value)

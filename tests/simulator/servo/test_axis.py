@@ -126,7 +126,7 @@ def test_homing_finds_the_index_from_anywhere_between_the_stops(start, index, di
     assert abs(made.motor.count - index - 700) <= 1
 
 
-def test_homing_says_when_there_is_no_index_and_when_time_is_short():
+def test_homing_reports_a_missing_index_and_a_timeout():
     jammed = axis(AxisDesign(low_stop=-0.5, high_stop=0.5, index_count=50_000))
     failed = jammed.fhm()
     assert not failed.success

@@ -142,7 +142,7 @@ def test_the_acceleration_changes_only_between_moves():
     assert (chip.desired_position, chip.acceleration) == (7000, 10_000)
 
 
-def test_what_is_loaded_waits_for_its_command():
+def test_loaded_values_wait_for_their_command():
     chip = started(position=50, velocity=200_000, acceleration=20_000)
     chip.load_filter(kp=10)
     chip.load_trajectory(position=90)
@@ -267,7 +267,7 @@ def test_the_index_register_and_home():
     assert chip.desired_position == 5000 - 20
 
 
-def test_positions_wrap_round_and_say_so():
+def test_positions_wrap_and_set_a_flag():
     chip = started(velocity=2**30 - 1, acceleration=2**30 - 1, mode="velocity")
     for _ in range(2**30 // 2**14 + 10):
         chip.step(chip.position >> 16)
@@ -291,7 +291,7 @@ def test_positions_wrap_round_and_say_so():
         (lambda _: MotionChip(overflow="trap"), "overflow 'trap'"),
     ],
 )
-def test_what_no_register_holds_is_refused_and_nothing_is_loaded(call, said):
+def test_values_beyond_a_register_are_refused_and_nothing_is_loaded(call, said):
     chip = MotionChip()
     with pytest.raises(ValidityError, match=said):
         call(chip)

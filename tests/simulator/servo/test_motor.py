@@ -42,7 +42,7 @@ def integrated(design: AxisDesign, drives, *, velocity: float = 0.0) -> np.ndarr
 
 
 @pytest.mark.parametrize("design", [AxisDesign(), AxisDesign(amplifier="voltage", full_scale=12.0), AxisDesign(**FREE)])
-def test_an_axis_moves_as_an_integrator_says(design):
+def test_an_axis_moves_as_a_numerical_integrator(design):
     drives = np.random.default_rng(5).choice([-0.9, -0.06, -0.03, 0.0, 0.03, 0.06, 0.9], 60)
     motor, angles = Motor(design), []
     for drive in drives:

@@ -130,9 +130,9 @@ def test_an_identified_axis_is_tuned_as_the_true_one():
     assert np.allclose(chosen.values[:3], ideal.values[:3], rtol=0.03)
 
 
-def test_moves_that_tell_nothing_are_refused():
+def test_uninformative_moves_are_refused():
     still = AxisTrace(np.arange(9) * SAMPLE_TIME, *(np.zeros((5, 9))))
-    with pytest.raises(EstimationError, match="do not tell"):
+    with pytest.raises(EstimationError, match="do not separate"):
         identify(still)
     real = moves(AxisDesign(), 5000)[0]
     swapped = AxisTrace(real.time, real.desired, real.velocity, real.actual, real.angle, -real.output)
@@ -143,7 +143,7 @@ def test_moves_that_tell_nothing_are_refused():
 @pytest.mark.parametrize(
     ("keys", "said"),
     [
-        ({"crossover_hz": 90.0, "interval": 7}, "phase margin 55 degrees cannot be had at 90 Hz"),
+        ({"crossover_hz": 90.0, "interval": 7}, "phase margin 55 degrees is not attainable at 90 Hz"),
         ({"crossover_hz": 80.0}, "FKD: derivative gain"),
         ({"crossover_hz": 0.0}, "crossover 0 Hz is outside"),
         ({"crossover_hz": 2000.0}, "crossover 2000 Hz is outside"),

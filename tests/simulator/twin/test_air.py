@@ -111,7 +111,7 @@ def test_the_horizontal_gradient_is_of_the_stated_size():
     assert t[1] - t[0] == pytest.approx(made.air.slope[0] * 100, rel=1e-9)
 
 
-def test_weather_wanders_by_what_is_said():
+def test_weather_varies_by_the_stated_amount():
     t = np.array([0.0, 3600.0])
     moved = []
     for seed in range(60):

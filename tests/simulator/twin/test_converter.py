@@ -66,7 +66,7 @@ def test_too_much_is_cut_at_the_converter_s_ends():
     assert np.mean(np.abs(found.astype(int)) >= 32_767) == pytest.approx(2 / 3, abs=0.02)  # |20 cos| > 10
 
 
-def test_noise_is_white_of_the_size_told_and_the_generator_s():
+def test_noise_is_white_of_the_given_size_from_the_generator():
     loud = Converter(offset=0.0, noise=0.2)
     first, again, other = (codes(np.zeros(25), converter=loud, seed=seed) for seed in (1, 1, 2))
     assert np.array_equal(first, again)

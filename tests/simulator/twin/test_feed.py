@@ -110,7 +110,7 @@ def test_each_line_is_the_truth_of_its_stamp():
     run(story)
 
 
-def test_who_comes_later_hears_the_weather_of_that_moment():
+def test_later_clients_receive_present_weather():
     async def story(feed, world, network):
         await asyncio.sleep(13.0)
         client = await network.connect(Listening, LOOPBACK, 5250)
@@ -122,7 +122,7 @@ def test_who_comes_later_hears_the_weather_of_that_moment():
 
 
 @pytest.mark.parametrize("word", ["HLP", "help"])
-def test_a_person_who_asks_is_told_what_comes_and_how_to_leave(word):
+def test_help_lists_unsolicited_lines_and_how_to_leave(word):
     async def story(feed, world, network):
         client = await network.connect(Listening, LOOPBACK, 5250)
         client.transport.write(f"{word}\r\n".encode())
@@ -191,7 +191,7 @@ def test_the_32_clients_hear_the_same_and_a_33rd_is_turned_away():
 
 def test_a_port_that_is_taken_and_a_weather_without_pause_are_refused():
     async def story(feed, world, network):
-        with pytest.raises(InputError, match=r"feed: 127\.0\.0\.1 port 5250 cannot be had"):
+        with pytest.raises(InputError, match=r"feed: 127\.0\.0\.1 port 5250 is not available"):
             await SiteFeed("gbt", [], world, feed.clock, network=network).start(LOOPBACK, 5250)
 
     run(story)
@@ -226,7 +226,7 @@ def test_it_serves_on_real_sockets_in_real_time():
 KEY = "a-key-of-the-site"
 
 
-def test_peers_without_the_key_take_no_place_and_hear_nothing():
+def test_peers_without_the_key_take_no_place_and_receive_nothing():
     async def story(feed, world, network):
         strangers = [await network.connect(Listening, LOOPBACK, 5250) for _ in range(MOST_CLIENTS + 5)]
         await asyncio.sleep(0.5)
@@ -245,7 +245,7 @@ def test_peers_without_the_key_take_no_place_and_hear_nothing():
 
 
 @pytest.mark.parametrize("first", [b"\x00\x01\x00\x08", b"EHLO mail\n", b"\xff\n", b"PS 0\n"])
-def test_what_is_no_word_of_the_feed_is_closed(first, caplog):
+def test_unknown_words_close_the_connection(first, caplog):
     async def story(feed, world, network):
         client = await network.connect(Listening, LOOPBACK, 5250)
         client.transport.write(first)
@@ -257,7 +257,7 @@ def test_what_is_no_word_of_the_feed_is_closed(first, caplog):
     run(story)
 
 
-def test_who_says_nothing_for_an_hour_is_closed_and_an_empty_line_is_enough():
+def test_silent_clients_are_closed_and_an_empty_line_prevents_it():
     async def story(feed, world, network):
         mute, alive = [await network.connect(Listening, LOOPBACK, 5250) for _ in range(2)]
         for _ in range(4):

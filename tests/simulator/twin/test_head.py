@@ -279,7 +279,7 @@ def test_no_light_returns_while_the_laser_is_off():
 
 @settings(max_examples=10, deadline=None)
 @given(st.lists(st.floats(1e-4, 0.4), min_size=1, max_size=60))
-def test_how_often_a_head_is_asked_changes_nothing(strides):
+def test_query_frequency_of_a_head_changes_nothing(strides):
     found = []
     for looks in (strides, []):
         head, clock = made()

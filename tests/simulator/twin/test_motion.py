@@ -145,7 +145,7 @@ def test_a_table_passes_its_postures_and_stands_outside(tmp_path):
         ("", "expected fixed AZ EL"),
     ],
 )
-def test_what_is_no_motion_is_refused(text, said):
+def test_invalid_motions_are_refused(text, said):
     with pytest.raises(InputError, match=said):
         AxisMotion.parse(text)
 

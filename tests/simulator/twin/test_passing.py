@@ -10,7 +10,7 @@ from catseye.geometry.sky.sun import altitude_azimuth, sun_direction
 from catseye.simulator.night.fields import AirWave
 from catseye.simulator.night.lag import lagged
 from catseye.simulator.twin.conditions import LIVING_NIGHT, STILL
-from catseye.simulator.twin.fronts import SLOT, LivingFronts, risen
+from catseye.simulator.twin.fronts import SLOT, LivingFronts, step_share
 from catseye.simulator.twin.passing import TravellingWaves
 from simulator.living_scene import START, only, rms, site, twin
 
@@ -62,8 +62,8 @@ def test_fronts_followed_late_are_the_lag_of_fronts():
     for lag in (45.0, 3600.0):
         expected = lagged(lambda s: fronts(origin, s), t, time_constant_s=lag, step_s=1.0)
         np.testing.assert_allclose(fronts(origin, t, lag), expected, atol=2e-6)
-    assert risen(1e5, 300.0, 60.0) == pytest.approx(1.0)
-    assert risen(-5.0, 300.0, 60.0) == pytest.approx(0.0, abs=1e-12)
+    assert step_share(1e5, 300.0, 60.0) == pytest.approx(1.0)
+    assert step_share(-5.0, 300.0, 60.0) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_eddies_are_local_and_ride_on_the_wind():

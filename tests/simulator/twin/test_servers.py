@@ -117,14 +117,14 @@ def test_each_ranger_of_a_site_is_served_at_its_address_from_its_files(few):
     running.run(story)
 
 
-def test_only_the_heads_given_are_served_and_a_stranger_is_refused(few):
+def test_only_given_heads_are_served_and_an_unknown_one_is_refused(few):
     running = Running(few, ["ZY102", "ZY104"])
     running.run(lambda world: asyncio.sleep(0.1))
     assert running.site.addresses == {
         "ZY102": ("127.0.0.1", 24_120, 24_121),
         "ZY104": ("127.0.0.1", 24_140, 24_141),
     }
-    with pytest.raises(InputError, match="ZY999 is no ranger"):
+    with pytest.raises(InputError, match="ZY999 is not a ranger"):
         TwinSite(few, {"ZY999": None}, world_faults=FaultBoard(), seconds=lambda: 0.0)
 
 
@@ -192,7 +192,7 @@ def test_a_dead_ranger_comes_back_cold(few):
     running.run(story)
 
 
-def test_a_hung_ranger_takes_lines_and_answers_nothing_and_forgets_them(few):
+def test_a_hung_ranger_takes_lines_without_answer_and_drops_them(few):
     running = Running(few, ["ZY101"], "hung-ranger ZY101 100 150")
 
     async def story(world):

@@ -188,7 +188,7 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(("fault", "strength", "farther"), FAULTS)
-def test_faults_do_what_they_say(fault, strength, farther):
+def test_faults_have_their_documented_effect(fault, strength, farther):
     board = FaultBoard()
     made = twin(planted=STILL, faults=board)
     well = aimed(made, "ZY105", "ZEG41040L", 50.0)[0]
@@ -201,7 +201,7 @@ def test_faults_do_what_they_say(fault, strength, farther):
     assert aimed(made, "ZY105", "ZEG41040L", 50.0)[0] == well
 
 
-def test_faults_of_stations_and_converters_do_what_they_say():
+def test_faults_of_stations_and_converters_have_their_documented_effect():
     board = FaultBoard([Fault.parse("lying-station WX1 100 200"), Fault.parse("silent-station WX2 100 200")])
     made = twin(planted=STILL, faults=board)
     assert made.weather("WX1", 99.0).temperature_c == pytest.approx(11.3)
@@ -354,7 +354,7 @@ def test_two_processes_agree_bit_for_bit_and_two_seeds_do_not():
     assert run.stdout.strip() != digest(twin("track 145 40", seed=8))
 
 
-def test_order_of_asking_changes_nothing():
+def test_query_order_changes_nothing():
     one, other = twin(), twin()
     early = one.shot("ZY105", "ZEG41040L", 5.0).samples
     other.shot("ZY105", "TR03-B", 900.0)

@@ -66,7 +66,7 @@ def test_a_leaning_mirror_reflects_as_the_imperfect_mount_does(azimuth, elevatio
     assert found.leaves == pytest.approx(expected.origin @ turn.T, abs=1e-9)
     # the way from z = 0 down the laser's direction to the face
     start = np.append(scale * AXES[2:], 0.0)
-    assert np.abs(found.way[0]) == pytest.approx(np.linalg.norm(found.leaves[0] - start), abs=1e-12)
+    assert np.abs(found.path[0]) == pytest.approx(np.linalg.norm(found.leaves[0] - start), abs=1e-12)
     target = found.leaves + 83.0 * found.direction
     back = station.counts(target)
     # whole turns of azimuth apart; 1e-9 rad of direction are 2e-5 counts, more where sin Phi is small

@@ -32,14 +32,14 @@ def test_certified_distances_hold_within_their_uncertainty():
     assert rms(z) == pytest.approx(1.0, abs=0.25)  # 60 draws: 9 %
 
 
-def test_typing_and_surface_are_off_by_what_is_said():
+def test_typing_and_surface_errors_have_their_stated_size():
     true, typed = twin(at=whole_site()), twin(at=whole_site(), planted=STILL)
     names = [n for n in whole_site().targets if n.startswith("DP")]
-    away = np.array([true.scene.retros[n].rest - typed.scene.retros[n].rest for n in names])
-    rest = np.array([typed.scene.retros[n].rest for n in names])
+    away = np.array([true.scene.retros[n].rest_place - typed.scene.retros[n].rest_place for n in names])
+    rest = np.array([typed.scene.retros[n].rest_place for n in names])
     surface = true.scene._surface
     assert rms(away[:, :2]) == pytest.approx(8e-3 * 0.96, rel=0.03)  # a normal clipped at two sigma
-    off = np.array([true.scene.retros[n].rest for n in names])
+    off = np.array([true.scene.retros[n].rest_place for n in names])
     normal = (off[:, 2] - surface.height(off[:, :2])) * surface.up(off[:, :2])[:, 2]
     assert rms(normal) == pytest.approx(0.29e-3, rel=0.4)  # six low orders of one draw: 30 %
     low = low_orders(off[:, :2], surface.centre, surface.radius) @ surface.orders
@@ -55,8 +55,8 @@ def test_a_triplet_is_its_data_sheet_within_the_sheets_uncertainties():
         made = twin(seed=seed)
         for sheet in site().triplets.values():
             left, right, ball = (made.scene.retros[n] for n in sheet.targets)
-            z.append((np.linalg.norm(right.rest - left.rest) * 1e3 - sheet.d12_mm) / sheet.u_d12_mm)
-            high = (ball.rest - (left.rest + right.rest) / 2) @ left.facing * 1e3
+            z.append((np.linalg.norm(right.rest_place - left.rest_place) * 1e3 - sheet.d12_mm) / sheet.u_d12_mm)
+            high = (ball.rest_place - (left.rest_place + right.rest_place) / 2) @ left.facing * 1e3
             z.append((high - sheet.h_corr_mm) / sheet.u_h_corr_mm)
             z.append((left.sizes[0] * 1e3 - sheet.left_prism.height_mm) / sheet.left_prism.u_height_mm)
             assert ball.facing == pytest.approx(-left.facing, abs=1e-12)

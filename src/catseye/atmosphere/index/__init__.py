@@ -1,1 +1,1 @@
-"""The index of air: models, kernels, wavelength."""
+"""Index of air: models, compiled kernels, wavelength."""

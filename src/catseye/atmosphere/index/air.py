@@ -1,7 +1,7 @@
-"""The index of air by a named model, checked against the model's limits.
+"""Index of air by a named model, checked against the model's limits.
 
 A new model is one file with a MODEL, and one line here. Carbon dioxide enters where the model has it; the others' air
-has a fixed share, which `AirState.co2_ppm` tells.
+has a fixed share, given in `AirState.co2_ppm`.
 """
 
 from collections.abc import Callable
@@ -23,30 +23,30 @@ MODELS: dict[str, IndexModel] = {
     "iag1999_closed": iag1999_closed.MODEL,
     "barrell_sears1963": barrell_sears1963.MODEL,
 }
-KERNELS = {"ciddor_hill1999", "rueger1990"}  # those with a compiled form beside the plain one, `NAME_kernel.py`
-LARGE = 200_000  # states from which on the compiled form is worth loading: 0.7 s, once
+KERNELS = {"ciddor_hill1999", "rueger1990"}  # models with a compiled form, `NAME_kernel.py`
+LARGE = 200_000  # states from which loading the compiled form (0.7 s, once) pays
 
-MODULATION = ValidInterval("modulation frequency", "Hz", 1e6, 1e12, "the notion of a group")
+MODULATION = ValidInterval("modulation frequency", "Hz", 1e6, 1e12, "the definition of a group index")
 
 
 @dataclass(frozen=True)
 class AirState:
-    """Everything about one state of air, or an array of them, that a ranger needs.
+    """State of air, or an array of them, as a ranger needs it.
 
     temperature_c          air temperature, °C
     pressure_hpa           total pressure, hPa
     group_index            n_g
     phase_index            n
-    group_refractivity     n_g - 1, with all its digits
-    phase_refractivity     n - 1, with all its digits
+    group_refractivity     n_g - 1, at full precision
+    phase_refractivity     n - 1, at full precision
     vapour_pressure_hpa    partial pressure of water vapour, hPa
     humidity_percent       relative humidity over liquid water, %
-    dew_point_c            over liquid water, °C; nan in perfectly dry air, which has none
+    dew_point_c            over liquid water, °C; nan in perfectly dry air
     group_wavelength       of the modulation in this air, m
     sensitivity            derivatives of the group index
     phase_sensitivity      derivatives of the phase index
-    standard_uncertainty   of the group index, from the formula alone, perfect weather given
-    co2_ppm                carbon dioxide that the numbers hold for, ppm
+    standard_uncertainty   of the group index, of the formula alone, weather taken as exact
+    co2_ppm                carbon dioxide of this state, ppm
     model                  the model's name
     """
 
@@ -75,9 +75,11 @@ class AirState:
         u_co2_ppm: Any = 0.0,
         u_wavelength_um: Any = 0.0,
     ) -> Any:
-        """Standard uncertainty of the group index from the formula and from uncorrelated inputs (1 sigma each).
+        """Standard uncertainty of the group index from formula and uncorrelated inputs.
 
-        Raises ValidityError for an uncertainty below zero or no number.
+        Inputs are 1 sigma each.
+
+        Raises ValidityError for an uncertainty below zero or not a number.
         Source: law of propagation of uncertainty, first order; [JCGM100] eq. 10.
 
         >>> round(float(air(20.0, 933.0, 50.0).combined_uncertainty(0.3)) * 1e6, 2)
@@ -105,7 +107,7 @@ class AirState:
 def group_refractivity(
     temperature_c, pressure_hpa, humidity_percent, *, wavelength_um=0.780, model="ciddor_hill1999", co2_ppm=450.0
 ):
-    """Group index of air minus one, by a named model, refusing values outside its limits.
+    """Group index of air minus one, by a named model within its limits.
 
     temperature_c      air temperature, °C, within the model's limits
     pressure_hpa       total pressure, hPa, within the model's limits
@@ -129,7 +131,7 @@ def group_refractivity(
 def phase_refractivity(
     temperature_c, pressure_hpa, humidity_percent, *, wavelength_um=0.780, model="ciddor_hill1999", co2_ppm=450.0
 ):
-    """Phase index of air minus one, by a named model, refusing values outside its limits.
+    """Phase index of air minus one, by a named model within its limits.
 
     Arguments as of `group_refractivity`.
 
@@ -147,7 +149,7 @@ def phase_refractivity(
 def group_refractivity_of_vapour(
     temperature_c, pressure_hpa, vapour_pressure_hpa, *, wavelength_um=0.780, model="ciddor_hill1999", co2_ppm=450.0
 ):
-    """Group index of air minus one from the partial pressure of its vapour, however that was found.
+    """Group index of air minus one from the vapour pressure.
 
     vapour_pressure_hpa   partial pressure of water vapour, hPa, 0 to saturation
     others                as of `group_refractivity`
@@ -158,7 +160,7 @@ def group_refractivity_of_vapour(
     ...     model="iag1999_closed")) * 1e6, 5)
     286.33807
     """
-    chosen = _known(model)
+    chosen = _model_named(model)
     weather = (temperature_c, pressure_hpa, vapour_pressure_hpa)
     _check_vapour(chosen, *weather, wavelength_um, co2_ppm)
     return chosen.refractivity(*weather, wavelength_um=wavelength_um, co2_ppm=co2_ppm)
@@ -167,14 +169,16 @@ def group_refractivity_of_vapour(
 def phase_refractivity_of_vapour(
     temperature_c, pressure_hpa, vapour_pressure_hpa, *, wavelength_um=0.780, model="ciddor_hill1999", co2_ppm=450.0
 ):
-    """Phase index of air minus one from the partial pressure of its vapour; arguments as of the group's.
+    """Phase index of air minus one from the vapour pressure.
+
+    Arguments as of `group_refractivity_of_vapour`.
 
     Raises ValidityError with the mask of the offending places.
 
     >>> round(float(phase_refractivity_of_vapour(20.0, 1000.0, 0.0, wavelength_um=0.633)) * 1e8, 1)
     26824.4
     """
-    chosen = _known(model)
+    chosen = _model_named(model)
     weather = (temperature_c, pressure_hpa, vapour_pressure_hpa)
     _check_vapour(chosen, *weather, wavelength_um, co2_ppm)
     return chosen.refractivity(*weather, wavelength_um=wavelength_um, co2_ppm=co2_ppm, kind="phase")
@@ -183,7 +187,9 @@ def phase_refractivity_of_vapour(
 def group_partials(
     temperature_c, pressure_hpa, vapour_pressure_hpa, *, wavelength_um=0.780, model="ciddor_hill1999", co2_ppm=450.0
 ) -> Partials:
-    """Derivatives of the group index with vapour pressure held; arguments as of `group_refractivity_of_vapour`.
+    """Derivatives of the group index at constant vapour pressure.
+
+    Arguments as of `group_refractivity_of_vapour`.
 
     Source: the model's formula differentiated; exact for it. [PARKER04] eq. 1.53 prints the third.
 
@@ -192,7 +198,7 @@ def group_partials(
     >>> round(float(group_partials(20.0, 933.0, 11.7323, model="rueger1990").vapour_pressure_hpa) * 1e8, 3)
     -4.094
     """
-    chosen = _known(model)
+    chosen = _model_named(model)
     weather = (temperature_c, pressure_hpa, vapour_pressure_hpa)
     _check_vapour(chosen, *weather, wavelength_um, co2_ppm)
     return chosen.partials(*weather, wavelength_um=wavelength_um, co2_ppm=co2_ppm)
@@ -208,7 +214,7 @@ def air(
     co2_ppm=450.0,
     modulation_hz=1500e6,
 ) -> AirState:
-    """Both indices of air, its vapour, and how the indices move with the weather.
+    """Both indices of air, its vapour, and their derivatives by weather.
 
     temperature_c      air temperature, °C, within the model's limits
     pressure_hpa       total pressure, hPa, within the model's limits
@@ -225,7 +231,7 @@ def air(
     >>> round(float(air(20.0, 933.0, 50.0, model="rueger1990").group_wavelength), 9)
     0.199811037
     """
-    chosen = _known(model)
+    chosen = _model_named(model)
     _check(chosen, temperature_c, pressure_hpa, humidity_percent, wavelength_um, co2_ppm)
     vapour = humidity.vapour_pressure_hpa(temperature_c, pressure_hpa, humidity_percent, chosen.vapour_formula)
     weather = (temperature_c, pressure_hpa, vapour, humidity_percent)
@@ -242,7 +248,7 @@ def air_of_vapour(
     co2_ppm=450.0,
     modulation_hz=1500e6,
 ) -> AirState:
-    """The same from the partial pressure of the vapour, however that was found: dew point, wet bulb.
+    """State of air from the vapour pressure, for dew point or wet bulb.
 
     vapour_pressure_hpa   partial pressure of water vapour, hPa, 0 to saturation
     others                as of `air`
@@ -252,7 +258,7 @@ def air_of_vapour(
     >>> round(float(air_of_vapour(20.0, 933.0, 11.7323, model="rueger1990").humidity_percent), 3)
     50.0
     """
-    chosen = _known(model)
+    chosen = _model_named(model)
     _check_vapour(chosen, temperature_c, pressure_hpa, vapour_pressure_hpa, wavelength_um, co2_ppm)
     saturated = humidity.saturation(temperature_c, pressure_hpa, chosen.vapour_formula).pressure_hpa
     relative = 100.0 * np.asarray(vapour_pressure_hpa, float) / saturated
@@ -280,8 +286,8 @@ def _air(
         humidity_percent=relative,
         dew_point_c=humidity.dew_point_c(vapour, pressure_hpa, chosen.vapour_formula),
         group_wavelength=SPEED_OF_LIGHT / ((1.0 + group) * np.asarray(modulation_hz, float)),
-        sensitivity=chosen.partials(*state, **light).with_humidity_held(saturation, relative),
-        phase_sensitivity=chosen.partials(*state, **light, kind="phase").with_humidity_held(saturation, relative),
+        sensitivity=chosen.partials(*state, **light).at_constant_humidity(saturation, relative),
+        phase_sensitivity=chosen.partials(*state, **light, kind="phase").at_constant_humidity(saturation, relative),
         standard_uncertainty=chosen.uncertainty(*state, **light),
         co2_ppm=co2_ppm if chosen.co2_slope else chosen.co2_ppm,
         model=chosen.name,
@@ -289,14 +295,17 @@ def _air(
 
 
 def _refractivity(weather, wavelength_um, model, co2_ppm, kind: Kind):
-    """By the compiled form where it pays and accepts the weather, else by the plain one, which names what is wrong."""
-    chosen = _known(model)
+    """Refractivity by the compiled form where faster and valid.
+
+    Otherwise by the plain form, which reports what is invalid.
+    """
+    chosen = _model_named(model)
     if model in KERNELS and np.ndim(wavelength_um) == 0 and np.ndim(co2_ppm) == 0:
         arrays = [np.asarray(value, float) for value in weather]
         shape = np.broadcast_shapes(*(array.shape for array in arrays))
         if np.prod(shape, dtype=int) >= LARGE:
             chosen.check(wavelength_um=wavelength_um, co2_ppm=co2_ppm)
-            # one value for all states stays one: the kernel knows
+            # one value for all states stays one: the kernel expands it
             flat = [a.ravel() if a.size == 1 else np.broadcast_to(a, shape).ravel() for a in arrays]
             values, inside = _kernel(model)(*flat, *chosen.coefficients(wavelength_um, co2_ppm, kind))
             if inside:
@@ -309,7 +318,7 @@ def _refractivity(weather, wavelength_um, model, co2_ppm, kind: Kind):
 
 
 def _kernel(model: str) -> Callable[..., Any]:
-    """The compiled form of a model, imported when a large problem first needs one."""
+    """Compiled form of a model, imported when a large problem first needs it."""
     if model == "rueger1990":
         from catseye.atmosphere.index.rueger1990_kernel import refractivity
     else:
@@ -317,14 +326,14 @@ def _kernel(model: str) -> Callable[..., Any]:
     return refractivity
 
 
-def _known(model: str) -> IndexModel:
+def _model_named(model: str) -> IndexModel:
     if model not in MODELS:
         raise ValidityError(f"air model {model!r} is unknown; choose one of {', '.join(MODELS)}")
     return MODELS[model]
 
 
 def _check(chosen: IndexModel, temperature_c, pressure_hpa, humidity_percent, wavelength_um, co2_ppm) -> None:
-    """Every argument within the model's limits, and the vapour leaves room for air."""
+    """Check all arguments against the model's limits, and vapour against pressure."""
     chosen.check(
         temperature_c=temperature_c,
         pressure_hpa=pressure_hpa,
@@ -337,10 +346,10 @@ def _check(chosen: IndexModel, temperature_c, pressure_hpa, humidity_percent, wa
 
 
 def _check_vapour(chosen: IndexModel, temperature_c, pressure_hpa, vapour_pressure_hpa, wavelength_um, co2_ppm) -> None:
-    """The same where the vapour pressure is given; it may reach saturation, to rounding."""
+    """Check a given vapour pressure; it may reach saturation, to rounding."""
     chosen.check(temperature_c=temperature_c, pressure_hpa=pressure_hpa, wavelength_um=wavelength_um, co2_ppm=co2_ppm)
     e = np.asarray(vapour_pressure_hpa, float)
-    ValidInterval("vapour pressure", "hPa", 0.0, np.inf, "the notion of a pressure").check(e)
+    ValidInterval("vapour pressure", "hPa", 0.0, np.inf, "the definition of a pressure").check(e)
     saturated = humidity.saturation(temperature_c, pressure_hpa, chosen.vapour_formula).pressure_hpa
     SATURATED.check(100.0 * e / saturated)
     _check_share(chosen, e, pressure_hpa)

@@ -1,9 +1,9 @@
-"""What the compiled forms of the air models share: saturation as a polynomial, blocks of states, threads.
+"""Shared parts of the compiled air models: saturation polynomial, blocks, threads.
 
 Nothing is exponentiated in a kernel. Within a model's limits of temperature the saturation pressure is a polynomial,
 interpolated at the Chebyshev points of that interval from the plain form in `atmosphere.weather.humidity` when a kernel
-is imported: it follows that form, and no digits stand here. The constants of the plain forms are handed in as
-arguments, so that a kernel that numba has stored never holds older ones.
+is imported: it follows that form, without constants of its own. The constants of the plain forms are passed as
+arguments, so that a kernel cached by numba never holds older ones.
 """
 
 import os
@@ -20,7 +20,7 @@ from catseye.atmosphere.weather.humidity import saturation
 from catseye.errors import ValidityError
 
 DEGREE = 15  # odd; 6e-13 of saturation at 100 °C, 1e-14 at 50 °C: 1e-16 and 3e-19 in the index
-BLOCK = 1024  # states between two looks at whether one was outside; copies of a single value, which stay in the cache
+BLOCK = 1024  # states between two checks of the limits; also the copies of a single value, which fit the cache
 MOST_THREADS = 4
 PARALLEL_FROM = 2_000_000  # states; below, starting the threads costs more than they save
 
@@ -29,7 +29,7 @@ inlined = njit(error_model="numpy", fastmath={"contract"})
 
 
 class SaturationPolynomial(NamedTuple):
-    """The part of a saturation pressure that depends on temperature alone, as a polynomial.
+    """Temperature-dependent part of a saturation pressure, as a polynomial.
 
     middle   °C, of the interval
     per_c    1/°C: the variable is u = per_c (t - middle), from -1 to 1
@@ -44,16 +44,18 @@ class SaturationPolynomial(NamedTuple):
 
 
 def limits_of(model: IndexModel) -> tuple[float, ...]:
-    """Where a model holds, as its kernel needs it: lower and upper °C, hPa, %."""
+    """Limits of a model for its kernel: lower and upper °C, hPa, %."""
     limits = (model.limits[name] for name in ("temperature_c", "pressure_hpa", "humidity_percent"))
     return tuple(end for limit in limits for end in (limit.lower, limit.upper))
 
 
 def saturation_polynomial(model: IndexModel, factor: Callable) -> SaturationPolynomial:
-    """What of a model's saturation pressure depends on temperature alone, over its limits of temperature.
+    """Polynomial of the temperature-dependent part of a model's saturation pressure.
+
+    It covers the model's limits of temperature.
 
     model    the model
-    factor   function of (temperature_c, pressure_hpa): the rest, which the kernel computes itself
+    factor   function of (temperature_c, pressure_hpa): the other part, which the kernel computes
 
     >>> from catseye.atmosphere.weather.humidity import enhancement_factor
     >>> from catseye.atmosphere.index.ciddor_hill1999 import MODEL
@@ -75,7 +77,7 @@ def saturation_polynomial(model: IndexModel, factor: Callable) -> SaturationPoly
 
 @inlined
 def saturation_value(t, middle, per_c, even, odd):
-    """A saturation polynomial's value at a temperature in °C."""
+    """Value of a saturation polynomial at a temperature in °C."""
     u = per_c * (t - middle)
     square, a, b = u * u, 0.0, 0.0
     for c in even:
@@ -87,33 +89,35 @@ def saturation_value(t, middle, per_c, even, odd):
 
 @inlined
 def part(values, first, last, spare):
-    """One block of an array; of an array of one element, as many copies, which `spare` holds."""
+    """Block of an array; for one element its copies in `spare`."""
     return values[first:last] if len(values) > 1 else spare[: last - first]
 
 
 def over_states(fill: Callable[..., bool], weather: tuple, constants: tuple) -> tuple[np.ndarray, bool]:
-    """Values of a compiled formula for n states, and whether all of them lay within the limits.
+    """Values of a compiled formula for n states; True if all are within limits.
 
     fill        kernel: (temperature_c, pressure_hpa, humidity_percent, values, *constants) -> inside
     weather     three arrays, each of n elements or of one
-    constants   what else the kernel takes
+    constants   further arguments of the kernel
 
     Raises ValidityError for arrays of other lengths. Threads from PARALLEL_FROM states, at most one a processor.
     """
-    given = [np.ascontiguousarray(each, float).reshape(-1) for each in weather]
-    lengths = {len(each) for each in given} - {1} or {1}
+    inputs = [np.ascontiguousarray(quantity, float).reshape(-1) for quantity in weather]
+    lengths = {len(quantity) for quantity in inputs} - {1} or {1}
     if len(lengths) > 1:
-        raise ValidityError(f"weather of {', '.join(str(len(each)) for each in given)} states (expected n or 1 each)")
+        raise ValidityError(
+            f"weather of {', '.join(str(len(quantity)) for quantity in inputs)} states (expected n or 1 each)"
+        )
     values = np.empty(lengths.pop())
     if not len(values):
         return values, True
     threads = min(os.cpu_count() or 1, MOST_THREADS) if len(values) >= PARALLEL_FROM else 1
     if threads == 1:
-        return values, fill(*given, values, *constants)
+        return values, fill(*inputs, values, *constants)
     ends = np.linspace(0, len(values), threads + 1).astype(int)
     with ThreadPoolExecutor(threads) as pool:  # the kernels hold no lock
         jobs = [
-            pool.submit(fill, *(x if len(x) == 1 else x[a:b] for x in given), values[a:b], *constants)
+            pool.submit(fill, *(x if len(x) == 1 else x[a:b] for x in inputs), values[a:b], *constants)
             for a, b in pairwise(ends)
         ]
         return values, all(job.result() for job in jobs)

@@ -1,4 +1,4 @@
-"""The formula of Barrell and Sears as geodesists resolved upon it in 1960 and 1963: what older instruments carry.
+"""Barrell and Sears, resolutions of 1960 and 1963: used in older instruments.
 
 Its form is (n_L - 1) = (n_g - 1)/(1 + a t) p/760 - 5.5e-8 e/(1 + a t), p and e in mm Hg. The resolution's a is
 0.003661 = 1/273.15; 1/273.16, also seen, is 6e-6 of the refractivity or less (2e-9 of the index).
@@ -25,7 +25,7 @@ MODEL = IndexModel(
     densities=densities,
     density_slopes=density_slopes,
     vapour_formula="buck",
-    # the least: 6e-8 rms from [CIDDOR99] over -20 to 45 °C, 600 to 1100 hPa, 0 to 100 %, all our lasers, and that
+    # minimum: 6e-8 rms from [CIDDOR99] over -20 to 45 °C, 600 to 1100 hPa, 0 to 100 %, all our lasers, and that
     # one's 5e-8; up to 3.2e-7 there, 4.3e-7 at 0.633 um and 50 °C, 1.8e-6 at 0.36 um: compared in each weather
     standard_uncertainty=1e-7,
     standard=ciddor_hill1999.MODEL,

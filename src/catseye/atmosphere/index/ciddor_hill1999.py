@@ -1,6 +1,8 @@
-"""Today's air: Ciddor's phase index and Ciddor and Hill's group index; refractivities add in proportion to density.
+"""Ciddor's phase index and Ciddor and Hill's group index, the default.
 
-The default for new work, as geodesists resolved for work better than 1 ppm [IAG99].
+Refractivities add in proportion to density.
+
+Recommended for new work, as resolved by the IAG for work better than 1 ppm [IAG99].
 A continuum formula does not hold inside absorption lines of water or oxygen: check a laser's line.
 """
 
@@ -35,7 +37,7 @@ STANDARD_DRY, STANDARD_VAPOUR = (15.0, 101_325.0, 0.0), (20.0, 1_333.0, 1.0)
 
 
 class Compressibility(NamedTuple):
-    """Compressibility Z of moist air and its partial derivatives (the others held).
+    """Compressibility Z of moist air and its partial derivatives.
 
     z                 dimensionless
     per_k             by temperature, 1/K
@@ -50,7 +52,7 @@ class Compressibility(NamedTuple):
 
 
 def compressibility(temperature_c, pressure_hpa, vapour_fraction) -> Compressibility:
-    """Compressibility of moist air with its slopes.
+    """Compressibility of moist air with its derivatives.
 
     temperature_c     air temperature, -40 to 100 °C
     pressure_hpa      total pressure, 100 to 1400 hPa
@@ -77,7 +79,7 @@ def compressibility(temperature_c, pressure_hpa, vapour_fraction) -> Compressibi
 
 
 def densities(temperature_c, pressure_hpa, vapour_pressure_hpa) -> Gases:
-    """Partial pressure over Z T of each gas, in Pa/K: what densities are proportional to.
+    """Density factors: partial pressure over Z T of each gas, Pa/K.
 
     temperature_c         air temperature, -40 to 100 °C
     pressure_hpa          total pressure, 100 to 1400 hPa
@@ -95,7 +97,9 @@ def densities(temperature_c, pressure_hpa, vapour_pressure_hpa) -> Gases:
 
 
 def density_slopes(temperature_c, pressure_hpa, vapour_pressure_hpa) -> Gases:
-    """Derivatives of both densities by temperature, total pressure and vapour pressure; arguments as above.
+    """Derivatives of both densities by temperature, pressure and vapour pressure.
+
+    Arguments as of `densities`.
 
     Source: [CIDDOR96] eq. 4 and appendix A differentiated.
 
@@ -106,7 +110,7 @@ def density_slopes(temperature_c, pressure_hpa, vapour_pressure_hpa) -> Gases:
     kelvin, x = np.asarray(temperature_c, float) + ZERO_CELSIUS_K, e / p
     z = compressibility(temperature_c, p, x)
     density = densities(temperature_c, p, e)
-    # shares of themselves: of 1/(Z T), the vapour's fraction x = e/p moving Z with both pressures
+    # relative: of 1/(Z T), where the vapour's fraction x = e/p changes Z with both pressures
     by_t = -(1.0 / kelvin + z.per_k / z.z)
     by_p = -(z.per_pa * PA_PER_HPA - z.per_fraction * x / p) / z.z
     by_e = -z.per_fraction / (p * z.z)
@@ -118,7 +122,7 @@ def density_slopes(temperature_c, pressure_hpa, vapour_pressure_hpa) -> Gases:
 
 
 def group_coefficients(wavelength_um, co2_ppm=CO2_STANDARD_PPM) -> Gases:
-    """Group refractivity that each gas adds per unit of its partial pressure over Z T, in K/Pa.
+    """Group refractivity of each gas per partial pressure over Z T, K/Pa.
 
     wavelength_um   vacuum wavelength, 0.30 to 1.69 um
     co2_ppm         carbon dioxide, 0 to 2000 ppm
@@ -133,7 +137,7 @@ def group_coefficients(wavelength_um, co2_ppm=CO2_STANDARD_PPM) -> Gases:
 
 
 def phase_coefficients(wavelength_um, co2_ppm=CO2_STANDARD_PPM) -> Gases:
-    """Phase refractivity that each gas adds per unit of its partial pressure over Z T, in K/Pa.
+    """Phase refractivity of each gas per partial pressure over Z T, K/Pa.
 
     wavelength_um   vacuum wavelength, 0.30 to 1.69 um
     co2_ppm         carbon dioxide, 0 to 2000 ppm
@@ -163,7 +167,7 @@ MODEL = IndexModel(
     densities=densities,
     density_slopes=density_slopes,
     vapour_formula="ciddor",
-    standard_uncertainty=5e-8,  # the upper end of the 2e-8 to 5e-8 that the author states
+    standard_uncertainty=5e-8,  # upper end of the author's 2e-8 to 5e-8
     limits={
         "temperature_c": ValidInterval("temperature", "C", -40.0, 100.0, "[CIDDOR96]"),
         "pressure_hpa": ValidInterval("pressure", "hPa", 100.0, 1400.0, "[CIDDOR96]"),

@@ -1,4 +1,6 @@
-"""The compiled form of today's air, for many states at one wavelength. Import it only when a problem is large.
+"""Compiled form of `ciddor_hill1999`, for many states at one wavelength.
+
+Import it only when a problem is large.
 
 The plain form, `ciddor_hill1999.MODEL.refractivity` with Ciddor's vapour, is its test. One division a state: with
 P and E the total and the vapour's pressure in Pa, x = E/P in [CIDDOR96]'s compressibility gives
@@ -33,7 +35,7 @@ from catseye.constants import ZERO_CELSIUS_K
 SATURATION = saturation_polynomial(MODEL, enhancement_factor)
 COMPRESSIBILITY = (A0, A1, A2, B0, B1, C0, C1, D, E)
 ENHANCEMENT = (ENHANCEMENT_0, ENHANCEMENT_P, ENHANCEMENT_T2)
-ROOM = 1.0 - 1e-9  # share of the pressure that vapour may take here; nearer to all of it the plain form decides
+ROOM = 1.0 - 1e-9  # largest vapour share of the pressure here; above it the plain form decides
 
 
 @inlined
@@ -48,7 +50,7 @@ def _block(temperature_c, pressure_hpa, humidity_percent, values, coefficients, 
         x = PA_PER_HPA * p
         # h in % times pressure in hPa is pressure in Pa
         e = h * (f0 + fp * x + ft2 * t * t) * saturation_value(t, middle, per_c, even, odd)
-        # written so that what is not a number is outside
+        # written so that NaN is outside
         inside = (t >= t_low) & (t <= t_high) & (p >= p_low) & (p <= p_high) & (h >= h_low) & (h <= h_high)
         outside |= not (inside & (e <= ROOM * x))
         kelvin = t + ZERO_CELSIUS_K
@@ -75,13 +77,15 @@ def _fill(temperature_c, pressure_hpa, humidity_percent, values, coefficients, l
 
 
 def refractivity(temperature_c, pressure_hpa, humidity_percent, dry, vapour) -> tuple[np.ndarray, bool]:
-    """Index of air minus one, (n,), and whether all lay within the model's limits; if not, the values mean nothing.
+    """Index of air minus one, (n,); True if all are within limits.
+
+    If not, the values are invalid.
 
     temperature_c      (n,) or (1,), °C
     pressure_hpa       (n,) or (1,), hPa
     humidity_percent   (n,) or (1,), over liquid water, %
     dry                refractivity times K/Pa that a partial pressure of dry air adds: `MODEL.coefficients`
-    vapour             that one of vapour adds
+    vapour             the same for vapour
 
     Source: [CIDDOR96] eqs. 4, 5 and appendix A. Equal to the plain form within 1e-16. Also outside: more vapour than
     air has room for.

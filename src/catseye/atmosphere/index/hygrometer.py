@@ -1,9 +1,9 @@
-"""From an instrument's reading to vapour pressure with its uncertainty, and on to that of the index of air.
+"""Hygrometer readings to vapour pressure and index of air, with uncertainty.
 
 One reading, four instruments: relative humidity, dew point or frost point of a chilled mirror, wet bulb. Each has its
 own derivatives by the air's temperature and pressure: a capacitive sensor needs the temperature to give a vapour
-pressure, a mirror does not. An error of the thermometer therefore reaches the index twice with the one, once with the
-other, and `index_uncertainty` adds the two ways before it squares.
+pressure, a mirror does not. An error of the thermometer therefore enters the index twice with the first, once with
+the second, and `index_uncertainty` adds both effects before it squares.
 """
 
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ from catseye.atmosphere.limit import ValidInterval, check_spreads
 from catseye.atmosphere.weather import humidity, psychrometer
 from catseye.errors import ValidityError
 
-# standard uncertainty of the saturation formulas, of themselves: the span of their disagreement over root three
+# relative standard uncertainty of the saturation formulas: the span of their disagreement over root three
 U_OVER_WATER = {"buck": 6e-4, "ciddor": 6e-4, "iapws": 2e-4}
 U_OVER_ICE = {"buck": 1e-3, "iapws": 4e-4}
 
@@ -24,7 +24,7 @@ DEPOSITS = ("dew", "frost")
 
 
 class VapourReading(NamedTuple):
-    """Vapour pressure from an instrument's reading, and how it moves with what it came from.
+    """Vapour pressure from a reading, with its derivatives.
 
     vapour_pressure_hpa   hPa
     per_temperature_c     derivative by the air's temperature, the reading held, hPa/°C
@@ -40,7 +40,9 @@ class VapourReading(NamedTuple):
     u_formula_hpa: Any
 
     def standard_uncertainty_hpa(self, u_reading, *, u_temperature_c=0.0, u_pressure_hpa=0.0):
-        """Standard uncertainty of the vapour pressure from uncorrelated inputs (1 sigma each) and the formula, in hPa.
+        """Standard uncertainty of the vapour pressure from uncorrelated inputs, hPa.
+
+        Inputs are 1 sigma each; the formula's is included.
 
         u_reading         of the humidity in %, or of the mirror or wet bulb in °C
         u_temperature_c   of the air's temperature, °C
@@ -60,11 +62,11 @@ class VapourReading(NamedTuple):
         )
 
     def index_uncertainty(self, partials: Partials, u_reading, *, u_temperature_c=0.0, u_pressure_hpa=0.0, u_model=0.0):
-        """Standard uncertainty of the index of air computed from this reading.
+        """Standard uncertainty of the index of air from this reading.
 
         partials          derivatives of the index with vapour pressure held, as `air.group_partials` gives
         u_reading         of the humidity in %, or of the mirror or wet bulb in °C
-        u_temperature_c   of the air's temperature, °C: it acts on the air's density and on the vapour at once
+        u_temperature_c   of the air's temperature, °C: it affects the air's density and the vapour together
         u_pressure_hpa    of the total pressure, hPa, likewise
         u_model           of the model of the index itself
 
@@ -86,7 +88,7 @@ class VapourReading(NamedTuple):
 def of_relative_humidity(
     temperature_c, pressure_hpa, humidity_percent, *, formula="buck", over_ice=False
 ) -> VapourReading:
-    """Vapour pressure from relative humidity, over liquid water unless ice is asked for.
+    """Vapour pressure from relative humidity, over liquid water by default.
 
     temperature_c      air temperature, -100 to 100 °C
     pressure_hpa       total pressure, 100 to 1400 hPa
@@ -111,14 +113,14 @@ def of_relative_humidity(
 
 
 def of_mirror(mirror_c, pressure_hpa, formula="buck", *, deposit=None) -> VapourReading:
-    """Vapour pressure from the temperature at which a chilled mirror holds its deposit.
+    """Vapour pressure from the deposit temperature of a chilled mirror.
 
     mirror_c       dew or frost point, -100 to 100 °C; with frost at most 0.01 °C
     pressure_hpa   total pressure, 100 to 1400 hPa
     formula        `buck`, `ciddor` or `iapws`; over ice `buck` or `iapws`
-    deposit        `dew` or `frost`; it may be left out where no reading is below 0 °C
+    deposit        `dew` or `frost`; optional where no reading is below 0 °C
 
-    Raises ValidityError outside these limits, and where a reading below 0 °C leaves open which deposit it was: at
+    Raises ValidityError outside these limits, and where the deposit of a reading below 0 °C is not given: at
     -10 °C frost means 9 % less vapour than dew.
     Source: [PARKER04] eq. 1.6.
 
@@ -133,7 +135,7 @@ def of_mirror(mirror_c, pressure_hpa, formula="buck", *, deposit=None) -> Vapour
     if deposit is None and np.any(open_question):
         coldest = float(np.min(mirror_c))
         raise ValidityError(
-            f"a mirror at {coldest:g} °C may carry dew or frost; say which with deposit",
+            f"a mirror at {coldest:g} °C may carry dew or frost; give deposit",
             open_question if open_question.ndim else None,
         )
     frost = deposit == "frost"
@@ -143,7 +145,9 @@ def of_mirror(mirror_c, pressure_hpa, formula="buck", *, deposit=None) -> Vapour
 
 
 def of_wet_bulb(temperature_c, wet_bulb_c, pressure_hpa, *, formula="buck", over_ice=False) -> VapourReading:
-    """Vapour pressure from a ventilated psychrometer; limits and errors of `vapour_pressure_of_wet_bulb_hpa`.
+    """Vapour pressure from a ventilated psychrometer.
+
+    Limits and errors as of `vapour_pressure_of_wet_bulb_hpa`.
 
     temperature_c   dry bulb, °C, which is the air's temperature
     wet_bulb_c      wet bulb, °C

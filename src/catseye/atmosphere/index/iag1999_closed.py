@@ -1,4 +1,4 @@
-"""The closed formula that geodesists resolved upon in 1999 for work that needs no better than 1 ppm.
+"""Closed formula of the 1999 resolution, for work to 1 ppm.
 
 Public code often calls the set of 1963 by this name: 287.604 is not 287.6155 (0.012 ppm at 0 °C), see
 `barrell_sears1963`.
@@ -27,7 +27,7 @@ MODEL = IndexModel(
     densities=densities,
     density_slopes=density_slopes,
     vapour_formula="buck",
-    # the least: 6e-8 rms from [CIDDOR99] over -20 to 45 °C, 600 to 1100 hPa, 0 to 100 %, all our lasers, and that
+    # minimum: 6e-8 rms from [CIDDOR99] over -20 to 45 °C, 600 to 1100 hPa, 0 to 100 %, all our lasers, and that
     # one's 5e-8; up to 3.2e-7 there, 4.3e-7 at 0.633 um and 50 °C, 1.8e-6 at 0.36 um: compared in each weather
     standard_uncertainty=1e-7,
     standard=ciddor_hill1999.MODEL,

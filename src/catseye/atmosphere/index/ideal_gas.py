@@ -1,7 +1,7 @@
-"""The densities of the closed formulas: total pressure and vapour pressure over temperature, both gases ideal.
+"""Densities of the closed formulas: pressures over temperature, ideal gases.
 
-A closed formula counts the total pressure as dry air and takes back, with a negative coefficient of the vapour
-pressure, what the vapour refracts less than the air it displaces.
+A closed formula takes the total pressure as dry air and subtracts, with a negative coefficient of the vapour
+pressure, the lower refraction of vapour against the air it displaces.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from catseye.constants import ZERO_CELSIUS_K
 
 
 def densities(temperature_c, pressure_hpa, vapour_pressure_hpa) -> Gases:
-    """Total pressure and vapour pressure over absolute temperature, in hPa/K.
+    """Total pressure and vapour pressure over absolute temperature, hPa/K.
 
     temperature_c         air temperature, -40 to 50 °C
     pressure_hpa          total pressure, 500 to 1100 hPa
@@ -28,7 +28,9 @@ def densities(temperature_c, pressure_hpa, vapour_pressure_hpa) -> Gases:
 
 
 def density_slopes(temperature_c, pressure_hpa, vapour_pressure_hpa) -> Gases:
-    """Derivatives of both by temperature, total pressure and vapour pressure; arguments as above.
+    """Derivatives of both by temperature, total pressure and vapour pressure.
+
+    Arguments as of `densities`.
 
     >>> round(float(density_slopes(0.0, 1013.25, 0.0).dry.temperature_c), 5)
     -0.01358
@@ -43,7 +45,7 @@ def density_slopes(temperature_c, pressure_hpa, vapour_pressure_hpa) -> Gases:
 
 
 def limits(source: str) -> dict[str, ValidInterval]:
-    """The limits that both closed formulas share."""
+    """Limits common to both closed formulas."""
     return {
         "temperature_c": ValidInterval("temperature", "C", -40.0, 50.0, source),
         "pressure_hpa": ValidInterval("pressure", "hPa", 500.0, 1100.0, source),

@@ -1,8 +1,8 @@
-"""What a model of the index of air is: how each gas disperses light, how dense it is, and within which limits.
+"""Model of the index of air: dispersion, density and limits.
 
 Every model here has the form n - 1 = dry(wavelength) D_dry(weather) + vapour(wavelength) D_vapour(weather). A model's
-file gives the two dispersion formulas and the two densities with their slopes; this file makes of them the phase
-index, the group index n + sigma dn/dsigma, and all derivatives, for every model alike.
+file gives the two dispersion formulas and the two densities with their slopes; this file derives the phase
+index, the group index n + sigma dn/dsigma, and all derivatives, for all models.
 """
 
 from collections.abc import Callable
@@ -14,12 +14,14 @@ import numpy as np
 from catseye.atmosphere.limit import ValidInterval
 
 Kind = Literal["group", "phase"]
-CO2_OF_TODAY_PPM = 450.0  # ppm, [CIDDOR96]: of the air that models without carbon dioxide are compared in
+CO2_OF_TODAY_PPM = 450.0  # ppm, [CIDDOR96]: air for comparing models without carbon dioxide
 CO2_SLOPE = 0.534e-6  # of the dry refractivity for each ppm, [CIDDOR96] eq. 2
 
 
 class IndexSensitivity(NamedTuple):
-    """Derivatives of an index; relative humidity held, but for that by the vapour pressure.
+    """Derivatives of an index at constant relative humidity.
+
+    The one by vapour pressure is at constant temperature and total pressure.
 
     temperature_c         per °C
     pressure_hpa          per hPa
@@ -38,7 +40,9 @@ class IndexSensitivity(NamedTuple):
 
 
 class Partials(NamedTuple):
-    """Derivatives of an index with vapour pressure held: what a dew-point or wet-bulb instrument needs.
+    """Derivatives of an index at constant vapour pressure.
+
+    For a dew-point or wet-bulb instrument.
 
     temperature_c         per °C
     pressure_hpa          per hPa of total pressure
@@ -53,8 +57,8 @@ class Partials(NamedTuple):
     co2_ppm: Any
     wavelength_um: Any
 
-    def with_humidity_held(self, saturation, humidity_percent) -> IndexSensitivity:
-        """The chain rule from vapour pressure to relative humidity, by `saturation` and its slopes."""
+    def at_constant_humidity(self, saturation, humidity_percent) -> IndexSensitivity:
+        """Convert to constant relative humidity by the chain rule, with `saturation` and its slopes."""
         fraction = np.asarray(humidity_percent, float) / 100.0
         return IndexSensitivity(
             self.temperature_c + self.vapour_pressure_hpa * fraction * saturation.per_c,
@@ -67,7 +71,7 @@ class Partials(NamedTuple):
 
 
 class Gases(NamedTuple):
-    """One quantity of each gas.
+    """One quantity for each gas.
 
     dry      of dry air
     vapour   of water vapour
@@ -92,7 +96,9 @@ class DensitySlopes(NamedTuple):
 
 @dataclass(frozen=True)
 class RefractiveDispersion:
-    """Phase refractivity per unit of density as a function of s = 1/wavelength²: poles k/(a - s) and powers of s.
+    """Phase refractivity per unit of density as a function of s = 1/wavelength².
+
+    Poles k/(a - s) and powers of s.
 
     poles    pairs (k, a), um^-2
     powers   coefficients of 1, s, s², ...
@@ -109,13 +115,16 @@ class RefractiveDispersion:
         return self.scale * (sum(k / (a - s) for k, a in self.poles) + sum(c * s**i for i, c in enumerate(self.powers)))
 
     def group(self, wavelength_um):
-        """Group refractivity per unit of density: f + 2 s df/ds, which is n + sigma dn/dsigma of each term."""
+        """Group refractivity per unit of density: f + 2 s df/ds.
+
+        This is n + sigma dn/dsigma of each term.
+        """
         s = np.asarray(wavelength_um, float) ** -2.0
         poles = sum(k * (a + s) / (a - s) ** 2 for k, a in self.poles)
         return self.scale * (poles + sum((2 * i + 1) * c * s**i for i, c in enumerate(self.powers)))
 
     def phase_per_um(self, wavelength_um):
-        """Derivative of the phase refractivity by the wavelength: ds = -2 s/wavelength dwavelength."""
+        """Derivative of the phase refractivity by wavelength: ds = -2 s/wavelength dwavelength."""
         wavelength = np.asarray(wavelength_um, float)
         s = wavelength**-2.0
         poles = sum(k / (a - s) ** 2 for k, a in self.poles)
@@ -123,7 +132,7 @@ class RefractiveDispersion:
         return -2.0 * self.scale * s / wavelength * (poles + powers)
 
     def group_per_um(self, wavelength_um):
-        """Derivative of the group refractivity by the wavelength."""
+        """Derivative of the group refractivity by wavelength."""
         wavelength = np.asarray(wavelength_um, float)
         s = wavelength**-2.0
         poles = sum(k * (3.0 * a + s) / (a - s) ** 3 for k, a in self.poles)
@@ -133,7 +142,7 @@ class RefractiveDispersion:
 
 @dataclass(frozen=True)
 class IndexModel:
-    """One model of the index of air.
+    """Model of the index of air.
 
     name                   as users write it
     source                 the bibliography's keys
@@ -141,12 +150,12 @@ class IndexModel:
     densities              function of (temperature_c, pressure_hpa, vapour_pressure_hpa) giving each gas's factor
     density_slopes         function of the same giving each factor's DensitySlopes
     vapour_formula         the saturation formula it goes with, a name in `atmosphere.weather.humidity.FORMULAS`
-    standard_uncertainty   of the formula itself in the group index of dry air, perfect weather given; the least
-    vapour_uncertainty     what each hPa of vapour adds to it in squares; see `uncertainty`
-    standard               the model that this one is compared with where it is worse; None: it has no better
+    standard_uncertainty   of the formula in the group index of dry air, exact weather; the minimum
+    vapour_uncertainty     increase per hPa of vapour, added in squares; see `uncertainty`
+    standard               the better model this one is compared with; None: there is none
     limits                 argument's name -> Limit
     co2_ppm                carbon dioxide for which `dispersion` holds
-    co2_slope              share by which each further ppm raises the dry air's refractivity; 0: no such term
+    co2_slope              relative change per further ppm of the dry air's refractivity; 0: no such term
     """
 
     name: str
@@ -170,12 +179,12 @@ class IndexModel:
     def uncertainty(
         self, temperature_c, pressure_hpa, vapour_pressure_hpa, *, wavelength_um=0.780, co2_ppm=CO2_OF_TODAY_PPM
     ):
-        """Standard uncertainty of the formula itself in the group index, perfect weather given.
+        """Standard uncertainty of the formula in the group index, exact weather.
 
-        co2_ppm   carbon dioxide that is there: a model without it is off by what it lacks
+        co2_ppm   carbon dioxide of the air: a model without it is biased by the difference
 
-        With a standard: how far the two are apart in this weather and the standard's own, in squares, but never less
-        than `standard_uncertainty`, for where the two happen to cross neither is better. Nothing is checked.
+        With a standard: the difference of the two in this weather and the standard's uncertainty, in squares, but never
+        less than `standard_uncertainty`, as a crossing of the two proves nothing. Nothing is checked.
         """
         weather, light = (temperature_c, pressure_hpa, vapour_pressure_hpa), {"wavelength_um": wavelength_um}
         if self.standard is not None:
@@ -191,14 +200,14 @@ class IndexModel:
         return np.hypot(least, lacking * self.refractivity(*weather, **light, co2_ppm=self.co2_ppm))
 
     def coefficients(self, wavelength_um, co2_ppm, kind: Kind = "group") -> Gases:
-        """Refractivity that each gas adds per unit of its density factor."""
+        """Refractivity of each gas per unit of its density factor."""
         dry, vapour = (getattr(gas, kind)(wavelength_um) for gas in self.dispersion)
         return Gases(dry * self._carbon_dioxide(co2_ppm), vapour)
 
     def refractivity(
         self, temperature_c, pressure_hpa, vapour_pressure_hpa, *, wavelength_um, co2_ppm, kind: Kind = "group"
     ):
-        """Index of air minus one, nothing checked."""
+        """Index of air minus one, without checks."""
         dry, vapour = self.coefficients(wavelength_um, co2_ppm, kind)
         density = self.densities(temperature_c, pressure_hpa, vapour_pressure_hpa)
         return dry * density.dry + vapour * density.vapour
@@ -206,7 +215,10 @@ class IndexModel:
     def partials(
         self, temperature_c, pressure_hpa, vapour_pressure_hpa, *, wavelength_um, co2_ppm, kind: Kind = "group"
     ) -> Partials:
-        """Derivatives of the index with vapour pressure held, nothing checked; exact for the formula."""
+        """Derivatives of the index at constant vapour pressure, without checks.
+
+        Exact for the formula.
+        """
         weather = (temperature_c, pressure_hpa, vapour_pressure_hpa)
         dry, vapour = self.coefficients(wavelength_um, co2_ppm, kind)
         per_um = Gases(*(getattr(gas, f"{kind}_per_um")(wavelength_um) for gas in self.dispersion))

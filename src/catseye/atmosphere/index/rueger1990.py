@@ -1,7 +1,9 @@
-"""The notes' air: Rüeger's 1990 book, with Owens' density factors. The model of record for reproducing the notes.
+"""Rüeger's 1990 air with Owens' density factors, as in the notes.
+
+For reproducing the notes.
 
 It lies up to 0.1 ppm below `ciddor_hill1999` in ordinary weather, 0.3 ppm when hot and saturated, 0.5 ppm at 45 °C
-(`tests/atmosphere/index/test_models_agree.py` measures it): for new work take that one.
+(`tests/atmosphere/index/test_models_agree.py` measures it): for new work use that one.
 """
 
 import numpy as np
@@ -21,7 +23,7 @@ VAPOUR_DENSITY, VAPOUR_SQUARE = (-2.37321e-3, 2.23366, -710.792, 7.75141e4), 3.7
 
 
 def density_factors(temperature_c, pressure_hpa, vapour_pressure_hpa) -> Gases:
-    """Owens' density factors D_s of the dry air and D_w of the vapour, in hPa/K.
+    """Owens' density factors D_s of dry air, D_w of vapour, hPa/K.
 
     temperature_c         air temperature, -40 to 50 °C
     pressure_hpa          total pressure, 500 to 1100 hPa
@@ -41,7 +43,9 @@ def density_factors(temperature_c, pressure_hpa, vapour_pressure_hpa) -> Gases:
 
 
 def density_slopes(temperature_c, pressure_hpa, vapour_pressure_hpa) -> Gases:
-    """Derivatives of both density factors by temperature, total pressure and vapour pressure; arguments as above.
+    """Derivatives of both density factors by temperature and pressures.
+
+    By temperature, total pressure and vapour pressure; arguments as of `density_factors`.
 
     Source: [PARKER04] eqs. 1.23, 1.24 differentiated.
 
@@ -64,7 +68,7 @@ def density_slopes(temperature_c, pressure_hpa, vapour_pressure_hpa) -> Gases:
 
 
 def group_coefficients(wavelength_um) -> Gases:
-    """Group refractivity per unit of each density factor, in K/hPa.
+    """Group refractivity per unit of each density factor, K/hPa.
 
     wavelength_um   vacuum wavelength, 0.36 to 1.69 um
 
@@ -77,7 +81,7 @@ def group_coefficients(wavelength_um) -> Gases:
 
 
 def phase_coefficients(wavelength_um) -> Gases:
-    """Phase refractivity per unit of each density factor, in K/hPa.
+    """Phase refractivity per unit of each density factor, K/hPa.
 
     wavelength_um   vacuum wavelength, 0.36 to 1.69 um
 

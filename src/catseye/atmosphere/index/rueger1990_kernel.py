@@ -1,4 +1,6 @@
-"""The compiled form of the notes' air, for many states at one wavelength. Import it only when a problem is large.
+"""Compiled form of `rueger1990`, for many states at one wavelength.
+
+Import it only when a problem is large.
 
 The plain form, `rueger1990.MODEL.refractivity` with Buck's vapour, is its test. One division a state.
 """
@@ -32,7 +34,7 @@ def _block(temperature_c, pressure_hpa, humidity_percent, values, coefficients, 
     outside = 0
     for i in range(len(values)):
         t, p, h = temperature_c[i], pressure_hpa[i], humidity_percent[i]
-        # written so that what is not a number is outside
+        # written so that NaN is outside
         inside = (t >= t_low) & (t <= t_high) & (p >= p_low) & (p <= p_high) & (h >= h_low) & (h <= h_high)
         outside |= not inside
         e = h * (f0 + fp * p) * saturation_value(t, middle, per_c, even, odd)
@@ -60,7 +62,9 @@ def _fill(temperature_c, pressure_hpa, humidity_percent, values, coefficients, l
 
 
 def refractivity(temperature_c, pressure_hpa, humidity_percent, dry, vapour) -> tuple[np.ndarray, bool]:
-    """Index of air minus one, (n,), and whether all lay within the model's limits; if not, the values mean nothing.
+    """Index of air minus one, (n,); True if all are within limits.
+
+    If not, the values are invalid.
 
     temperature_c      (n,) or (1,), °C
     pressure_hpa       (n,) or (1,), hPa

@@ -1,6 +1,6 @@
-"""Wavelengths in air, of the light and of its modulation, and the index that two sidebands really see.
+"""Wavelengths in air of light and modulation, and the index of sidebands.
 
-The notes' 1.2 takes a sideband to either side of the carrier and says that the modulation sees their difference. With
+The notes' 1.2 takes a sideband on either side of the carrier; the modulation is their difference. With
 f the carrier, m the modulation and n(f) the phase index, the two phases over a length d differ by
 2 pi d/c [n(f + m)(f + m) - n(f - m)(f - m)], which is that of a wave of 2m in the index
 
@@ -10,7 +10,7 @@ and d(n f)/df is eq. 1.1, n - lambda dn/dlambda. At 780 nm and 1.5 GHz the secon
 the index of the modulation, whatever the length; at 1 THz it would be 1.8e-11.
 
 The notes print the carrier of 780 nm as 384 615.3 GHz. That is 3e8/780e-9; with c it is 384 349.3 GHz. The sidebands,
-384 616.8 and 384 613.8, carry the same slip; their distance of 3 GHz is right.
+384 616.8 and 384 613.8, have the same error; their distance of 3 GHz is right.
 """
 
 from typing import Any, NamedTuple
@@ -23,13 +23,13 @@ from catseye.constants import SPEED_OF_LIGHT
 from catseye.errors import EstimationError
 
 INDEX = ValidInterval("index of air", "(ratio)", 1.0, 1.001, "air", places=3)
-MODULATION = ValidInterval("modulation frequency", "Hz", 1e6, 1e12, "the notion of a group")
+MODULATION = ValidInterval("modulation frequency", "Hz", 1e6, 1e12, "the definition of a group index")
 MICROMETRE = 1e-6  # m
 ROUNDS = 20  # of the search for a vacuum wavelength; each gains five decimals
 
 
 class Sidebands(NamedTuple):
-    """The carrier, the two sidebands, and what their beat sees.
+    """Carrier, sidebands and the index of their beat.
 
     carrier_hz, lower_hz, upper_hz   frequencies, Hz
     lower, upper                     phase refractivity n - 1 of each sideband
@@ -45,7 +45,7 @@ class Sidebands(NamedTuple):
 
 
 def modulation_wavelength(modulation_hz, group_index):
-    """Wavelength of the modulation in air, in m.
+    """Wavelength of the modulation in air, m.
 
     modulation_hz   modulation frequency, 1e6 to 1e12 Hz
     group_index     n_g, 1 to 1.001
@@ -61,7 +61,7 @@ def modulation_wavelength(modulation_hz, group_index):
 
 
 def vacuum_wavelength_of_frequency_um(frequency_hz):
-    """Wavelength in vacuum, in um.
+    """Wavelength in vacuum, um.
 
     frequency_hz   of the light, Hz, above zero
 
@@ -74,7 +74,7 @@ def vacuum_wavelength_of_frequency_um(frequency_hz):
 
 
 def air_wavelength_um(vacuum_um, temperature_c, pressure_hpa, humidity_percent, **air):
-    """Wavelength that light of a vacuum wavelength has in air, in um.
+    """Wavelength in air of light with a given vacuum wavelength, um.
 
     vacuum_um          wavelength in vacuum, um, within the model's limits
     temperature_c      air temperature, °C
@@ -92,7 +92,9 @@ def air_wavelength_um(vacuum_um, temperature_c, pressure_hpa, humidity_percent, 
 
 
 def vacuum_wavelength_um(air_um, temperature_c, pressure_hpa, humidity_percent, **air):
-    """Wavelength in vacuum of light whose wavelength in this air is known, in um: the inverse of `air_wavelength_um`.
+    """Wavelength in vacuum of light with a given wavelength in air, um.
+
+    The inverse of `air_wavelength_um`.
 
     air_um             wavelength in this air, um
     temperature_c      air temperature, °C
@@ -100,25 +102,27 @@ def vacuum_wavelength_um(air_um, temperature_c, pressure_hpa, humidity_percent, 
     humidity_percent   relative humidity over liquid water, 0 to 100 %
     air                `model` and `co2_ppm` of `air.phase_refractivity`
 
-    Source: lambda_0 = n(lambda_0) lambda, repeated until it stands, to 1e-15. Raises EstimationError if it does not
+    Source: lambda_0 = n(lambda_0) lambda, repeated until it converges, to 1e-15. Raises EstimationError if it does not
     within twenty rounds, ValidityError as the model does.
 
     >>> round(float(vacuum_wavelength_um(0.779806134, 20.0, 933.0, 50.0)), 9)
     0.78
     """
-    known = np.asarray(air_um, float)
-    vacuum_um = known
+    in_air = np.asarray(air_um, float)
+    vacuum_um = in_air
     for _ in range(ROUNDS):
         before = vacuum_um
         n = 1.0 + phase_refractivity(temperature_c, pressure_hpa, humidity_percent, wavelength_um=before, **air)
-        vacuum_um = known * n
+        vacuum_um = in_air * n
         if np.all(np.abs(vacuum_um - before) <= 1e-15 * vacuum_um):
             return vacuum_um
-    raise EstimationError(f"the vacuum wavelength did not settle in {ROUNDS} rounds; is {known} um air's?")
+    raise EstimationError(
+        f"the vacuum wavelength did not converge in {ROUNDS} rounds; is {in_air} um a wavelength in air?"
+    )
 
 
 def sidebands(vacuum_um, modulation_hz, temperature_c, pressure_hpa, humidity_percent, **air) -> Sidebands:
-    """The index that a modulation sees, from the phases of its two sidebands and no derivative.
+    """Index of the modulation from its two sidebands, without a derivative.
 
     vacuum_um          carrier's wavelength in vacuum, um
     modulation_hz      modulation frequency, 1e6 to 1e12 Hz

@@ -1,1 +1,1 @@
-"""The air along a path: profiles, means, bent rays."""
+"""Air along a path: profiles, means, bent rays."""

@@ -1,4 +1,4 @@
-"""The index of air averaged along straight paths at any times, with the covariance between all of them.
+"""Mean index of air along straight paths at any times, with full covariance.
 
 Three `profile.Profile`s: temperature; relative humidity, whose standard uncertainty in the index is a few per cent of
 temperature's; pressure, reduced to one height by weight, since air at rest leaves a barometer no other profile.
@@ -6,9 +6,9 @@ temperature's; pressure, reduced to one height by weight, since air at rest leav
     covariance = sum over the three of  slope_a slope_b cov(mean_a, mean_b)  +  local air along the paths
 
 The slopes are the index's own derivatives at every node, relative humidity held: a thermometer that reads too high
-takes the vapour pressure with it, as it does in the hygrometer's own box. Left out: what a wrong temperature does
+raises the vapour pressure too, as in the hygrometer itself. Neglected: the effect of a wrong temperature
 through the weight of the air, (z - z_barometer)/8600 m of its own effect, 1 % at 100 m; and the second order,
-u²(T) (n - 1)/T², 3e-10 at 0.3 °C. The formula's own standard uncertainty is common to all and stands apart.
+u²(T) (n - 1)/T², 3e-10 at 0.3 °C. The formula's own standard uncertainty is common to all and given separately.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.errors import EstimationError
 
 NODES = 8  # of a mean along a path: 1e-13 for these profiles from 1 to 150 m
-LOCAL_NODES = 12  # equal shares of a path, for local air; claims up to 4 % too much at 100 m
+LOCAL_NODES = 12  # equal shares of a path, for local air; uncertainty up to 4 % too large at 100 m
 LOCAL_ROWS = 64  # paths at a time
 
 
@@ -37,7 +37,7 @@ class WeatherReadings:
     temperature_c      (n,) °C
     pressure_hpa       (n,) hPa at the station
     humidity_percent   (n,) % over liquid water
-    count              (n,) int, how many readings each is the mean of
+    count              (n,) int, readings averaged in each
     """
 
     seconds: np.ndarray
@@ -49,28 +49,30 @@ class WeatherReadings:
     count: np.ndarray
 
     def of(self, name: str) -> ProfileReadings:
-        """The readings of one quantity, those that are nan left out."""
+        """Readings of one quantity, without nan."""
         value = np.asarray(getattr(self, name), float)
-        there = ~np.isnan(value)
-        if not there.any():
-            raise EstimationError(f"{name} was read by no station; the index of air needs it")
+        valid = ~np.isnan(value)
+        if not valid.any():
+            raise EstimationError(f"{name} was not read by any station; the index of air needs it")
         columns = (self.seconds, self.z, self.station, value, self.count)
-        return ProfileReadings(*(np.asarray(column)[there] for column in columns))
+        return ProfileReadings(*(np.asarray(column)[valid] for column in columns))
 
     def averaged(self, block: float) -> "WeatherReadings":
-        """Means over blocks of time of each station; see `ProfileReadings.averaged`.
+        """Means over blocks of time, by station; see `ProfileReadings.averaged`.
 
         block   s, length of a block, above zero
 
-        Raises EstimationError where a sensor gave nothing: its rows would be averaged with others' weights.
+        Raises EstimationError where a sensor gave nothing: its rows would have other weights than the rest.
         """
         names = ("temperature_c", "pressure_hpa", "humidity_percent")
-        whole = [ProfileReadings(self.seconds, self.z, self.station, getattr(self, name), self.count) for name in names]
-        if any(np.isnan(one.value).any() for one in whole):
+        quantities = [
+            ProfileReadings(self.seconds, self.z, self.station, getattr(self, name), self.count) for name in names
+        ]
+        if any(np.isnan(quantity.value).any() for quantity in quantities):
             raise EstimationError("a sensor gave nothing in some readings; give only whole rows to be averaged")
-        means = [one.averaged(block) for one in whole]
+        means = [quantity.averaged(block) for quantity in quantities]
         first = means[0]
-        values = [one.value for one in means]
+        values = [quantity.value for quantity in means]
         return WeatherReadings(first.seconds, first.z, first.station, values[0], values[1], values[2], first.count)
 
 
@@ -81,7 +83,7 @@ class PathIndex(NamedTuple):
     covariance      (m, m) of it, from readings, offsets, profile, time and local air
     temperature_c   (m,) mean temperature along the path, °C
     covariance_c2   (m, m) of that
-    u_formula       standard uncertainty of the formula itself, common to all paths
+    u_formula       standard uncertainty of the formula, common to all paths
     """
 
     refractivity: np.ndarray
@@ -93,7 +95,9 @@ class PathIndex(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class AirProfile:
-    """Temperature, pressure and humidity of a site's air; `AirProfile.of` makes one.
+    """Temperature, pressure and humidity of a site's air.
+
+    `AirProfile.of` makes one.
 
     temperature, humidity   in °C and %
     pressure                in hPa at `z_pressure`, the mean height of the barometers
@@ -114,7 +118,7 @@ class AirProfile:
         pressure: ProfilePrior = PRESSURE,
         humidity: ProfilePrior = HUMIDITY,
     ) -> "AirProfile":
-        """The air given its readings.
+        """Air profile from readings.
 
         readings                          of at least one station; every quantity at least once
         ground                            m, height of the ground, below every station and path
@@ -132,9 +136,11 @@ class AirProfile:
         return cls(warmth, damp, Profile.of(even, pressure, ground=ground), middle)
 
     def state(self, seconds, z) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Temperature °C, pressure hPa, humidity % at times (m,) and heights (m, k): (m, k) each.
+        """Temperature °C, pressure hPa, humidity % at times (m,), heights (m, k).
 
-        Relative humidity is held within 0 to 100 %: a profile carried on leads beyond, nature does not.
+        Returns (m, k) each.
+
+        Relative humidity is held within 0 to 100 %: an extrapolated profile can exceed it.
         """
         z = np.asarray(z, float)
         warmth = self.temperature.at(seconds, z)
@@ -143,7 +149,7 @@ class AirProfile:
         return warmth, _weighed(self.temperature, self.humidity, seconds, base, self.z_pressure, z), damp
 
     def along(self, seconds, a, b, *, wavelength_um=0.780, model="ciddor_hill1999", co2_ppm=450.0) -> PathIndex:
-        """Mean group refractivity of straight paths, each at its time, with the covariance between them.
+        """Mean group refractivity of straight paths at given times, with covariance.
 
         seconds         (m,) s, as the readings'
         a, b            (m, 3) ends, m, z up
@@ -181,7 +187,9 @@ class AirProfile:
 
 
 def shared_air(a, b, length) -> np.ndarray:
-    """How much of the local air m straight paths share: correlation of its means along them times their sizes, (m, m).
+    """Covariance of unit local air between m straight paths, (m, m).
+
+    Correlation of its means along the paths times their sizes.
 
     a, b     (m, 3) ends, m
     length   m, correlation length of local air
@@ -207,7 +215,7 @@ def shared_air(a, b, length) -> np.ndarray:
 
 
 def _weighed(warmth: Profile, damp: Profile, seconds, pressure_hpa, z_from, z_to):
-    """Pressure carried from one height to another by the air's weight, at the temperature half-way."""
+    """Pressure at another height by the air's weight, temperature half-way."""
     half = np.broadcast_to(0.5 * (np.asarray(z_from) + np.asarray(z_to)), np.shape(pressure_hpa))
     temperature = warmth.at(seconds, half)
     e = vapour_pressure_hpa(temperature, pressure_hpa, np.clip(damp.at(seconds, half), 0.0, 100.0))

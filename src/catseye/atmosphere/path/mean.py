@@ -1,4 +1,4 @@
-"""The air along a line of sight: weather carried to other heights, and the mean refractivity between two heights.
+"""Mean refractivity along a line of sight, and pressure at other heights.
 
 Along a straight line the height is linear in the distance run, so that the mean over the height is the mean over the
 path; over 1 km the Earth's curvature departs from that by 2 cm.
@@ -14,15 +14,15 @@ LAPSE_HPA_PER_M = 0.11  # [PARKER04] section 1.4.2, at 20 °C and 800 m
 
 
 def pressure_at(pressure_hpa, z_from, z_to, *, lapse_hpa_per_m=LAPSE_HPA_PER_M):
-    """Pressure at another height by a constant lapse, as the notes do, in hPa.
+    """Pressure at another height by a constant lapse, hPa, as in the notes.
 
     pressure_hpa      total pressure at `z_from`, 500 to 1100 hPa
     z_from            height of the barometer, m
-    z_to              height wanted, m, within 150 m of it
+    z_to              target height, m, within 150 m of it
     lapse_hpa_per_m   fall of pressure with height, 0.08 to 0.13 hPa/m
 
     Source: [PARKER04] section 1.4.2. Good to 0.2 hPa over 100 m at 20 °C, 1.5 hPa at -20 °C: `hydrostatic_pressure_hpa`
-    does better everywhere.
+    is better everywhere.
 
     >>> round(float(pressure_at(933.0, 803.8, 807.4)), 3)
     932.604
@@ -33,12 +33,12 @@ def pressure_at(pressure_hpa, z_from, z_to, *, lapse_hpa_per_m=LAPSE_HPA_PER_M):
 def hydrostatic_pressure_hpa(
     pressure_hpa, temperature_c, z_from, *, z_to, vapour_pressure_hpa=0.0, gravity=STANDARD_GRAVITY
 ):
-    """Pressure at another height, the air between being at rest and at one temperature, in hPa.
+    """Pressure at another height in isothermal air at rest, hPa.
 
     pressure_hpa          total pressure at `z_from`, 500 to 1100 hPa
     temperature_c         mean temperature of the air between, -40 to 50 °C
     z_from                height of the barometer, m
-    z_to                  height wanted, m, within 1 km of it
+    z_to                  target height, m, within 1 km of it
     vapour_pressure_hpa   partial pressure of water vapour at `z_from`, 0 to 100 hPa (moist air is lighter)
     gravity               local gravity, m/s²
 
@@ -56,16 +56,18 @@ def hydrostatic_pressure_hpa(
 
 
 def interpolate_height(z, z1, v1, *, z2, v2):
-    """Value at a height on the straight line through two stations' values; beyond them it extrapolates.
+    """Linear interpolation in height between two stations' values.
 
-    z    height wanted, m
+    It extrapolates beyond them.
+
+    z    target height, m
     z1   height of the first station, m
     v1   value there, any unit
     z2   height of the second station, m
     v2   value there, the same unit
 
     Source: first degree in height, [PARKER04] section 1.3. Two stations at one height give their mean everywhere.
-    As good as the profile is straight: near the ground on a sunny day it is not.
+    Valid where the profile is linear: not near the ground on a sunny day.
 
     >>> float(interpolate_height(25.0, 0.0, 20.0, z2=50.0, v2=19.0))
     19.5
@@ -85,7 +87,7 @@ def mean_over_height(refractivity_of_height, z_a, z_b, *, nodes=5):
     z_b                      height of the other, m; equal heights give the value there
     nodes                    Gauss-Legendre nodes, 1 to 100: exact for polynomials of degree 2 nodes - 1
 
-    Source: [PARKER04] section 1.3 (the mean is what a range sees), Gauss-Legendre quadrature. Five nodes are good to
+    Source: [PARKER04] section 1.3 (a range depends on the mean), Gauss-Legendre quadrature. Five nodes are good to
     1e-12 for air with straight profiles of temperature and pressure over 200 m.
 
     >>> round(float(mean_over_height(lambda z: 250e-6 - 25e-9 * z, 0.0, 100.0)) * 1e6, 6)
@@ -96,7 +98,7 @@ def mean_over_height(refractivity_of_height, z_a, z_b, *, nodes=5):
 
 
 def covariance_over_height(covariance_of_heights, z_a, z_b, *, nodes=5):
-    """Covariance between the means along m straight lines, from the covariance between heights.
+    """Covariance of means along m straight lines, from that between heights.
 
     covariance_of_heights   function of two arrays of heights in m, which it broadcasts, giving a covariance
     z_a                     (m,) m, height of one end of each
@@ -116,12 +118,14 @@ def covariance_over_height(covariance_of_heights, z_a, z_b, *, nodes=5):
 
 
 def nodes_along(z_a, z_b, nodes):
-    """Heights of the Gauss-Legendre nodes between z_a and z_b (...), m: (..., nodes); and their shares (nodes,).
+    """Heights (..., nodes) of Gauss-Legendre nodes between z_a and z_b, m.
+
+    Also returns their weights (nodes,).
 
     z_a, z_b   heights of the ends, m
     nodes      1 to 100
 
-    Source: Gauss-Legendre quadrature; the shares' sum is one.
+    Source: Gauss-Legendre quadrature; the weights' sum is one.
 
     >>> [part.round(4).tolist() for part in nodes_along(0.0, 10.0, 2)]
     [[2.1132, 7.8868], [0.5, 0.5]]

@@ -1,17 +1,19 @@
-"""One quantity of the air in height and time, from stations' readings: Gauss-Markov (kriging), with its covariance.
+"""Profile of one quantity of the air in height and time, by kriging.
+
+A Gauss-Markov process from stations' readings, with its covariance.
 
 The quantity at a height h above the ground and a time t is
 
     level(t) + gradient(t) h + layer(t) ln(1 + h/1 m) + local air
 
-what mixed air or a steady inversion has, and the logarithm that the ground makes by day and by night. Each coefficient
+the form of mixed air or a steady inversion, and the logarithm of the surface layer by day and night. Each coefficient
 is an unknown steady part and a part that changes with a correlation time (Matérn's 3/2: it has a slope, so that a drift
-is carried on for a while and then forgotten). Local air is what one place has for itself: turbulence, a correlation
+continues for a while and then decays). Local air belongs to one place: turbulence, a correlation
 time of a minute. Each station has an offset, common to all its readings, and each reading its noise. All these are
-priors, so that one station, stations at one height, a gap, a time outside the readings are no special cases: where
+priors, so that one station, stations at one height, a gap, a time outside the readings are not special cases: where
 nothing was read, the standard uncertainty grows to the prior's.
 
-A station's place is not in its record; its local air counts as shared with no path and no other station.
+A station's place is not in its record; its local air is taken as independent of all paths and other stations.
 """
 
 from dataclasses import dataclass
@@ -21,14 +23,14 @@ import numpy as np
 from catseye.atmosphere.limit import ValidInterval
 from catseye.errors import EstimationError, ValidityError
 
-MOST_READINGS = 2000  # of one quantity: 1 s on one core; more are averaged first (`ProfileReadings.averaged`)
+MOST_READINGS = 2000  # of one quantity: 1 s on one core; average more first (`ProfileReadings.averaged`)
 ABOVE_GROUND = ValidInterval("height above the ground", "m", 0.0, 1000.0, "a logarithmic surface layer", places=1)
-BLOCK_ROWS = 512  # of a covariance at a time
+BLOCK_ROWS = 512  # elements of a covariance at a time
 
 
 @dataclass(frozen=True)
 class Coefficient:
-    """What is known of a coefficient beforehand; its expectation is zero, the level's the mean of the readings.
+    """Prior of a coefficient; its expectation is zero, the level's the readings' mean.
 
     steady     standard uncertainty of its part that does not change
     changing   standard deviation of its part that does
@@ -40,14 +42,14 @@ class Coefficient:
     time: float
 
     def covariance(self, lag: np.ndarray) -> np.ndarray:
-        """At time lags in s: Matérn's with 3/2, [RASMUSSEN06] eq. 4.17."""
+        """Covariance at time lags in s: Matérn's with 3/2, [RASMUSSEN06] eq. 4.17."""
         r = np.sqrt(3.0) * np.abs(lag) / self.time
         return self.steady**2 + self.changing**2 * (1.0 + r) * np.exp(-r)
 
 
 @dataclass(frozen=True)
 class ProfilePrior:
-    """What is known of a quantity before it is read, in its unit.
+    """Prior of a quantity, in its unit.
 
     level, gradient, layer   coefficients: unit, unit/m, unit per factor e of (1 m + height above the ground)
     offset                   standard uncertainty of a station's constant offset
@@ -68,11 +70,11 @@ class ProfilePrior:
 
     @property
     def coefficients(self) -> tuple[Coefficient, Coefficient, Coefficient]:
-        """In the order of `Profile.basis`."""
+        """Coefficients in the order of `Profile.basis`."""
         return self.level, self.gradient, self.layer
 
     def local_covariance(self, seconds: np.ndarray) -> np.ndarray:
-        """Of local air at one place between times (m,): (m, m)."""
+        """Covariance (m, m) of local air at one place between times (m,)."""
         return self.local**2 * np.exp(-np.abs(seconds[:, None] - seconds) / self.local_time)
 
 
@@ -102,7 +104,7 @@ class ProfileReadings:
     z         (n,) m, height of its station
     station   (n,) int, which station, from 0
     value     (n,) the quantity's unit
-    count     (n,) how many readings each is the mean of
+    count     (n,) readings averaged in each
     """
 
     seconds: np.ndarray
@@ -112,12 +114,12 @@ class ProfileReadings:
     count: np.ndarray
 
     def averaged(self, block: float) -> "ProfileReadings":
-        """Means over blocks of time of each station.
+        """Means over blocks of time, by station.
 
         block   s, length of a block, above zero
 
-        The noise falls with the root of the count. Local air is taken as undiminished, which claims a little too
-        large a standard uncertainty where blocks are longer than its correlation time.
+        The noise falls with the root of the count. Local air is not reduced, which gives a slightly too
+        large standard uncertainty where blocks are longer than its correlation time.
         Raises ValidityError for a block that is not above zero.
 
         >>> two = ProfileReadings(*(np.array(v) for v in ([0.0, 10.0], [2.0, 2.0], [0, 0], [5.0, 6.0], [1, 1])))
@@ -135,18 +137,18 @@ class ProfileReadings:
             return np.bincount(of, weights=self.count * column) / count
 
         first = np.unique(of, return_index=True)[1]
-        whole = np.rint(count).astype(int)
-        return ProfileReadings(mean(self.seconds), self.z[first], self.station[first], mean(self.value), whole)
+        counts = np.rint(count).astype(int)
+        return ProfileReadings(mean(self.seconds), self.z[first], self.station[first], mean(self.value), counts)
 
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """A quantity as its readings leave it; `Profile.of` makes one.
+    """Profile of a quantity given its readings; `Profile.of` makes one.
 
-    readings    what it comes from
-    prior       what was known before
+    readings    the readings
+    prior       the prior
     ground      m, height of the ground
-    mean        the readings' mean, which the level is counted from
+    mean        the readings' mean, from which the level counts
     weights     (n,) inverse covariance of the readings times (readings - mean)
     factor      (n, n) lower Cholesky factor of that covariance
     """
@@ -160,7 +162,7 @@ class Profile:
 
     @classmethod
     def of(cls, readings: ProfileReadings, prior: ProfilePrior, *, ground: float) -> "Profile":
-        """The quantity given its readings.
+        """Profile from readings.
 
         readings   at least one
         prior      TEMPERATURE, PRESSURE, HUMIDITY or another
@@ -179,7 +181,7 @@ class Profile:
 
         n = len(readings.value)
         if n == 0:
-            raise EstimationError("no reading at all; the air cannot be known from priors")
+            raise EstimationError("no readings; priors alone do not determine the air")
         if n > MOST_READINGS:
             raise EstimationError(f"{n} readings are more than {MOST_READINGS}; average them over blocks of time first")
         for name in ("seconds", "z", "value"):
@@ -189,27 +191,33 @@ class Profile:
         empty = cls(readings, prior, ground, mean, np.zeros(n), np.zeros((0, 0)))
         basis = empty.basis(readings.z)
         covariance = empty._smooth(readings.seconds, basis, readings.seconds, basis)
-        same = readings.station[:, None] == readings.station
-        covariance += same * (prior.offset**2 + prior.local_covariance(readings.seconds))
+        same_station = readings.station[:, None] == readings.station
+        covariance += same_station * (prior.offset**2 + prior.local_covariance(readings.seconds))
         covariance[np.diag_indices(n)] += prior.noise**2 / readings.count
         factor = cholesky(covariance, lower=True, overwrite_a=True)
         weights = _solved(factor, _solved(factor, readings.value - mean), transposed=True)
         return cls(readings, prior, ground, mean, weights, factor)
 
     def basis(self, z) -> np.ndarray:
-        """What each coefficient counts at heights z (...): (..., 3). Raises ValidityError below the ground."""
+        """Basis (..., 3) of the coefficients at heights z (...).
+
+        Raises ValidityError below the ground.
+        """
         h = np.asarray(z, float) - self.ground
         ABOVE_GROUND.check(h)
         return np.stack([np.ones(h.shape), h, np.log1p(h)], axis=-1)
 
     def coefficients(self, seconds) -> np.ndarray:
-        """The coefficients at times (m,): (m, 3), the level from `mean`."""
+        """Coefficients (m, 3) at times (m,), the level from `mean`."""
         lag = np.asarray(seconds, float)[:, None] - self.readings.seconds
         design = self.basis(self.readings.z) * self.weights[:, None]
         return np.stack([c.covariance(lag) @ design[:, j] for j, c in enumerate(self.prior.coefficients)], axis=1)
 
     def at(self, seconds, z) -> np.ndarray:
-        """The smooth quantity at times (m,) and heights (m, ...), local air and offsets left out: (m, ...)."""
+        """Smooth quantity (m, ...) at times (m,) and heights (m, ...).
+
+        Without local air and offsets.
+        """
         basis = self.basis(z)
         return self.mean + np.einsum("m...j,mj->m...", basis, self.coefficients(seconds))
 
@@ -218,10 +226,12 @@ class Profile:
         return np.sqrt(np.diagonal(self.covariance(seconds, self.basis(z))))
 
     def covariance(self, seconds, weights) -> np.ndarray:
-        """Covariance of sums of the smooth quantity over heights, each at one time: (m, m).
+        """Covariance (m, m) of sums of the smooth quantity over heights.
+
+        Each sum is at one time.
 
         seconds   (m,) s
-        weights   (m, 3) `basis` summed over each one's heights: of a mean along a path, its mean
+        weights   (m, 3) `basis` summed over its heights; for a mean along a path, averaged
         """
         t, weights = np.asarray(seconds, float), np.asarray(weights, float)
         basis = self.basis(self.readings.z)
@@ -229,14 +239,14 @@ class Profile:
         return self._smooth(t, weights, t, weights) - learnt.T @ learnt
 
     def offsets(self) -> tuple[np.ndarray, np.ndarray]:
-        """What each station reads too much, as far as the others and the prior tell, and its u: (stations,) each."""
+        """Offset and u (stations,) of each station, from other stations and prior."""
         count = int(self.readings.station.max()) + 1
         of = (self.readings.station[:, None] == np.arange(count)) * self.prior.offset**2
         learnt = _solved(self.factor, of)
         return of.T @ self.weights, np.sqrt(np.maximum(self.prior.offset**2 - np.sum(learnt**2, axis=0), 0.0))
 
     def _smooth(self, s, f, t, g) -> np.ndarray:
-        """Prior covariance of the smooth quantity, times s (n,), t (m,), coefficients' weights f (n, 3), g (m, 3)."""
+        """Prior covariance of the smooth quantity, times s (n,), t (m,), weights f (n, 3), g (m, 3)."""
         out = np.empty((len(s), len(t)))
         for k in range(0, len(s), BLOCK_ROWS):
             rows = slice(k, k + BLOCK_ROWS)

@@ -1,17 +1,17 @@
-"""The bent ray between two points in any smooth air: its length, its optical path, where it leaves and arrives.
+"""Bent ray between two points in smooth air: length, optical path, directions.
 
 x runs along the chord from a to b, y are the two directions across it. The ray equation d/ds (n dr/ds) = grad n is,
 with x as the variable and nothing neglected,
 
     y'' = (1 + y'²) (dn/dy - y' dn/dx) / n,        y(0) = y(d) = 0
 
-and the two excesses are integrals of small quantities, so that nanometres are not differences of hundred metres:
+and the two excesses are integrals of small quantities, not differences of large lengths:
 
     of length          integral of s' - 1,                    s' - 1 = y'²/(1 + sqrt(1 + y'²))
     of optical path    integral of (n_ray - n_chord) + n_ray (s' - 1)
 
 Runge and Kutta's fourth-order steps with all rays at once; the first direction by Newton's method; steps are doubled
-until nothing moves. `bending` has the closed forms and the bound beyond which no air can go.
+until the result converges. `bending` has the closed forms and the bound for any air.
 """
 
 from collections.abc import Callable
@@ -22,20 +22,20 @@ import numpy as np
 from catseye.errors import ValidityError
 
 FIRST_STEPS, MOST_STEPS = 32, 2048
-ROUNDS = 12  # of Newton's method
-NUDGE = 1e-6  # of a first slope, for its derivatives
-STEEPEST = 0.3  # first slope against the chord that is tried
+ROUNDS = 12  # rounds of Newton's method
+NUDGE = 1e-6  # step of a first slope, for its derivatives
+STEEPEST = 0.3  # largest first slope against the chord
 OVER = "over a mirage: no single ray found"
 ROUGH = "air too rough: steps exhausted"
 FOUND = "found"
 
 
 class RayAir(NamedTuple):
-    """What air tells a ray at points (..., 3).
+    """Refractivity and its gradient at points (..., 3).
 
     refractivity   (...) phase index less one
     gradient       (..., 3) its gradient, 1/m
-    group          (...) group index less one, which the optical path is counted in; None: the phase index
+    group          (...) group index less one, for the optical path; None: the phase index
     """
 
     refractivity: Any
@@ -48,10 +48,10 @@ class BentRay(NamedTuple):
 
     length_excess    (m,) length of the ray less the chord, m; never below zero
     optical_excess   (m,) optical path along the ray less the integral of the index along the chord, m
-    leaving          (m, 3) rad, the ray's direction at a less the chord's, across the chord; aim this much beside b
+    leaving          (m, 3) rad, the ray's direction at a less the chord's, across the chord; aim this much off b
     arriving         (m, 3) rad, the same of its direction at b
     sag              (m, 3) m, the ray less the chord at half the chord
-    status           (m,) FOUND, OVER or ROUGH; numbers of the others are nan
+    status           (m,) FOUND, OVER or ROUGH; numbers are nan unless FOUND
     """
 
     length_excess: np.ndarray
@@ -63,12 +63,12 @@ class BentRay(NamedTuple):
 
 
 def layered(index_of_height: Callable, group_of_height: Callable | None = None) -> Callable[[np.ndarray], RayAir]:
-    """Air in level layers, for `bent_ray`.
+    """Refractivity of air in level layers, for `bent_ray`.
 
     index_of_height   function of heights in m, giving phase refractivity and its slope in 1/m
     group_of_height   function of heights in m, giving group refractivity; None: the optical path of the light itself
 
-    The Earth's curvature is left out: over 120 m it turns the plumb line by 4 arc seconds.
+    The Earth's curvature is neglected: over 120 m it turns the plumb line by 4 arc seconds.
     Source: n = n(z), grad n = (0, 0, dn/dz).
 
     >>> layered(lambda z: (2.5e-4 + 1e-6 * z, 1e-6 + 0.0 * z))(np.zeros((2, 3))).gradient[0]
@@ -85,15 +85,15 @@ def layered(index_of_height: Callable, group_of_height: Callable | None = None) 
 
 
 def bent_ray(air: Callable[[np.ndarray], RayAir], a, b, *, tolerance=1e-12) -> BentRay:
-    """The ray from each a to each b through smooth air.
+    """Rays from each a to each b through smooth air.
 
     air         function of points (..., 3) in m, giving a RayAir; `layered` makes one from profiles of height
     a, b        (m, 3) or (3,) ends, m
-    tolerance   m, change of the excesses on doubling the steps at which they stand, above zero
+    tolerance   m, above zero: change of the excesses on doubling the steps at convergence
 
-    A ray that is not found or not settled is a status, its numbers nan: over a mirage there are several rays, or none.
-    Where the optical path is counted in the group index it is that of the light's ray: the modulation goes where the
-    light goes. Raises ValidityError for ends that are one point or not finite, or a tolerance not above zero.
+    A ray not found or not converged has a status, its numbers are nan: over a mirage there are several rays, or none.
+    With the group index the optical path is still along the light's ray: the modulation follows the light. Raises
+    ValidityError for ends that are one point or not finite, or a tolerance not above zero.
 
     Source: derived at the top of this file from the ray equation d/ds(n dr/ds) = grad n.
 
@@ -107,25 +107,27 @@ def bent_ray(air: Callable[[np.ndarray], RayAir], a, b, *, tolerance=1e-12) -> B
     if not tolerance > 0.0:
         raise ValidityError(f"tolerance {tolerance} m is not above zero")
     steps, start = FIRST_STEPS, np.zeros((len(a), 2))
-    before, start, hit = _shot_at(air, a, frame, chord, start, steps)
+    previous, start, hit = _shot_at(air, a, frame, chord, start, steps)
     settled = np.zeros(len(a), dtype=bool)
     while steps < MOST_STEPS and not np.all(settled | ~hit):
         steps *= 2
-        now, start, hit = _shot_at(air, a, frame, chord, start, steps)
-        settled = np.all(np.abs(now[:, 4:6] - before[:, 4:6]) <= tolerance, axis=1)
-        before = now
+        state, start, hit = _shot_at(air, a, frame, chord, start, steps)
+        settled = np.all(np.abs(state[:, 4:6] - previous[:, 4:6]) <= tolerance, axis=1)
+        previous = state
     good = hit & settled
     status = np.where(good, FOUND, np.where(hit, ROUGH, OVER))
-    return _as_ray(before, start, frame, good, status)
+    return _as_ray(previous, start, frame, good, status)
 
 
 def _frames(a, b):
-    """(m, 3, 3) rows x along the chord, y1, y2 across it; and the chord's length (m,)."""
+    """Frames (m, 3, 3): x along the chord, y1, y2 across it; chord lengths (m,)."""
     along = b - a
     chord = np.linalg.norm(along, axis=-1)
     if not np.all(np.isfinite(chord) & (chord > 0.0)):
         first = int(np.flatnonzero(~(np.isfinite(chord) & (chord > 0.0)))[0])
-        raise ValidityError(f"path {first} from {a[first]} to {b[first]} is no path; give two finite, different points")
+        raise ValidityError(
+            f"path {first} from {a[first]} to {b[first]} has zero length or a non-finite end; give two different points"
+        )
     x = along / chord[:, None]
     least = np.eye(3)[np.argmin(np.abs(x), axis=-1)]
     y1 = np.cross(x, least)
@@ -134,9 +136,9 @@ def _frames(a, b):
 
 
 def _shot_at(air, a, frame, chord, start, steps):
-    """Newton's method on the first slope until the ray hits b: end states (m, 8), slopes (m, 2), which hit.
+    """Newton's method on the first slope: end states (m, 8), slopes (m, 2), hits.
 
-    The derivatives are kept from round to round while every round takes nine tenths of what the last one missed.
+    The derivatives are reused while each round removes nine tenths of the last miss.
     """
     jacobian, missed = None, np.full(len(a), np.inf)
     for _ in range(ROUNDS):
@@ -154,7 +156,10 @@ def _shot_at(air, a, frame, chord, start, steps):
 
 
 def _derivatives(air, a, frame, chord, start, steps, end):
-    """Of y at b by the first slope, (m, 2, 2); the chord's where b is a focus of rays from a, and no guide."""
+    """Derivatives (m, 2, 2) of y at b by the first slope.
+
+    The chord's values where b is a focus of rays from a.
+    """
     columns = [
         (_integrated(air, a, frame, chord, start + NUDGE * unit, steps)[:, :2] - end[:, :2]) / NUDGE
         for unit in np.eye(2)
@@ -166,7 +171,7 @@ def _derivatives(air, a, frame, chord, start, steps, end):
 
 
 def _integrated(air, a, frame, chord, start, steps):
-    """States (m, 8) at b: y (2), y' (2), length excess, optical excess, y at the middle (2)."""
+    """States (m, 8) at b: y (2), y' (2), length excess, optical excess, middle y (2)."""
     state = np.zeros((len(a), 8))
     state[:, 2:4] = start
     h = chord / steps
@@ -185,13 +190,13 @@ def _integrated(air, a, frame, chord, start, steps):
 def _rates(air, a, frame, x, state):
     """Derivatives by x of the state."""
     chord_point = a + x[:, None] * frame[:, 0]
-    here = air(chord_point + np.einsum("mi,mij->mj", state[:, 0:2], frame[:, 1:]))
+    local = air(chord_point + np.einsum("mi,mij->mj", state[:, 0:2], frame[:, 1:]))
     straight = air(chord_point)
-    gradient = np.einsum("mij,mj->mi", frame, np.asarray(here.gradient, float))
+    gradient = np.einsum("mij,mj->mi", frame, np.asarray(local.gradient, float))
     slope = state[:, 2:4]
     square = np.sum(slope**2, axis=1)
-    index = 1.0 + np.asarray(here.refractivity, float)
-    counted = here.refractivity if here.group is None else here.group
+    index = 1.0 + np.asarray(local.refractivity, float)
+    counted = local.refractivity if local.group is None else local.group
     on_chord = straight.refractivity if straight.group is None else straight.group
     longer = square / (1.0 + np.sqrt(1.0 + square))
     rates = np.zeros(state.shape)

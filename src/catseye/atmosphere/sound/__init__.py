@@ -1,1 +1,1 @@
-"""The speed of sound, and wind."""
+"""Speed of sound and wind."""

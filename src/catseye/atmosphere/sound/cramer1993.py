@@ -1,4 +1,4 @@
-"""Cramer's speed of sound: the reference of acoustics' standards from 0 to 30 °C, an interpolating polynomial."""
+"""Cramer's speed of sound, the acoustics standards' polynomial for 0 to 30 °C."""
 
 import numpy as np
 
@@ -17,14 +17,14 @@ A_WW, A_PP, A_CC, A_WPC = -2.835149, -2.15e-13, 29.179762, 0.000486
 
 
 def speed(temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm=450.0):
-    """Speed of sound in humid air at zero frequency, in m/s.
+    """Speed of sound in humid air at zero frequency, m/s.
 
     temperature_c         air temperature, 0 to 30 °C
     pressure_hpa          total pressure, 750 to 1020 hPa
     vapour_pressure_hpa   partial pressure of water vapour, up to 0.06 of the total
     co2_ppm               carbon dioxide, 0 to 10 000 ppm
 
-    Source: [CRAMER93] eq. 15. Good to 300 ppm, the author says: 0.1 m/s.
+    Source: [CRAMER93] eq. 15. Good to 300 ppm (author): 0.1 m/s.
 
     >>> round(float(speed(0.0, 1013.25, 0.0, 314.0)), 2)
     331.45
@@ -36,7 +36,9 @@ def speed(temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm=450.0):
 
 
 def partials(temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm=450.0) -> SoundPartials:
-    """Derivatives of Cramer's speed of sound, vapour pressure held; arguments as of `speed`.
+    """Derivatives of Cramer's speed of sound at constant vapour pressure.
+
+    Arguments as of `speed`.
 
     Source: [CRAMER93] eq. 15 differentiated.
 

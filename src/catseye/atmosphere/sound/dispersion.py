@@ -1,9 +1,11 @@
-"""How much faster sound runs at a frequency than at zero frequency, since vibrating molecules lag behind.
+"""Dispersion of sound: its speed at a frequency against zero frequency.
 
-Above its relaxation frequency a gas's vibration takes no more part in the heat capacity. The notes and the models of
+Vibrating molecules lag behind the sound.
+
+Above its relaxation frequency a gas's vibration no longer contributes to the heat capacity. The notes and the models of
 the speed are for zero frequency; a chirp of some kHz runs above nitrogen's relaxation (some 100 Hz in moist air) and
-below oxygen's (tens of kHz; some 10 Hz in dry air). So it is fast by 0.02 m/s (0.04 °C) in moist air at 20 °C, and by
-up to 0.14 m/s (0.23 °C) in dry air: not to be ignored.
+below oxygen's (tens of kHz; some 10 Hz in dry air). So its speed is high by 0.02 m/s (0.04 °C) in moist air at 20 °C,
+and by up to 0.14 m/s (0.23 °C) in dry air: not negligible.
 """
 
 from typing import Any, NamedTuple
@@ -23,10 +25,10 @@ FREQUENCY = ValidInterval("frequency", "Hz", 0.0, 1e6, "[ISO93]")
 
 
 class SoundDispersion(NamedTuple):
-    """What a frequency adds to the speed of sound, as shares of the speed at zero frequency.
+    """Relative change of the speed of sound at a frequency.
 
-    phase      of the phase velocity: what a steady tone shows, and a correlation that follows its carrier
-    group      of the group velocity: what the envelope of a narrow band shows
+    phase      of the phase velocity: for a steady tone, or a correlation with the carrier
+    group      of the group velocity: for the envelope of a narrow band
     standard   standard uncertainty of either: 10 % of the larger
     """
 
@@ -35,16 +37,17 @@ class SoundDispersion(NamedTuple):
     standard: Any
 
     def of_a_pulse(self):
-        """The share that a correlation with the known signal shows, and its standard uncertainty: the phase's.
+        """Dispersion and standard uncertainty for correlation with a known pulse.
 
-        A real signal has no phase of its own to give: the delay with the highest correlation is the mean of the phase
-        delays with weight f² |S|², whatever the band, so the frequency to give is the signal's root mean square one.
+        It is that of the phase. A real signal has no phase of its own to give: the delay with the highest correlation
+        is the mean of the phase delays with weight f² |S|², whatever the band, so the frequency to give is the signal's
+        root mean square one.
         """
         return self.phase, self.standard
 
 
 def relaxation_hz(temperature_c, pressure_hpa, vapour_pressure_hpa):
-    """Relaxation frequencies of oxygen and nitrogen in moist air, in Hz.
+    """Relaxation frequencies of oxygen and nitrogen in moist air, Hz.
 
     temperature_c         air temperature, -20 to 50 °C
     pressure_hpa          total pressure, up to 2000 hPa
@@ -64,7 +67,7 @@ def relaxation_hz(temperature_c, pressure_hpa, vapour_pressure_hpa):
 
 
 def dispersion(temperature_c, pressure_hpa, vapour_pressure_hpa, *, frequency_hz) -> SoundDispersion:
-    """What a frequency adds to the speed of sound at zero frequency, phase and group, as shares.
+    """Relative change of phase and group velocity of sound at a frequency.
 
     temperature_c         air temperature, -40 to 50 °C
     pressure_hpa          total pressure, 500 to 1100 hPa

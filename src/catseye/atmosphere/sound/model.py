@@ -1,4 +1,4 @@
-"""What a model of the speed of sound in air is: a formula, its derivatives, where it holds, and how good it is."""
+"""Model of the speed of sound in air: formula, derivatives, limits, uncertainty."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from catseye.atmosphere.limit import ValidInterval
 
 
 class SoundPartials(NamedTuple):
-    """Derivatives of the speed of sound with vapour pressure held, the others held too.
+    """Derivatives of the speed of sound at constant vapour pressure.
 
     temperature_c         m/s per °C
     pressure_hpa          m/s per hPa of total pressure
@@ -23,8 +23,8 @@ class SoundPartials(NamedTuple):
     vapour_pressure_hpa: Any
     co2_ppm: Any
 
-    def with_humidity_held(self, saturation, humidity_percent) -> "SoundSensitivity":
-        """The chain rule from vapour pressure to relative humidity, by `saturation` and its slopes."""
+    def at_constant_humidity(self, saturation, humidity_percent) -> "SoundSensitivity":
+        """Convert to constant relative humidity by the chain rule, with `saturation` and its slopes."""
         fraction = np.asarray(humidity_percent, float) / 100.0
         return SoundSensitivity(
             self.temperature_c + self.vapour_pressure_hpa * fraction * saturation.per_c,
@@ -36,7 +36,9 @@ class SoundPartials(NamedTuple):
 
 
 class SoundSensitivity(NamedTuple):
-    """Derivatives of the speed of sound; relative humidity held, but for that by the vapour pressure.
+    """Derivatives of the speed of sound at constant relative humidity.
+
+    The one by vapour pressure is at constant temperature and total pressure.
 
     temperature_c         m/s per °C
     pressure_hpa          m/s per hPa
@@ -54,19 +56,20 @@ class SoundSensitivity(NamedTuple):
 
 @dataclass(frozen=True)
 class SoundModel:
-    """One model of the speed of sound at zero frequency; its functions take (temperature_c, pressure_hpa,
-    vapour_pressure_hpa, co2_ppm), nothing checked.
+    """Model of the speed of sound at zero frequency.
+
+    Its functions take (temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm), nothing checked.
 
     name                   as users write it
     source                 the bibliography's keys
     speed                  function giving m/s
     partials               function giving SoundPartials
     vapour_formula         the saturation formula it goes with, a name in `atmosphere.weather.humidity.FORMULAS`
-    standard_uncertainty   of the formula itself, m/s, perfect weather given; the least
+    standard_uncertainty   of the formula, m/s, exact weather; the minimum
     limits                 argument's name -> Limit
     has_co2                carbon dioxide enters
-    departure              function giving (m/s that the formula may be off in this weather, m/s of what that was
-                           found by), or None where it is the same in all; see `uncertainty`
+    departure              function giving (m/s, the formula's error in this weather, m/s, uncertainty of the
+                           reference for that), or None where it is constant; see `uncertainty`
     """
 
     name: str
@@ -80,10 +83,10 @@ class SoundModel:
     departure: Callable[..., tuple[Any, Any]] | None = None
 
     def uncertainty(self, temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm=450.0):
-        """Standard uncertainty of the formula itself, m/s, perfect weather given; nothing is checked.
+        """Standard uncertainty of the formula, m/s, exact weather; nothing is checked.
 
-        What it is off here and the uncertainty of that in squares, but never less than `standard_uncertainty`: where
-        two formulas happen to cross neither is better.
+        Its error here and the uncertainty of that in squares, but never less than `standard_uncertainty`: a crossing of
+        two formulas proves nothing.
         """
         if self.departure is None:
             return self.standard_uncertainty
@@ -103,7 +106,7 @@ def limits(
     pressure_hpa: tuple[float, float],
     co2_ppm: tuple[float, float] = (0.0, 2000.0),
 ) -> dict[str, ValidInterval]:
-    """The limits of a model, each given as (least, greatest)."""
+    """Limits of a model, each given as (least, greatest)."""
     return {
         "temperature_c": ValidInterval("temperature", "C", *temperature_c, source),
         "pressure_hpa": ValidInterval("pressure", "hPa", *pressure_hpa, source),

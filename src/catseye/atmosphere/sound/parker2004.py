@@ -1,16 +1,19 @@
-"""The notes' speed of sound, chapter 4 as printed: for reproducing the notes, not for measuring temperature.
+"""Speed of sound as printed in chapter 4 of the notes.
 
-What is wrong with it, derived by hand. An ideal gas has c² = gamma R T/M. In moist air with the mole fraction x = P_w/P
+For reproducing the notes, not for measuring temperature.
+
+Its errors, derived by hand. An ideal gas has c² = gamma R T/M. In moist air with the mole fraction x = P_w/P
 the molar mass is M_a [1 - x (1 - M_w/M_a)], M_w/M_a = 18.015/28.966 = 0.622 (the notes round to 5/8). Heat capacities
 add: 1/(gamma - 1) = (1 - x)/(gamma_a - 1) + x/(gamma_w - 1), which falls with x as d ln gamma/dx =
 (1 - gamma_a^-1)(gamma_a - 1) [1/(gamma_a - 1) - 1/(gamma_w - 1)]. With gamma_a = 1.402 and gamma_w = 1.330 (vapour has
 three translations and three rotations, 4 R, and a little vibration) that is -0.063, so that d ln c²/dx =
 0.378 - 0.063 = 0.315. Eq. 4.3 takes the mean of the gammas instead, gamma_w/gamma_a - 5/8 = 0.324 with gamma_w = 1.330:
-as good as the whole. But it prints gamma_w = 1.004 "for water", which no gas has (a monatomic one has 5/3, the limit
-of a very large molecule is 1); 1.004 is the specific heat of dry air in kJ/(kg K). So 0.0911 stands where 0.32 belongs.
-At 20 °C, 933 hPa, 50 % the notes' humid air is slow by (0.324 - 0.091)/2 x c = 0.50 m/s, 0.86 °C of temperature; at
-30 °C, 1000 hPa, 100 % by 1.8 m/s, 2.9 °C. Their dry air is fast by 0.05 m/s there (0.09 °C): gamma = 1.402 lies between
-the 1.4001 of the ideal gas and the 1.4026 of air at 1000 hPa, M = 28.980 above the 28.966 of today's composition.
+as good as the full form. But it prints gamma_w = 1.004 "for water", which no gas has (a monatomic one has 5/3, the
+limit of a very large molecule is 1); 1.004 is the specific heat of dry air in kJ/(kg K). So it has 0.0911 instead of
+0.32. At 20 °C, 933 hPa, 50 % the notes' humid air is slow by (0.324 - 0.091)/2 x c = 0.50 m/s, 0.86 °C of temperature;
+at 30 °C, 1000 hPa, 100 % by 1.8 m/s, 2.9 °C. Their dry air is fast by 0.05 m/s there (0.09 °C): gamma = 1.402 lies
+between the 1.4001 of the ideal gas and the 1.4026 of air at 1000 hPa, M = 28.980 above the 28.966 of today's
+composition.
 
 The printed digits: the notes' program computes with unrounded constants and prints 343.577 (4.8), rounded; their
 343.379 (4.2) is 343.379 83 truncated, or 343.379 30 with 20.0553.
@@ -33,13 +36,13 @@ SHARE = GAMMA_WATER / GAMMA_AIR - MASS_RATIO  # 4.4 prints 0.091119
 
 
 def speed(temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm=None, *, gamma_water=GAMMA_WATER):
-    """Speed of sound in humid air, as the notes have it, in m/s.
+    """Speed of sound in humid air by the notes, m/s.
 
     temperature_c         air temperature, -40 to 50 °C
     pressure_hpa          total pressure, 500 to 1100 hPa
     vapour_pressure_hpa   partial pressure of water vapour, 0 to 100 hPa
     co2_ppm               ignored: the notes' air is fixed
-    gamma_water           ratio of specific heats of water vapour; 1.004 is the notes', 1.330 its true one
+    gamma_water           ratio of specific heats of water vapour; 1.004 is the notes', 1.330 the true value
 
     Source: [PARKER04] eqs. 4.1 and 4.3. Erratum: gamma_w, see the head of this file.
 
@@ -53,14 +56,14 @@ def speed(temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm=None, *, gam
 
 
 def partials(temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm=None) -> SoundPartials:
-    """Derivatives of the notes' speed of sound, vapour pressure held.
+    """Derivatives of the notes' speed of sound at constant vapour pressure.
 
     temperature_c         air temperature, -40 to 50 °C
     pressure_hpa          total pressure, 500 to 1100 hPa
     vapour_pressure_hpa   partial pressure of water vapour, 0 to 100 hPa
     co2_ppm               ignored
 
-    Source: [PARKER04] eq. 4.3 differentiated; the last but one is 4.12.
+    Source: [PARKER04] eq. 4.3 differentiated; the one by vapour pressure is 4.12.
 
     >>> round(float(partials(20.0, 933.0, 11.73229).vapour_pressure_hpa), 7)
     0.0167967
@@ -73,7 +76,9 @@ def partials(temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm=None) -> 
 
 
 def temperature_c(speed, pressure_hpa, vapour_pressure_hpa):
-    """Temperature of air from its speed of sound as the notes have it, vapour pressure given, in °C.
+    """Temperature of air from the notes' speed of sound, °C.
+
+    The vapour pressure is given.
 
     speed                 of sound, m/s; of a path, its length over the travel time (4.7)
     pressure_hpa          total pressure, 500 to 1100 hPa
@@ -89,7 +94,9 @@ def temperature_c(speed, pressure_hpa, vapour_pressure_hpa):
 
 
 def departure(temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm=450.0):
-    """Standard uncertainty of the notes' speed of sound, m/s: its distance from `real_gas`, and that one's own.
+    """Standard uncertainty of the notes' speed of sound, m/s.
+
+    Its distance from `real_gas`, and the uncertainty of that.
 
     Arguments as of `speed`, and carbon dioxide, ppm, which the notes' air lacks.
 

@@ -1,15 +1,15 @@
-"""Sound along a path through moving air: wind, bent rays, and what the mean over a path means.
+"""Sound along a path: wind, bent rays, means over the path.
 
 Sound runs with speed c in the air, which itself moves with the wind: the front of a wave that is to travel along the
 path must head upwind of it, so that its speed along the path is sqrt(c² - w_perp²) + w_par. Two directions at once give
-both terms exactly when the air is the same along the path. Seen from a path, a wind of 5 m/s along it is 8 °C one way,
-nothing in the mean of the reciprocal times, and w²/c² (0.12 °C) in the reciprocal of the mean time.
+both terms exactly when the air is the same along the path. A wind of 5 m/s along the path changes one direction by 8
+°C, the mean of the reciprocal times not at all, and the reciprocal of the mean time by w²/c² (0.12 °C).
 
 In air that is not the same everywhere: times add, so that a path gives the harmonic mean of c + w. With the variances
 var(T), var(w) along the path the temperature of the mean speed is low by (3/4) var(T)/T + (2T/c²) var(w): 0.003 °C for
 1 K rms, 0.005 °C for 1 m/s rms (vapour pressure the same all along). The group index's mean over the same path exceeds
-the index at that temperature by (n - 1) var(T)/4T² only: 8e-10 for 1 K rms, since sound's mean leans the way light's
-does.
+the index at that temperature by (n - 1) var(T)/4T² only: 8e-10 for 1 K rms, since both means deviate
+in the same direction.
 """
 
 from typing import Any, NamedTuple
@@ -19,11 +19,11 @@ import numpy as np
 from catseye.atmosphere.limit import ValidInterval
 from catseye.constants import ZERO_CELSIUS_K
 
-WIND = ValidInterval("wind", "m/s", -60.0, 60.0, "the formula of slow winds")
+WIND = ValidInterval("wind", "m/s", -60.0, 60.0, "the formula for slow winds")
 
 
 class Pair(NamedTuple):
-    """What two travel times in opposite directions give.
+    """Speed and wind from two travel times in opposite directions.
 
     speed_along   sqrt(c² - w_perp²), m/s
     wind          along the path, m/s, positive from A to B
@@ -34,7 +34,9 @@ class Pair(NamedTuple):
 
 
 def pair(time_ab, time_ba, length) -> Pair:
-    """Speed of sound and wind along a path from the travel times in both directions, exact for uniform air.
+    """Speed of sound and wind along a path from both travel times.
+
+    Exact for uniform air.
 
     time_ab   travel time from A to B, s
     time_ba   travel time from B to A at the same instant, s
@@ -52,7 +54,7 @@ def pair(time_ab, time_ba, length) -> Pair:
 
 
 def travel_time(length, speed, wind_along, wind_across):
-    """Time that sound takes along a straight path in uniform air and wind, s.
+    """Travel time of sound along a straight path in uniform air and wind, s.
 
     length        of the path, m
     speed         of sound in air at rest, m/s
@@ -71,14 +73,15 @@ def travel_time(length, speed, wind_along, wind_across):
 
 
 def straight_line_speed(speed_along, crosswind, u_crosswind):
-    """Speed of sound in air at rest from that along a path, for what is known of the crosswind: value and uncertainty.
+    """Speed of sound in air at rest from that along a path, with uncertainty.
 
     speed_along   sqrt(c² - w_perp²), m/s
-    crosswind     expected component across the path, m/s; 0 where nothing is known
+    crosswind     expected component across the path, m/s; 0 where unknown
     u_crosswind   its standard uncertainty, m/s; without an anemometer the rms of the site's winds
 
-    A crosswind only ever slows sound, so that ignorance is a bias as well: with w_perp normal about w0 with u the mean
-    of w_perp² is w0² + u², its variance 4 w0² u² + 2 u⁴. Both are used: 5 m/s of unknown sign is +0.061 ± 0.086 °C.
+    A crosswind always slows sound, so that an unknown one is a bias as well: with w_perp normal about w0 with u the
+    mean of w_perp² is w0² + u², its variance 4 w0² u² + 2 u⁴. Both are used: 5 m/s of unknown sign is +0.061 ± 0.086
+    °C.
 
     Source: exact geometry; mean and variance of the square of a normal variable.
 
@@ -91,7 +94,7 @@ def straight_line_speed(speed_along, crosswind, u_crosswind):
 
 
 def bent_ray_excess(length, speed, gradient):
-    """How much earlier, relatively, sound arrives by its own bent way than along the straight line between the ends.
+    """Relative time by which sound on its bent ray precedes the straight line.
 
     length     between the ends, m
     speed      of sound half-way on the straight line, m/s
@@ -114,7 +117,9 @@ def bent_ray_excess(length, speed, gradient):
 
 
 def mean_temperature_excess(temperature_c, temperature_variance, wind_variance=0.0, *, speed=343.0):
-    """What to add to the temperature of a path's harmonic mean speed for its mean temperature, °C, second order.
+    """Correction from the temperature of a mean speed to the mean temperature, °C.
+
+    Second order; for the harmonic mean speed of a path.
 
     temperature_c          of the path, °C
     temperature_variance   of the temperature along it, K²
@@ -132,7 +137,9 @@ def mean_temperature_excess(temperature_c, temperature_variance, wind_variance=0
 
 
 def mean_refractivity_excess(refractivity, temperature_c, temperature_variance):
-    """What the mean of n - 1 over a path exceeds n - 1 at the temperature that sound gives, second order.
+    """Excess of the path mean of n - 1 over n - 1 at the sound's temperature.
+
+    Second order.
 
     refractivity           n - 1 at the temperature that sound gives
     temperature_c          that temperature, °C

@@ -1,13 +1,15 @@
-"""Speed of sound in moist air as a mixture of gases with their own heat capacities and second virial coefficients.
+"""Speed of sound in moist air, a mixture of real gases.
+
+Each gas has its heat capacity and second virial coefficients.
 
 Derived. To the first order in density p V = R T + B p, and at zero frequency and fixed composition
     c² = (gamma R T/M) (1 + K p/RT),   K = 2 B + 2 (gamma - 1) T B' + ((gamma - 1)²/gamma) T² B''
 with gamma = C_p/(C_p - R) of the ideal gas and B of the mixture, x_a² B_aa + 2 x_a x_w B_aw + x_w² B_ww. Moles add
-heat capacities and masses. Dry air is that of [PICARD08]; carbon dioxide takes the place of oxygen. What is left out:
+heat capacities and masses. Dry air is that of [PICARD08]; carbon dioxide takes the place of oxygen. Neglected:
 third virial coefficients, 7 ppm of the speed at 1013 hPa and -40 °C, 4 ppm at 20 °C, in proportion to p² (against the
-full equation of state of [LEMMON00]): it reads slow by that. Those with vapour are more: 50 ppm at 30 °C and 100 ppm at
-45 °C in saturated air at 1000 hPa (against [IAPWS10], with which all the rest agrees within 3 ppm at the same
-composition), in proportion to p² and to the vapour's share: it reads fast by that.
+full equation of state of [LEMMON00]): the speed is low by that. Those with vapour are more: 50 ppm at 30 °C and 100 ppm
+at 45 °C in saturated air at 1000 hPa (against [IAPWS10], with which all else agrees within 3 ppm at the same
+composition), in proportion to p² and to the vapour's share: the speed is high by that.
 """
 
 from typing import Any, NamedTuple
@@ -30,7 +32,7 @@ AIR_POWERS = (
     (0.223806688, -1.5),
 )
 AIR_VIBRATIONS = ((0.791309509, 3364.011), (0.212236768, 2242.45))
-NOBLE_EXCESS = 1.565e-4  # noble gases of [PICARD08] beyond the 0.0092 of argon in [LEMMON00]; each takes one R away
+NOBLE_EXCESS = 1.565e-4  # noble gases of [PICARD08] beyond the 0.0092 of argon in [LEMMON00]; each subtracts one R
 # carbon dioxide for oxygen: vibrations at 667 (twice), 1342 and 2349 cm^-1 (harmonic), and none at 1556 cm^-1
 CO2_FOR_O2_VIBRATIONS = ((2.0, 960.0), (1.0, 1932.0), (1.0, 3380.0), (-1.0, 2242.45))
 # [WAGNER02] table 6.1, C_p/R of the ideal gas: rotation and translation, then weight and temperature of vibrations
@@ -58,12 +60,14 @@ B_AIR = tuple(
 B_AIR_WATER = ((66.5687e-6, -0.237), (-238.834e-6, -1.048), (-176.755e-6, -3.183))
 B_WATER = ((0.34404e-3, -0.5), (-0.75826e-3, -0.8), (-24.219e-3, -3.35), (-3978.2e-3, -8.3))
 THIRD_VIRIAL, SATURATED_SHARE = 100e-6, 0.0959  # of the speed; vapour's share in saturated air at 45 °C and 1000 hPa
-REST = 84e-6  # of the speed: heat capacities 60, second virial coefficients 50, composition 30 ppm
+OTHER_TERMS = 84e-6  # of the speed: heat capacities 60, second virial coefficients 50, composition 30 ppm
 HUNDRED_KELVIN = 100.0
 
 
 class HeatCapacity(NamedTuple):
-    """Molar heat capacity at constant pressure of an ideal mixture over the gas constant, and its derivatives.
+    """Molar heat capacity of an ideal mixture over R, with derivatives.
+
+    At constant pressure.
 
     cp             C_p/R
     per_k          by temperature, 1/K
@@ -78,7 +82,9 @@ class HeatCapacity(NamedTuple):
 
 
 def heat_capacity(temperature_c, vapour_fraction, co2_ppm=450.0) -> HeatCapacity:
-    """Molar heat capacity of moist air as an ideal gas, over the gas constant, with its slopes.
+    """Molar heat capacity of moist air over R, with derivatives.
+
+    As an ideal gas.
 
     temperature_c     air temperature, -40 to 50 °C
     vapour_fraction   mole fraction of water vapour, 0 to 0.2
@@ -103,7 +109,9 @@ def heat_capacity(temperature_c, vapour_fraction, co2_ppm=450.0) -> HeatCapacity
 
 
 def second_virial(temperature_c, vapour_fraction):
-    """Second virial coefficient of moist air: (B, T B', T² B'', T³ B''') and the same differentiated by the fraction.
+    """Second virial coefficient of moist air, (B, T B', T² B'', T³ B'''), and by fraction.
+
+    The same four differentiated by the vapour fraction.
 
     temperature_c     air temperature, -40 to 50 °C
     vapour_fraction   mole fraction of water vapour, 0 to 0.2
@@ -124,7 +132,7 @@ def second_virial(temperature_c, vapour_fraction):
 
 
 def speed(temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm=450.0):
-    """Speed of sound in moist air at zero frequency, in m/s.
+    """Speed of sound in moist air at zero frequency, m/s.
 
     temperature_c         air temperature, -40 to 50 °C
     pressure_hpa          total pressure, 500 to 1100 hPa
@@ -141,7 +149,9 @@ def speed(temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm=450.0):
 
 
 def partials(temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm=450.0) -> SoundPartials:
-    """Derivatives of the speed of sound in moist air, vapour pressure held; arguments as of `speed`.
+    """Derivatives of the speed of sound at constant vapour pressure.
+
+    Arguments as of `speed`.
 
     Source: derived at the head of this file, differentiated by hand; exact for the formula.
 
@@ -153,7 +163,7 @@ def partials(temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm=450.0) ->
 
 
 def _square(temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm):
-    """c² in m²/s², and the derivatives of ln c² per °C, hPa, hPa of vapour and ppm of carbon dioxide."""
+    """c² in m²/s², and derivatives of ln c² per °C, hPa, hPa vapour, ppm CO2."""
     kelvin = np.asarray(temperature_c, float) + ZERO_CELSIUS_K
     p = np.asarray(pressure_hpa, float)
     x = np.asarray(vapour_pressure_hpa, float) / p
@@ -193,7 +203,7 @@ def _vibrations(kelvin, terms):
 
 
 def _powers(ratio, terms):
-    """Sum of c r^d and T^k times its k-th derivative by temperature, k = 1, 2, 3: (4, ...)."""
+    """Sums (4, ...) of c r^d and T^k times its k-th derivative by temperature, k = 1, 2, 3."""
     rows = [(c * ratio**d, d) for c, d in terms]
     return np.stack(
         [
@@ -206,18 +216,19 @@ def _powers(ratio, terms):
 
 
 def departure(temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm=450.0):
-    """Standard uncertainty, m/s: the third virial coefficients that are left out, and the rest.
+    """Standard uncertainty, m/s: neglected third virial coefficients, and other terms.
 
     Arguments as of `speed`.
 
-    Source: the head of this file: 100 ppm where vapour has 9.6 % of 1000 hPa (saturated at 45 °C), by p² and its share.
+    Source: the head of this file: 100 ppm where vapour has 9.6 % of 1000 hPa (saturated at 45 °C), in proportion to p²
+    and its share.
 
     >>> [round(float(v), 3) for v in departure(45.0, 1000.0, 95.9)]
     [0.036, 0.03]
     """
     p, share = np.asarray(pressure_hpa, float) / 1000.0, np.asarray(vapour_pressure_hpa, float) / pressure_hpa
     c = speed(temperature_c, pressure_hpa, vapour_pressure_hpa, co2_ppm)
-    return c * THIRD_VIRIAL * p**2 * share / SATURATED_SHARE, c * REST
+    return c * THIRD_VIRIAL * p**2 * share / SATURATED_SHARE, c * OTHER_TERMS
 
 
 MODEL = SoundModel(
@@ -226,7 +237,7 @@ MODEL = SoundModel(
     speed=speed,
     partials=partials,
     vapour_formula="iapws",
-    # m/s, the least, 100 ppm: heat capacities 60, second virial coefficients 50, composition 30, third ones 40
+    # m/s, the minimum, 100 ppm: heat capacities 60, second virial coefficients 50, composition 30, third ones 40
     standard_uncertainty=0.035,
     limits=limits("this mixture", temperature_c=(-40.0, 50.0), pressure_hpa=(500.0, 1100.0)),
     has_co2=True,

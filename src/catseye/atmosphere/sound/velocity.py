@@ -1,7 +1,7 @@
-"""From the length that a ranger shows to the straight line between two points: velocity corrections, arc to chord.
+"""Velocity and arc-to-chord corrections from displayed length to straight line.
 
-An electronic distance meter shows d' = c t / 2 n_ref for the time t of a round trip. Air along the whole path gives the
-length of the ray; weather is read at its ends, and the ray is bent. Each function gives a correction, to be added.
+An electronic distance meter displays d' = c t / 2 n_ref for the time t of a round trip. Air along the whole path gives
+the length of the ray; weather is read at its ends, and the ray is bent. Each function gives a correction, to be added.
 
 The second correction, derived: with the coefficient of refraction k the ray's curvature is k/R, and k/R = -dn/dh. Over
 level ends the ray runs below the level surface through them, by (1 - k) x (d - x) / 2R at x, in the mean by
@@ -16,16 +16,16 @@ from catseye.atmosphere.limit import ValidInterval
 EARTH_RADIUS = 6_371_000.0  # m, mean; 0.3 % of it changes nothing below 10 km
 REFRACTION = 0.13  # coefficient k of light by day, well above the ground
 
-COEFFICIENT = ValidInterval("coefficient of refraction", "(ratio)", -5.0, 5.0, "the notion of a smoothly bent ray")
+COEFFICIENT = ValidInterval("coefficient of refraction", "(ratio)", -5.0, 5.0, "the model of a smoothly bent ray")
 RADIUS = ValidInterval("radius of the earth", "m", 6.2e6, 6.6e6, "the earth")
 INDEX = ValidInterval("index of air", "(ratio)", 1.0, 1.001, "air", places=3)
 
 
-def first_velocity_correction(shown, reference_index, group_index):
-    """What the air along the path adds to the length shown, in m.
+def first_velocity_correction(displayed, reference_index, group_index):
+    """First velocity correction: from displayed length to the air along the path, m.
 
-    shown             length as shown, without any correction for weather, m
-    reference_index   group index n_ref for which the instrument shows lengths, 1 to 1.001
+    displayed         length as displayed, without any correction for weather, m
+    reference_index   group index n_ref for which the instrument displays lengths, 1 to 1.001
     group_index       group index of the air along the path, 1 to 1.001
 
     Exact: d = d' n_ref/n; the common form d'(n_ref - n) is larger by 0.03 % of itself.
@@ -39,11 +39,13 @@ def first_velocity_correction(shown, reference_index, group_index):
     INDEX.check(reference_index)
     INDEX.check(group_index)
     reference, index = np.asarray(reference_index, float), np.asarray(group_index, float)
-    return np.asarray(shown, float) * (reference - index) / index
+    return np.asarray(displayed, float) * (reference - index) / index
 
 
 def second_velocity_correction(length, *, refraction=REFRACTION, radius=EARTH_RADIUS):
-    """What a ray below its ends' level surface adds, the index being that at the ends, in m; negative for 0 < k < 1.
+    """Second velocity correction: ray below its ends' level surface, m.
+
+    The index is that at the ends; negative for 0 < k < 1.
 
     length       of the ray, m
     refraction   coefficient k: radius of the earth over that of the ray, above zero for a ray concave to the ground
@@ -63,7 +65,9 @@ def second_velocity_correction(length, *, refraction=REFRACTION, radius=EARTH_RA
 
 
 def arc_to_chord_correction(length, *, refraction=REFRACTION, radius=EARTH_RADIUS):
-    """What makes the straight line from the length of the bent ray, in m; never positive.
+    """Correction from the bent ray's length to the straight line, m.
+
+    Never positive.
 
     length       of the ray, m
     refraction   coefficient k: radius of the earth over that of the ray

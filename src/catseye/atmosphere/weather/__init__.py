@@ -1,1 +1,1 @@
-"""Humidity, pressure, dew: from what instruments show to what formulas need."""
+"""Weather readings to formula inputs: humidity, pressure, dew."""

@@ -1,14 +1,14 @@
-"""From a mercury barometer to station pressure, local gravity for it, and pressure carried to another elevation.
+"""Mercury barometer readings to station pressure; gravity; pressure at other elevations.
 
 A barometer's reading is a length of mercury on a brass scale. 760 mm Hg is one atmosphere only at 0 °C and 9.80665
 m/s²: elsewhere the mercury is lighter and the scale longer ([PARKER04] eq. 1.8), and the mercury's weight is the local
 gravity's (1.12). The notes print p_r in 1.12 where 1.18 multiplies the temperature-corrected p_t: applied as printed
-the temperature would be forgotten, 3 hPa at 20 °C. Their example 1.22 gives 929.37 mb: 697.094 mm Hg is 929.383 mb
+the temperature would be ignored, 3 hPa at 20 °C. Their example 1.22 gives 929.37 mb: 697.094 mm Hg is 929.383 mb
 (929.382 with all digits of gravity); they multiply the truncated 697.09 and truncate again.
 
-Gravity by formula is that of the sea-level ellipsoid lifted through free air. The rock between is missing from it (a
-Bouguer plate: 1.12e-6 m/s² a metre), and so is what lies below: real gravity departs by some 3e-4 m/s², 0.03 hPa at
-933 hPa and 8e-9 in the index. A measured station ends the question: `GRAVITY_STATIONS`.
+Gravity by formula is that of the sea-level ellipsoid lifted through free air. It excludes the rock between (a
+Bouguer plate: 1.12e-6 m/s² a metre) and below: real gravity departs by some 3e-4 m/s², 0.03 hPa at
+933 hPa and 8e-9 in the index. A measured station avoids this: `GRAVITY_STATIONS`.
 """
 
 from collections.abc import Callable
@@ -23,11 +23,11 @@ from catseye.errors import ValidityError
 
 HPA_PER_MMHG = 1.333_223_874_15  # 13595.1 kg/m³ times standard gravity; [PARKER04] eq. 1.20 rounds to 1.333224
 BRASS_PER_C, MERCURY_PER_C = 1.84e-5, 1.818e-4  # [PARKER04] eq. 1.8: scale in length, mercury in volume
-U_MERCURY_EXPANSION = 1e-5  # of the pressure, 0 to 40 °C: how far a straight line is from mercury's expansion
+U_MERCURY_EXPANSION = 1e-5  # of the pressure, 0 to 40 °C: nonlinearity of mercury's expansion
 GAL = 1e-2  # m/s²
 FOOT = 0.3048  # m
-FREE_AIR = -3.086e-6  # 1/s²: change of gravity with height, nothing but air between
-BOUGUER_PLATE = 1.119e-6  # 1/s²: what a plate of rock of 2670 kg/m³ gives back
+FREE_AIR = -3.086e-6  # 1/s²: change of gravity with height through free air
+BOUGUER_PLATE = 1.119e-6  # 1/s²: effect of a plate of rock of 2670 kg/m³
 U_NORMAL_GRAVITY = 3e-4  # m/s², of a formula: the usual size of free-air anomalies on land, our estimate
 
 # [SMITHSON51] (eq. 1.9 of [PARKER04]): cm/s² at 45°, cos 2 phi, cos² 2 phi
@@ -49,7 +49,7 @@ TEMPERATURE = ValidInterval("temperature", "°C", -100.0, 60.0, "the hydrostatic
 
 
 def temperature_corrected_mmhg(reading_mmhg, mercury_c):
-    """The reading that the barometer would show at 0 °C, in mm Hg.
+    """Barometer reading reduced to 0 °C, mm Hg.
 
     reading_mmhg   as read, index and capillarity corrections of its certificate added, 300 to 850 mm Hg
     mercury_c      temperature of mercury and scale, -30 to 60 °C
@@ -67,7 +67,7 @@ def temperature_corrected_mmhg(reading_mmhg, mercury_c):
 
 
 def station_pressure_hpa(reading_mmhg, mercury_c, gravity):
-    """Pressure at the barometer's own elevation, in hPa.
+    """Pressure at the barometer's elevation, hPa.
 
     reading_mmhg   as read, 300 to 850 mm Hg
     mercury_c      temperature of mercury and scale, -30 to 60 °C
@@ -87,13 +87,15 @@ def station_pressure_hpa(reading_mmhg, mercury_c, gravity):
 def station_pressure_uncertainty_hpa(
     reading_mmhg, mercury_c, gravity, *, u_reading_mmhg, u_mercury_c, u_gravity=U_NORMAL_GRAVITY
 ):
-    """Standard uncertainty of `station_pressure_hpa` from uncorrelated inputs (1 sigma each), in hPa.
+    """Standard uncertainty of `station_pressure_hpa` from uncorrelated inputs, hPa.
+
+    Inputs are 1 sigma each.
 
     u_reading_mmhg   of the reading with its certificate's corrections, mm Hg
     u_mercury_c      of the mercury's temperature, °C: 0.12 hPa/°C at 700 mm Hg, usually the largest part
     u_gravity        m/s²; the default is that of a formula
 
-    The straight expansion of mercury adds 1e-5 of the pressure.
+    The linear expansion of mercury adds 1e-5 of the pressure.
     Source: [JCGM100] eq. 10 with the derivatives of [PARKER04] eqs. 1.8, 1.12.
 
     >>> u = station_pressure_uncertainty_hpa(700.0, 20.0, 9.79784, u_reading_mmhg=0.05, u_mercury_c=0.5)
@@ -128,7 +130,9 @@ def sea_level_gravity(latitude):
 
 
 def elevation_correction(latitude, elevation):
-    """What gravity changes from sea level to an elevation through free air, m/s²; below zero above the sea.
+    """Change of gravity from sea level to an elevation in free air, m/s².
+
+    Below zero above the sea.
 
     latitude    rad, -pi/2 to pi/2
     elevation   above sea level, -500 to 9000 m
@@ -145,14 +149,14 @@ def elevation_correction(latitude, elevation):
 
 
 def normal_gravity(latitude, elevation, *, formula="smithsonian"):
-    """Gravity that a smooth earth would have here, m/s².
+    """Normal gravity at a latitude and elevation, m/s².
 
     latitude    rad, -pi/2 to pi/2; a minute of arc is 1.5e-5 m/s² at 38°
     elevation   above sea level, -500 to 9000 m
     formula     `smithsonian`, the notes', or `grs80`, today's
 
     Raises ValidityError outside these limits. The two lie within 1.1e-4 m/s² (0.01 hPa) of each other up to 5 km; the
-    true gravity is off by more, `U_NORMAL_GRAVITY`, because neither knows the rock.
+    true gravity departs by more, `U_NORMAL_GRAVITY`, because neither includes the rock.
     Source: [PARKER04] eqs. 1.9, 1.10, 1.13; [MORITZ80] Somigliana's closed formula with the lift of second order.
 
     >>> round(float(normal_gravity(np.radians(38.45), 797.3)), 5)
@@ -183,13 +187,13 @@ GRAVITY_FORMULAS: dict[str, Callable[..., Any]] = {"smithsonian": _smithsonian, 
 
 @dataclass(frozen=True)
 class GravityStation:
-    """A brass marker whose gravity was measured absolutely.
+    """Brass marker with absolutely measured gravity.
 
     name            as published
     gravity_gal     1 gal is 0.01 m/s²
     elevation_ft    above sea level, printed to a foot
     u_gal           standard uncertainty where one is published
-    where           the place in words
+    where           description of the place
     """
 
     name: str
@@ -200,7 +204,7 @@ class GravityStation:
 
     @property
     def gravity(self) -> float:
-        """Gravity at the place, m/s²."""
+        """Gravity at the marker, m/s²."""
         return self.gravity_gal * GAL
 
     @property
@@ -223,7 +227,10 @@ class GravityStation:
         return self.gravity + gradient * (np.asarray(elevation, float) - self.elevation)
 
     def anomaly(self, latitude, *, formula="smithsonian"):
-        """Measured gravity less a formula's at this elevation, m/s²; the latitude in rad is not published with it."""
+        """Measured gravity less a formula's at this elevation, m/s².
+
+        The latitude, rad, is not published with the station.
+        """
         return self.gravity - normal_gravity(latitude, self.elevation, formula=formula)
 
 
@@ -242,7 +249,7 @@ GRAVITY_STATIONS = {
 
 
 class CarriedPressure(NamedTuple):
-    """Pressure at another elevation and its derivatives by what it was carried with.
+    """Pressure at another elevation and its derivatives by the inputs.
 
     pressure_hpa          hPa
     per_pressure_hpa      by the pressure at the barometer, the vapour pressure held
@@ -266,7 +273,9 @@ class CarriedPressure(NamedTuple):
     def standard_uncertainty_hpa(
         self, u_pressure_hpa, *, u_temperature_c=0.0, u_lapse=0.0, u_vapour=0.0, u_gravity=U_NORMAL_GRAVITY, u_rise=0.0
     ):
-        """Standard uncertainty of the pressure carried, from uncorrelated inputs (1 sigma each), in hPa.
+        """Standard uncertainty of the carried pressure from uncorrelated inputs, hPa.
+
+        Inputs are 1 sigma each.
 
         Source: [JCGM100] eq. 10.
 
@@ -275,7 +284,7 @@ class CarriedPressure(NamedTuple):
         0.112
         """
         u = (u_pressure_hpa, u_temperature_c, u_lapse, u_vapour, u_gravity, u_rise)
-        parts = (slope * np.asarray(each, float) for slope, each in zip(self[1:7], u, strict=True))
+        parts = (slope * np.asarray(spread, float) for slope, spread in zip(self[1:7], u, strict=True))
         return np.sqrt(self.u_formula_hpa**2 + sum(np.square(part) for part in parts))
 
 
@@ -289,13 +298,13 @@ def carried_pressure(
     vapour_pressure_hpa=0.0,
     gravity=STANDARD_GRAVITY,
 ) -> CarriedPressure:
-    """Pressure at another elevation, the temperature falling straight with height and the vapour's share held.
+    """Pressure at another elevation, with linear temperature and constant vapour share.
 
     pressure_hpa          at the barometer, 100 to 1400 hPa
     temperature_c         of the air at the barometer, -100 to 60 °C
     z_from                elevation of the barometer, m
-    z_to                  elevation wanted, m, within 12 km
-    lapse_c_per_m         fall of temperature with height: 0.0065 is the standard air's, 0 one temperature, below
+    z_to                  target elevation, m, within 12 km
+    lapse_c_per_m         fall of temperature with height: 0.0065 for standard air, 0 isothermal, below
                           zero an inversion
     vapour_pressure_hpa   at the barometer, 0 hPa to the total pressure (moist air is lighter)
     gravity               mean between, m/s²
@@ -318,7 +327,7 @@ def carried_pressure(
     ValidInterval("vapour's share of the pressure", "%", 0.0, 100.0, "a mixture of gases").check(100.0 * vapour / p)
     x = -lapse * rise / kelvin  # relative change of the absolute temperature
     ValidInterval(
-        "absolute temperature at the top over that below", "(ratio)", 0.5, 2.0, "one straight layer", 1
+        "absolute temperature at the top over that below", "(ratio)", 0.5, 2.0, "the model of one linear layer", 1
     ).check(1.0 + x)
     share, light = vapour / p, 1.0 - WATER_OVER_AIR
     weight = gravity * DRY_AIR_KG_PER_MOL / GAS_CONSTANT  # K/m, of dry air
@@ -340,7 +349,7 @@ def carried_pressure(
 
 
 def _log_ratio(x):
-    """ln(1 + x)/x and its derivative, by their series where x is small: 1 - x/2 + x²/3 - ..."""
+    """ln(1 + x)/x and its derivative, by series where x is small: 1 - x/2 + x²/3 - ..."""
     small = np.abs(x) < 1e-3
     safe = np.where(small, 1.0, x)
     value = np.where(small, 1.0 + x * (-1 / 2 + x * (1 / 3 + x * (-1 / 4 + x / 5))), np.log1p(safe) / safe)

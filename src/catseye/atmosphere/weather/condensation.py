@@ -1,9 +1,9 @@
-"""Whether a retroreflector or mirror at a given temperature will dew or frost over, and how far it is from it.
+"""Dew or frost on retroreflectors and mirrors: margin and probability.
 
 A surface collects water when the air at its temperature would be more than saturated: over liquid water at or above
 0 °C, over ice below. Air whose dew point is above 0 °C leaves dew first; drier air leaves frost, and does so earlier
 than its dew point says, for the frost point is the higher of the two. Clean glass may stay clear some kelvin below the
-frost point for want of nuclei: this is the temperature from which on a deposit is possible, the cautious side.
+frost point for lack of nuclei: this is the temperature at which a deposit becomes possible, a conservative limit.
 """
 
 from dataclasses import dataclass
@@ -25,16 +25,16 @@ STILL_AIR, PER_WIND = 2.8, 3.0  # [WATMUFF77]: W/(m² K), and per m/s of wind
 SURFACE = ValidInterval("surface temperature", "°C", -100.0, 100.0, "saturation over water and ice")
 WIND = ValidInterval("wind", "m/s", 0.0, 7.0, "[WATMUFF77]")
 SKY_EMISSIVITY = ValidInterval("emissivity of the sky", "(ratio)", 0.0, 1.0, "[BERDAHL84]")
-EMISSIVITY = ValidInterval("emissivity", "(ratio)", 0.0, 1.0, "the notion of emissivity")
-SKY_VIEW = ValidInterval("view of the sky", "(ratio)", 0.0, 1.0, "the notion of a share")
+EMISSIVITY = ValidInterval("emissivity", "(ratio)", 0.0, 1.0, "the definition of emissivity")
+SKY_VIEW = ValidInterval("view of the sky", "(ratio)", 0.0, 1.0, "the definition of a share")
 STEPS = 20
 
 
 class Condensation(NamedTuple):
-    """What the air does to a surface.
+    """Condensation on surfaces.
 
     margin_k         surface less threshold, K: below zero a deposit grows; inf in perfectly dry air
-    threshold_c      dew point, or frost point where that is what comes first, °C; nan in perfectly dry air
+    threshold_c      dew point, or frost point where frost comes first, °C; nan in perfectly dry air
     threat           which deposit the surface would collect first on cooling: "dew", "frost" or "none" (dry air)
     deposit          which it collects now: "none", "dew", or below 0 °C "frost"
     u_margin_k       standard uncertainty of the margin, K
@@ -49,14 +49,14 @@ class Condensation(NamedTuple):
     probability: Any
 
     def lines(self) -> list[str]:
-        """One line for each surface, in the order of the arrays."""
+        """Text lines, one a surface, in the order of the arrays."""
         columns = (np.atleast_1d(value).ravel() for value in self)
         return [_line(*(value.item() for value in row)) for row in zip(*columns, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
 class CondensationSpread:
-    """Standard uncertainties of what condensation depends on; numbers or arrays.
+    """Standard uncertainties of the inputs of condensation; numbers or arrays.
 
     surface_c          of the surface's temperature, °C
     temperature_c      of the air's, °C
@@ -75,7 +75,7 @@ EXACT = CondensationSpread()
 
 
 def condensation(surface_c, temperature_c, pressure_hpa, *, humidity_percent, u=EXACT, formula="buck") -> Condensation:
-    """Margin of surfaces to the dew or frost point of the air around them, and the probability of a deposit.
+    """Margin of surfaces to dew or frost point, with probability of deposit.
 
     surface_c            temperature of the surface, -100 to 100 °C
     temperature_c        air temperature, -100 to 100 °C
@@ -112,7 +112,7 @@ def condensation(surface_c, temperature_c, pressure_hpa, *, humidity_percent, u=
     slope = _slope_hpa_per_c(np.where(dry, 0.0, threshold), dew >= 0.0, p, formula)
     per_t, per_h = share * air.per_c / slope, air.pressure_hpa / 100.0 / slope
     variance = u_s**2 + (per_t * u_t) ** 2 + (per_h * u_h) ** 2 - 2.0 * per_t * covariance
-    u_margin = np.sqrt(np.maximum(np.where(dry, 0.0, variance), 0.0))  # rounding: a full correlation may leave -1e-17
+    u_margin = np.sqrt(np.maximum(np.where(dry, 0.0, variance), 0.0))  # rounding: a full correlation may give -1e-17
     threat = np.where(dry, "none", np.where(dew >= 0.0, "dew", "frost"))
     deposit = np.where(margin < 0.0, np.where(surface < 0.0, "frost", "dew"), "none")
     answer = np.broadcast_arrays(margin, threshold, threat, deposit, u_margin, _below_zero(margin, u_margin))
@@ -120,7 +120,9 @@ def condensation(surface_c, temperature_c, pressure_hpa, *, humidity_percent, u=
 
 
 def radiative_depression_k(temperature_c, dew_point_c, pressure_hpa=1000.0, *, wind=1.0, emissivity=0.9, sky_view=1.0):
-    """How far a surface cools below the air by radiating to a clear midnight sky, in K: an estimate for planning.
+    """Radiative cooling of a surface below the air, K, under clear midnight sky.
+
+    An estimate for planning.
 
     temperature_c   air temperature, -40 to 50 °C
     dew_point_c     dew point over water, -40 °C to the air's temperature; the sky was fitted from -13 to 24 °C, and
@@ -131,9 +133,9 @@ def radiative_depression_k(temperature_c, dew_point_c, pressure_hpa=1000.0, *, w
     sky_view        share of the hemisphere that is sky, 0 to 1; the rest is taken to be as warm as the air
 
     Radiation lost equals heat gained from the air: eps V sigma (T_s⁴ - eps_sky T_a⁴) + eps (1 - V) sigma (T_s⁴ - T_a⁴)
-    = h (T_a - T_s). Heat led in by the mount and the heat of the deposit itself warm the surface further: a thin,
-    insulated plate is this cold, a heavy prism in a housing is not. Good to a third of itself at best. By day and under
-    cloud it says nothing.
+    = h (T_a - T_s). Heat conducted by the mount and the heat of the deposit itself warm the surface further: a thin,
+    insulated plate is this cold, a heavy prism in a housing is not. Good to a third of itself at best. Not valid by day
+    and under cloud.
     Raises ValidityError outside these limits. Newton's method, at most 20 steps.
     Source: [BERDAHL84] (clear sky), [WATMUFF77] (h = 2.8 + 3.0 wind).
 
@@ -171,11 +173,11 @@ def _slope_hpa_per_c(threshold_c, dew, p, formula):
 
 
 def _below_zero(margin, u):
-    """Probability that a normal margin is below zero; a step where it is known exactly."""
+    """Probability that a normal margin is below zero; a step where u is 0."""
     from scipy.special import ndtr
 
-    known = u == 0.0
-    ratio = np.where(known, np.where(margin < 0.0, np.inf, -np.inf), -margin / np.where(known, 1.0, u))
+    exact = u == 0.0
+    ratio = np.where(exact, np.where(margin < 0.0, np.inf, -np.inf), -margin / np.where(exact, 1.0, u))
     return ndtr(ratio)
 
 
@@ -183,14 +185,14 @@ def _refuse_uncertainties(u_surface, u_temperature, u_humidity, covariance) -> N
     named = {"u_surface_c": u_surface, "u_temperature_c": u_temperature, "u_humidity_percent": u_humidity}
     for name, u in named.items():
         if not np.all(u >= 0.0) or not np.all(np.isfinite(u)):
-            raise ValidityError(f"{name} = {float(np.min(u)):g} is not a standard uncertainty; give 0 or more")
+            raise ValidityError(f"{name} = {float(np.min(u)):g} is invalid as a standard uncertainty; give 0 or more")
     if not np.all(np.abs(covariance) <= u_surface * u_temperature * (1.0 + 1e-12)):
         raise ValidityError("covariance_c2 is larger than u_surface_c u_temperature_c; no correlation exceeds 1")
 
 
 def _line(margin, threshold, threat, deposit, u, probability) -> str:
     if threat == "none":
-        return "clear: the air holds no vapour"
+        return "clear: the air has no vapour"
     point = f"the {threat} point, {threshold:.1f} °C"
     if u > 0.0:
         point = f"{point}, ± {u:.{'1f' if u >= 0.1 else '1g'}} K; {100.0 * probability:.0f} % probable"

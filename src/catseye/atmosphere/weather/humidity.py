@@ -1,7 +1,7 @@
-"""Water vapour in air: saturation over water and over ice, vapour pressure, relative humidity, dew and frost point.
+"""Humidity: saturation over water and ice, vapour pressure, dew and frost point.
 
-Relative humidity is over liquid water at all temperatures (the meteorologists' convention); ice is never chosen
-silently. Three formulas for moist air saturated over water are registered by name: `buck` (the notes'), `ciddor` (the
+Relative humidity is over liquid water at all temperatures (the meteorologists' convention); ice is never a
+default. Three formulas for moist air saturated over water are registered by name: `buck` (the notes'), `ciddor` (the
 one that reproduces Ciddor's tables) and `iapws` (today's reference for pure water, with Ciddor's enhancement factor).
 They agree within 0.1 % from -20 to 50 °C, which is 2e-9 in the index of saturated air at 30 °C. Over ice there are
 `buck` (the notes') and `iapws` (today's sublimation pressure with Greenspan's enhancement factor for ice), within
@@ -57,7 +57,7 @@ TRIPLE_K, TRIPLE_PA = 273.16, 611.657
 GREENSPAN_ALPHA = (3.64449e-4, 2.93631e-5, 4.88635e-7, 4.36543e-9)
 GREENSPAN_LN_BETA = (-1.07271e1, 7.61989e-2, -1.74771e-4, 2.46721e-6)
 
-# a chilled mirror reads far below the air's own limits; formulas are extrapolated there, docstrings say how well
+# a chilled mirror reads far below the air's limits; docstrings give the quality of the extrapolation
 PRESSURE = ValidInterval("pressure", "hPa", 100.0, 1400.0, "[CIDDOR96]'s enhancement of saturation")
 DEW_POINT = ValidInterval("dew point", "°C", -100.0, 100.0, "saturation over water")
 FROST_POINT = ValidInterval("frost point", "°C", -100.0, MELTING_C, "ice", places=2)
@@ -67,7 +67,7 @@ HUMIDITY = ValidInterval("relative humidity", "%", 0.0, 100.0, "unsaturated air"
 OVER_ICE_HUMIDITY = ValidInterval(
     "relative humidity over ice", "%", 0.0, 300.0, "supersaturation over ice"
 )  # 265 % at -100 °C
-VAPOUR_PRESSURE = ValidInterval("vapour pressure", "hPa", 0.0, 1400.0, "the notion of a pressure")
+VAPOUR_PRESSURE = ValidInterval("vapour pressure", "hPa", 0.0, 1400.0, "the definition of a pressure")
 
 
 class Saturation(NamedTuple):
@@ -84,7 +84,7 @@ class Saturation(NamedTuple):
 
 
 def saturation_pressure_hpa(temperature_c, pressure_hpa):
-    """Saturation vapour pressure over liquid water, in hPa, by Buck's formula.
+    """Saturation vapour pressure over liquid water, hPa, by Buck's formula.
 
     temperature_c   air temperature, -40 to 50 °C
     pressure_hpa    total pressure, 500 to 1100 hPa (enters through the enhancement factor)
@@ -101,7 +101,7 @@ def saturation_pressure_hpa(temperature_c, pressure_hpa):
 
 
 def ice_saturation_pressure_hpa(temperature_c, pressure_hpa):
-    """Saturation vapour pressure over ice, in hPa; never used unless asked for.
+    """Saturation vapour pressure over ice, hPa; never a default.
 
     temperature_c   air temperature, -50 to 0 °C
     pressure_hpa    total pressure, 500 to 1100 hPa
@@ -116,7 +116,7 @@ def ice_saturation_pressure_hpa(temperature_c, pressure_hpa):
 
 
 def iapws_saturation_pressure_hpa(temperature_c):
-    """Saturation pressure of pure water over its liquid, no air present, in hPa.
+    """Saturation pressure of pure water over liquid, without air, hPa.
 
     temperature_c   temperature, 0 to 370 °C; extrapolated to supercooled water down to -40 °C
 
@@ -129,7 +129,7 @@ def iapws_saturation_pressure_hpa(temperature_c):
 
 
 def sublimation_pressure_hpa(temperature_c):
-    """Saturation pressure of pure water vapour over ice, no air present, in hPa.
+    """Saturation pressure of pure water over ice, without air, hPa.
 
     temperature_c   temperature of the ice, -223 to 0.01 °C
 
@@ -157,26 +157,30 @@ def enhancement_factor(temperature_c, pressure_hpa):
 
 
 def saturation(temperature_c, pressure_hpa, formula="buck") -> Saturation:
-    """Saturation vapour pressure of moist air over liquid water with its slopes, by a named formula.
+    """Saturation pressure of moist air over liquid water, by a named formula.
+
+    With its slopes.
 
     temperature_c   air temperature, -40 to 50 °C (`ciddor` and `iapws`: to 100 °C)
     pressure_hpa    total pressure, 500 to 1100 hPa
     formula         `buck`, `ciddor` or `iapws`
 
-    Nothing is checked but the formula's name: solvers pass here on their way.
+    Only the formula's name is checked, as solvers iterate here.
     Source: [RUEGER90] eq. 5.27; [CIDDOR96] appendix A; [IAPWS97] eq. 30. Good to 0.1 %; the slopes are analytic.
 
     >>> round(float(saturation(20.0, 1013.25, "ciddor").pressure_hpa), 4)
     23.4858
     """
-    _known(formula, FORMULAS)
+    _refuse_unknown(formula, FORMULAS)
     return FORMULAS[formula](np.asarray(temperature_c, float), np.asarray(pressure_hpa, float))
 
 
 def ice_saturation(temperature_c, pressure_hpa, formula="buck") -> Saturation:
-    """Saturation vapour pressure of moist air over ice with its slopes, by a named formula.
+    """Saturation pressure of moist air over ice, by a named formula.
 
-    temperature_c   temperature of the ice, -100 to 0.01 °C
+    With its slopes.
+
+     temperature_c   temperature of the ice, -100 to 0.01 °C
     pressure_hpa    total pressure, 100 to 1400 hPa
     formula         `buck` or `iapws` (Ciddor gives none over ice)
 
@@ -189,23 +193,23 @@ def ice_saturation(temperature_c, pressure_hpa, formula="buck") -> Saturation:
     >>> round(float(ice_saturation(-10.0, 1013.25, "iapws").pressure_hpa), 4)
     2.6092
     """
-    _known(formula, ICE_FORMULAS, " over ice")
+    _refuse_unknown(formula, ICE_FORMULAS, " over ice")
     OVER_ICE.check(temperature_c)
     PRESSURE.check(pressure_hpa)
     return ICE_FORMULAS[formula](np.asarray(temperature_c, float), np.asarray(pressure_hpa, float))
 
 
 def vapour_pressure_hpa(temperature_c, pressure_hpa, humidity_percent, formula="buck", *, over_ice=False):
-    """Partial pressure of water vapour from relative humidity, over liquid water unless ice is asked for, in hPa.
+    """Vapour pressure from relative humidity, hPa, over liquid water by default.
 
     temperature_c      air temperature, -40 to 50 °C
     pressure_hpa       total pressure, 500 to 1100 hPa
-    humidity_percent   relative humidity, 0 to 100 %; air that clouds form in goes above 100 % over ice
+    humidity_percent   relative humidity, 0 to 100 %; air in clouds exceeds 100 % over ice
     formula            `buck`, `ciddor` or `iapws`; over ice `buck` or `iapws`
     over_ice           the humidity is stated over ice, which few instruments and no weather service does
 
     Raises ValidityError outside -100 to 100 °C (over ice, 0.01 °C), 100 to 1400 hPa, and 0 to 100 % (300 %).
-    Source: [RUEGER90] eq. 5.29 ([PARKER04] eq. 1.5). Good to 0.1 % of itself, the formula's part.
+    Source: [RUEGER90] eq. 5.29 ([PARKER04] eq. 1.5). Good to 0.1 % of itself, for the formula.
 
     >>> round(float(vapour_pressure_hpa(20.0, 933.0, 50.0)), 4)
     11.7323
@@ -218,9 +222,9 @@ def vapour_pressure_hpa(temperature_c, pressure_hpa, humidity_percent, formula="
 
 
 def relative_humidity_percent(vapour_pressure_hpa, temperature_c, pressure_hpa, *, formula="buck", over_ice=False):
-    """Relative humidity of air with this vapour, over liquid water unless ice is asked for, in %.
+    """Relative humidity from vapour pressure, %, over liquid water by default.
 
-    vapour_pressure_hpa   partial pressure of water vapour, 0 to 1400 hPa; above saturation the answer is above 100 %
+    vapour_pressure_hpa   partial pressure of water vapour, 0 to 1400 hPa; above saturation the result is above 100 %
     temperature_c         air temperature, -100 to 100 °C
     pressure_hpa          total pressure, 100 to 1400 hPa
     formula               the one that gave the vapour pressure
@@ -240,7 +244,9 @@ def relative_humidity_percent(vapour_pressure_hpa, temperature_c, pressure_hpa, 
 
 
 def vapour_pressure_of_dew_point_hpa(dew_point_c, pressure_hpa, formula="buck"):
-    """Partial pressure of water vapour from the dew point, over liquid water also below 0 °C, in hPa.
+    """Vapour pressure from the dew point, hPa.
+
+    Over liquid water also below 0 °C.
 
     dew_point_c    dew point, -100 to 100 °C
     pressure_hpa   total pressure, 100 to 1400 hPa
@@ -259,7 +265,7 @@ def vapour_pressure_of_dew_point_hpa(dew_point_c, pressure_hpa, formula="buck"):
 
 
 def vapour_pressure_of_frost_point_hpa(frost_point_c, pressure_hpa, formula="buck"):
-    """Partial pressure of water vapour from the frost point, in hPa.
+    """Vapour pressure from the frost point, hPa.
 
     frost_point_c   frost point, -100 to 0.01 °C
     pressure_hpa    total pressure, 100 to 1400 hPa
@@ -276,7 +282,9 @@ def vapour_pressure_of_frost_point_hpa(frost_point_c, pressure_hpa, formula="buc
 
 
 def dew_point_c(vapour_pressure_hpa, pressure_hpa, formula="buck"):
-    """Temperature at which this air, cooled at constant pressure, is saturated over liquid water, in °C.
+    """Dew point of air, °C.
+
+    The temperature at which this air, cooled at constant pressure, is saturated over liquid water.
 
     vapour_pressure_hpa   partial pressure of water vapour, 1e-9 to 1000 hPa; drier air has no dew point: nan
     pressure_hpa          total pressure, 500 to 1100 hPa
@@ -289,7 +297,7 @@ def dew_point_c(vapour_pressure_hpa, pressure_hpa, formula="buck"):
     >>> round(float(dew_point_c(11.7323, 933.0)), 3)
     9.267
     """
-    _known(formula, FORMULAS)
+    _refuse_unknown(formula, FORMULAS)
     VAPOUR_PRESSURE.check(vapour_pressure_hpa)
     PRESSURE.check(pressure_hpa)
     e, p = _with_vapour(vapour_pressure_hpa), np.asarray(pressure_hpa, float)
@@ -298,7 +306,9 @@ def dew_point_c(vapour_pressure_hpa, pressure_hpa, formula="buck"):
 
 
 def frost_point_c(vapour_pressure_hpa, pressure_hpa, formula="buck"):
-    """Temperature at which this air, cooled at constant pressure, is saturated over ice, in °C.
+    """Frost point of air, °C.
+
+    The temperature at which this air, cooled at constant pressure, is saturated over ice.
 
     vapour_pressure_hpa   partial pressure of water vapour, hPa; nan where it has no frost point: drier than 1e-9 hPa,
                           or so moist (6.14 hPa) that dew forms above 0.01 °C
@@ -312,7 +322,7 @@ def frost_point_c(vapour_pressure_hpa, pressure_hpa, formula="buck"):
     >>> round(float(frost_point_c(2.6096, 933.0)), 3)
     -10.0
     """
-    _known(formula, ICE_FORMULAS, " over ice")
+    _refuse_unknown(formula, ICE_FORMULAS, " over ice")
     VAPOUR_PRESSURE.check(vapour_pressure_hpa)
     PRESSURE.check(pressure_hpa)
     e, p = _with_vapour(vapour_pressure_hpa), np.asarray(pressure_hpa, float)
@@ -321,7 +331,7 @@ def frost_point_c(vapour_pressure_hpa, pressure_hpa, formula="buck"):
     return np.where(frost <= MELTING_C + 1e-9, frost, np.nan)[()]
 
 
-def _known(formula, formulas, where=""):
+def _refuse_unknown(formula, formulas, where=""):
     if formula not in formulas:
         raise ValidityError(f"saturation formula {formula!r} is unknown{where}; choose one of {', '.join(formulas)}")
 
@@ -368,7 +378,10 @@ def _iapws(t, p) -> Saturation:
 
 
 def _iapws_ice(t, p) -> Saturation:
-    """Sublimation pressure times Greenspan's factor f: ln f = alpha (1 - e/p) + beta (p/e - 1), e that of pure ice."""
+    """Sublimation pressure times Greenspan's factor f.
+
+    ln f = alpha (1 - e/p) + beta (p/e - 1), e that of pure ice.
+    """
     e, e_t = (value / PA_PER_HPA for value in _sublimation(t + ZERO_CELSIUS_K))
     alpha, alpha_t = _polynomial(GREENSPAN_ALPHA, t)
     ln_beta, ln_beta_t = _polynomial(GREENSPAN_LN_BETA, t)
@@ -381,7 +394,7 @@ def _iapws_ice(t, p) -> Saturation:
 
 
 def _sublimation(kelvin):
-    """[IAPWS11] eq. 6 in Pa and its slope in Pa/K: each term of ln(p/p_t) is a theta^(b - 1)."""
+    """[IAPWS11] eq. 6, Pa, and slope, Pa/K: terms of ln(p/p_t) are a theta^(b - 1)."""
     theta = kelvin / TRIPLE_K
     pressure = TRIPLE_PA * np.exp(sum(a * theta ** (b - 1.0) for a, b in SUBLIMATION))
     return pressure, pressure * sum(a * (b - 1.0) * theta ** (b - 2.0) for a, b in SUBLIMATION) / TRIPLE_K
@@ -393,7 +406,7 @@ def _polynomial(coefficients, t):
 
 
 def _enhanced(t, p, pure_pa, pure_pa_per_c) -> Saturation:
-    """Moist-air saturation from that of pure water: both Ciddor's and IAPWS's carry the same factor."""
+    """Moist-air saturation from that of pure water, with the common enhancement factor."""
     factor = enhancement_factor(t, p)
     pure, slope = pure_pa / PA_PER_HPA, pure_pa_per_c / PA_PER_HPA
     return Saturation(
@@ -420,15 +433,13 @@ FORMULAS: dict[str, Callable[..., Saturation]] = {"buck": _buck, "ciddor": _cidd
 ICE_FORMULAS: dict[str, Callable[..., Saturation]] = {"buck": _buck_ice, "iapws": _iapws_ice}
 
 
-LEAST_RESOLVED = (
-    1.0  # %: hygrometers have u of 1 to 3 %, so that what lies between 0 and this is none of their readings
-)
+LEAST_RESOLVED = 1.0  # %: hygrometers have u of 1 to 3 %, so that values between 0 and this are not plausible
 
 
 def likely_fraction(humidity_percent) -> bool:
-    """True where every relative humidity is above 0 and at most 1 %: more likely a fraction of 1 than percent.
+    """True where all humidities are above 0 and at most 1 %: likely fractions.
 
-    humidity_percent   relative humidity, %; NaN where none was read
+    humidity_percent   relative humidity, %; NaN where not read
 
     >>> likely_fraction(0.5), likely_fraction(0.0), likely_fraction([0.5, 40.0])
     (True, False, False)
@@ -438,9 +449,9 @@ def likely_fraction(humidity_percent) -> bool:
 
 
 def fraction_words(humidity_percent) -> str:
-    """Both readings of a humidity that is likely a fraction."""
+    """Text with both interpretations of a humidity that is likely a fraction."""
     first = float(_read(humidity_percent)[0])
-    return f"a humidity of {first:g} % is below what hygrometers resolve; as a fraction it would be {100.0 * first:g} %"
+    return f"a humidity of {first:g} % is below hygrometers' resolution; as a fraction it would be {100.0 * first:g} %"
 
 
 def _read(humidity_percent) -> np.ndarray:
@@ -449,12 +460,12 @@ def _read(humidity_percent) -> np.ndarray:
 
 
 def humidity_doubts(humidity_percent) -> tuple[str, ...]:
-    """Both readings of humidities that are likely fractions of 1; empty where they are percent.
+    """Texts for humidities that are likely fractions of 1; empty if percent.
 
     humidity_percent   relative humidity, %
 
     >>> humidity_doubts([0.41, 0.43])
-    ('a humidity of 0.41 % is below what hygrometers resolve; as a fraction it would be 41 %',)
+    ("a humidity of 0.41 % is below hygrometers' resolution; as a fraction it would be 41 %",)
     >>> humidity_doubts([41.0, 43.0])
     ()
     """

@@ -1,11 +1,13 @@
-"""The psychrometer: vapour pressure from a dry and a wet bulb, and back; the bulb's film may be water or ice.
+"""Psychrometer: vapour pressure from dry and wet bulb, and back.
+
+The bulb's film may be water or ice.
 
 The notes' listing REFRACT.EQ has both formulas as eq523 and eq524, with saturation at the *wet* bulb's temperature
-`tp`. Further down it sets tp = t for the relative humidity: whoever evaluates eq523 after that line gets (t - tp) = 0
-and saturated air, whatever the bulbs read. Here the two temperatures are two arguments.
+`tp`. Further down it sets tp = t for the relative humidity: evaluating eq523 after that line gives (t - tp) = 0
+and saturated air for any readings. Here the two temperatures are two arguments.
 
-Below 0 °C a wick may hold supercooled water or ice, and the thermometers do not say which: bulbs at
--5 °C and -6 °C mean 0.15 hPa less with ice, 3.5 % of relative humidity. The observer looks, and says `over_ice`.
+Below 0 °C a wick may hold supercooled water or ice, and the thermometers do not show which: bulbs at
+-5 °C and -6 °C mean 0.15 hPa less with ice, 3.5 % of relative humidity. The observer checks and sets `over_ice`.
 """
 
 from typing import Any, NamedTuple
@@ -29,7 +31,7 @@ from catseye.errors import ValidityError
 WATER_PER_C, ICE_PER_C = 0.000662, 0.000583
 U_COEFFICIENT = 0.01  # of itself: [WMO18] has as much at 15 °C, 1.4 % less at 0 °C and over ice
 STEPS = 30
-ROUNDING = 2e-3  # by so much the formulas over water and over ice may cross at 0 °C
+ROUNDING = 2e-3  # tolerance for the crossing of the formulas over water and ice at 0 °C
 
 DRY_BULB = ValidInterval("dry bulb", "°C", -40.0, 60.0, "[RUEGER90] eq. 5.23")
 WET_BULB = ValidInterval("wet bulb", "°C", -40.0, 60.0, "[RUEGER90] eq. 5.23")
@@ -50,7 +52,7 @@ class WetBulbPartials(NamedTuple):
 
 
 def vapour_pressure_of_wet_bulb_hpa(temperature_c, wet_bulb_c, pressure_hpa, *, over_ice=False, formula="buck"):
-    """Partial pressure of water vapour from a ventilated psychrometer, in hPa.
+    """Vapour pressure from a ventilated psychrometer, hPa.
 
     temperature_c   dry bulb, -40 to 60 °C
     wet_bulb_c      wet bulb, at most the dry one; -40 to 0.01 °C with ice on it. Over an ice bulb air may be
@@ -60,7 +62,7 @@ def vapour_pressure_of_wet_bulb_hpa(temperature_c, wet_bulb_c, pressure_hpa, *, 
     over_ice        the wick is frozen
     formula         of saturation: `buck` as printed, or `iapws`, or over water `ciddor`
 
-    Raises ValidityError outside these limits, and where the readings ask for a negative vapour pressure.
+    Raises ValidityError outside these limits, and where the readings imply a negative vapour pressure.
     Source: [RUEGER90] eqs. 5.23, 5.24. As good as the ventilation: 1 % of p A (t - t_wet).
 
     >>> round(float(vapour_pressure_of_wet_bulb_hpa(20.0, 14.0, 933.0)), 3)
@@ -84,15 +86,17 @@ def vapour_pressure_of_wet_bulb_hpa(temperature_c, wet_bulb_c, pressure_hpa, *, 
         most = saturation(t, p, formula).pressure_hpa
         _refuse(
             e > most * (1.0 + ROUNDING),
-            "wet bulb {0:g} °C with ice asks for {1:.3f} hPa of vapour, more than water at the dry bulb's {2:g} °C "
-            "leaves, {3:.3f} hPa; are the two exchanged?",
+            "wet bulb {0:g} °C with ice needs {1:.3f} hPa of vapour, more than water at the dry bulb's {2:g} °C "
+            "allows, {3:.3f} hPa; are the two exchanged?",
             *(wet, e, t, most),
         )
     return e
 
 
 def wet_bulb_partials(temperature_c, wet_bulb_c, pressure_hpa, *, over_ice=False, formula="buck") -> WetBulbPartials:
-    """Derivatives of `vapour_pressure_of_wet_bulb_hpa`, nothing checked; arguments as there.
+    """Derivatives of `vapour_pressure_of_wet_bulb_hpa`, without checks.
+
+    Arguments as there.
 
     Source: [RUEGER90] eqs. 5.23, 5.24 differentiated.
 
@@ -105,7 +109,7 @@ def wet_bulb_partials(temperature_c, wet_bulb_c, pressure_hpa, *, over_ice=False
 
 
 def wet_bulb_c(temperature_c, vapour_pressure_hpa, pressure_hpa, *, over_ice=False, formula="buck"):
-    """What the wet bulb of a ventilated psychrometer reads in this air, in °C.
+    """Wet bulb temperature of a ventilated psychrometer in this air, °C.
 
     temperature_c         dry bulb, -40 to 60 °C
     vapour_pressure_hpa   partial pressure of water vapour, from 0 to saturation over water
@@ -127,7 +131,7 @@ def wet_bulb_c(temperature_c, vapour_pressure_hpa, pressure_hpa, *, over_ice=Fal
     most = saturation(t, p, formula).pressure_hpa
     _refuse(
         e > most * (1.0 + ROUNDING),
-        "vapour pressure {0:.3f} hPa is above saturation over water at {1:g} °C, {2:.3f} hPa; no wet bulb shows it",
+        "vapour pressure {0:.3f} hPa is above saturation over water at {1:g} °C, {2:.3f} hPa; no wet bulb can show it",
         *(e, t, most),
     )
     _saturated(0.0, p, over_ice, formula)  # refuses an unknown formula
@@ -150,7 +154,7 @@ def _saturated(wet, p, over_ice, formula) -> Saturation:
 
 
 def _refuse(bad, text, *values) -> None:
-    """ValidityError with the mask of the bad places, the text filled with the first one's values."""
+    """Raise ValidityError with the mask of bad places, text filled with the first."""
     if not np.any(bad):
         return
     bad, *columns = np.broadcast_arrays(bad, *values)

@@ -1,1 +1,1 @@
-"""The telescope: frames, paraboloid, subreflector, alidade, panels."""
+"""Telescope geometry: frames, paraboloid, subreflector, alidade, panels."""

@@ -1,13 +1,15 @@
-"""How far a beam turns when feed, subreflector or receiver move a little: the tilt of the wavefront over the aperture.
+"""Beam deviation from small displacements of feed, subreflector or receiver.
 
-All in the reflector frame: x to the right of who looks along the beam, z along it, the paraboloid's vertex in the
-origin and its focus F1 at z = f. By Fermat a small displacement changes the way of a ray only by
+It is the tilt of the wavefront over the aperture.
+
+All in the reflector frame: x to the right when looking along the beam, z along it, the paraboloid's vertex in the
+origin and its focus F1 at z = f. By Fermat's principle a small displacement changes a ray's path by
 
     feed or receiver at a focus F moved by d      d . (F - Q) / |F - Q|, Q the last point of reflection before it
     a mirror's point P moved by d                 d . ((P - Q)/|P - Q| + (P - R)/|P - R|), Q and R the ray's neighbours
 
-and the plane that fits these ways best over the aperture, all parts alike, turns the beam by its slopes towards x and
-y. A feed's taper is not known here.
+and the plane of best fit to these changes over the aperture, uniformly weighted, turns the beam by its slopes towards
+x and y. The feed's taper is not included.
 """
 
 from dataclasses import dataclass
@@ -19,12 +21,12 @@ from catseye.errors import ValidityError
 from catseye.geometry.frames.rotation import skew
 
 Array = NDArray[np.float64]
-RINGS, SPOKES = 24, 64  # of the aperture: quadrature good to 1e-10
+RINGS, SPOKES = 24, 64  # rings and spokes of the aperture: quadrature good to 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class ApertureNodes:
-    """Nodes of a quadrature over a round aperture of a paraboloid.
+    """Quadrature nodes over a round aperture of a paraboloid.
 
     focal_length   m
     inside         (m, 2) m, x and y from the aperture's centre
@@ -39,13 +41,13 @@ class ApertureNodes:
 
     @property
     def focus(self) -> Array:
-        """(3,) m, the prime focus."""
+        """Position of the prime focus, (3,) m."""
         return np.array([0.0, 0.0, self.focal_length])
 
-    def tilt(self, way: ArrayLike) -> Array:
-        """Slopes (2, k) towards x and y of the planes that fit ways (m, k) over the aperture best."""
-        moment = self.weight @ self.inside[:, 0] ** 2  # the same along y; a plane's parts are orthogonal on a disc
-        return np.asarray((self.weight[:, None] * self.inside).T @ np.asarray(way, dtype=float) / moment)
+    def tilt(self, path_change: ArrayLike) -> Array:
+        """Slopes (2, k) towards x and y of planes fitted to path changes (m, k)."""
+        moment = self.weight @ self.inside[:, 0] ** 2  # the same along y; the terms of a plane are orthogonal on a disc
+        return np.asarray((self.weight[:, None] * self.inside).T @ np.asarray(path_change, dtype=float) / moment)
 
 
 def aperture(focal_length: float, centre: ArrayLike, radius: float) -> ApertureNodes:
@@ -66,21 +68,24 @@ def aperture(focal_length: float, centre: ArrayLike, radius: float) -> ApertureN
 
 
 def prime_focus_tilt(of: ApertureNodes) -> Array:
-    """Slopes (2, 3) of the wavefront, rad/m, by a shift of a feed at the prime focus. Source: the top of this file."""
-    way = of.focus - of.surface
-    return of.tilt(way / np.linalg.norm(way, axis=1)[:, None])
+    """Wavefront slopes (2, 3), rad/m, for a shift of a prime-focus feed.
+
+    Source: the top of this file.
+    """
+    path = of.focus - of.surface
+    return of.tilt(path / np.linalg.norm(path, axis=1)[:, None])
 
 
 @dataclass(frozen=True)
 class Gregorian:
-    """An ellipsoidal subreflector that shares the prime focus F1 with the paraboloid.
+    """Ellipsoidal subreflector that shares the prime focus F1 with the paraboloid.
 
     interfocal     m, from F1 to the receiver's focus F2, above 0
     eccentricity   of the ellipsoid, 0 to 1
     tilt           rad, of the line F1 to F2 against -z, above zero towards -y (away from the dish)
 
-    The defaults are chosen: no public source in our hands lists them. They do what an offset pair must: the rays of the
-    aperture's rim meet F2 in a circular cone, of 14.99 degrees half-angle, and the subreflector comes out 7.6 by 7.9 m.
+    The defaults are chosen, as no public source is known. They satisfy the condition of an offset pair: the rays of the
+    aperture's rim meet F2 in a circular cone, of 14.99 degrees half-angle, and the subreflector is 7.6 by 7.9 m.
     """
 
     interfocal: float = 11.0
@@ -88,11 +93,13 @@ class Gregorian:
     tilt: float = float(np.radians(5.57))
 
     def second_focus(self, focus: Array) -> Array:
-        """(3,) m, F2, from F1 (3,)."""
+        """Second focus F2, (3,) m, from F1 (3,)."""
         return focus + self.interfocal * np.array([0.0, -np.sin(self.tilt), -np.cos(self.tilt)])
 
     def reflections(self, of: ApertureNodes) -> Array:
-        """(m, 3) m, where the rays of an aperture meet the ellipsoid after they have crossed in F1.
+        """Reflection points (m, 3), m, of an aperture's rays on the ellipsoid.
+
+        The rays have crossed in F1.
 
         |P - F1| + |P - F2| = 2a along the direction v from F1 at the angle q to F2 gives
         |P - F1| = (a^2 - c^2)/(a - c cos q), with c half the distance of the foci and a = c/e.
@@ -111,7 +118,7 @@ class Gregorian:
 
 
 def subreflector_tilt(of: ApertureNodes, gregorian: Gregorian, pivot: ArrayLike) -> Array:
-    """Slopes (2, 6) of the wavefront by a subreflector's shift (rad/m) and its turn (rad/rad) about a pivot (3,) m."""
+    """Wavefront slopes (2, 6) for subreflector shift (rad/m) and turn (rad/rad) about a pivot (3,) m."""
     p = gregorian.reflections(of)
     back, on = p - of.surface, p - gregorian.second_focus(of.focus)
     normal = back / np.linalg.norm(back, axis=1)[:, None] + on / np.linalg.norm(on, axis=1)[:, None]
@@ -121,6 +128,6 @@ def subreflector_tilt(of: ApertureNodes, gregorian: Gregorian, pivot: ArrayLike)
 
 
 def receiver_tilt(of: ApertureNodes, gregorian: Gregorian) -> Array:
-    """Slopes (2, 3) of the wavefront, rad/m, by a shift of a receiver at the second focus."""
-    way = gregorian.second_focus(of.focus) - gregorian.reflections(of)
-    return of.tilt(way / np.linalg.norm(way, axis=1)[:, None])
+    """Wavefront slopes (2, 3), rad/m, for a shift of a second-focus receiver."""
+    path = gregorian.second_focus(of.focus) - gregorian.reflections(of)
+    return of.tilt(path / np.linalg.norm(path, axis=1)[:, None])

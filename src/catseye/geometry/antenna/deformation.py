@@ -1,7 +1,9 @@
-"""How a frame of the telescope, or a group of points, is shifted and turned by gravity, temperature and the track.
+"""Shift and turn of telescope frames or groups with posture.
+
+Causes are gravity, temperature and the track.
 
 A motion has six components, three shifts (m) and a rotation vector (rad), in the nominal axes of the frame that moves,
-and a pivot in the same axes. It carries a point x of the frame to
+and a pivot in the same axes. It moves a point x of the frame to
 
     x' = pivot + shift + exp([turn] x) (x - pivot).
 
@@ -13,7 +15,7 @@ Each component is linear in its coefficients, with the same functions of posture
              knots: a parabola, a line, a constant; not-a-knot ends)
 
 so that a table's value between its knots, too, is a weighted sum of the table. Their uncertainty has two parts: the
-coefficients' covariance, common to all postures, and what the model leaves in each posture anew.
+coefficients' covariance, common to all postures, and the model's residual, independent in each posture.
 """
 
 import re
@@ -36,7 +38,7 @@ SMALL_ANGLE = 1e-4  # rad: below it the series of the left Jacobian is exact to 
 
 @dataclass(frozen=True, eq=False)
 class TelescopePosture:
-    """How the telescope stands, and how warm its structure is; arrays (...) that broadcast.
+    """Telescope posture and structure temperature; arrays (...) that broadcast.
 
     azimuth         rad, clockwise from north
     elevation       rad
@@ -54,7 +56,7 @@ class TelescopePosture:
 
 @dataclass(frozen=True, eq=False)
 class Validity:
-    """Where a model may be used; ends included.
+    """Range of posture and temperature of a model; ends included.
 
     elevation       (low, high), rad
     temperature_c   (low, high), degrees C
@@ -64,7 +66,7 @@ class Validity:
     temperature_c: tuple[float, float]
 
     def refuse_outside(self, posture: TelescopePosture) -> None:
-        """Raises ValidityError for the first posture outside: a model is not extrapolated."""
+        """Raise ValidityError for the first posture outside; models are not extrapolated."""
         slack = 1e-12  # rad or degrees C: rounding of a conversion from degrees is not outside
         for name, value, (low, high), scale, unit in (
             ("elevation", posture.elevation, self.elevation, DEGREE, "deg"),
@@ -81,7 +83,7 @@ class Validity:
 
 
 def factors(term: str) -> list[Callable[[TelescopePosture, float], NDArray[np.float64]]]:
-    """The functions of posture and reference temperature whose product a term is.
+    """Factors whose product a term is: functions of posture and temperature.
 
     Raises ValidityError for a factor that is not known.
 
@@ -151,12 +153,12 @@ class PostureTerms:
 
 @dataclass(frozen=True, eq=False)
 class KnotTable:
-    """Weights of the knots of a grid over elevation and temperature.
+    """Weights of grid knots over elevation and temperature.
 
     elevation       (n,), rad, rising
     temperature_c   (m,), degrees C, rising; a single one makes the table independent of temperature
 
-    Raises ValidityError for knots that do not rise, and outside the knots: a table is not extrapolated.
+    Raises ValidityError for knots that do not increase, and outside the knots: a table is not extrapolated.
     """
 
     elevation: NDArray[np.float64]
@@ -166,7 +168,7 @@ class KnotTable:
         for name in ("elevation", "temperature_c"):
             knots = np.asarray(getattr(self, name), dtype=float)
             if knots.ndim != 1 or not len(knots) or not np.all(np.diff(knots) > 0.0):
-                raise ValidityError(f"knots of {name} {knots.tolist()} do not rise (expected a rising list)")
+                raise ValidityError(f"knots of {name} {knots.tolist()} do not increase (expected an increasing list)")
             object.__setattr__(self, name, knots)
 
     def __len__(self) -> int:
@@ -174,13 +176,13 @@ class KnotTable:
 
     @cached_property
     def limits(self) -> Validity:
-        """The knots' ends; any temperature where there is one only."""
+        """Range of the knots; any temperature if there is one only."""
         warm = self.temperature_c
         ends = (float(warm[0]), float(warm[-1])) if len(warm) > 1 else (-np.inf, np.inf)
         return Validity((float(self.elevation[0]), float(self.elevation[-1])), ends)
 
     def rows(self, posture: TelescopePosture) -> NDArray[np.float64]:
-        """Weights (..., n m), elevation by elevation, of the table's values."""
+        """Weights (..., n m) of the table's values, elevation by elevation."""
         self.limits.refuse_outside(posture)
         by_elevation = _weights(self.elevation, posture.elevation)
         by_temperature = _weights(self.temperature_c, posture.temperature_c)
@@ -189,7 +191,7 @@ class KnotTable:
 
 
 def _weights(knots: NDArray[np.float64], at: ArrayLike) -> NDArray[np.float64]:
-    """Weights (..., n) of values at the knots in the spline through them."""
+    """Weights (..., n) of values at the knots in the spline."""
     x = np.asarray(at, dtype=float)
     if len(knots) == 1:
         return np.ones((*x.shape, 1))
@@ -201,13 +203,13 @@ def _weights(knots: NDArray[np.float64], at: ArrayLike) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class PostureMotion:
-    """Shift and turn of a frame or group as functions of posture.
+    """Shift and turn of a frame as functions of posture.
 
     basis          Terms or Table, k functions
     coefficients   (6, k), m and rad: shift x, y, z, turn x, y, z
-    pivot          (3,), m, in the frame's own nominal axes
-    covariance     (6k, 6k) of the coefficients, component by component; zero where they are taken as known
-    u              (6,), m and rad, above zero: what the model leaves in any one posture, each time anew
+    pivot          (3,), m, in the frame's nominal axes
+    covariance     (6k, 6k) of the coefficients, component by component; zero where they are exact
+    u              (6,), m and rad, above zero: residual of the model, independent in each posture
     """
 
     basis: PostureTerms | KnotTable
@@ -229,7 +231,10 @@ class PostureMotion:
         return self.basis.rows(posture) @ self.coefficients.T
 
     def six_covariance(self, posture: TelescopePosture) -> NDArray[np.float64]:
-        """Covariance (..., 6, 6) of shift and turn in one posture: of the coefficients, and what is left in each."""
+        """Covariance (..., 6, 6) of shift and turn in one posture.
+
+        It includes the coefficients and the residual.
+        """
         rows = self.basis.rows(posture)
         k = len(self.basis)
         shared = np.einsum("...a,iajb,...b->...ij", rows, self.covariance.reshape(6, k, 6, k), rows)
@@ -237,7 +242,7 @@ class PostureMotion:
 
 
 def carried(six: ArrayLike, pivot: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Rotation (..., 3, 3) and translation (..., 3) m of a shift and turn about a pivot.
+    """Rotation (..., 3, 3) and translation (..., 3) m of a shift and turn.
 
     six     (..., 6), m and rad
     pivot   (3,), m
@@ -254,11 +259,11 @@ def carried(six: ArrayLike, pivot: ArrayLike) -> tuple[NDArray[np.float64], NDAr
 
 
 def carried_jacobian(six: ArrayLike, pivot: ArrayLike, points: ArrayLike) -> NDArray[np.float64]:
-    """Derivatives (..., 3, 6) of carried points by shift (1) and turn (m/rad).
+    """Derivatives (..., 3, 6) of moved points by shift (1) and turn (m/rad).
 
     six      (..., 6), m and rad
     pivot    (3,), m
-    points   (..., 3), m, before they are carried
+    points   (..., 3), m, before the motion
 
     Source: [SHUSTER93]; the turn's own change enters through the left Jacobian. Exact.
 
@@ -273,7 +278,9 @@ def carried_jacobian(six: ArrayLike, pivot: ArrayLike, points: ArrayLike) -> NDA
 
 
 def left_jacobian(turn: ArrayLike) -> NDArray[np.float64]:
-    """Matrix (..., 3, 3) from a change of a rotation vector to the small turn, in fixed axes, that it makes.
+    """Matrix (..., 3, 3) from a rotation vector's change to a small turn.
+
+    The small turn is in fixed axes.
 
     turn    (..., 3), rad, shorter than a turn
 

@@ -1,10 +1,10 @@
-"""The telescope's nominal frames: reflector, elevation, alidade, ground, and what the reflector carries.
+"""Nominal frames: reflector, elevation, alidade, ground, and reflector-mounted frames.
 
     ground <- alidade <- elevation <- reflector <- prime_focus <- subreflector (its six degrees of freedom: that file)
                                                 <- feed_arm
 
 A rigid telescope on a perfect track. Gravity, temperature and track move the real one by millimetres and more:
-`deformation` holds what a model says of that, and the rangers are there to find the rest.
+`deformation` models that, and the rangers measure the remainder.
 One posture is a `Transform`; many at once, along a path in time, are `Transforms`.
 """
 
@@ -67,7 +67,7 @@ def ground_from_reflector(
     elevation_axis_height: float = ELEVATION_AXIS_HEIGHT,
     reflector_to_elevation: ArrayLike = REFLECTOR_TO_ELEVATION,
 ) -> Transform:
-    """Transform of reflector points into the ground frame at a nominal posture.
+    """Transform of reflector points into the ground frame, nominal posture.
 
     azimuth                   rad, any, clockwise from north
     elevation                 rad, 0 to pi/2 in use
@@ -88,7 +88,9 @@ def ground_from_reflector(
 
 
 def reflector_from_prime_focus(*, focal_length: float = FOCAL_LENGTH) -> Transform:
-    """Transform of prime-focus points into the reflector frame, a translation along the paraboloid's axis.
+    """Transform of prime-focus points into the reflector frame.
+
+    A translation along the paraboloid's axis.
 
     focal_length    m, of the parent paraboloid
 
@@ -104,7 +106,9 @@ def reflector_from_prime_focus(*, focal_length: float = FOCAL_LENGTH) -> Transfo
 
 
 def reflector_from_feed_arm(*, foot: ArrayLike = FEED_ARM_FOOT) -> Transform:
-    """Transform of feed-arm points into the reflector frame: parallel axes, the origin where the arm begins.
+    """Transform of feed-arm points into the reflector frame.
+
+    Parallel axes, the origin at the foot of the arm.
 
     foot    (3,), m, reflector frame
 

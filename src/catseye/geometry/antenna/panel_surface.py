@@ -1,4 +1,4 @@
-"""Panels of a paraboloid: axes at a corner, the surface's own rise beside it, which panel a place is on.
+"""Panels of a paraboloid: corner axes, surface rise, panel under a place.
 
 Reflector frame: origin at the vertex, z towards the focus. A panel is known by its four corners in x and y, in order
 round it; a deviation is along the normal, above zero towards the focus. At a corner x runs outwards along the surface,
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 STEPS = 8  # of Newton's method; quadrilaterals near a parallelogram need three
-EDGE = 1e-6  # share of a panel by which a place may be outside and still counts as on it
+EDGE = 1e-6  # tolerance outside a panel, as a share of the panel
 CANDIDATES = 16  # panels whose middles are nearest; those that meet at a corner are among them
 SIGNS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])  # of the bilinear shape functions
 
@@ -29,7 +29,9 @@ class Axes:
     z: np.ndarray
 
     def places(self, x: np.ndarray, y: np.ndarray, focal_length: float) -> tuple[np.ndarray, np.ndarray]:
-        """Where the normal through a place of the tangent plane meets the paraboloid: (..., 3) m, and how far up, m.
+        """Points (..., 3) m of the paraboloid over a tangent plane, and heights, m.
+
+        They lie on the normal through a place of the tangent plane.
 
         x, y           (...) m, in the tangent plane
         focal_length   m
@@ -53,7 +55,7 @@ class Axes:
 def axes(xy: np.ndarray, focal_length: float) -> Axes:
     """Axes at points of the paraboloid.
 
-    xy             (..., 2) m, reflector frame; not the vertex, where outwards is nowhere
+    xy             (..., 2) m, reflector frame; not the vertex, where outwards is undefined
     focal_length   m
     """
     xy = np.asarray(xy, dtype=float)
@@ -71,7 +73,7 @@ def axes(xy: np.ndarray, focal_length: float) -> Axes:
 
 
 def cosine_of_slope(normal: np.ndarray, elevation: float) -> np.ndarray:
-    """Cosine (...) of the angle between a normal and the plumb line.
+    """Cosine (...) of the angle between normal and plumb line.
 
     normal      (..., 3) reflector frame
     elevation   of the paraboloid's axis, rad: the zenith is (0, -cos E, sin E) in the reflector frame
@@ -80,7 +82,7 @@ def cosine_of_slope(normal: np.ndarray, elevation: float) -> np.ndarray:
 
 
 def shares(xy: np.ndarray, quad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """How the four corners of a quadrilateral share a place (..., 4), and whether it is inside (...).
+    """Shares (..., 4) of a quadrilateral's corners at a place; True (...) inside.
 
     xy     (..., 2)
     quad   (..., 4, 2) corners in order round it
@@ -94,13 +96,13 @@ def shares(xy: np.ndarray, quad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     local = np.zeros(xy.shape)
     for _ in range(STEPS):
         weight, along, across = _bilinear(local)
-        rest = xy - np.einsum("...k,...kc->...c", weight, quad)
+        misfit = xy - np.einsum("...k,...kc->...c", weight, quad)
         p, q = np.einsum("...k,...kc->...c", along, quad), np.einsum("...k,...kc->...c", across, quad)
         area = p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0]
         with np.errstate(divide="ignore", invalid="ignore"):
-            du = (rest[..., 0] * q[..., 1] - rest[..., 1] * q[..., 0]) / area
-            dv = (p[..., 0] * rest[..., 1] - p[..., 1] * rest[..., 0]) / area
-        local = local + np.clip(np.nan_to_num(np.stack([du, dv], axis=-1)), -2.0, 2.0)  # far places stay outside
+            du = (misfit[..., 0] * q[..., 1] - misfit[..., 1] * q[..., 0]) / area
+            dv = (p[..., 0] * misfit[..., 1] - p[..., 1] * misfit[..., 0]) / area
+        local = local + np.clip(np.nan_to_num(np.stack([du, dv], axis=-1)), -2.0, 2.0)  # distant places stay outside
     missed = np.max(np.abs(xy - np.einsum("...k,...kc->...c", _bilinear(local)[0], quad)), axis=-1)
     inside = (np.max(np.abs(local), axis=-1) <= 1.0 + EDGE) & (missed < 1e-9 * (1.0 + np.max(np.abs(xy), axis=-1)))
     return _bilinear(local)[0], inside
@@ -117,7 +119,7 @@ def _bilinear(local: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def panels_under(xy: np.ndarray, quads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The panel under each place (m,), -1 where there is none, and the shares (m, 4) of its corners.
+    """Panel under each place (m,), -1 if none, and corner shares (m, 4).
 
     xy      (m, 2) m
     quads   (p, 4, 2) m
@@ -134,7 +136,9 @@ def panels_under(xy: np.ndarray, quads: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def warps(xy: np.ndarray) -> np.ndarray:
-    """What of four corners' heights no rigid motion makes: (..., 4) with heights ~ h @ warp, absolute values sum to 1.
+    """Warp weights (..., 4) of four corners: heights ~ h @ warp.
+
+    No rigid motion makes that part; absolute values sum to 1.
 
     xy   (..., 4, 2) m, corners in the panel's plane
 

@@ -1,28 +1,30 @@
-"""The eight-term pointing series of the Green Bank telescope: IA, IE, CA, NPAE, AW, AN, HZCZ, HZSZ.
+"""Eight-term pointing series of the Green Bank telescope.
+
+The terms are IA, IE, CA, NPAE, AW, AN, HZCZ, HZSZ.
 
     dA cos E = CA + NPAE sin E + IA cos E + AW cos A sin E + AN sin A sin E
     dE       = -IE - AW sin A + AN cos A + HZCZ sin E + HZSZ cos E
 
-A and E are azimuth, clockwise from north, and elevation; (dA, dE) is what is added to a direction on the sky to give
-the encoders' (the correction that `reduction.live.pose` calls so), and minus the offset of the beam. With it
+A and E are azimuth, clockwise from north, and elevation; (dA, dE) is added to a direction on the sky to give
+that of the encoders (the correction of `reduction.live.pose`), and minus the offset of the beam. With it
 
-    IA     the azimuth encoder reads too much                    IE     the elevation encoder reads too little
+    IA     the azimuth encoder reads too high                     IE     the elevation encoder reads too low
     CA     the beam lies to the left of square to the elevation axis
     NPAE   the elevation axis's right end stands too high: the beam leans to the left as it rises
     AN, AW the azimuth axis leans to the north, to the west
     HZCZ, HZSZ   droop of beam against structure: sin E, cos E
 
-as geometry demands: an axis turned by a small vector w takes the direction d to d + w x d, along rising azimuth
+as follows from geometry: an axis turned by a small vector w takes the direction d to d + w x d, along rising azimuth
 -w.e and along rising elevation w.a with a = (cos A, -sin A, 0), e = (-sin E sin A, -sin E cos A, cos E); an axis that
 leans to the north has w = (-AN, 0, 0), to the west (0, -AW, 0), and the encoders read minus that.
 
 [TPOINT11] uses the same names. As a public re-implementation of it writes them, from what the encoders show to the
 sky, the six terms of geometry are dA cos E = -IA cos E - CA - NPAE sin E - AN sin A sin E - AW cos A sin E and dE =
 IE - AN cos A + AW sin A: the published series with the other sign throughout, so the coefficients are the same and
-only (dA, dE) is told the other way round. HZCZ and HZSZ are there, by the rule of their names, corrections of the
-zenith distance by cos Z and sin Z, positive downwards: again minus the published dE. What the published text as we
-have it does not print is which way (dA, dE) is added: we take the way in which AN and AW lean where their names say.
-Read the other way, all eight coefficients change sign together and nothing else changes.
+only (dA, dE) has the opposite sign. HZCZ and HZSZ are there, by the rule of their names, corrections of the
+zenith distance by cos Z and sin Z, positive downwards: again minus the published dE. The published text
+does not state the sense in which (dA, dE) is added: we take the one in which AN and AW lean as their names say.
+In the opposite sense all eight coefficients change sign together and nothing else changes.
 """
 
 from collections.abc import Sequence
@@ -42,7 +44,7 @@ PUBLISHED_SKY_RMS_ARCSEC = 7.39
 
 
 def design(azimuth: ArrayLike, elevation: ArrayLike) -> Array:
-    """Derivatives (..., 2, 8) of azimuth times cos E and elevation by the terms.
+    """Derivatives (..., 2, 8) of azimuth times cos E and elevation by terms.
 
     azimuth     rad, clockwise from north; broadcasts with
     elevation   rad
@@ -62,11 +64,11 @@ def design(azimuth: ArrayLike, elevation: ArrayLike) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class PointingSeries:
-    """Coefficients of the series, those that are known.
+    """Coefficients of the pointing series, possibly a selection.
 
     terms        names, a selection of TERMS; the others are zero
     values       (k,) rad
-    covariance   (k, k) rad^2; zero where nothing is said
+    covariance   (k, k) rad^2; zero where unknown
     """
 
     terms: tuple[str, ...]
@@ -83,7 +85,7 @@ class PointingSeries:
             )
 
     def correction(self, azimuth: ArrayLike, elevation: ArrayLike) -> Array:
-        """(..., 2) rad, azimuth times cos E and elevation: what is added to the sky's to give the encoders'.
+        """Correction (..., 2), rad, azimuth times cos E and elevation, sky to encoders.
 
         azimuth, elevation   rad, on the sky
         """
@@ -91,14 +93,14 @@ class PointingSeries:
         return np.asarray(correction)
 
     def covariance_of_correction(self, azimuth: ArrayLike, elevation: ArrayLike) -> Array:
-        """(..., 2, 2) rad^2, of `correction` at each direction, from the coefficients' covariance."""
+        """Covariance (..., 2, 2), rad^2, of `correction` from the coefficients."""
         rows = design(azimuth, elevation)[..., columns(self.terms)]
         return np.asarray(rows @ self.covariance @ np.swapaxes(rows, -1, -2))
 
     def encoders(self, azimuth: ArrayLike, elevation: ArrayLike) -> tuple[Array, Array]:
-        """Azimuth and elevation, rad, that the encoders show when the beam is at a direction on the sky.
+        """Encoder azimuth and elevation, rad, for a beam direction on the sky.
 
-        azimuth, elevation   rad; raises ValidityError at the zenith, where azimuth times cos E says nothing of azimuth
+        azimuth, elevation   rad; raises ValidityError at the zenith, where azimuth is undefined
         """
         a, e = np.broadcast_arrays(np.asarray(azimuth, dtype=float), np.asarray(elevation, dtype=float))
         low = np.abs(np.cos(e)) < 1e-6
@@ -109,7 +111,9 @@ class PointingSeries:
 
 
 def published() -> PointingSeries:
-    """The fit of 28-30 December 2001, without covariance, which is not public. Source: [GBTPM01].
+    """Fit of 28-30 December 2001; its covariance is not public.
+
+    Source: [GBTPM01].
 
     >>> (published().correction(0.0, np.pi / 4) / ARCSECOND).round(3).tolist()
     [-41.899, 281.958]
@@ -118,19 +122,21 @@ def published() -> PointingSeries:
 
 
 def columns(terms: Sequence[str]) -> list[int]:
-    """Where some terms stand in TERMS; ValidityError for a stranger or a term twice."""
+    """Columns of terms in TERMS; ValidityError for unknown or repeated terms."""
     strangers = [t for t in terms if t not in TERMS]
     if strangers:
         raise ValidityError(f"pointing term {strangers[0]!r} is none of {', '.join(TERMS)}")
     if len(set(terms)) != len(terms):
-        raise ValidityError(f"pointing terms {', '.join(terms)}: one is there twice (expected each once)")
+        raise ValidityError(f"pointing terms {', '.join(terms)}: repeated (expected each once)")
     return [TERMS.index(t) for t in terms]
 
 
 def axis_terms(turn: ArrayLike) -> Array:
-    """AN and AW (..., 2), rad, of an azimuth axis turned by a small rotation vector in the ground frame.
+    """AN and AW (..., 2), rad, of an azimuth axis turned by a vector.
 
-    turn   (..., 3) rad, x east, y north, z up; z is no tilt: it is minus IA's doing, an index
+    The small rotation vector is in the ground frame.
+
+    turn   (..., 3) rad, x east, y north, z up; z is no tilt but an index error, minus IA
 
     An axis along z turned by w goes to z + w x z = (w_y, -w_x, 1): it leans to the north by -w_x, to the west by -w_y.
 

@@ -1,4 +1,4 @@
-"""The subreflector's six degrees of freedom: three translations and three rotations about a stated pivot.
+"""Subreflector position: three translations and three rotations about a pivot.
 
 At rest its frame stands in the prime-focus frame as the home transform says. A position (shift, angles) moves it from
 there: first turned about the x axis, then y, then z of the prime-focus frame, each axis through the pivot, each by the
@@ -6,8 +6,8 @@ right-hand rule; then shifted. The axes stay where they are, so
 
     x_prime_focus = pivot + shift + Rz(c) Ry(b) Rx(a) (home(x) - pivot),     R active, angles (a, b, c).
 
-The notes only name six degrees of freedom; order and pivot are our choice, and any other is `about` or another matrix
-away. What the position of the beam makes of them is not in this file.
+The notes only name six degrees of freedom; order and pivot are our choice, and any other needs `about` or another
+matrix. The effect on the beam is not in this file.
 """
 
 import numpy as np
@@ -17,12 +17,12 @@ from catseye.errors import FrameError, ValidityError
 from catseye.geometry.frames.frame import Transform, Transforms
 from catseye.geometry.frames.rotation import rx, ry, rz
 
-HOME = Transform("prime_focus", "subreflector", np.eye(3), np.zeros(3))  # chosen: both frames agree at rest
-LOCK = 1e-6  # of cos b: nearer to a quarter turn about y, the turns about x and z are one and the same
+HOME = Transform("prime_focus", "subreflector", np.eye(3), np.zeros(3))  # chosen: both frames coincide at rest
+LOCK = 1e-6  # of cos b: below it, near a quarter turn about y, turns about x and z are not separable
 
 
 def turned(angles: ArrayLike) -> NDArray[np.float64]:
-    """Active rotation matrix (..., 3, 3): about x, then y, then z of axes that stay.
+    """Active rotation matrix (..., 3, 3): about fixed x, then y, then z.
 
     angles    (..., 3), rad, about x, y, z
 
@@ -36,7 +36,9 @@ def turned(angles: ArrayLike) -> NDArray[np.float64]:
 
 
 def angles_of(matrix: ArrayLike) -> NDArray[np.float64]:
-    """Angles (..., 3), rad, about x, y, z whose `turned` is the matrix; y within a quarter turn.
+    """Angles (..., 3), rad, about x, y, z of a `turned` matrix.
+
+    The angle about y is within a quarter turn.
 
     matrix    (..., 3, 3), an active rotation
 
@@ -53,7 +55,7 @@ def angles_of(matrix: ArrayLike) -> NDArray[np.float64]:
     cosine = np.hypot(m[..., 0, 0], m[..., 1, 0])
     if np.any(cosine < LOCK):
         raise ValidityError(
-            f"turn about y is within {LOCK:.0e} rad of a quarter turn: angles about x and z are not two"
+            f"turn about y is within {LOCK:.0e} rad of a quarter turn: angles about x and z are not separable"
         )
     a = np.arctan2(m[..., 2, 1], m[..., 2, 2])
     return np.stack([a, np.arctan2(-m[..., 2, 0], cosine), np.arctan2(m[..., 1, 0], m[..., 0, 0])], axis=-1)
@@ -87,10 +89,10 @@ def prime_focus_from_subreflector(
 def position_of(
     transform: Transform | Transforms, *, pivot: ArrayLike, home: Transform = HOME
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The position (shift (..., 3) m, angles (..., 3) rad) that a transform stands for.
+    """Position (shift (..., 3) m, angles (..., 3) rad) from a transform.
 
     transform   prime_focus_from_subreflector, as measured
-    pivot       (3,), m, prime-focus frame, of the answer
+    pivot       (3,), m, prime-focus frame, of the result
     home        prime_focus_from_subreflector at rest
 
     Raises as `angles_of`. Source: the inverse of `prime_focus_from_subreflector`. Exact.
@@ -109,14 +111,16 @@ def position_of(
 def position_jacobian(
     shift: ArrayLike, angles: ArrayLike, points: ArrayLike, *, pivot: ArrayLike
 ) -> NDArray[np.float64]:
-    """Derivatives (..., 3, 6) of points in the prime-focus frame by shift (1) and angles (m/rad).
+    """Derivatives (..., 3, 6) of points by shift (1) and angles (m/rad).
+
+    Points are in the prime-focus frame.
 
     shift, angles   (..., 3), m and rad, of the position
     points          (..., 3), m, prime-focus frame, where they are at rest (home applied)
     pivot           (3,), m, prime-focus frame
 
-    Source: derivatives of the formula above: the axes stay, so the angle about z turns about z, that about y about
-    the y axis carried by z, that about x about the x axis carried by both. Exact.
+    Source: derivatives of the formula above: the axes are fixed, so the angle about z turns about z, that about y about
+    the y axis turned by z, that about x about the x axis turned by both. Exact.
 
     >>> position_jacobian(np.zeros(3), np.zeros(3), [0.0, 2.0, 0.0], pivot=np.zeros(3))[:, 3].tolist()
     [0.0, 0.0, 2.0]

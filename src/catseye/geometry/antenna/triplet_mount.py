@@ -1,4 +1,6 @@
-"""The mount of a triplet: two rotations turn its plate, and a rifle scope in its place aims them at a common point A.
+"""Triplet mount: two rotations, aimed by a rifle scope.
+
+All units are aimed at a common point A.
 
 Axes of a unit, origin where the mount's two axes meet: x from the left prism to the right, y up, z the normal of the
 plate on the prism side. Axes of the mount's base are the same at both angles zero: y the outer axis, x the trunnions.
@@ -21,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 def base_from_unit(swing: ArrayLike, tip: ArrayLike) -> Array:
-    """Matrix (..., 3, 3) whose columns are the unit's axes in those of the mount's base.
+    """Matrix (..., 3, 3) from unit axes to mount base axes.
 
     swing   rad, about the outer axis
     tip     rad, above zero raises the normal
@@ -35,13 +37,13 @@ def base_from_unit(swing: ArrayLike, tip: ArrayLike) -> Array:
 
 
 def aim_angles(towards: ArrayLike, sight_offset: ArrayLike = (0.0, 0.0)) -> tuple[Array, Array]:
-    """Swing (...) in (-pi, pi] and tip (...) in [-pi/2, pi/2], rad, that bring the scope's sight onto a point.
+    """Swing (...) in (-pi, pi], tip (...) in [-pi/2, pi/2], rad, to aim the sight.
 
     towards        (..., 3) m, from the pivot to A, axes of the base, not on the outer axis
     sight_offset   (..., 2) m, where the sight crosses the unit's x and y
 
     The unit's coordinates of A must come out as (x, y) of the sight: first the swing makes x right, then the tip y.
-    Raises ValidityError where A is nearer to an axis than the sight is, so that no angle does it.
+    Raises ValidityError where A is nearer to an axis than the sight is, so that no angle reaches it.
 
     Source: [GOLDMAN00] appendix C (the aim by rifle scope), solved in closed form here. Exact.
 
@@ -64,7 +66,9 @@ def aim_angles(towards: ArrayLike, sight_offset: ArrayLike = (0.0, 0.0)) -> tupl
 
 
 def misaim(swing: ArrayLike, tip: ArrayLike, *, towards: ArrayLike, ball: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
-    """How far the plate's normal leans away from the direction ball to A, (..., 2) rad: along the unit's x and its y.
+    """Angle of the plate's normal from the direction ball to A, (..., 2) rad.
+
+    Along the unit's x and its y.
 
     swing, tip   rad, of the mount
     towards      (..., 3) m, from the pivot to A, axes of the base
@@ -72,7 +76,7 @@ def misaim(swing: ArrayLike, tip: ArrayLike, *, towards: ArrayLike, ball: ArrayL
 
     Above zero A lies towards +x (the right prism), +y of the normal. The memo takes the normal as pointing at A
     (e_TR): a scope that sits `sight_offset` beside the ball leaves that offset over the distance, 2 mrad for 0.1 m at
-    50 m. Add to it what the scope's line leans against the normal.
+    50 m. Add the lean of the scope's line against the normal.
 
     Source: [GOLDMAN00] appendix C and figure 10, whose e_TR it questions. Exact.
 
@@ -86,4 +90,4 @@ def misaim(swing: ArrayLike, tip: ArrayLike, *, towards: ArrayLike, ball: ArrayL
 
 def _require(good: NDArray[np.bool_], text: str) -> None:
     if not np.all(good):
-        raise ValidityError(f"{text}: no angle brings the sight onto it; give coordinates of A from the pivot, in m")
+        raise ValidityError(f"{text}: no angle aims the sight at it; give coordinates of A from the pivot, in m")

@@ -1,1 +1,1 @@
-"""What is in the way: boxes, solids, who sees what."""
+"""Obstructions of beams: boxes, solids, visibility."""

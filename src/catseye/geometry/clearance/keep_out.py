@@ -1,12 +1,14 @@
-"""Where a beam must not go, cones about directions (the Sun) and boxes (structure, people), and paths that keep out.
+"""Keep-out zones of a beam, and path checks against them.
+
+Zones are cones about directions (the Sun) and boxes (structure, people); a path is checked against all.
 
 The clearance of a beam from a zone is an angle: how far it must turn at least to come into the zone. It is continuous,
-and it cannot shrink faster than beam and zone turn. So a beam with a clearance c may go on for c / rate without another
-look, and a path is found free by a finite number of looks which leave nothing between them unseen: conservative
-advancement. No sampling, hence no slip between samples. A path that comes nearer than `TOUCH` counts as entering.
+and it cannot shrink faster than beam and zone turn. So a beam with a clearance c is safe for c / rate without another
+check, and a finite number of checks covers a path without gaps: conservative advancement. A path that comes nearer
+than `TOUCH` counts as entering.
 
-A beam of a mirror that shows its back (|Phi| above pi) is taken as the formulas say: nothing leaves there, but the same
-plane face would turn the Sun's light the same way if it were polished on both sides. That is the safe side.
+A mirror that shows its back (|Phi| above pi) is treated by the same formulas: nothing leaves there, but a face
+polished on both sides would reflect the Sun's light so. That is conservative.
 """
 
 from collections.abc import Sequence
@@ -22,13 +24,13 @@ from catseye.geometry.mirror.encoder import BEAM_PER_COUNT
 from catseye.geometry.mirror.pointing import MirrorStation, beam
 from catseye.geometry.mirror.slew import MirrorSlew
 
-BOXES_NEAR = 0.05  # rad: further off, a path asks for the sphere about a box, which is quicker
-COMPILED_FROM = 5000  # moves: loading numba takes longer than the plain form for these
+BOXES_NEAR = 0.05  # rad: beyond it a path uses the sphere about a box, which is faster
+COMPILED_FROM = 5000  # moves: for fewer, loading numba takes longer than the plain form
 TOUCH = 5e-5  # rad, 10": the last clearance, less than a count of the elevation axis
 
 
 class EntryStatus(IntEnum):
-    """What becomes of a path beside the zones."""
+    """Status of a path against the zones."""
 
     FREE = 0
     ENTERS = 1
@@ -37,12 +39,12 @@ class EntryStatus(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class Entries:
-    """What becomes of paths (...).
+    """Zone entries of paths (...).
 
     status    codes of EntryStatus
     time      s from the start to the entry, NaN without one
     zone      number of the zone entered, -1 without one
-    looks     how many times the path was looked at
+    looks     number of checks along the path
     """
 
     status: NDArray[np.int8]
@@ -53,11 +55,11 @@ class Entries:
 
 @dataclass(frozen=True, eq=False)
 class ConeZone:
-    """Directions nearer than `half_angle` to a direction that moves evenly from `direction` to `later` during a path.
+    """Directions within `half_angle` of an axis, which moves evenly to `later` along a path.
 
     direction     (..., 3), ground, any length; one for each path
-    half_angle    (...), rad; -inf where the zone does not count
-    later         (..., 3), at the path's end; None: it stays
+    half_angle    (...), rad; -inf where the zone is inactive
+    later         (..., 3), at the path's end; None: fixed
     """
 
     direction: NDArray[np.float64]
@@ -71,7 +73,7 @@ class ConeZone:
                 vector = np.asarray(getattr(self, name), dtype=float)
                 size = np.linalg.norm(vector, axis=-1, keepdims=True)
                 if vector.shape[-1:] != (3,) or not np.all((size > 0.0) & np.isfinite(size)):
-                    raise ValidityError(f"{name} of a cone is not a vector (..., 3) that points somewhere")
+                    raise ValidityError(f"{name} of a cone is not a non-zero vector (..., 3)")
                 object.__setattr__(self, name, vector / size)
         half = np.asarray(self.half_angle, dtype=float)
         if not np.all(half < np.pi):
@@ -79,7 +81,10 @@ class ConeZone:
         object.__setattr__(self, "half_angle", half)
 
     def clearance(self, direction: ArrayLike, share: ArrayLike = 0.0) -> NDArray[np.float64]:
-        """Angle (...), rad, from beams (..., 3), unit, to the zone at a share 0 to 1 of the path; below zero inside."""
+        """Angle (...), rad, from beams (..., 3), unit, to the zone; below zero inside.
+
+        At a share 0 to 1 of the path.
+        """
         axis = self.direction
         if self.later is not None:
             s = np.asarray(share, dtype=float)[..., None]
@@ -88,14 +93,14 @@ class ConeZone:
         return _angle(np.asarray(direction, dtype=float), axis) - self.half_angle
 
     def rate(self, total: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How fast the axis turns at most (...), rad/s, along paths that take a total (...) s."""
+        """Upper bound (...), rad/s, of the axis rate, for path times (...) s."""
         if self.later is None:
             return np.zeros_like(total)
         # A point that runs evenly along the chord turns fastest half-way, by 2 tan(a/2) where the arc has a.
         return 2.0 * np.tan(0.5 * _angle(self.direction, self.later)) / np.where(total > 0.0, total, np.inf)
 
     def __getitem__(self, index: Any) -> "ConeZone":
-        """The entries of some of the paths."""
+        """Zone entries of some of the paths."""
         direction = self.direction if self.direction.ndim == 1 else self.direction[index]
         later = self.later if self.later is None or self.later.ndim == 1 else self.later[index]
         half = self.half_angle if self.half_angle.ndim == 0 else self.half_angle[index]
@@ -104,13 +109,13 @@ class ConeZone:
 
 @dataclass(frozen=True, eq=False)
 class BoxZone:
-    """A solid with edges along x, y, z, turned about its vertical middle axis.
+    """Box with horizontal and vertical edges, turned about its middle axis.
 
     centre    (3,), m, ground
-    size      (3,), m, whole lengths before the turn, above 0
+    size      (3,), m, full lengths before the turn, above 0
     turn      rad, right-handed about z: x towards y
-    length    m, of the beam: what lies further from the scan point does not count
-    why       what it keeps the beam off, for a refusal
+    length    m, of the beam: parts further from the scan point are ignored
+    why       reason, for a refusal
     """
 
     centre: NDArray[np.float64]
@@ -130,11 +135,13 @@ class BoxZone:
             )
 
     def clearance(self, origin: ArrayLike, direction: ArrayLike, exact_below: float = np.inf) -> NDArray[np.float64]:
-        """Angle (...), rad, from beams to the nearest point of the box; 0 if they hit, inf if it is beyond reach.
+        """Angle (...), rad, from beams to a box; 0 on a hit.
 
-        origin       (3,), m: one scan point; inside the box everything is refused
+        inf if the box is beyond reach.
+
+        origin       (3,), m: one scan point; inside the box all beams are refused
         direction    (..., 3), unit
-        exact_below  rad: above it the answer may be less, the clearance of the sphere about the box
+        exact_below  rad: above it the result may be less, the clearance of the sphere about the box
         """
         view = Outline.of(self, np.asarray(origin, dtype=float))
         return view.clearance(np.asarray(direction, dtype=float), exact_below)
@@ -142,7 +149,9 @@ class BoxZone:
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """A box as it is seen from a scan point: what does not depend on the beam, in the box's axes.
+    """Outline of a box from a scan point, independent of the beam.
+
+    In the box's axes.
 
     at       (3,), m, the scan point from the box's centre; half (3,), m, half the box's size; to_box (3, 3)
     near     m to its nearest point
@@ -165,14 +174,14 @@ class Outline:
 
     @classmethod
     def of(cls, box: BoxZone, origin: NDArray[np.float64]) -> "Outline":
-        """As seen from origin (3,), m, ground."""
+        """Outline from origin (3,), m, ground."""
         to_box = _upright(box.turn)
         at, half = to_box @ (origin - box.centre), 0.5 * box.size
         a, b = _edges(at, half, box.length)
         poles = np.cross(a, b)
         sizes = np.linalg.norm(poles, axis=-1)
-        whole = sizes > 1e-12  # else an edge seen end on: a corner
-        poles = poles[whole] / sizes[whole, None]
+        broadside = sizes > 1e-12  # else an edge seen end on: a corner
+        poles = poles[broadside] / sizes[broadside, None]
         distance, sphere = float(np.linalg.norm(at)), float(np.linalg.norm(half))
         return cls(
             at,
@@ -182,14 +191,14 @@ class Outline:
             float(np.linalg.norm(np.maximum(np.abs(at) - half, 0.0))),
             np.concatenate([a, b]),
             poles,
-            np.cross(poles, a[whole]),
-            np.cross(b[whole], poles),
+            np.cross(poles, a[broadside]),
+            np.cross(b[broadside], poles),
             -at / distance if distance > 0.0 else np.array([0.0, 0.0, 1.0]),
             float(np.arcsin(sphere / distance)) if distance > sphere else np.pi,
         )
 
     def clearance(self, direction: NDArray[np.float64], exact_below: float = np.inf) -> NDArray[np.float64]:
-        """As `BoxZone.clearance`; where it is above `exact_below`, rad, perhaps less: that of the box's sphere."""
+        """Clearance as `BoxZone.clearance`; above `exact_below`, rad, that of the sphere."""
         if self.near == 0.0:
             return np.zeros(direction.shape[:-1])
         if self.near > self.length:
@@ -201,7 +210,7 @@ class Outline:
         return least
 
     def _exact(self, d: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Of directions (n, 3) in the box's axes."""
+        """Exact clearance of directions (n, 3) in the box's axes."""
         least = np.full(len(d), np.inf)
         if len(self.corners):
             chord = np.min(np.sum((d[:, None] - self.corners) ** 2, axis=-1), axis=-1)
@@ -220,7 +229,7 @@ Zone = ConeZone | BoxZone
 
 
 def servo_margin(counts: ArrayLike) -> float:
-    """Angle, rad, that the beam may be off where the axes may be off by counts (2,), azimuth and elevation, 0 or above.
+    """Beam angle margin, rad, for axis errors in counts (2,), azimuth and elevation, 0 or above.
 
     >>> round(float(np.degrees(servo_margin([20.0, 20.0]))), 4)
     0.161
@@ -234,18 +243,20 @@ def servo_margin(counts: ArrayLike) -> float:
 def clearances(
     zones: Sequence[Zone], origin: ArrayLike, direction: ArrayLike, *, exact_below: float = np.inf
 ) -> NDArray[np.float64]:
-    """Clearance of beams (..., zones), rad, at the start of their paths; see `ConeZone` and `BoxZone`.
+    """Clearance (..., zones), rad, of beams at the start of their paths.
+
+    See `ConeZone` and `BoxZone`.
 
     zones        of which a cone has one direction, or one for each beam
     origin       (3,), m, ground: the scan point
     direction    (..., 3), unit, ground
-    exact_below  rad: a box further off may answer less, the clearance of the sphere about it
+    exact_below  rad: a box further off may give less, the clearance of the sphere about it
     """
     d = np.asarray(direction, dtype=float)
     shape = d.shape[:-1]
-    each = [z.clearance(d) if isinstance(z, ConeZone) else z.clearance(origin, d, exact_below) for z in zones]
-    each = [np.broadcast_to(one, shape) for one in each]
-    return np.stack(each, axis=-1) if each else np.zeros((*shape, 0))
+    columns = [z.clearance(d) if isinstance(z, ConeZone) else z.clearance(origin, d, exact_below) for z in zones]
+    columns = [np.broadcast_to(one, shape) for one in columns]
+    return np.stack(columns, axis=-1) if columns else np.zeros((*shape, 0))
 
 
 def first_entry(
@@ -256,16 +267,18 @@ def first_entry(
     margin: float = 0.0,
     compiled: bool | None = None,
 ) -> Entries:
-    """When paths of one mirror first come into a zone, with nothing between two looks unseen.
+    """First entry of one mirror's paths into a zone.
+
+    No gaps between checks.
 
     station    one ranger
     slews      its moves, a batch (n,) or one
     zones      cones with one direction or one for each move; boxes
-    margin     rad: how far the beam may be off its path (`servo_margin`)
-    compiled   whether the kernel does it; None: for many moves
+    margin     rad: largest deviation of the beam from its path (`servo_margin`)
+    compiled   True for the kernel; None: for many moves
 
-    A path is FREE only if its clearance stays above margin + TOUCH all the way. Raises ValidityError for a station of
-    many or a batch of more than one axis.
+    A path is FREE only if its clearance stays above margin + TOUCH all the way. Raises ValidityError for a batch of
+    stations or moves of more than one axis.
 
     Source: derived above; the method is conservative advancement, as in [MIRTICH96].
     """
@@ -281,13 +294,13 @@ def first_entry(
     drift = [v.rate(total) if isinstance(v, ConeZone) else np.zeros(n) for v in views]
     status, looks = np.zeros(n, dtype=np.int8), np.zeros(n, dtype=np.int64)
     entry, zone = np.full(n, np.nan), np.full(n, -1)
-    at, now = np.arange(n if zones else 0), np.zeros(n if zones else 0)
+    at, instant = np.arange(n if zones else 0), np.zeros(n if zones else 0)
     while len(at):
-        left = slews[at]
+        remaining = slews[at]
         # as `geometry.mirror.pointing.ray`: eq. 2.47 turned round
-        direction = beam(station, left.position(now)) @ station.mirror_from_ground
-        share = now / np.where(total[at] > 0.0, total[at], 1.0)
-        rate = left.beam_rate(now)
+        direction = beam(station, remaining.position(instant)) @ station.mirror_from_ground
+        share = instant / np.where(total[at] > 0.0, total[at], 1.0)
+        rate = remaining.beam_rate(instant)
         gap, step = np.full(len(at), np.inf), np.full(len(at), np.inf)
         nearest = np.zeros(len(at), dtype=int)
         for i, view in enumerate(views):
@@ -300,16 +313,16 @@ def first_entry(
             nearest, gap = np.where(one < gap, i, nearest), np.minimum(one, gap)  # NaN stays, and counts as inside
         looks[at] += 1
         inside = ~(gap > TOUCH)
-        status[at[inside]] = np.where(now[inside] > 0.0, EntryStatus.ENTERS, EntryStatus.STARTS_INSIDE)
-        entry[at[inside]], zone[at[inside]] = now[inside], nearest[inside]
-        now = now + step
-        going = ~inside & (now < total[at])
-        at, now = at[going], now[going]
+        status[at[inside]] = np.where(instant[inside] > 0.0, EntryStatus.ENTERS, EntryStatus.STARTS_INSIDE)
+        entry[at[inside]], zone[at[inside]] = instant[inside], nearest[inside]
+        instant = instant + step
+        going = ~inside & (instant < total[at])
+        at, instant = at[going], instant[going]
     return Entries(status, entry, zone, looks)
 
 
 def _compiled_entries(station: MirrorStation, slews: MirrorSlew, zones: Sequence[Zone], margin: float) -> Entries:
-    """`first_entry` of many moves by the kernel."""
+    """Compute `first_entry` of many moves by the kernel."""
     from catseye.geometry.clearance.keep_out_kernel import first_entries
 
     n, total = slews.shape[0], slews.total
@@ -335,7 +348,7 @@ def _compiled_entries(station: MirrorStation, slews: MirrorSlew, zones: Sequence
 
 
 def _packed(views: list[Outline]) -> tuple[NDArray, ...]:
-    """Outlines as arrays for the kernel, their corners and edges filled up with zeros."""
+    """Outlines as arrays for the kernel, padded with zeros."""
     b = len(views)
     corners, edges, counts = np.zeros((b, 24, 3)), np.zeros((b, 3, 12, 3)), np.zeros((b, 2), dtype=np.int64)
     for i, v in enumerate(views):
@@ -362,25 +375,31 @@ def _angle(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64
 
 
 def _upright(turn: float) -> NDArray[np.float64]:
-    """(3, 3): coordinates in axes turned about z."""
+    """Rotation (3, 3) to axes turned about z."""
     c, s = np.cos(turn), np.sin(turn)
     return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _hits(at: NDArray, d: NDArray, half: NDArray, length: float) -> NDArray[np.bool_]:
-    """Whether half-lines from `at` along d (..., 3) meet the box within their length; touching counts."""
+    """True where half-lines from `at` along d (..., 3) hit the box within their length.
+
+    Touching counts.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         low, high = (-half - at) / d, (half - at) / d
     enter, leave = np.fmin(low, high), np.fmax(low, high)
-    beside = (d == 0.0) & (np.abs(at) > half)
-    still = (d == 0.0) & ~beside
+    misses = (d == 0.0) & (np.abs(at) > half)
+    still = (d == 0.0) & ~misses
     enter, leave = np.where(still, -np.inf, enter), np.where(still, np.inf, leave)
     first, last = np.max(enter, axis=-1), np.min(leave, axis=-1)
-    return ~np.any(beside, axis=-1) & (first <= last) & (last >= 0.0) & (first <= length)
+    return ~np.any(misses, axis=-1) & (first <= last) & (last >= 0.0) & (first <= length)
 
 
 def _edges(at: NDArray, half: NDArray, length: float) -> tuple[NDArray, NDArray]:
-    """Unit directions (k, 3) from `at` to both ends of each edge, or of its part within the length."""
+    """Unit directions (k, 3) from `at` to both ends of each edge.
+
+    Of its part within the length.
+    """
     directions = []
     for axis in range(3):
         i, j = (axis + 1) % 3, (axis + 2) % 3
@@ -394,12 +413,14 @@ def _edges(at: NDArray, half: NDArray, length: float) -> tuple[NDArray, NDArray]
                 ends[0, axis], ends[1, axis] = max(a[axis] - half[axis], -reach), min(a[axis] + half[axis], reach)
                 if room > 0.0 and ends[0, axis] <= ends[1, axis] and np.all(np.any(ends != 0.0, axis=-1)):
                     directions.append(ends / np.linalg.norm(ends, axis=-1, keepdims=True))
-    both = np.array(directions).reshape(-1, 2, 3)
-    return both[:, 0], both[:, 1]
+    pairs = np.array(directions).reshape(-1, 2, 3)
+    return pairs[:, 0], pairs[:, 1]
 
 
 def _angle_to_rim(d: NDArray, at: NDArray, half: NDArray, axis: int, length: float) -> NDArray[np.float64]:
-    """Angle (...) from d (..., 3) to the circle of the near face across an axis that is one length away; inf if none.
+    """Angle (...) from d (..., 3) to the circle of the near face; inf if none.
+
+    The face is across an axis, and the circle is one length away.
 
     The nearest point of the circle lies towards d; where it is off the face, an edge is nearer.
     """
@@ -409,10 +430,10 @@ def _angle_to_rim(d: NDArray, at: NDArray, half: NDArray, axis: int, length: flo
         return np.full(d.shape[:-1], np.inf)
     radius = np.arccos(height / length)
     down = -side * d[..., axis]
-    others = [k for k in range(3) if k != axis]
-    across = np.hypot(d[..., others[0]], d[..., others[1]])
+    lateral = [k for k in range(3) if k != axis]
+    across = np.hypot(d[..., lateral[0]], d[..., lateral[1]])
     reach = length * np.sin(radius) / np.where(across > 0.0, across, 1.0)
     on = np.ones(d.shape[:-1], dtype=bool)
-    for k in others:
+    for k in lateral:
         on &= np.abs(at[k] + reach * d[..., k]) <= half[k]
     return np.where(on, np.abs(np.arctan2(across, down) - radius), np.inf)

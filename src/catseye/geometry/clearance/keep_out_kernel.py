@@ -1,6 +1,8 @@
-"""The compiled form of `keep_out.first_entry` for many moves. Import it only when a problem is large.
+"""Compiled form of `keep_out.first_entry` for many moves.
 
-The plain form is its test. One move after the other, all its looks while it is in registers: a tenth of the time.
+Import it only when a problem is large.
+
+The plain form is its test. One move after the other, all its checks while it is in registers: a tenth of the time.
 """
 
 import numpy as np
@@ -12,21 +14,24 @@ _inlined = njit(error_model="numpy")
 
 @_inlined
 def _count(time, start, end, ramp, duration, speed):
-    """Count of one axis; as `MirrorSlew.position`."""
+    """Count of one axis, as `MirrorSlew.position`."""
     t = min(max(time, 0.0), duration)
-    left = duration - t
-    if t < left:
+    remaining = duration - t
+    if t < remaining:
         return start + speed * (0.5 * t * t / ramp if t < ramp else t - 0.5 * ramp)
-    return end - speed * (0.5 * left * left / ramp if left < ramp else left - 0.5 * ramp)
+    return end - speed * (0.5 * remaining * remaining / ramp if remaining < ramp else remaining - 0.5 * ramp)
 
 
 @_inlined
 def _slowed(time, ramp, duration):
-    """Share of the top speed that an axis does not exceed from a time on; as in `MirrorSlew.beam_rate`."""
-    left = max(duration - time, 0.0)
-    if left < ramp:
-        return left / ramp
-    return 1.0 if left > 0.0 else 0.0
+    """Bound of an axis's speed from a time on, as a share of top speed.
+
+    As in `MirrorSlew.beam_rate`.
+    """
+    remaining = max(duration - time, 0.0)
+    if remaining < ramp:
+        return remaining / ramp
+    return 1.0 if remaining > 0.0 else 0.0
 
 
 @_inlined
@@ -42,7 +47,7 @@ def _dot(ax, ay, az, b):
 
 @_inlined
 def _hits(at, d, half, length):
-    """Whether a step enters a zone, as `keep_out._hits`."""
+    """True if a step enters a zone, as `keep_out._hits`."""
     first, last = -np.inf, np.inf
     for k in range(3):
         if d[k] == 0.0:
@@ -56,7 +61,7 @@ def _hits(at, d, half, length):
 
 @_inlined
 def _rim(at, d, half, length, axis):
-    """As `keep_out._angle_to_rim`."""
+    """Rim angle as `keep_out._angle_to_rim`."""
     height = abs(at[axis]) - half[axis]
     if not 0.0 < height < length:
         return np.inf
@@ -71,7 +76,10 @@ def _rim(at, d, half, length, axis):
 
 @_inlined
 def _outline(x, y, z, exact_below, box, d):
-    """As `Outline.clearance`, box as in `first_entries`; limits are length, near, radius; d (3,) is room to work in."""
+    """Clearance as `Outline.clearance`, box as in `first_entries`.
+
+    Limits are length, near, radius; d (3,) is scratch.
+    """
     at, half, to_box, limits, corners, edges, counts, middle = box
     if limits[1] == 0.0:
         return 0.0
@@ -98,14 +106,14 @@ def _outline(x, y, z, exact_below, box, d):
 
 @_compiled
 def first_entries(moves, pointing, cones, boxes, settings, out):
-    """Status, time, zone and looks of moves (n,) into `out`.
+    """Status, time, zone and checks of moves (n,) into `out`.
 
     moves     start, end, ramp, duration, top speed, (n, 2) each
     pointing  counts at zero (2,), rad a count (2,), mirror from ground (3, 3)
     cones     directions (c, n, 3) at the start and at the end, half angles (c, n), rates (c, n)
     boxes     at, half (b, 3), to_box (b, 3, 3), limits (b, 3), corners (b, 24, 3), edges (b, 3, 12, 3), counts (b, 2),
               middle (b, 3), place (zones,): the number of each cone, then of each box, among the zones
-    settings  margin, least clearance, clearance below which a box is looked at exactly
+    settings  margin, least clearance, clearance below which a box is computed exactly
     """
     start, end, ramp, duration, speed = moves
     zeros, per_count, matrix = pointing
@@ -116,23 +124,23 @@ def first_entries(moves, pointing, cones, boxes, settings, out):
     d = np.empty(3)
     for i in range(len(start)):
         total = max(duration[i, 0], duration[i, 1])
-        now = 0.0
+        instant = 0.0
         while True:
             theta = (
-                _count(now, start[i, 0], end[i, 0], ramp[i, 0], duration[i, 0], speed[i, 0]) - zeros[0]
+                _count(instant, start[i, 0], end[i, 0], ramp[i, 0], duration[i, 0], speed[i, 0]) - zeros[0]
             ) * per_count[0]
-            phi = (_count(now, start[i, 1], end[i, 1], ramp[i, 1], duration[i, 1], speed[i, 1]) - zeros[1]) * per_count[
-                1
-            ]
+            phi = (
+                _count(instant, start[i, 1], end[i, 1], ramp[i, 1], duration[i, 1], speed[i, 1]) - zeros[1]
+            ) * per_count[1]
             u, v, w = np.sin(phi) * np.cos(theta), np.sin(phi) * np.sin(theta), np.cos(phi)
             x = u * matrix[0, 0] + v * matrix[1, 0] + w * matrix[2, 0]
             y = u * matrix[0, 1] + v * matrix[1, 1] + w * matrix[2, 1]
             z = u * matrix[0, 2] + v * matrix[1, 2] + w * matrix[2, 2]
             rate = np.hypot(
-                speed[i, 0] * _slowed(now, ramp[i, 0], duration[i, 0]) * per_count[0],
-                speed[i, 1] * _slowed(now, ramp[i, 1], duration[i, 1]) * per_count[1],
+                speed[i, 0] * _slowed(instant, ramp[i, 0], duration[i, 0]) * per_count[0],
+                speed[i, 1] * _slowed(instant, ramp[i, 1], duration[i, 1]) * per_count[1],
             )
-            share = now / total if total > 0.0 else 0.0
+            share = instant / total if total > 0.0 else 0.0
             gap, step, nearest = np.inf, np.inf, -1
             for c in range(len(first)):
                 for k in range(3):
@@ -154,9 +162,9 @@ def first_entries(moves, pointing, cones, boxes, settings, out):
                     gap, nearest = one, place[len(first) + b]
             looks[i] += 1
             if not gap > touch:
-                status[i] = 1 if now > 0.0 else 2
-                entry[i], zone[i] = now, nearest
+                status[i] = 1 if instant > 0.0 else 2
+                entry[i], zone[i] = instant, nearest
                 break
-            now += step
-            if not now < total:
+            instant += step
+            if not instant < total:
                 break

@@ -1,10 +1,13 @@
-"""Simple solids in the way of a beam: where a straight path first meets a box, a sphere, a cone or a dish.
+"""Simple solids in the way of a beam; first hit.
+
+A box, a sphere, a cone or a dish.
 
 A path is a segment, start (..., 3) to end (..., 3) in metres in the solid's own frame; places on it are shares, 0 at
-its start and 1 at its end. `first_hit` answers the share at which the path is first in the solid (0 if it begins
-there), infinity where it is clear. Intersections are exact; a path that only touches may count either way.
+its start and 1 at its end. `first_hit` gives the share at which the path is first in the solid (0 if it begins
+there), infinity where it is clear. Intersections are exact; a path that only touches may count or not.
 
-`grown` makes a solid larger, for a beam that is not a line: exactly for a sphere, at least so much for all others.
+`grown` makes a solid larger, for a beam that is not a line: exactly for a sphere, by at least the margin for all
+others.
 """
 
 from dataclasses import dataclass, replace
@@ -20,10 +23,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class SolidBox:
-    """A box turned about z.
+    """Box turned about z.
 
     centre   (3,) m
-    size     (3,) m, above 0: full lengths along its own axes
+    size     (3,) m, above 0: full lengths along its axes
     turn     rad: of its x axis from the frame's, by the right hand about z
 
     >>> SolidBox((5.0, 0.0, 0.0), (2.0, 2.0, 2.0)).first_hit([0.0, 0.0, 0.0], [10.0, 0.0, 0.0]).item()
@@ -40,31 +43,31 @@ class SolidBox:
             raise ValidityError(f"size {np.asarray(self.size).tolist()} m of a box is not above 0")
 
     def first_hit(self, start: ArrayLike, end: ArrayLike) -> Array:
-        """Share (...) of the path at which it is first in the box; infinite where it is clear.
+        """Share (...) of the path at first entry; inf if clear.
 
         Source: the slabs between opposite faces: inside is where all three are. Exact.
         """
-        own = rz(self.turn)
-        p = (np.asarray(start, dtype=float) - np.asarray(self.centre, dtype=float)) @ own.T
-        d = (np.asarray(end, dtype=float) - np.asarray(start, dtype=float)) @ own.T
+        to_box = rz(self.turn)
+        p = (np.asarray(start, dtype=float) - np.asarray(self.centre, dtype=float)) @ to_box.T
+        d = (np.asarray(end, dtype=float) - np.asarray(start, dtype=float)) @ to_box.T
         half = 0.5 * np.asarray(self.size, dtype=float)
         with np.errstate(divide="ignore", invalid="ignore"):
             near, far = (-half - p) / d, (half - p) / d
         low, high = np.minimum(near, far), np.maximum(near, far)
-        along = d == 0.0  # between two faces for good, or never
+        along = d == 0.0  # between two faces always, or never
         inside = np.abs(p) <= half
         low = np.where(along, np.where(inside, -np.inf, np.inf), low)
         high = np.where(along, np.where(inside, np.inf, -np.inf), high)
         return _first(low.max(axis=-1), high.min(axis=-1))
 
     def grown(self, margin: float) -> "SolidBox":
-        """The box with every face moved out."""
+        """Box with every face moved out."""
         return replace(self, size=np.asarray(self.size, dtype=float) + 2.0 * margin)
 
 
 @dataclass(frozen=True, eq=False)
 class SolidSphere:
-    """A ball.
+    """Sphere as an obstacle to beams.
 
     centre   (3,) m
     radius   m, above 0
@@ -81,7 +84,7 @@ class SolidSphere:
         _positive("radius", self.radius)
 
     def first_hit(self, start: ArrayLike, end: ArrayLike) -> Array:
-        """Share (...) of the path at which it is first in the ball; infinite where it is clear.
+        """Share (...) of the path at first entry; infinite if clear.
 
         Source: the quadratic of a line and a sphere. Exact.
         """
@@ -91,13 +94,13 @@ class SolidSphere:
         return _first(low, high)
 
     def grown(self, margin: float) -> "SolidSphere":
-        """The ball with a larger radius."""
+        """Sphere with a larger radius."""
         return replace(self, radius=self.radius + margin)
 
 
 @dataclass(frozen=True, eq=False)
 class SolidCone:
-    """A round bar, a tower, a cone or a piece of one: between two flat ends square to its axis.
+    """Cone, cylinder or frustum between two flat ends square to its axis.
 
     start, end                (3,) m, centres of its ends, apart
     start_radius, end_radius  m, 0 or more, not both 0; equal: a cylinder
@@ -120,7 +123,7 @@ class SolidCone:
             raise ValidityError(f"radius {min(self.start_radius, self.end_radius)} m of a cone is below 0")
 
     def first_hit(self, start: ArrayLike, end: ArrayLike) -> Array:
-        """Share (...) of the path at which it is first in the solid; infinite where it is clear.
+        """Share (...) of the path at first entry; infinite if clear.
 
         Source: the solid is where the height is between its ends and rho <= r(height): a slab, and the inside of a
         quadratic, which between the ends has one nappe and is one stretch of a line. Exact.
@@ -144,18 +147,18 @@ class SolidCone:
         return _first_below(a, b, c, np.maximum(low, 0.0), np.minimum(high, 1.0))
 
     def grown(self, margin: float) -> "SolidCone":
-        """The solid with its ends moved out and its side by at least the margin."""
+        """Cone with ends and side moved out by a margin."""
         foot, top = np.asarray(self.start, dtype=float), np.asarray(self.end, dtype=float)
         height = float(np.linalg.norm(top - foot))
         slope = (self.end_radius - self.start_radius) / height
-        out = margin * (np.hypot(1.0, slope) + abs(slope))  # square to the side, and what the longer ends take off
+        out = margin * (np.hypot(1.0, slope) + abs(slope))  # square to the side, less the effect of the longer ends
         step = margin * (top - foot) / height
         return SolidCone(foot - step, top + step, self.start_radius + out, self.end_radius + out)
 
 
 @dataclass(frozen=True, eq=False)
 class Dish:
-    """A piece of a paraboloid, as thin as paper: z = (x^2 + y^2)/4f in its own frame, within a round aperture.
+    """Thin piece of a paraboloid z = (x^2 + y^2)/4f within a round aperture.
 
     focal_length      m, above 0
     aperture_centre   (2,) m, x and y
@@ -181,7 +184,7 @@ class Dish:
             raise ValidityError(f"thickness {min(self.below, self.above)} m of a dish is below 0")
 
     def first_hit(self, start: ArrayLike, end: ArrayLike) -> Array:
-        """Share (...) of the path at which it is first in the dish; infinite where it is clear.
+        """Share (...) of the path at first entry; infinite if clear.
 
         Source: with g = z - (x^2 + y^2)/4f the dish is -below <= g <= above within the aperture's cylinder; g along a
         line is a quadratic that opens downwards. A path enters the layer at the cylinder's edge or at a root. Exact.
@@ -195,15 +198,15 @@ class Dish:
         b = 0.5 * d[..., 2] - _dot(p[..., :2], along) / (4.0 * self.focal_length)
         c = p[..., 2] - _dot(p[..., :2], p[..., :2]) / (4.0 * self.focal_length)
         begin = np.where(low <= high, low, 0.0)
-        here = (a * begin + 2.0 * b) * begin + c
-        inside = (here >= -self.below) & (here <= self.above)
+        height = (a * begin + 2.0 * b) * begin + c
+        inside = (height >= -self.below) & (height <= self.above)
         crossings = np.stack([*_roots(a, b, c - self.above), *_roots(a, b, c + self.below)], axis=-1)
         valid = (crossings >= low[..., None]) & (crossings <= high[..., None])
         root = np.where(valid, crossings, np.inf).min(axis=-1)
         return np.where(low > high, np.inf, np.where(inside, low, root))
 
     def grown(self, margin: float) -> "Dish":
-        """The dish thicker by at least the margin to both sides and wider by it."""
+        """Dish thicker by at least the margin on both sides, and wider by it."""
         edge = float(np.hypot(*np.asarray(self.aperture_centre, dtype=float))) + self.aperture_radius + margin
         along_z = margin * float(np.hypot(1.0, edge / (2.0 * self.focal_length)))  # where it is steepest
         return replace(
@@ -218,40 +221,43 @@ Solid = SolidBox | SolidSphere | SolidCone | Dish
 
 
 def _first(low: Array, high: Array) -> Array:
-    """The beginning of a stretch low..high within 0..1, infinite where there is none."""
+    """Beginning of an interval low..high within 0..1, infinite if empty."""
     begin = np.maximum(low, 0.0)
     return np.where((begin <= high) & (begin <= 1.0), begin, np.inf)
 
 
 def _roots(a: Array, b: Array, c: Array) -> tuple[Array, Array]:
-    """Both roots, in order, of a t^2 + 2 b t + c, without loss of digits; NaN where there is none."""
+    """Both ordered roots of a t^2 + 2 b t + c, at full precision; NaN if none."""
     with np.errstate(divide="ignore", invalid="ignore"):
         root = np.sqrt(b**2 - a * c)
         q = -(b + np.where(b >= 0.0, root, -root))
         first, second = q / a, c / q
-        first = np.where(a == 0.0, second, first)  # of a straight line there is one
+        first = np.where(a == 0.0, second, first)  # a straight line has one
         second = np.where(q == 0.0, first, second)
     return np.fmin(first, second), np.fmax(first, second)
 
 
 def _between_roots(a: Array, b: Array, c: Array) -> tuple[Array, Array]:
-    """Where a t^2 + 2 b t + c <= 0 for a >= 0: from, to; empty (inf, -inf) where nowhere, all where a = b = 0 >= c."""
+    """Interval where a t^2 + 2 b t + c <= 0, a >= 0; (inf, -inf) if none.
+
+    All where a = b = 0 >= c.
+    """
     low, high = _roots(a, b, c)
     still = (a == 0.0) & (b == 0.0)
     low = np.where(still, np.where(c <= 0.0, -np.inf, np.inf), low)
     high = np.where(still, np.where(c <= 0.0, np.inf, -np.inf), high)
-    none = np.isnan(low) | np.isnan(high)
-    return np.where(none, np.inf, low), np.where(none, -np.inf, high)
+    missing = np.isnan(low) | np.isnan(high)
+    return np.where(missing, np.inf, low), np.where(missing, -np.inf, high)
 
 
 def _first_below(a: Array, b: Array, c: Array, low: Array, high: Array) -> Array:
-    """First share in low..high at which a t^2 + 2 b t + c <= 0; infinite where none."""
+    """First share in low..high at which a t^2 + 2 b t + c <= 0; infinite if none."""
     begin = np.where(low <= high, low, 0.0)
-    now = (a * begin + 2.0 * b) * begin + c <= 0.0
+    inside = (a * begin + 2.0 * b) * begin + c <= 0.0
     roots = np.stack(_roots(a, b, c), axis=-1)
     valid = (roots >= low[..., None]) & (roots <= high[..., None])
     entered = np.where(valid, roots, np.inf).min(axis=-1)
-    return np.where(low > high, np.inf, np.where(now, low, entered))
+    return np.where(low > high, np.inf, np.where(inside, low, entered))
 
 
 def _dot(u: Array, v: Array) -> Array:

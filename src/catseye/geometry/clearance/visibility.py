@@ -1,4 +1,4 @@
-"""Which ranger can see which retroreflector: angle of incidence, range, and solids in the way; pairs in a batch."""
+"""Visibility of retroreflectors from rangers: incidence, range, obstructions."""
 
 from collections.abc import Sequence
 
@@ -9,15 +9,17 @@ from catseye.errors import ValidityError
 from catseye.geometry.clearance.solids import Solid
 
 Array = NDArray[np.float64]
-CLEAR = -1  # in the answer of `first_obstruction`
+CLEAR = -1  # in the result of `first_obstruction`
 
 
 def incidence(scan_points: ArrayLike, points: ArrayLike, axes: ArrayLike) -> Array:
-    """Angle (r, t), rad, between a retroreflector's axis and the direction to a ranger, 0 to pi.
+    """Angle (r, t), rad, between retroreflector axis and direction to ranger.
+
+    0 to pi.
 
     scan_points   (r, 3), m
     points        (t, 3), m, same frame
-    axes          (t, 3), any length: outward normals; NaN where unknown, and then the answer is NaN
+    axes          (t, 3), any length: outward normals; NaN where unknown, and then the result is NaN
 
     Source: arctangent of cross over dot product, which loses no digits near 0. Exact.
 
@@ -51,12 +53,14 @@ def first_obstruction(
     clear_start: float = 0.0,
     clear_end: float = 0.0,
 ) -> tuple[NDArray[np.int64], Array]:
-    """Which solid first stands in each path, (r, t), -1 where none; and how far from the ranger (r, t), m, or infinity.
+    """First solid (r, t) in each path, -1 if none, and its distance (r, t), m.
+
+    The distance is from the ranger, infinite if none.
 
     scan_points, points   (r, 3) and (t, 3), m, in the frame of the solids
     solids                all in that frame
-    clear_start           m, 0 or more, of the path at the ranger that are taken as clear: its own mount
-    clear_end             m, 0 or more, of the path at the retroreflector that are taken as clear: its own seat
+    clear_start           m, 0 or more, of the path at the ranger taken as clear: its mount
+    clear_end             m, 0 or more, of the path at the retroreflector taken as clear: its seat
 
     A path shorter than both is clear. Raises ValidityError for lengths below 0.
 
@@ -76,10 +80,10 @@ def first_obstruction(
         unit = vector / length[..., None]
         start = r[:, None] + clear_start * unit
         end = t[None] - clear_end * unit
-    rest = length - clear_start - clear_end
+    remainder = length - clear_start - clear_end
     best = np.full(length.shape, np.inf)
     which = np.full(length.shape, CLEAR, dtype=np.int64)
-    open_ = rest > 0.0
+    open_ = remainder > 0.0
     if not solids or not open_.any():
         return which, best
     start, end = np.where(open_[..., None], start, 0.0), np.where(open_[..., None], end, 1.0)
@@ -88,7 +92,7 @@ def first_obstruction(
         nearer = share < best
         best, which = np.where(nearer, share, best), np.where(nearer, k, which)
     hit = which != CLEAR
-    return which, np.where(hit, clear_start + np.where(hit, best, 0.0) * rest, np.inf)
+    return which, np.where(hit, clear_start + np.where(hit, best, 0.0) * remainder, np.inf)
 
 
 def _points(values: ArrayLike, what: str) -> Array:

@@ -1,1 +1,1 @@
-"""Axis systems: rotations, frames, local and plumb."""
+"""Axis systems: rotations, frames, local and plumb axes."""

@@ -16,7 +16,7 @@ ORTHONORMAL_TOLERANCE = 1e-9  # largest element of R R^T - 1: 0.1 um at 100 m
 
 @dataclass(frozen=True, eq=False)
 class Transform:
-    """A rigid transform that knows its two frames and refuses strangers.
+    """Rigid transform between two named frames; refuses other frames.
 
     to             name of the frame of the result
     from_          name of the frame of the argument
@@ -62,18 +62,18 @@ class Transform:
         return f"{self.to}_from_{self.from_}"
 
     def points(self, x: ArrayLike) -> NDArray[np.float64]:
-        """Points of the frame `from_`, (..., 3) in metres, in the frame `to`."""
+        """Points (..., 3), m, of the frame `from_` in the frame `to`."""
         return self.directions(x) + self.translation
 
     def directions(self, v: ArrayLike) -> NDArray[np.float64]:
-        """Directions or displacements of the frame `from_`, (..., 3), in the frame `to`: turned, not moved."""
+        """Directions or displacements (..., 3) in the frame `to`, rotated only."""
         vectors = np.asarray(v, dtype=float)
         if vectors.shape[-1:] != (3,):
             raise ValidityError(f"{self}: points have shape {vectors.shape}, expected (..., 3)")
         return vectors @ self.rotation.T
 
     def inverse(self) -> "Transform":
-        """The way back: from the second frame to the first."""
+        """Inverse transform, from the frame `to` to `from_`."""
         return Transform(self.from_, self.to, self.rotation.T, -self.rotation.T @ self.translation)
 
     def __matmul__(self, other: "Transform") -> "Transform":
@@ -91,11 +91,13 @@ class Transform:
 
 @dataclass(frozen=True, eq=False)
 class Transforms:
-    """Many rigid transforms between the same two frames; a `Transform` with batch axes in front.
+    """Many rigid transforms between the same two frames.
+
+    A `Transform` with batch axes in front.
 
     to             name of the frame of the results
     from_          name of the frame of the arguments
-    rotation       (..., 3, 3), orthonormal; not tested, since what makes them builds them from angles
+    rotation       (..., 3, 3), orthonormal; not tested, as they are built from angles
     translation    (..., 3), m
 
     Batch axes broadcast against those of points; `transforms[:, None]` makes room for several points at each time.
@@ -127,16 +129,16 @@ class Transforms:
 
     @classmethod
     def of(cls, transform: "Transform | Transforms") -> "Transforms":
-        """The same, without batch axes where it is a single Transform."""
+        """Transforms, without batch axes for a single Transform."""
         return cls(transform.to, transform.from_, transform.rotation, transform.translation)
 
     @property
     def single(self) -> Transform:
-        """The Transform that this is, where there are no batch axes."""
+        """Single Transform, if there are no batch axes."""
         return Transform(self.to, self.from_, self.rotation, self.translation)
 
     def __getitem__(self, index: Any) -> "Transforms":
-        """Batch axes indexed, as numpy does it; None makes a new one."""
+        """Index the batch axes; None adds an axis."""
         at = index if isinstance(index, tuple) else (index,)
         at = at if Ellipsis in at else (*at, Ellipsis)
         rotation = self.rotation[(*at, slice(None), slice(None))]
@@ -144,18 +146,18 @@ class Transforms:
         return Transforms(self.to, self.from_, rotation, translation)
 
     def points(self, x: ArrayLike) -> NDArray[np.float64]:
-        """Points of the frame `from_`, (..., 3) in metres, in the frame `to`."""
+        """Points (..., 3), m, of the frame `from_` in the frame `to`."""
         return self.directions(x) + self.translation
 
     def directions(self, v: ArrayLike) -> NDArray[np.float64]:
-        """Directions or displacements of the frame `from_`, (..., 3), in the frame `to`: turned, not moved."""
+        """Directions or displacements (..., 3) in the frame `to`, rotated only."""
         vectors = np.asarray(v, dtype=float)
         if vectors.shape[-1:] != (3,):
             raise ValidityError(f"{self}: points have shape {vectors.shape}, expected (..., 3)")
         return np.einsum("...ij,...j->...i", self.rotation, vectors)
 
     def inverse(self) -> "Transforms":
-        """The way back: from the second frame to the first."""
+        """Inverse transforms, from the frame `to` to `from_`."""
         back = np.swapaxes(self.rotation, -1, -2)
         return Transforms(self.from_, self.to, back, -np.einsum("...ij,...j->...i", back, self.translation))
 

@@ -1,7 +1,9 @@
-"""The local Cartesian ground frame on the ellipsoid of NAD83 (GRS 80), and West Virginia's South state plane.
+"""Local ground frame on NAD83, and West Virginia's state plane.
+
+The ellipsoid is GRS 80.
 
 x east, y north, z up at the origin. z is the ellipsoid's normal there ("all of the metrology work uses the NAD83
-directions"), or the plumb line where asked. Heights: h above the ellipsoid, H elevation (NAVD88), N geoid height,
+directions"), or the plumb line on request. Heights: h above the ellipsoid, H elevation (NAVD88), N geoid height,
 h = H + N. Metric state plane is EPSG:32151; EPSG:26854, the same zone, is in US survey feet and is refused by size.
 """
 
@@ -21,7 +23,7 @@ FLATTENING = 1.0 / 298.257222101  # GRS 80
 E2 = FLATTENING * (2.0 - FLATTENING)  # first eccentricity squared
 STATE_PLANE = "EPSG:32151"  # NAD83 / West Virginia South, metres
 EASTINGS, NORTHINGS = (4.0e5, 8.2e5), (0.0, 3.0e5)  # m, of the zone; feet lie outside
-MOST_DEFLECTION = 1e-3  # rad, 3.4': more is no deflection but degrees or arcseconds
+MOST_DEFLECTION = 1e-3  # rad, 3.4': a larger value is in degrees or arcseconds
 PINTLE_LATITUDE = (38.0 + 25.0 / 60.0 + 59.236 / 3600.0) * DEGREE  # NAD83
 PINTLE_LONGITUDE = -(79.0 + 50.0 / 60.0 + 23.406 / 3600.0) * DEGREE  # east positive
 
@@ -29,14 +31,17 @@ Floats = NDArray[np.float64]
 
 
 class Grid(NamedTuple):
-    """At a place: grid length = scale * length on the ellipsoid, grid azimuth = azimuth - convergence (rad)."""
+    """Grid scale and convergence at a place.
+
+    Grid length = scale * length on the ellipsoid, grid azimuth = azimuth - convergence (rad).
+    """
 
     scale: Floats
     convergence: Floats
 
 
 class Radii(NamedTuple):
-    """Of the ellipsoid, m: along the meridian, and across it (prime vertical)."""
+    """Radii of the ellipsoid, m: meridian and prime vertical."""
 
     meridian: Floats
     prime_vertical: Floats
@@ -44,7 +49,7 @@ class Radii(NamedTuple):
 
 @dataclass(frozen=True)
 class LocalFrame:
-    """The ground frame: where its origin is and where its axes point.
+    """Ground frame: position of its origin, directions of its axes.
 
     latitude, longitude   rad, NAD83, of the vertical through the origin; east positive
     height                m, of the origin (z = 0) above the ellipsoid
@@ -55,7 +60,7 @@ class LocalFrame:
     plumb                 z is the plumb line at the origin: axes turned by xi and eta about x and y alone, azimuths
                           stay NAD83's; else z is the ellipsoid's normal
 
-    Raises ValidityError for values that cannot be meant.
+    Raises ValidityError for implausible values.
 
     Source: [PARKER04] section 2.1; [SNYDER87] (ellipsoid and projection). Exact to the rounding of coordinates of 6e6
     m: there and back 5e-10 m rms, 3e-9 m at most; by the state plane 7e-9 m.
@@ -89,7 +94,7 @@ class LocalFrame:
 
     @property
     def geocentric_from_ground(self) -> Floats:
-        """(3, 3), the frame's axes in geocentric ones, one a column."""
+        """Axes (3, 3) of the frame in geocentric ones, one a column."""
         axes = horizon(self.latitude, self.longitude).T
         return axes @ from_vector([-self.xi, self.eta, 0.0]) if self.plumb else axes
 
@@ -98,7 +103,7 @@ class LocalFrame:
         return _geocentric(self.latitude, self.longitude, self.height)
 
     def from_geodetic(self, latitude: ArrayLike, longitude: ArrayLike, height: ArrayLike) -> Floats:
-        """Points (..., 3), m, in the ground frame.
+        """Points (..., 3), m, in the ground frame from geodetic coordinates.
 
         latitude, longitude   rad, NAD83, east positive
         height                m, above the ellipsoid
@@ -106,15 +111,15 @@ class LocalFrame:
         return (_geocentric(latitude, longitude, height) - self._origin) @ self.geocentric_from_ground
 
     def geodetic(self, points: ArrayLike) -> tuple[Floats, Floats, Floats]:
-        """Latitude, longitude (rad, NAD83, east positive) and height above the ellipsoid (m) of points.
+        """Latitude, longitude (rad, NAD83, east positive), ellipsoidal height (m) of points.
 
         points   (..., 3), m, ground
         """
-        given = _triples(points)
-        x, y, z = np.moveaxis(given @ self.geocentric_from_ground.T + self._origin, -1, 0)
+        local = _triples(points)
+        x, y, z = np.moveaxis(local @ self.geocentric_from_ground.T + self._origin, -1, 0)
         longitude, latitude, height = _cart().transform(x, y, z, radians=True, direction="INVERSE", errcheck=True)
         # PROJ's inverse is good to 3e-8 m; one step of Newton's method brings it to the rounding.
-        off = (given - self.from_geodetic(latitude, longitude, height)) @ self.geocentric_from_ground.T
+        off = (local - self.from_geodetic(latitude, longitude, height)) @ self.geocentric_from_ground.T
         east, north, up = np.moveaxis(np.einsum("...ij,...j->...i", horizon(latitude, longitude), off), -1, 0)
         meridian, across = radii(latitude)
         return (
@@ -124,7 +129,9 @@ class LocalFrame:
         )
 
     def geoid(self, latitude: ArrayLike, longitude: ArrayLike) -> Floats:
-        """Geoid height N, m, of a geoid that is plane over the site and square to the plumb line.
+        """Geoid height N, m, for a plane geoid.
+
+        The plane is square to the plumb line.
 
         latitude, longitude   rad
 
@@ -136,14 +143,14 @@ class LocalFrame:
         return self.geoid_height - self.xi * north - self.eta * east
 
     def from_state_plane(self, coordinates: ArrayLike) -> Floats:
-        """Points (..., 3), m, in the ground frame.
+        """Points (..., 3), m, in the ground frame from state plane coordinates.
 
         coordinates   (..., 3), m: easting, northing (West Virginia South, NAD83, metres) and elevation (NAVD88)
 
         Raises ValidityError for coordinates outside the zone, such as feet.
         """
-        given = _triples(coordinates)
-        for name, values, (low, high) in zip(("easting", "northing"), (given[..., 0], given[..., 1]),
+        plane = _triples(coordinates)
+        for name, values, (low, high) in zip(("easting", "northing"), (plane[..., 0], plane[..., 1]),
                                              (EASTINGS, NORTHINGS), strict=True):  # fmt: skip
             outside = ~((values >= low) & (values <= high))
             if outside.any():
@@ -151,11 +158,13 @@ class LocalFrame:
                     f"{name} {values[outside].flat[0]:.9g} m is outside the zone West Virginia South, {low:g} to "
                     f"{high:g} m (EPSG:26854 is in US survey feet: multiply by 1200/3937)"
                 )
-        longitude, latitude = _zone()(given[..., 0], given[..., 1], inverse=True, radians=True, errcheck=True)
-        return self.from_geodetic(latitude, longitude, given[..., 2] + self.geoid(latitude, longitude))
+        longitude, latitude = _zone()(plane[..., 0], plane[..., 1], inverse=True, radians=True, errcheck=True)
+        return self.from_geodetic(latitude, longitude, plane[..., 2] + self.geoid(latitude, longitude))
 
     def state_plane(self, points: ArrayLike) -> Floats:
-        """Easting, northing (West Virginia South, NAD83) and elevation (NAVD88) of points, (..., 3), m.
+        """State plane easting, northing and elevation (..., 3), m, of points.
+
+        West Virginia South, NAD83; NAVD88.
 
         points   (..., 3), m, ground
         """
@@ -165,14 +174,16 @@ class LocalFrame:
 
 
 def with_zero_at(frame: LocalFrame, latitude: float, longitude: float, height: float) -> LocalFrame:
-    """The frame moved along its z axis until a point lies at z = 0, as the tooling ball of ZY103 does.
+    """Frame moved along z until a point lies at z = 0.
+
+    As for the tooling ball of ZY103.
 
     frame                 with any height of its origin
     latitude, longitude   rad, of the point
     height                m, of the point above the ellipsoid
 
-    The point lies above the origin by the curvature: 1.1 mm at 120 m. Twice, as the frame's scale is its height's: what
-    is left is below 1e-12 m.
+    The point lies above the origin by the curvature: 1.1 mm at 120 m. Done twice, as the scale depends on height: the
+    remainder is below 1e-12 m.
     """
     for _ in range(2):
         above = float(frame.from_geodetic(latitude, longitude, height)[2])
@@ -182,7 +193,7 @@ def with_zero_at(frame: LocalFrame, latitude: float, longitude: float, height: f
 
 
 def horizon(latitude: ArrayLike, longitude: ArrayLike) -> Floats:
-    """Matrix (..., 3, 3) that gives east, north, up of geocentric vectors.
+    """Matrix (..., 3, 3) from geocentric vectors to east, north, up.
 
     latitude, longitude   rad; of the ellipsoid's normal, or of the plumb line (astronomic)
 
@@ -198,7 +209,7 @@ def horizon(latitude: ArrayLike, longitude: ArrayLike) -> Floats:
 
 
 def grid(latitude: ArrayLike, longitude: ArrayLike) -> Grid:
-    """Scale factor and convergence (rad) of the state plane West Virginia South.
+    """Scale factor and convergence (rad) of the South state plane.
 
     latitude, longitude   rad, NAD83, east positive
 
@@ -231,7 +242,7 @@ def radii(latitude: ArrayLike) -> Radii:
 
 
 def radius_towards(latitude: ArrayLike, azimuth: ArrayLike) -> Floats:
-    """Radius of curvature of the ellipsoid's normal section in a direction, m.
+    """Radius of curvature of the ellipsoid's normal section, m.
 
     latitude   rad
     azimuth    rad, clockwise from north
@@ -247,7 +258,9 @@ def radius_towards(latitude: ArrayLike, azimuth: ArrayLike) -> Floats:
 
 
 def elevation_factor(latitude: ArrayLike, height: ArrayLike) -> Floats:
-    """Length on the ellipsoid over horizontal length at a height; times the grid's scale it is the combined factor.
+    """Elevation factor: length on the ellipsoid over length at a height.
+
+    Times the grid's scale it is the combined factor.
 
     latitude   rad
     height     m, above the ellipsoid
@@ -266,7 +279,7 @@ def elevation_factor(latitude: ArrayLike, height: ArrayLike) -> Floats:
 
 
 def fall_of_level(distance: ArrayLike, radius: ArrayLike) -> Floats:
-    """How far a level surface lies below the plane that touches it, m.
+    """Depth of a level surface below its tangent plane, m.
 
     distance   m, in that plane from where they touch
     radius     m, of the surface there
@@ -298,7 +311,7 @@ def _triples(points: ArrayLike) -> Floats:
 
 @lru_cache(maxsize=1)
 def _cart() -> Any:
-    """PROJ's geodetic to geocentric, longitude first."""
+    """PROJ transformation, geodetic to geocentric, longitude first."""
     from pyproj import Transformer
 
     return Transformer.from_pipeline("+proj=cart +ellps=GRS80")
@@ -306,7 +319,7 @@ def _cart() -> Any:
 
 @lru_cache(maxsize=1)
 def _zone() -> Any:
-    """PROJ's projection of the zone, longitude first."""
+    """PROJ projection of the state plane zone, longitude first."""
     from pyproj import Proj
 
     return Proj(STATE_PLANE)

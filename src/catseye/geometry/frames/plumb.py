@@ -1,12 +1,14 @@
-"""The plumb line against the ground frame's z, and what it does to a mount that was levelled and turned by it.
+"""Plumb line against the ground frame's z, and its effect on mounts.
 
-A level and a theodolite know only the plumb line where they stand. Away from the origin the line leans outwards by the
+Mounts are levelled and oriented by it.
+
+A level and a theodolite refer to the local plumb line. Away from the origin the line leans outwards by the
 curvature of the earth, d/R (3.9" at 120 m), and everywhere by the deflection of the vertical, xi to the north and eta
 to the east. North turns too: meridians converge, by x tan(phi)/R at x east of the origin (3.1" at 120 m), and the
 astronomic meridian differs from NAD83's by eta tan(phi), Laplace's equation. All of it is one rotation.
 
 Signs by hand. Let v = (tx, ty, 1) be the zenith of a level at the point, in ground axes: tx = x/N + eta and
-ty = y/M + xi; the curvature's part points outwards. A level shows how far the mount's axes rise above its own horizon,
+ty = y/M + xi; the curvature's part points outwards. A level shows the rise of the mount's axes above its horizon,
 x^.v and z^.v. With alpha1 the axes lie along x0 = (cos a1, sin a1, 0) and z0 = (sin a1, -cos a1, 0), and by eq. 2.5
 their third components are sin a2 and -cos a2 sin a3. So against the level alpha2' = x^.v, alpha3' = -z^.v, and against
 the ground frame
@@ -26,7 +28,7 @@ Floats = NDArray[np.float64]
 
 
 def astronomic(frame: LocalFrame, points: ArrayLike) -> tuple[Floats, Floats]:
-    """Astronomic latitude and longitude (rad) at points: where the plumb line points.
+    """Astronomic latitude and longitude (rad) at points.
 
     frame    ground frame, with its deflection of the vertical
     points   (..., 3), m, ground
@@ -38,12 +40,12 @@ def astronomic(frame: LocalFrame, points: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def plumb_from_ground(frame: LocalFrame, points: ArrayLike) -> Floats:
-    """Matrix (..., 3, 3) that gives astronomic east, north and zenith at points of ground vectors.
+    """Matrix (..., 3, 3) to astronomic east, north and zenith at points.
 
     frame    ground frame
     points   (..., 3), m, ground
 
-    Azimuths in these axes are what stars give; zenith angles what a level gives. Exact.
+    Azimuths in these axes are those of stars, zenith angles those of a level. Exact.
 
     Source: [TORGE12] (Laplace's equation is its first order, eta tan phi for a level sight).
 
@@ -57,13 +59,13 @@ def plumb_from_ground(frame: LocalFrame, points: ArrayLike) -> Floats:
 
 
 def lean(frame: LocalFrame, points: ArrayLike) -> Floats:
-    """How the plumb line at points leans against the frame's z, (..., 2) rad, to the east and to the north.
+    """Lean of the plumb line from the frame's z, (..., 2) rad, east and north.
 
-    frame    ground frame; where its z is the plumb line at the origin, the deflection is in it already
+    frame    ground frame; where its z is the plumb line at the origin, the deflection is already included
     points   (..., 3), m, ground
 
-    Curvature x/(N + h), y/(M + h), outwards, and the deflection; first order, good to 1e-9 rad within 300 m. For people
-    and as a check; the corrections use `plumb_from_ground`.
+    Curvature x/(N + h), y/(M + h), outwards, and the deflection; first order, good to 1e-9 rad within 300 m. For
+    display and checks; the corrections use `plumb_from_ground`.
 
     >>> from catseye.geometry.frames.local_frame import PINTLE_LATITUDE, PINTLE_LONGITUDE
     >>> frame = LocalFrame(PINTLE_LATITUDE, PINTLE_LONGITUDE, 775.0, xi=1e-5)
@@ -78,7 +80,7 @@ def lean(frame: LocalFrame, points: ArrayLike) -> Floats:
 
 
 def mount_angles(gamma_matrix: ArrayLike) -> Floats:
-    """The angles alpha1, alpha2, alpha3 (..., 3), rad, of a mount's matrix.
+    """Angles alpha1, alpha2, alpha3 (..., 3), rad, of a mount's matrix.
 
     gamma_matrix   (..., 3, 3), from `geometry.mirror.mount.gamma`; alpha2 within ±pi/2
 
@@ -102,7 +104,7 @@ def mount_angles(gamma_matrix: ArrayLike) -> Floats:
 
 
 def azimuth(vectors: ArrayLike) -> Floats:
-    """Azimuth (...), rad in [0, 2 pi), clockwise from the second axis, of vectors (..., 3) in axes east, north, up.
+    """Azimuth (...), rad in [0, 2 pi), clockwise from north, of vectors (..., 3) in east, north, up.
 
     >>> round(float(np.degrees(azimuth([-1.0, 0.0, 5.0]))), 9)
     270.0
@@ -122,14 +124,16 @@ def zenith_angle(vectors: ArrayLike) -> Floats:
 
 
 def axis_lean_error(zenith: ArrayLike, lean_right: ArrayLike) -> Floats:
-    """What a leaning vertical axis adds to a theodolite's horizontal reading, rad; the mean of both faces has it too.
+    """Theodolite reading error from a leaning vertical axis, rad.
+
+    The mean of both faces has it too.
 
     zenith       (...), rad, of the sight
     lean_right   (...), rad, by which the top of the axis leans to the right of the line of sight
 
     By hand: axis v' = v + i r, r to the right. In the circle's plane the forward axis stays h, the axis to the right
-    becomes r - i v. The sight sin z h + cos z v has components sin z and -i cos z there: it reads i cot z too little.
-    A sight above the horizon with the axis leaning right reads too little, below the horizon too much.
+    becomes r - i v. The sight sin z h + cos z v has components sin z and -i cos z there: it reads i cot z too low.
+    A sight above the horizon with the axis leaning right reads too low, below the horizon too high.
 
     Source: [PARKER04] section 2.5 warns of it; first order, exact to 1e-8 rad for leans below 20" and z above 5°.
 

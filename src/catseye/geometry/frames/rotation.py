@@ -1,7 +1,7 @@
 """Rotation matrices, (..., 3, 3).
 
-`rx`, `ry`, `rz` are passive, as in the notes: they turn the axes and leave the point. `from_vector` is active: it turns
-the point and leaves the axes. Hence rx(a) is the transpose of from_vector((a, 0, 0)).
+`rx`, `ry`, `rz` are passive, as in the notes: they turn the axes, not the point. `from_vector` is active: it turns
+the point, not the axes. Hence rx(a) is the transpose of from_vector((a, 0, 0)).
 """
 
 import numpy as np
@@ -11,19 +11,19 @@ from catseye.errors import ValidityError
 
 
 def _matrix(rows: list[list[NDArray[np.float64]]]) -> NDArray[np.float64]:
-    """The (..., 3, 3) array of nine broadcast elements."""
+    """Array (..., 3, 3) of nine broadcast elements."""
     elements = np.broadcast_arrays(*[element for row in rows for element in row])
     return np.stack(elements, axis=-1).reshape((*elements[0].shape, 3, 3))
 
 
 def _sines(angle: ArrayLike) -> tuple[NDArray[np.float64], ...]:
-    """cos, sin, 0 and 1 in the shape of the angle."""
+    """Cosine, sine, 0 and 1, shaped as the angle."""
     a = np.asarray(angle, dtype=float)
     return np.cos(a), np.sin(a), np.zeros_like(a), np.ones_like(a)
 
 
 def rx(angle: ArrayLike) -> NDArray[np.float64]:
-    """Matrix that gives coordinates in axes turned about x.
+    """Matrix to coordinates in axes turned about x.
 
     angle    rad, any, positive by the right-hand rule about x
 
@@ -37,7 +37,7 @@ def rx(angle: ArrayLike) -> NDArray[np.float64]:
 
 
 def ry(angle: ArrayLike) -> NDArray[np.float64]:
-    """Matrix that gives coordinates in axes turned about y.
+    """Matrix to coordinates in axes turned about y.
 
     angle    rad, any, positive by the right-hand rule about y
 
@@ -51,7 +51,7 @@ def ry(angle: ArrayLike) -> NDArray[np.float64]:
 
 
 def rz(angle: ArrayLike) -> NDArray[np.float64]:
-    """Matrix that gives coordinates in axes turned about z.
+    """Matrix to coordinates in axes turned about z.
 
     angle    rad, any, positive by the right-hand rule about z
 
@@ -65,7 +65,7 @@ def rz(angle: ArrayLike) -> NDArray[np.float64]:
 
 
 def skew(v: ArrayLike) -> NDArray[np.float64]:
-    """Matrix whose product with a vector u is the cross product v x u.
+    """Matrix whose product with u is v x u.
 
     v    (..., 3), any unit
 
@@ -80,7 +80,9 @@ def skew(v: ArrayLike) -> NDArray[np.float64]:
 
 
 def from_vector(rotation_vector: ArrayLike) -> NDArray[np.float64]:
-    """Active rotation matrix of a rotation vector: it turns a point about the vector by the vector's length.
+    """Active rotation matrix of a rotation vector.
+
+    It turns a point about the vector by the vector's length.
 
     rotation_vector    (..., 3), rad, any length
 
@@ -97,12 +99,13 @@ def from_vector(rotation_vector: ArrayLike) -> NDArray[np.float64]:
 
 
 def to_vector(matrix: ArrayLike) -> NDArray[np.float64]:
-    """Rotation vector of an active rotation matrix, of length 0 to pi.
+    """Rotation vector (0 to pi) of an active rotation matrix.
 
     matrix    (..., 3, 3), orthonormal with determinant +1
 
     Source: [SHEPPERD78], through the quaternion whose largest element is found first. Good to 1e-15 rad near zero and
-    to 1e-15 of the angle elsewhere; at a half turn the vector and its opposite are the same rotation, and either comes.
+    to 1e-15 of the angle elsewhere; at a half turn the vector and its opposite are the same rotation; either is
+    returned.
 
     >>> to_vector(from_vector([1e-9, -2e-9, 0.5])).round(12).tolist()
     [1e-09, -2e-09, 0.5]
@@ -129,7 +132,7 @@ def to_vector(matrix: ArrayLike) -> NDArray[np.float64]:
 
 
 def _triples(v: ArrayLike, what: str) -> NDArray[np.float64]:
-    """The array as floats, refused unless its last axis has three elements."""
+    """Convert to a float array; refuse a last axis without three elements."""
     array = np.asarray(v, dtype=float)
     if array.shape[-1:] != (3,):
         raise ValidityError(f"{what} has shape {array.shape}, expected (..., 3)")

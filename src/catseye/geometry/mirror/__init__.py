@@ -1,1 +1,1 @@
-"""A steered mirror: pointing, encoders, slews, tracks."""
+"""Steered mirror: pointing, encoders, slews, tracks."""

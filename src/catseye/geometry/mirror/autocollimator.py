@@ -1,8 +1,8 @@
-"""What an autocollimator sees in the mirror, and by way of the mirror in a flat beside it.
+"""Autocollimator readings off the mirror and a flat.
 
 Mount axes: z^ from the fixed point to the v-block, y^ up, x^ in the surface plate. The autocollimator stands on the
 +z^ side and looks into the mirror. Its light leaves along -c; c, its optical axis, leans by (lean_x, lean_y) from z^
-towards +x^ and +y^, and its reticle is turned by `roll` about c, right-handed. What comes back along r reads
+towards +x^ and +y^, and its reticle is turned by `roll` about c, right-handed. Light returned along r reads
 
     x, y = r.X / r.c, r.Y / r.c,       the beam's angles; a scale of mirror angles shows half of them.
 
@@ -19,8 +19,8 @@ from z^ the circle's centre is z~ itself, in mount axes the last row of lambda (
     x = +beta2,   y = -beta1        (mirror angles; twice that of the beam)
 
 The notes' step 4 gives beta1 as "approximately the y component": with y up it is minus that, as their own example has
-it (z~ rotated up by 2'30", beta1 = -2'30"). tau and kappa come together here as tau - kappa; in one position of the
-azimuth not even that can be told from beta.
+it (z~ rotated up by 2'30", beta1 = -2'30"). tau and kappa appear here only as tau - kappa; in one position of the
+azimuth even that is not separable from beta.
 
 The notes' step 6 finds N_a0 where y is zero for a flat on the x~ axis. With the autocollimator still on z^ that is not
 Theta = 0: its light comes in off the azimuth axis by beta1, and y vanishes at Theta' = beta1 (ZP3: -727 urad, 11.6
@@ -63,7 +63,7 @@ def face_normal(theta: ArrayLike, shaft: ArrayLike, face_tilt: ArrayLike = 0.0, 
 def reflected(direction: ArrayLike, normal: ArrayLike) -> Array:
     """Direction (..., 3) of a ray after a plane mirror.
 
-    direction   (..., 3), any length, which it keeps
+    direction   (..., 3), any length, which is preserved
     normal      (..., 3), unit, either sense
 
     Exact.
@@ -76,7 +76,7 @@ def reflected(direction: ArrayLike, normal: ArrayLike) -> Array:
 
 
 def autocollimator_axes(alignment: ArrayLike) -> Array:
-    """Matrix (..., 3, 3) whose rows are the autocollimator's X, Y and optical axis c in mount axes.
+    """Autocollimator axes (..., 3, 3) in mount axes: rows X, Y, optical axis c.
 
     alignment   (..., 3), rad: lean of c towards +x^, towards +y^, and roll about it
 
@@ -88,7 +88,7 @@ def autocollimator_axes(alignment: ArrayLike) -> Array:
 
 
 def mirror_reading(normal: ArrayLike, beta: ArrayLike, alignment: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
-    """What the autocollimator reads (..., 2) off the mirror's face, x and y, rad of the beam.
+    """Reading (..., 2) off the mirror's face, x and y, rad of the beam.
 
     normal      (..., 3), of the face in mirror axes, as `face_normal` gives it
     beta        (..., 2), rad: beta1, beta2
@@ -107,7 +107,9 @@ def mirror_reading(normal: ArrayLike, beta: ArrayLike, alignment: ArrayLike = (0
 def flat_reading(
     normal: ArrayLike, beta: ArrayLike, alignment: ArrayLike = (0.0, 0.0, 0.0), *, flat: ArrayLike = (0.0, 0.0)
 ) -> Array:
-    """What it reads (..., 2), rad of the beam, off a flat that stands on the x^ axis, by way of the mirror.
+    """Reading (..., 2), rad of the beam, off a flat via the mirror.
+
+    The flat stands on the x^ axis.
 
     normal, beta, alignment   as for `mirror_reading`; the mirror stands near Theta = 0 and Phi = 90 degrees
     flat                      (..., 2), rad: lean of the flat's normal, which is -x^, towards +y^ and +z^

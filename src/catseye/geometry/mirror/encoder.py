@@ -1,4 +1,6 @@
-"""Beam angles and encoder counts of a mirror; 100 000 counts a turn, and the elevation turns the beam twice.
+"""Beam angles and encoder counts of a mirror.
+
+100 000 counts a turn; the elevation axis turns the beam twice as far.
 
 Theta is the beam's turn about the azimuth axis, Phi its angle from that axis; in mirror axes it leaves along
 u = (sin Phi cos Theta, sin Phi sin Theta, cos Phi).
@@ -15,13 +17,16 @@ from catseye.errors import ValidityError
 
 COUNTS_PER_TURN = 100_000.0
 HALF_TURN = 0.5 * COUNTS_PER_TURN
-COUNTS_PER_RADIAN = COUNTS_PER_TURN / TWO_PI  # of an axis; the beam's Phi counts half as much
+COUNTS_PER_RADIAN = COUNTS_PER_TURN / TWO_PI  # counts a turn of an axis; half for the beam's Phi
 BEAM_PER_COUNT = np.array([1.0, 2.0]) / COUNTS_PER_RADIAN  # rad of Theta and of Phi
 BEAM_PER_COUNT.flags.writeable = False
 
 
 class Choice(NamedTuple):
-    """Counts (..., 2), azimuth and elevation, within the stops (NaN where none are); `prime`, `allowed` (...) bool."""
+    """Counts (..., 2), azimuth and elevation, within the stops, with flags.
+
+    NaN where none are allowed; `prime`, `allowed` (...) bool.
+    """
 
     counts: NDArray[np.float64]
     prime: NDArray[np.bool_]
@@ -29,9 +34,9 @@ class Choice(NamedTuple):
 
 
 def wrapped(theta: ArrayLike) -> NDArray[np.float64]:
-    """The same direction as an angle (...) in [-pi/2, 3 pi/2), rad.
+    """Same direction as an angle (...) in [-pi/2, 3 pi/2).
 
-    theta    (...), rad, any
+    theta    (...), rad, any; the result is in rad
 
     Source: [PARKER04] eq. 2.19. Exact but for the rounding of 2 pi.
 
@@ -71,7 +76,7 @@ def elevation_counts(phi: ArrayLike, ne0: ArrayLike) -> NDArray[np.float64]:
 
 
 def autocollimation_counts(phi: ArrayLike, ne0: ArrayLike) -> NDArray[np.float64]:
-    """Elevation counts (...) at which the mirror's face looks where the beam would point at Phi.
+    """Elevation counts (...) for the mirror's face to look at Phi.
 
     phi, ne0    as for `elevation_counts`
 
@@ -84,7 +89,7 @@ def autocollimation_counts(phi: ArrayLike, ne0: ArrayLike) -> NDArray[np.float64
 
 
 def back_retro_counts(phi: ArrayLike, ne0: ArrayLike) -> NDArray[np.float64]:
-    """Elevation counts (...) at which the retroreflector in the mirror's back looks at Phi.
+    """Elevation counts (...) for the back retroreflector to look at Phi.
 
     phi, ne0    as for `elevation_counts`
 
@@ -97,7 +102,9 @@ def back_retro_counts(phi: ArrayLike, ne0: ArrayLike) -> NDArray[np.float64]:
 
 
 def azimuth_angle(na: ArrayLike, na0: ArrayLike) -> NDArray[np.float64]:
-    """Theta' (...), rad, of the mount at azimuth counts: the inverse of `azimuth_counts`, not wrapped.
+    """Mount angle Theta' (...), rad, at azimuth counts, not wrapped.
+
+    The inverse of `azimuth_counts`.
 
     >>> round(float(azimuth_angle(20805.0, -4195.0)), 6)
     1.570796
@@ -106,7 +113,9 @@ def azimuth_angle(na: ArrayLike, na0: ArrayLike) -> NDArray[np.float64]:
 
 
 def elevation_angle(ne: ArrayLike, ne0: ArrayLike) -> NDArray[np.float64]:
-    """Phi' (...), rad, of the beam at elevation counts: the inverse of `elevation_counts`; below zero in prime.
+    """Beam angle Phi' (...), rad, at elevation counts; below zero in prime.
+
+    The inverse of `elevation_counts`.
 
     >>> round(float(elevation_angle(7565.0, -4935.0)), 6)
     1.570796
@@ -115,7 +124,9 @@ def elevation_angle(ne: ArrayLike, ne0: ArrayLike) -> NDArray[np.float64]:
 
 
 def prime_counts(na: ArrayLike, ne: ArrayLike, ne0: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Azimuth and elevation counts (...) of the other setting of the mount that points the same.
+    """Counts (...) of the other setting that points the same.
+
+    Azimuth and elevation.
 
     na, ne    (...), counts of one setting
     ne0       (...), counts where Phi = 0
@@ -130,7 +141,9 @@ def prime_counts(na: ArrayLike, ne: ArrayLike, ne0: ArrayLike) -> tuple[NDArray[
 
 
 def within(na: ArrayLike, low: ArrayLike, high: ArrayLike) -> NDArray[np.bool_]:
-    """Whether azimuth counts (...) lie between the stops, both included; NaN does not.
+    """True where azimuth counts (...) lie between the stops, inclusive.
+
+    NaN does not.
 
     >>> within([-25.0, 0.0, 25.5], -25, 25).tolist()
     [True, True, False]
@@ -140,12 +153,14 @@ def within(na: ArrayLike, low: ArrayLike, high: ArrayLike) -> NDArray[np.bool_]:
 
 
 def turned_within(na: ArrayLike, low: ArrayLike, high: ArrayLike) -> NDArray[np.float64]:
-    """Azimuth counts (...) moved by whole turns to lie between the stops; as given where no turn brings them there.
+    """Azimuth counts (...) moved by whole turns to between the stops.
+
+    Unchanged where no turn brings them there.
 
     na           (...), counts
     low, high    (...), counts, the stops
 
-    Those that lie between the stops already stay; else it is the smallest move that does.
+    Counts between the stops are unchanged; otherwise the smallest move is taken.
 
     >>> turned_within([60_000.0, -60_000.0, 0.0], -50_000, 50_000).tolist()
     [-40000.0, 40000.0, 0.0]
@@ -165,14 +180,14 @@ def choice(
     current: ArrayLike | None = None,
     speeds: ArrayLike = (1.0, 1.0),
 ) -> Choice:
-    """Which of the two pointings to take: allowed by the stops and, from where the mirror stands, the sooner reached.
+    """Choice of pointing allowed by the stops and sooner reached.
 
     direct, prime   (..., 2), counts, azimuth and elevation; whole turns of azimuth are tried too
     low, high       (...), counts, the azimuth stops
-    current         (..., 2), counts where the mirror stands; without it the direct pointing wins where it is allowed
-    speeds          (2,), counts/s of the axes, above 0; both move at once, so that the later one decides
+    current         (..., 2), current counts; without it the direct pointing is preferred where allowed
+    speeds          (2,), counts/s of the axes, above 0; both move at once, so that the slower one decides
 
-    Where neither is allowed the answer is NaN and `allowed` False.
+    Where neither is allowed the result is NaN and `allowed` False.
 
     Source: [PARKER04] section 2.4: "checks must be made to ensure the allowed range of N_a".
 
@@ -198,7 +213,7 @@ def choice(
 
 
 def _turns(na: NDArray[np.float64], low: ArrayLike, high: ArrayLike, current: NDArray | None) -> NDArray[np.float64]:
-    """Azimuth counts on the allowed turn, the one nearest to `current` where there are several."""
+    """Azimuth counts on the allowed turn nearest to `current`."""
     first = turned_within(na, low, high)
     if current is None:
         return first

@@ -1,4 +1,4 @@
-"""The beam of a real mirror: its axes do not meet, its face and the laser's beam lean, its encoders are not centred.
+"""Beam of a mirror with offsets, tilts and encoder waves.
 
 The mount stands at (Theta', Phi'), the encoders' turn; in the prime pointing Phi' is below zero. Mirror axes, with
 h = (cos Theta', sin Theta', 0) and k = z x h = (-sin Theta', cos Theta', 0):
@@ -9,8 +9,8 @@ h = (cos Theta', sin Theta', 0) and k = z x h = (-sin Theta', cos Theta', 0):
     laser            through (x_b, y_b, 0), coming in along d = -(t_x, t_y, sqrt(1 - t_x^2 - t_y^2))
 
 and the beam leaves along u = d - 2 (d . m) m from where the laser meets the face. Without tilts this is the beam of
-`mirror_path`, whose way back to counts (`beam_angles`) knows no tilts; here it is found by aiming beside the target by
-as much as the beam misses it.
+`mirror_path`, whose inverse to counts (`beam_angles`) excludes tilts; here it is found by aiming off the target by
+the miss of the beam.
 """
 
 from dataclasses import dataclass
@@ -29,11 +29,12 @@ SETTLED = 2e-15  # of a direction
 
 @dataclass(frozen=True, eq=False)
 class Imperfections:
-    """What one mirror adds to the six transformations.
+    """Imperfections of one mirror, added to the six transformations.
 
     axes              (4,), m: axis offset e, mirror offset s, beam x, beam y, as in `mirror_path`
     tilts             (3,), rad: of the face towards k, of the incoming beam (x, y of the direction it comes from)
-    azimuth_waves     (2, n), counts: cosine and sine terms, orders 1 to n of Theta', of what the encoder reads too high
+    azimuth_waves     (2, n), counts: cosine and sine terms, orders 1 to n of Theta', of the encoder's error (positive
+                      too high)
     elevation_waves   (2, m), counts: the same of the elevation encoder, orders of the mirror's own turn Phi'/2
 
     Raises ValidityError for other shapes, and tilts of 0.1 rad and more.
@@ -56,17 +57,17 @@ class Imperfections:
 
     @property
     def matter(self) -> bool:
-        """Whether any of it differs from zero."""
+        """True if any imperfection differs from zero."""
         return any(np.any(part) for part in (self.axes, self.tilts, self.azimuth_waves, self.elevation_waves))
 
 
 def imperfect_ray(station: MirrorStation, imperfections: Imperfections, at_counts: ArrayLike) -> MirrorBeam:
-    """The beam at encoder counts: the point where it leaves the face, m, and its direction, both (..., 3), ground.
+    """Beam at encoder counts: origin on the face, m, and direction, (..., 3), ground.
 
     station      of batch shape that broadcasts with the counts'
     at_counts    (..., 2), azimuth and elevation, as read
 
-    Where the mount shows the laser its back the answer is what the face's plane would do.
+    Where the back of the mirror faces the laser the result is that of the face's plane.
 
     Source: derived above; [PARKER04] eq. 2.16 to 2.22 where all is zero. Exact, by reflection.
     """
@@ -85,15 +86,15 @@ def imperfect_counts(
     points     (..., 3), m, ground
     prime      (...), bool: by the other setting of the mount, half a turn of azimuth above the direct one
 
-    NaN where it was not found: so near to the azimuth axis that the tilts decide where the beam goes, straight behind
+    NaN without a solution: so near to the azimuth axis that the tilts decide where the beam goes, straight behind
     the mirror, or nearer than the beam is displaced.
 
-    Source: derived above. Settled to 2e-15 rad.
+    Source: derived above. Converged to 2e-15 rad.
     """
     target = in_mirror_axes(station, points)
-    wanted = target / np.linalg.norm(target, axis=-1, keepdims=True)
+    unit_target = target / np.linalg.norm(target, axis=-1, keepdims=True)
     sign = np.where(np.asarray(prime, dtype=bool), -1.0, 1.0)
-    toward, moved = wanted, np.full(wanted.shape[:-1], np.inf)
+    toward, moved = unit_target, np.full(unit_target.shape[:-1], np.inf)
     with np.errstate(invalid="ignore"):
         for _ in range(ITERATIONS):
             mount = _mount_of(toward, sign)
@@ -112,11 +113,13 @@ def imperfect_counts(
 def imperfect_face_counts(
     station: MirrorStation, imperfections: Imperfections, points: ArrayLike
 ) -> NDArray[np.float64]:
-    """Encoder counts (..., 2) at which the mirror's face looks at points: autocollimation, direct pointing.
+    """Encoder counts (..., 2) at which the face looks at points.
+
+    Autocollimation, direct pointing.
 
     station, points    as for `imperfect_counts`
 
-    The retroreflector in the mirror's back looks there half a turn of elevation further on, where the waves are others.
+    The retroreflector in the mirror's back looks there half a turn of elevation further on, where the waves differ.
 
     Source: [PARKER04] eq. 2.23 with the normal m above: m_z = cos(t) cos(Phi'/2) and m's turn about z solved. NaN
     within the face's tilt of the azimuth axis, where no setting looks.
@@ -136,7 +139,9 @@ def imperfect_face_counts(
 def imperfect_back_counts(
     station: MirrorStation, imperfections: Imperfections, face_counts: ArrayLike
 ) -> NDArray[np.float64]:
-    """Elevation counts (...) of the back retroreflector that looks where the face does at `face_counts` (..., 2).
+    """Elevation counts (...) of the back retroreflector from `face_counts` (..., 2).
+
+    It looks in the same direction as the face.
 
     Source: [PARKER04] eq. 2.24: half a turn of the mirror further.
     """
@@ -152,7 +157,7 @@ def _mount_of(direction: NDArray, sign: NDArray) -> NDArray:
 
 
 def _beam(mount: NDArray, imperfections: Imperfections) -> tuple[NDArray, NDArray]:
-    """Where the beam leaves the face, m, and its direction, in mirror axes."""
+    """Beam origin on the face, m, and direction, in mirror axes."""
     e, s, beam_x, beam_y = imperfections.axes
     face, tilt_x, tilt_y = imperfections.tilts
     turn, half = mount[..., 0], 0.5 * mount[..., 1]
@@ -171,7 +176,7 @@ def _beam(mount: NDArray, imperfections: Imperfections) -> tuple[NDArray, NDArra
 
 
 def _mount(station: MirrorStation, imperfections: Imperfections, at_counts: ArrayLike) -> NDArray:
-    """Theta', Phi' (..., 2), rad, of the mount from what its encoders read."""
+    """Theta', Phi' (..., 2), rad, of the mount from encoder readings."""
     n = np.asarray(at_counts, dtype=float)
     if n.shape[-1:] != (2,):
         raise ValidityError(f"counts have shape {n.shape}, expected (..., 2)")
@@ -188,7 +193,7 @@ def _mount(station: MirrorStation, imperfections: Imperfections, at_counts: Arra
 
 
 def _read(station: MirrorStation, imperfections: Imperfections, mount: NDArray) -> NDArray:
-    """Counts (..., 2) that the encoders read with the mount at Theta', Phi'."""
+    """Encoder readings (..., 2), counts, with the mount at Theta', Phi'."""
     turns = (mount[..., 0], 0.5 * mount[..., 1])
     waves = (imperfections.azimuth_waves, imperfections.elevation_waves)
     return np.stack(
@@ -203,7 +208,7 @@ def _read(station: MirrorStation, imperfections: Imperfections, mount: NDArray) 
 
 
 def _wave(turn: NDArray, waves: NDArray) -> NDArray:
-    """Counts read too high at an axis's turn."""
+    """Encoder error, counts, positive too high, at an axis's turn."""
     order = np.arange(1, waves.shape[1] + 1)
     angle = turn[..., None] * order
     return np.cos(angle) @ waves[0] + np.sin(angle) @ waves[1]

@@ -1,4 +1,6 @@
-"""The change of range where the mirror's two axes and the laser beam do not meet in one point.
+"""Change of range from offsets of mirror axes and beam.
+
+The two axes and the beam do not meet in one point.
 
 Mirror axes as in section 2.2 of the notes: origin O at the scan point, the foot on the azimuth axis of the
 perpendicular that it shares with the elevation axis; z along the azimuth axis towards laser and detector. The beam
@@ -12,23 +14,23 @@ Four offsets, metres, in this order:
     beam x, beam y   of the incoming beam from the azimuth axis; these axes do not turn
 
 The mount stands at Theta' = Theta and Phi' = Phi in the direct pointing, at Theta' = Theta + pi and Phi' = -Phi in the
-prime pointing: both give the same u and m, but h turns round, so that e changes its sign and s and the beam do not.
+prime pointing: both give the same u and m, but h is reversed, so that e changes its sign and s and the beam do not.
 
 The face lies in m.x = c, c = s + e sin(Phi'/2). The image of O in it is 2 c m, which for a beam along z shortens the
-way by 2 c m_z = 2 c cos(Phi/2), and moves the outgoing beam off O across by
+path by 2 c m_z = 2 c cos(Phi/2), and moves the outgoing beam off O across by
     w = (beam.h - 2 c sin(Phi'/2)) along increasing Phi',  beam.k along increasing Theta' (k = z x h).
-The middle of the beam meets a target at the distance R from O at the length sqrt(R^2 - w^2) along the beam. The way
+The middle of the beam meets a target at the distance R from O at the length sqrt(R^2 - w^2) along the beam. The path
 from any plane across the incoming beam is hence, apart from a constant and exactly, longer than R by
 
     sqrt(R^2 - w^2) - R - 2 c cos(Phi/2)   =   -(2 s cos(Phi/2) + e sin(Phi')) - w^2 / 2R + ...
 
-The way back is the same, whatever the retroreflector moves it aside: the wave is plane. So this is the change of range.
-What it takes for granted: the beam is parallel to the azimuth axis and its middle is on the target (a peaked return).
+The return path is the same for any sideways shift by the retroreflector: the wave is plane. So this is the change of
+range. Assumptions: the beam is parallel to the azimuth axis and its middle is on the target (a peaked return).
 
 The notes say (section 2.4) that the autocollimation distance differs between direct and prime pointing by twice the
 offset of the mirror from the mechanical axis. That holds for the elevation axis off the azimuth axis, times sin Phi;
-the face off the elevation axis (s) shows in neither, since both pointings turn the same face to the same side. What
-they say of the back retroreflector, that it shows the offset of the two axes, is right.
+the face off the elevation axis (s) shows in neither, since both pointings turn the same face to the same side. Their
+statement that the back retroreflector shows the offset of the two axes is right.
 """
 
 import numpy as np
@@ -37,12 +39,12 @@ from numpy.typing import ArrayLike, NDArray
 from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
 
-ITERATIONS = 60  # of `beam_angles`; each gains a factor of some R / 2c
+ITERATIONS = 60  # rounds of `beam_angles`; each gains a factor of some R / 2c
 SETTLED = 1e-14  # m/m
 
 
 def direction_angles(vector: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Theta (...) in [-pi/2, 3 pi/2) and Phi (...) in [0, pi], rad, of vectors in mirror axes.
+    """Theta (...) in [-pi/2, 3 pi/2) and Phi (...) in [0, pi], rad, in mirror axes.
 
     vector    (..., 3), any unit, not null
 
@@ -60,14 +62,14 @@ def direction_angles(vector: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np
 def path_change(
     theta: ArrayLike, phi: ArrayLike, distance: ArrayLike, offsets: ArrayLike, *, prime: ArrayLike = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """How much longer the range reads than the distance from the scan point (...), m, and its derivatives (..., 4).
+    """Range less distance from the scan point (...), m, and derivatives (..., 4).
 
     theta, phi   (...), rad: angles of the outgoing beam; Phi 0 to pi (a mount's own angle Phi' below 0 is prime)
     distance     (...), m: straight from the scan point to the target, above the beam's displacement there
     offsets      (..., 4), m: axis, mirror, beam x, beam y
     prime        (...), bool: the mount stands at (Theta + pi, -Phi)
 
-    The derivatives are by the four offsets, of a beam held where it points. Raises ValidityError where the beam passes
+    The derivatives are by the four offsets, at a fixed beam direction. Raises ValidityError where the beam passes
     the scan point further off than the target.
 
     Source: [PARKER04] section 5.3 names the effect (d_l, d_d, D_i), eq. 2.16-2.18, 2.25 and 2.26 the angles; the
@@ -87,7 +89,7 @@ def path_change(
     w1 = beam_x * along + beam_y * across - 2.0 * c * sine
     w2 = beam_y * along - beam_x * across
     w_squared = w1**2 + w2**2
-    clear = ~(r**2 <= w_squared)  # NaN answers NaN
+    clear = ~(r**2 <= w_squared)  # NaN gives NaN
     if not np.all(clear):
         first = np.unravel_index(np.argmin(clear), clear.shape)
         near, off = (float(np.broadcast_to(v, clear.shape)[first]) for v in (r, np.sqrt(w_squared)))
@@ -108,15 +110,17 @@ def path_change(
 def beam_angles(
     target: ArrayLike, offsets: ArrayLike, *, prime: ArrayLike = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Theta and Phi (...), rad, of the outgoing beam whose middle meets a target, as for `path_change`.
+    """Theta and Phi (...), rad, of the outgoing beam that meets a target.
+
+    As for `path_change`.
 
     target     (..., 3), m, mirror axes
     offsets    (..., 4), m: axis, mirror, beam x, beam y
     prime      (...), bool: the mount stands at (Theta + pi, -Phi)
 
-    Without offsets these are the target's own angles. They are found by turning the beam until it passes where the
-    target is. NaN after 60 turns: a target nearer than the beam is displaced, or so near to Phi = pi, straight behind
-    the mirror, that the grazing beam passes it on all sides.
+    Without offsets these are the target's own angles. They are found by turning the beam until it passes
+    through the target. NaN after 60 turns: a target nearer than the beam is displaced, or so near to Phi = pi, straight
+    behind the mirror, that the grazing beam passes it on all sides.
 
     Source: [PARKER04] eq. 2.13-2.18 and the displacement derived above. To 1e-14 rad.
 
@@ -133,7 +137,7 @@ def beam_angles(
             (sin_t, cos_t), (sin_p, cos_p) = (np.sin(theta), np.cos(theta)), (np.sin(phi), np.cos(phi))
             up = np.stack([cos_p * cos_t, cos_p * sin_t, -sin_p], axis=-1)
             aside = np.stack([-sin_t, cos_t, np.zeros_like(sin_t)], axis=-1)
-            sine = np.sin(0.5 * phi)  # in prime, h, the sine and the direction of w1 all turn round: twice over
+            sine = np.sin(0.5 * phi)  # in prime, h, the sine and the direction of w1 all change sign
             w1 = beam_x * cos_t + beam_y * sin_t - 2.0 * (s + sign * e * sine) * sine
             w2 = beam_y * cos_t - beam_x * sin_t
             along = at - w1[..., None] * up - w2[..., None] * aside
@@ -147,7 +151,9 @@ def beam_angles(
 
 
 def axis_offset(direct: ArrayLike, prime: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
-    """Offset (...), m, of the elevation axis from the azimuth axis, from distances measured to the mirror itself.
+    """Offset (...), m, of the elevation axis, from distances to the mirror.
+
+    It is the offset from the azimuth axis.
 
     direct, prime   (...), m: from afar to the face at autocollimation, or to the back retroreflector, both pointings
     phi             (...), rad: angle of the line of sight from the azimuth axis, in which the face (or back) looks

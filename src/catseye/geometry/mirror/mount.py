@@ -1,4 +1,4 @@
-"""A ranger on its Kelvin mount: from ground axes to mount axes to mirror axes, and the scan point.
+"""Ranger on its Kelvin mount: axes and scan point.
 
 Mount axes: z from the fixed point to the v-block, y the normal of the mount's plane (up), x completing the right hand.
 """
@@ -14,7 +14,7 @@ P.flags.writeable = False
 
 
 def gamma(alpha1: ArrayLike, alpha2: ArrayLike, alpha3: ArrayLike) -> NDArray[np.float64]:
-    """Matrix (..., 3, 3) that gives mount coordinates of ground vectors.
+    """Matrix (..., 3, 3) from ground to mount coordinates.
 
     alpha1    rad, any: pi minus the survey azimuth of the line fixed point to v-block
     alpha2    rad, small: tip of the mount about its z axis
@@ -30,7 +30,7 @@ def gamma(alpha1: ArrayLike, alpha2: ArrayLike, alpha3: ArrayLike) -> NDArray[np
 
 
 def lambda_(beta1: ArrayLike, beta2: ArrayLike) -> NDArray[np.float64]:
-    """Matrix (..., 3, 3) that gives mirror coordinates of mount vectors.
+    """Matrix (..., 3, 3) from mount to mirror coordinates.
 
     beta1    rad, small: turn about the mount's x axis (theta in some reports)
     beta2    rad, small: turn about the mount's y axis (phi in some reports)
@@ -44,7 +44,9 @@ def lambda_(beta1: ArrayLike, beta2: ArrayLike) -> NDArray[np.float64]:
 
 
 def scan_point(fixed_point: ArrayLike, gamma_matrix: ArrayLike, mirror_offset: ArrayLike) -> NDArray[np.float64]:
-    """Scan point of a ranger, where its two mirror axes meet, in ground coordinates (..., 3) in metres.
+    """Scan point of a ranger, ground coordinates (..., 3), m.
+
+    Its two mirror axes meet there.
 
     fixed_point      (..., 3), m, ground: centre of the Kelvin mount's tooling ball
     gamma_matrix     (..., 3, 3), from `gamma`
@@ -60,11 +62,11 @@ def scan_point(fixed_point: ArrayLike, gamma_matrix: ArrayLike, mirror_offset: A
 
 
 def mount_angles(gamma_matrix: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """alpha1 (...), alpha2 (...) in [-pi/2, pi/2] and alpha3 (...), rad, of a mount however it is turned.
+    """Angles alpha1, alpha2 in [-pi/2, pi/2], alpha3 (...), rad, of any mount.
 
     gamma_matrix    (..., 3, 3), ground to mount axes, orthonormal
 
-    Source: [PARKER04] eq. 2.5 solved; the factors are taken off one by one, so that `gamma` of the answer is the matrix
+    Source: [PARKER04] eq. 2.5 solved; the factors are removed one by one, so that `gamma` of the result is the matrix
     to 1e-15 also where alpha2 is a quarter turn and the other two angles turn about one axis.
 
     >>> [round(float(a), 9) for a in mount_angles(gamma(1.008848, -0.000024, 0.000145))]

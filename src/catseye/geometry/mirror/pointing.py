@@ -1,4 +1,4 @@
-"""The six transformations: from a point in the ground frame to encoder counts, and from counts to a ray.
+"""Six transformations: ground point to encoder counts, and back.
 
     1  R - R_i            off the Kelvin mount's fixed point
     2  gamma              into the mount's axes
@@ -7,8 +7,8 @@
     5  range, Theta, Phi  spherical
     6  N_a, N_e           encoder counts
 
-1 to 4 are mirror = lambda gamma (R - S) with the scan point S = R_i + gamma^T (dx, dy, dz): one turn and one shift, in
-which no digits are lost for points near by. This is the mirror as it should be; `imperfect` has what real ones add.
+1 to 4 are mirror = lambda gamma (R - S) with the scan point S = R_i + gamma^T (dx, dy, dz): one turn and one shift,
+without loss of precision for near points. This is the ideal mirror; `imperfect` adds the errors of real ones.
 """
 
 from dataclasses import dataclass
@@ -32,12 +32,12 @@ from catseye.geometry.mirror.mount import gamma, lambda_, mount_angles, scan_poi
 
 PARAMETERS = ("x", "y", "z", "alpha1", "alpha2", "alpha3", "dx", "dy", "dz", "beta1", "beta2", "na0", "ne0")
 SIZES = {"fixed_point": 3, "alpha": 3, "offset": 3, "beta": 2, "zeros": 2}
-COMPILED_FROM = 1_000_000  # points: loading numba takes longer than the plain form for these
+COMPILED_FROM = 1_000_000  # points: for fewer, loading numba takes longer than the plain form
 
 
 @dataclass(frozen=True, eq=False)
 class MirrorStation:
-    """One or many mirrors on their monuments: 13 numbers each, `PARAMETERS` in this order.
+    """Mirrors on their monuments: 13 numbers each, ordered as `PARAMETERS`.
 
     fixed_point    (..., 3), m, ground: centre of the Kelvin mount's tooling ball
     alpha          (..., 3), rad: alpha1, alpha2, alpha3
@@ -47,7 +47,7 @@ class MirrorStation:
 
     Its batch shape broadcasts against that of points and counts: `station[:, None]` of 18 and 1000 points make 18 x
     1000.
-    Raises ValidityError for a shape that does not end so, or a number that is not finite.
+    Raises ValidityError for a shape with other last axes, or a number that is not finite.
 
     Source: [PARKER04] section 2.2.
 
@@ -76,7 +76,10 @@ class MirrorStation:
     def from_matrix(
         cls, point: ArrayLike, gamma_matrix: ArrayLike, *, offset: ArrayLike, beta: ArrayLike, zeros: ArrayLike
     ) -> "MirrorStation":
-        """Of the scan point (..., 3), m, and gamma (..., 3, 3) of a mount turned anyhow, as on the feed arm."""
+        """Station from scan point (..., 3), m, and gamma (..., 3, 3), as on the feed arm.
+
+        The mount may have any orientation.
+        """
         g = np.asarray(gamma_matrix, dtype=float)
         away = np.einsum("...ji,...j->...i", g, np.asarray(offset, dtype=float))
         return cls(
@@ -94,48 +97,48 @@ class MirrorStation:
 
     @property
     def parameters(self) -> NDArray[np.float64]:
-        """(..., 13) in the order of `PARAMETERS`."""
+        """Parameters (..., 13) in the order of `PARAMETERS`."""
         parts = [np.broadcast_to(getattr(self, name), (*self.shape, size)) for name, size in SIZES.items()]
         return np.concatenate(parts, axis=-1)
 
     @classmethod
     def of_parameters(cls, parameters: ArrayLike) -> "MirrorStation":
-        """The station whose `parameters` (..., 13) these are."""
+        """Station with given `parameters` (..., 13)."""
         values = np.asarray(parameters, dtype=float)
         if values.shape[-1:] != (len(PARAMETERS),):
             raise ValidityError(f"parameters of a station have shape {values.shape}, expected (..., {len(PARAMETERS)})")
         return cls(*np.split(values, np.cumsum(list(SIZES.values()))[:-1], axis=-1))
 
     def __getitem__(self, index: object) -> "MirrorStation":
-        """Stations of the batch, or new axes in it, as numpy's indices do it."""
-        whole = self.parameters
+        """Index the batch of stations, as numpy does."""
+        table = self.parameters
         return MirrorStation.of_parameters(
-            whole[(*index, slice(None)) if isinstance(index, tuple) else (index, slice(None))]
+            table[(*index, slice(None)) if isinstance(index, tuple) else (index, slice(None))]
         )
 
     @cached_property
     def gamma(self) -> NDArray[np.float64]:
-        """(..., 3, 3): mount coordinates of ground vectors."""
+        """Matrix (..., 3, 3) from ground to mount coordinates."""
         return gamma(*np.moveaxis(self.alpha, -1, 0))
 
     @cached_property
     def lambda_(self) -> NDArray[np.float64]:
-        """(..., 3, 3): mirror coordinates of mount vectors."""
+        """Matrix (..., 3, 3) from mount to mirror coordinates."""
         return lambda_(*np.moveaxis(self.beta, -1, 0))
 
     @cached_property
     def mirror_from_ground(self) -> NDArray[np.float64]:
-        """(..., 3, 3): mirror coordinates of ground vectors, eq. 2.47."""
+        """Matrix (..., 3, 3) from ground to mirror coordinates, eq. 2.47."""
         return self.lambda_ @ self.gamma
 
     @cached_property
     def scan_point(self) -> NDArray[np.float64]:
-        """The scan points in the ground frame, (..., 3) m."""
+        """Scan points in the ground frame, (..., 3) m."""
         return scan_point(self.fixed_point, self.gamma, self.offset)
 
 
 class Aim(NamedTuple):
-    """Where a mirror looks for a point, each (...): m from the scan point, rad, rad, counts, counts."""
+    """Range (m), beam angles (rad) and counts of a point, each (...)."""
 
     range: NDArray[np.float64]
     theta: NDArray[np.float64]
@@ -145,14 +148,14 @@ class Aim(NamedTuple):
 
 
 class MirrorBeam(NamedTuple):
-    """A beam: the scan point (..., 3), m, and its unit direction (..., 3), both ground."""
+    """Beam: scan point (..., 3), m, and unit direction (..., 3), ground."""
 
     origin: NDArray[np.float64]
     direction: NDArray[np.float64]
 
 
 def in_mirror_axes(station: MirrorStation, points: ArrayLike) -> NDArray[np.float64]:
-    """Points (..., 3), m, ground, in the mirror's axes, from the scan point.
+    """Mirror coordinates of ground points (..., 3), m, from the scan point.
 
     Source: [PARKER04] eq. 2.12. Exact.
     """
@@ -162,7 +165,7 @@ def in_mirror_axes(station: MirrorStation, points: ArrayLike) -> NDArray[np.floa
 
 
 def aim(station: MirrorStation, points: ArrayLike) -> Aim:
-    """Range, beam angles and encoder counts for points, in the direct pointing.
+    """Range, beam angles and encoder counts for points, direct pointing.
 
     station    of batch shape that broadcasts with the points'
     points     (..., 3), m, ground
@@ -192,27 +195,30 @@ def counts(
     compiled: bool | None = None,
     out: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
-    """Encoder counts (..., 2), azimuth and elevation, for points in the direct pointing, as `aim` gives them.
+    """Encoder counts (..., 2), azimuth and elevation, for points, direct pointing.
+
+    The same as from `aim`.
 
     station, points    as for `aim`
-    compiled           by the kernel, equal within 1e-9 counts; None for a million or more, every station to every point
-    out                (..., 2), where to put them and what is returned; new memory if None
+    compiled           True for the kernel, equal within 1e-9 counts; None: for a million or more, every station to
+                       every point
+    out                (..., 2), destination, which is returned; new memory if None
 
-    Raises ValidityError where the kernel is asked for stations and points that go in pairs, and for an `out` of another
+    Raises ValidityError where the kernel is requested for stations and points in pairs, and for an `out` of another
     shape or kind.
     """
     at = np.asarray(points, dtype=float)
     shape = (*np.broadcast_shapes(station.shape, at.shape[:-1]), 2)
-    each = _stations_by_points(station.shape, at.shape[:-1])
-    if compiled and not each:
+    crossed = _stations_by_points(station.shape, at.shape[:-1])
+    if compiled and not crossed:
         raise ValidityError(
-            f"stations {station.shape} and points {at.shape} go in pairs, which the kernel does not do (expected every "
+            f"stations {station.shape} and points {at.shape} are in pairs, which the kernel refuses (expected every "
             "station to every point, stations in front)"
         )
     if out is not None and (out.shape != shape or out.dtype != float or not out.flags.c_contiguous):
         raise ValidityError(f"out has shape {out.shape} and type {out.dtype}, expected {shape}, float64, contiguous")
     answer = np.empty(shape) if out is None else out
-    if each and (compiled or (compiled is None and answer.size // 2 >= COMPILED_FROM)):
+    if crossed and (compiled or (compiled is None and answer.size // 2 >= COMPILED_FROM)):
         from catseye.geometry.mirror.pointing_kernel import stations_by_points
 
         _refuse_points(at)
@@ -231,7 +237,7 @@ def counts(
 
 
 def _table(part: NDArray[np.float64], batch: tuple[int, ...], tail: tuple[int, ...]) -> NDArray[np.float64]:
-    """One row a station, in memory."""
+    """One row a station, in contiguous memory."""
     return np.ascontiguousarray(np.broadcast_to(part, (*batch, *tail)).reshape(-1, *tail))
 
 
@@ -241,7 +247,7 @@ def _refuse_points(at: NDArray[np.float64]) -> None:
 
 
 def _stations_by_points(stations: tuple[int, ...], points: tuple[int, ...]) -> bool:
-    """Whether every station meets every point, stations in the outer axes."""
+    """True if every station meets every point, stations in the outer axes."""
     depth = max(len(stations), len(points))
     s, p = ((1,) * (depth - len(shape)) + shape for shape in (stations, points))
     outer = [i for i in range(depth) if s[i] != 1]
@@ -250,7 +256,7 @@ def _stations_by_points(stations: tuple[int, ...], points: tuple[int, ...]) -> b
 
 
 def ray(station: MirrorStation, at_counts: ArrayLike) -> MirrorBeam:
-    """The beam at encoder counts, direct or prime pointing.
+    """Beam at encoder counts, direct or prime pointing.
 
     station      of batch shape that broadcasts with the counts'
     at_counts    (..., 2), azimuth and elevation; any turn
@@ -267,7 +273,7 @@ def ray(station: MirrorStation, at_counts: ArrayLike) -> MirrorBeam:
 
 
 def beam(station: MirrorStation, at_counts: ArrayLike) -> NDArray[np.float64]:
-    """Unit direction (..., 3) of the beam in mirror axes at encoder counts (..., 2); eq. 2.16 to 2.18."""
+    """Unit direction (..., 3) of the beam in mirror axes at counts (..., 2); eq. 2.16 to 2.18."""
     n = np.asarray(at_counts, dtype=float)
     if n.shape[-1:] != (2,):
         raise ValidityError(f"counts have shape {n.shape}, expected (..., 2)")
@@ -278,7 +284,7 @@ def beam(station: MirrorStation, at_counts: ArrayLike) -> NDArray[np.float64]:
 
 
 def counts_jacobian(station: MirrorStation, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Derivatives of the counts by the points (..., 2, 3), counts/m, and by the stations' parameters (..., 2, 13).
+    """Derivatives of counts by points (..., 2, 3), counts/m, and parameters (..., 2, 13).
 
     station, points    as for `aim`
 
@@ -312,7 +318,9 @@ def counts_jacobian(station: MirrorStation, points: ArrayLike) -> tuple[NDArray[
 def ray_jacobian(
     station: MirrorStation, at_counts: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Derivatives of a beam's direction by counts (..., 3, 2) and by parameters (..., 3, 13), of its origin by these.
+    """Derivatives of a beam's direction and origin.
+
+    Direction by counts (..., 3, 2) and parameters (..., 3, 13), origin by parameters (..., 3, 13).
 
     station, at_counts    as for `ray`
 
@@ -333,8 +341,8 @@ def ray_jacobian(
     in_mount = np.einsum("...ji,...j->...i", station.lambda_, u)
     by_alpha = mount_to_ground @ np.swapaxes(np.cross(about_mount, in_mount[..., None, :]), -1, -2)
     by_beta = to_ground @ np.swapaxes(np.cross(about_mirror, u[..., None, :]), -1, -2)
-    nothing = np.zeros((*by_counts.shape[:-1], 3))
-    direction = np.concatenate([nothing, by_alpha, nothing, by_beta, -by_counts], axis=-1)
+    zeros = np.zeros((*by_counts.shape[:-1], 3))
+    direction = np.concatenate([zeros, by_alpha, zeros, by_beta, -by_counts], axis=-1)
     origin_by_alpha = mount_to_ground @ np.swapaxes(np.cross(about_mount, station.offset[..., None, :]), -1, -2)
     shape = direction.shape[:-2]
     parts = (np.eye(3), origin_by_alpha, mount_to_ground, np.zeros((3, 4)))
@@ -363,7 +371,9 @@ def counts_covariance(
 def ray_covariance(
     station: MirrorStation, at_counts: ArrayLike, *, of_station: ArrayLike, of_counts: ArrayLike | None = None
 ) -> NDArray[np.float64]:
-    """Covariance (..., 6, 6) of a beam's origin, m, and of its direction, rad, ground axes, in this order.
+    """Covariance (..., 6, 6) of beam origin, m, and direction, rad.
+
+    Ground axes, in this order.
 
     station, at_counts   as for `ray`
     of_station           (..., 13, 13), of `PARAMETERS`, in their units
@@ -375,16 +385,18 @@ def ray_covariance(
     slopes = np.concatenate([origin, direction], axis=-2)
     answer = slopes @ np.asarray(of_station, dtype=float) @ np.swapaxes(slopes, -1, -2)
     if of_counts is not None:
-        nothing = np.zeros_like(by_counts)
-        read = np.concatenate([nothing, by_counts], axis=-2)
+        zeros = np.zeros_like(by_counts)
+        read = np.concatenate([zeros, by_counts], axis=-2)
         answer = answer + read @ np.asarray(of_counts, dtype=float) @ np.swapaxes(read, -1, -2)
     return answer
 
 
 def _turning_axes(station: MirrorStation) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Axes, a row each, about which alpha1..3 turn the mount's axes (..., 3, 3) and beta1, 2 the mirror's (..., 2, 3).
+    """Axes of turns: alpha1..3 for the mount's (..., 3, 3), beta1, 2 for the mirror's (..., 2, 3).
 
-    gamma = Rx(alpha3) Rz(alpha2) Ry(alpha1) P: a factor's own axis, turned by the factors that come after it.
+    One a row.
+
+    gamma = Rx(alpha3) Rz(alpha2) Ry(alpha1) P: a factor's axis, turned by the later factors.
     """
     tip = rx(station.alpha[..., 2])
     first = (tip @ rz(station.alpha[..., 1]))[..., :, 1]

@@ -1,4 +1,6 @@
-"""The compiled form of `pointing.counts`: every station to every point, blocks of points that stay in the first cache.
+"""Compiled form of `pointing.counts`: every station to every point.
+
+Blocks of points fit the first-level cache.
 
 Arctangents are a polynomial without branches, so that a whole vector register of points goes through at once; the plain
 form in `pointing` is its test. Import it only when a problem is large.
@@ -18,7 +20,7 @@ from numba import njit
 LANES = 128  # points a block
 MOST_THREADS = 4
 EIGHTH = math.tan(math.pi / 8.0)
-QUARTER, HALF, WHOLE = math.pi / 4.0, math.pi / 2.0, math.pi
+EIGHTH_TURN, QUARTER_TURN, HALF_TURN = math.pi / 4.0, math.pi / 2.0, math.pi
 AZIMUTH, ELEVATION = 1e5 / (2.0 * math.pi), 1e5 / (4.0 * math.pi)  # counts a radian of Theta and of Phi
 Q = (
     0.999999999999999,
@@ -40,7 +42,7 @@ _inlined = njit(error_model="numpy", fastmath={"contract"})
 
 @_inlined
 def _eighth(s):
-    """atan(t)/t of s = t^2, |t| <= tan(pi/8)."""
+    """Value atan(t)/t of s = t^2, |t| <= tan(pi/8)."""
     q = Q9
     q = q * s + Q8
     q = q * s + Q7
@@ -81,13 +83,13 @@ def _fill(matrix, origin, zeros, points, counts):
                 base1 = base1 if base1 > 0.0 else 1.0  # on the azimuth axis Theta is 0; in the scan point all is NaN
                 over = 1.0 / (base1 * base2)
                 t1, t2 = top1 * base2 * over, top2 * base1 * over
-                theta = t1 * _eighth(t1 * t1) + (QUARTER if far1 else 0.0)
-                phi = t2 * _eighth(t2 * t2) + (QUARTER if far2 else 0.0)
-                theta = HALF - theta if side > front else theta
-                phi = HALF - phi if across > along else phi
+                theta = t1 * _eighth(t1 * t1) + (EIGHTH_TURN if far1 else 0.0)
+                phi = t2 * _eighth(t2 * t2) + (EIGHTH_TURN if far2 else 0.0)
+                theta = QUARTER_TURN - theta if side > front else theta
+                phi = QUARTER_TURN - phi if across > along else phi
                 theta = -theta if v < 0.0 else theta
-                theta = WHOLE - theta if u < 0.0 else theta  # in [-pi/2, 3 pi/2) without more ado
-                phi = WHOLE - phi if w < 0.0 else phi
+                theta = HALF_TURN - theta if u < 0.0 else theta  # already in [-pi/2, 3 pi/2)
+                phi = HALF_TURN - phi if w < 0.0 else phi
                 azimuth[j] = theta * AZIMUTH + na0
                 elevation[j] = phi * ELEVATION + ne0
             for j in range(lanes):
@@ -98,8 +100,9 @@ def _fill(matrix, origin, zeros, points, counts):
 def stations_by_points(
     matrix: np.ndarray, origin: np.ndarray, zeros: np.ndarray, points: np.ndarray, counts: np.ndarray
 ) -> None:
-    """Fill counts (s, n, 2), azimuth and elevation, of n points (n, 3), m, ground, for s stations.
+    """Fill counts (s, n, 2), azimuth and elevation, for s stations, n points.
 
+    points    (n, 3), m, ground
     matrix    (s, 3, 3), ground to mirror axes
     origin    (s, 3), m, the scan points
     zeros     (s, 2), counts: na0, ne0

@@ -1,7 +1,9 @@
-"""Search patterns about a pointing: a raster in whole counts and a spiral, without gaps for a beam of a given width.
+"""Search patterns in whole counts, raster and spiral, without gaps.
+
+They suit a beam of a given width.
 
 On the sky a count of azimuth is 12.96" times sin Phi wide and one of elevation 25.92" high (12.96" of the mirror). A
-place of the sky is covered when some place of the pattern is within `reach` of it: the angle off the beam's axis at
+place of the sky is covered when a place of the pattern is within `reach` of it: the angle off the beam's axis at
 which a retroreflector still returns enough. Offsets are (x, y) in rad from the centre, x along increasing azimuth, y
 along increasing Phi', on the sphere along great circles from the centre.
 """
@@ -24,10 +26,10 @@ from catseye.geometry.mirror.encoder import (
 from catseye.geometry.mirror.mirror_path import direction_angles
 
 Array = NDArray[np.float64]
-PITCH_OVER_REACH = 1.35  # of the spiral; sqrt(2) where turns are straight, less for its bend near the centre
+PITCH_OVER_REACH = 1.35  # pitch of the spiral; sqrt(2) for straight turns, less for the curvature near the centre
 HALF_DIAGONAL = 0.5 * float(np.hypot(*BEAM_PER_COUNT))  # rad, of a count at sin Phi = 1, where it is largest
 LEAST_REACH = 1.5 * HALF_DIAGONAL  # rad, of a spiral that is rounded to whole counts
-MOST_PLACES = 2_000_000  # of one pattern
+MOST_PLACES = 2_000_000  # places of one pattern
 SIDE, ONES = np.linspace(-1.0, 1.0, 65), np.ones(65)
 EDGE = np.stack(  # of a square of half width 1
     [np.concatenate([SIDE, SIDE, ONES, -ONES]), np.concatenate([ONES, -ONES, SIDE, SIDE])], axis=-1
@@ -36,11 +38,11 @@ EDGE = np.stack(  # of a square of half width 1
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """Places to look at, in order.
+    """Places of a search, in order.
 
     counts     (n, 2) whole counts (Na, Ne), within the stops
     offsets    (n, 2) rad, of these counts, from the centre
-    left_out   how many places of the pattern lie beyond the stops
+    left_out   number of places beyond the stops
     """
 
     counts: Array
@@ -52,7 +54,7 @@ class Pattern:
 
 
 def count_size(centre: ArrayLike, zeros: ArrayLike) -> Array:
-    """Size (2,), rad on the sky, of a count of azimuth and of elevation at a pointing.
+    """Size (2,), rad on the sky, of a count of azimuth and elevation.
 
     centre    (2,) counts (Na, Ne)
     zeros     (2,) counts (na0, ne0)
@@ -67,14 +69,16 @@ def count_size(centre: ArrayLike, zeros: ArrayLike) -> Array:
 
 
 def spiral_offsets(radius: float, reach: float) -> Array:
-    """Places (n, 2), rad, of an Archimedean spiral with constant steps along its arc that covers a disc.
+    """Places (n, 2), rad, of an Archimedean spiral that covers a disc.
+
+    Steps along its arc are constant.
 
     radius    rad, 0 or more: every place within it of the centre is covered
-    reach     rad, above 0: how far from a place of the pattern is covered
+    reach     rad, above 0: radius covered about a place of the pattern
 
     Turns are as far apart as steps along the arc.
 
-    Source: geometry; that nothing is left out for this pitch is found by a dense check (2.3 % to spare), not proven.
+    Source: geometry; full coverage for this pitch is checked densely (2.3 % to spare), not proven.
 
     >>> len(spiral_offsets(0.0, 1e-4)), len(spiral_offsets(1e-3, 1e-4))
     (1, 198)
@@ -100,7 +104,7 @@ def spiral_offsets(radius: float, reach: float) -> Array:
 def raster(
     centre: ArrayLike, zeros: ArrayLike, half_width: ArrayLike, *, reach: float, limits: tuple[float, float]
 ) -> Pattern:
-    """Rows of whole counts, there and back, that cover a rectangle.
+    """Raster of whole counts, alternating rows, that covers a rectangle.
 
     centre       (2,) counts (Na, Ne), real, direct or prime
     zeros        (2,) counts (na0, ne0)
@@ -110,8 +114,8 @@ def raster(
 
     The steps of rows and columns are the whole counts with the largest area whose half diagonal is within reach. The
     size of an azimuth count is taken where it is largest in the rectangle; rows and columns reach as far as the counts
-    of the rectangle's own edge, which is no rectangle in counts. A rectangle that reaches the azimuth axis is refused
-    (a spiral serves there).
+    of the rectangle's own edge, which is not a rectangle in counts. A rectangle that reaches the azimuth axis is
+    refused (use a spiral there).
 
     Source: geometry. No gap, rounding included: the places are whole counts.
     """
@@ -131,27 +135,27 @@ def raster(
     size = BEAM_PER_COUNT * np.array([float(across.max()), 1.0])
     step = _whole_steps(size, reach)
     around = counts_of_offsets(middle, zero, half * EDGE) - np.rint(middle)
-    before = np.maximum(np.ceil(-around.min(axis=0) / step - 0.5), 0.0)
-    behind = np.maximum(np.ceil(around.max(axis=0) / step - 0.5), 0.0)
-    _refuse_many(float(np.prod(before + behind + 1.0)), "a raster")
-    columns = np.rint(middle[0]) + step[0] * np.arange(-before[0], behind[0] + 1.0)
-    rows = np.rint(middle[1]) + step[1] * np.arange(-before[1], behind[1] + 1.0)
-    there = np.tile(columns, (len(rows), 1))
-    there[1::2] = there[1::2, ::-1]
-    counts = np.stack([there.ravel(), np.repeat(rows, len(columns))], axis=-1)
+    low_steps = np.maximum(np.ceil(-around.min(axis=0) / step - 0.5), 0.0)
+    high_steps = np.maximum(np.ceil(around.max(axis=0) / step - 0.5), 0.0)
+    _refuse_many(float(np.prod(low_steps + high_steps + 1.0)), "a raster")
+    columns = np.rint(middle[0]) + step[0] * np.arange(-low_steps[0], high_steps[0] + 1.0)
+    rows = np.rint(middle[1]) + step[1] * np.arange(-low_steps[1], high_steps[1] + 1.0)
+    alternating = np.tile(columns, (len(rows), 1))
+    alternating[1::2] = alternating[1::2, ::-1]
+    counts = np.stack([alternating.ravel(), np.repeat(rows, len(columns))], axis=-1)
     return _within_stops(counts, middle, zero, limits)
 
 
 def spiral(centre: ArrayLike, zeros: ArrayLike, radius: float, *, reach: float, limits: tuple[float, float]) -> Pattern:
-    """A spiral from the centre outwards, in whole counts, that covers a disc.
+    """Outward spiral of whole counts that covers a disc.
 
     centre    (2,) counts (Na, Ne), real, direct or prime
     zeros     (2,) counts (na0, ne0)
     radius    rad on the sky, 0 or more
-    reach     rad, above 1.5 half diagonals of a count, which rounding takes from it
+    reach     rad, above 1.5 half diagonals of a count, which rounding subtracts
     limits    azimuth stops, counts
 
-    Likely places come first. A place that rounds to one before it is not looked at again.
+    Likely places come first. A place that rounds to an earlier one is skipped.
 
     Source: `spiral_offsets` and `counts_of_offsets`.
     """
@@ -167,7 +171,7 @@ def spiral(centre: ArrayLike, zeros: ArrayLike, radius: float, *, reach: float, 
 
 
 def counts_of_offsets(centre: ArrayLike, zeros: ArrayLike, offsets: ArrayLike) -> Array:
-    """Counts (n, 2), real, of places on the sky about a pointing, in the same pointing.
+    """Counts (n, 2), real, of sky offsets from a pointing, same setting.
 
     centre, zeros   (2,) counts
     offsets         (n, 2) rad
@@ -192,7 +196,9 @@ def counts_of_offsets(centre: ArrayLike, zeros: ArrayLike, offsets: ArrayLike) -
 
 
 def offsets_of_counts(centre: ArrayLike, zeros: ArrayLike, counts: ArrayLike) -> Array:
-    """Offsets (n, 2), rad, on the sky of counts from a pointing: `counts_of_offsets` turned round.
+    """Offsets (n, 2), rad, on the sky of counts from a pointing.
+
+    The inverse of `counts_of_offsets`.
 
     centre, zeros   (2,) counts
     counts          (n, 2)
@@ -208,7 +214,7 @@ def offsets_of_counts(centre: ArrayLike, zeros: ArrayLike, counts: ArrayLike) ->
 
 
 def _axes(theta: float, phi: float) -> tuple[Array, Array, Array]:
-    """The beam, and on the sky the directions of growing azimuth and of growing Phi'.
+    """Beam, and sky directions of growing azimuth and of growing Phi'.
 
     In prime, sin Phi' < 0: growing azimuth moves the beam along -(-sin Theta', cos Theta').
     """
@@ -218,7 +224,7 @@ def _axes(theta: float, phi: float) -> tuple[Array, Array, Array]:
 
 
 def _whole_steps(size: Array, reach: float) -> Array:
-    """The whole counts a step, (azimuth, elevation), of largest area whose half diagonal is within reach."""
+    """Largest whole-count steps (azimuth, elevation) with half diagonal within reach."""
     _positive(reach=reach)
     if 0.5 * np.hypot(*size) > reach:
         raise ValidityError(
@@ -238,8 +244,8 @@ def _within_stops(counts: Array, centre: Array, zeros: Array, limits: tuple[floa
         raise ValidityError(f"azimuth limits {low} and {high} are not in order (expected low < high)")
     turned = np.stack([turned_within(counts[:, 0], low, high), counts[:, 1]], axis=-1)
     good = within(turned[:, 0], low, high)
-    kept = turned[good]
-    return Pattern(kept, offsets_of_counts(centre, zeros, kept), int(np.sum(~good)))
+    retained = turned[good]
+    return Pattern(retained, offsets_of_counts(centre, zeros, retained), int(np.sum(~good)))
 
 
 def _refuse_many(expected: float, what: str) -> None:

@@ -1,7 +1,7 @@
-"""How a mirror's two axes go from counts to counts: where they are at any time, and how fast the beam turns at most.
+"""Slews of a mirror's axes: position, bound of beam rate.
 
-Each axis ramps up at constant acceleration, runs, and ramps down (a trapezoid of speed, a triangle where the way is
-short). The axes start together, and each takes the time it needs: the way is not straight in counts. Coordinated axes
+Each axis ramps up at constant acceleration, runs, and ramps down (a trapezoid of speed, a triangle for a short
+move). The axes start together, and each takes the time it needs: the path is not straight in counts. Coordinated axes
 share one trapezoid and end together: straight in counts. Tracking, eq. 2.45 and 2.46, is a ramp of no length.
 
 The beam u = (sin Phi cos Theta, sin Phi sin Theta, cos Phi) turns at sqrt(Theta'^2 sin^2 Phi + Phi'^2), primes for
@@ -21,10 +21,12 @@ from catseye.geometry.mirror.encoder import BEAM_PER_COUNT
 
 @dataclass(frozen=True)
 class Pace:
-    """What the axes may do: speed (azimuth, elevation), counts/s, and acceleration, counts/s^2, all above 0.
+    """Limits of the axes: speed, counts/s, and acceleration, counts/s^2, above 0.
+
+    Azimuth and elevation.
 
     coordinated    both axes share one profile, straight in counts; else each has its own
-    start_skew     s, 0 or more: by how much one axis may start after the other; a guard widens its margin by it
+    start_skew     s, 0 or more: largest delay of one axis after the other; a guard widens its margin by it
 
     Raises ValidityError otherwise.
     """
@@ -47,7 +49,7 @@ class Pace:
 
 @dataclass(frozen=True, eq=False)
 class MirrorSlew:
-    """Moves of both axes, a batch (...) of them; `trapezoid` and `straight` make them.
+    """Moves of both axes, a batch (...); `trapezoid` and `straight` make them.
 
     start, end    (..., 2), counts, azimuth and elevation
     ramp          (..., 2), s, length of the ramp up and of the ramp down of each axis
@@ -66,40 +68,45 @@ class MirrorSlew:
 
     @property
     def total(self) -> NDArray[np.float64]:
-        """(...), s, until both axes stand."""
+        """Time (...), s, until both axes stand."""
         return np.max(self.duration, axis=-1)
 
     @property
     def top_speed(self) -> NDArray[np.float64]:
-        """(..., 2), counts/s with its sign, between the ramps; 0 where an axis does not move."""
+        """Signed speed (..., 2), counts/s, between the ramps; 0 without a move."""
         running = self.duration - self.ramp
         return (self.end - self.start) / np.where(running > 0.0, running, np.inf)
 
     def __getitem__(self, index: Any) -> "MirrorSlew":
-        """Some of the batch of moves."""
+        """Moves selected from the batch."""
         return MirrorSlew(self.start[index], self.end[index], self.ramp[index], self.duration[index])
 
     def position(self, time: ArrayLike) -> NDArray[np.float64]:
-        """Counts (..., 2) at times (...) s from the start; before it the start, after the end the end."""
+        """Counts (..., 2) at times (...) s from the start.
+
+        Before it the start, after the end the end.
+        """
         full = np.broadcast_to(self.duration, np.broadcast_shapes(self.duration.shape, (*np.shape(time), 2)))
         t = np.clip(np.asarray(time, dtype=float)[..., None], 0.0, full)
-        left, ramp = full - t, np.where(self.ramp > 0.0, self.ramp, 1.0)
+        remaining, ramp = full - t, np.where(self.ramp > 0.0, self.ramp, 1.0)
         half = 0.5 * self.ramp
         way_up = np.where(t < self.ramp, 0.5 * t**2 / ramp, t - half)
-        way_down = np.where(left < self.ramp, 0.5 * left**2 / ramp, left - half)
-        # Each half from its own end: both ends are met exactly.
-        return np.where(t < left, self.start + self.top_speed * way_up, self.end - self.top_speed * way_down)
+        way_down = np.where(remaining < self.ramp, 0.5 * remaining**2 / ramp, remaining - half)
+        # Each half from its own end: both ends are exact.
+        return np.where(t < remaining, self.start + self.top_speed * way_up, self.end - self.top_speed * way_down)
 
     def beam_rate(self, after: ArrayLike = 0.0) -> NDArray[np.float64]:
-        """What the beam's turning rate (...), rad/s, never exceeds from a time (...) s on."""
-        left = np.clip(self.duration - np.asarray(after, dtype=float)[..., None], 0.0, None)
-        slowed = np.where(left < self.ramp, left / np.where(self.ramp > 0.0, self.ramp, 1.0), 1.0 * (left > 0.0))
+        """Bound (...), rad/s, of the beam's turning rate from a time (...) s on."""
+        remaining = np.clip(self.duration - np.asarray(after, dtype=float)[..., None], 0.0, None)
+        slowed = np.where(
+            remaining < self.ramp, remaining / np.where(self.ramp > 0.0, self.ramp, 1.0), 1.0 * (remaining > 0.0)
+        )
         rate = self.top_speed * slowed * BEAM_PER_COUNT
         return np.hypot(rate[..., 0], rate[..., 1])
 
 
 def trapezoid(start: ArrayLike, end: ArrayLike, pace: Pace) -> MirrorSlew:
-    """The quickest moves between counts that stand at both ends.
+    """Quickest moves between counts, at rest at both ends.
 
     start, end    (..., 2), counts
     pace          of the axes
@@ -111,21 +118,21 @@ def trapezoid(start: ArrayLike, end: ArrayLike, pace: Pace) -> MirrorSlew:
     ([2.5, 0.4], [800.0, 400.0])
     """
     a, b = _pairs(start, end)
-    way = np.abs(b - a)
+    travel = np.abs(b - a)
     velocity, acceleration = np.array(pace.velocity), np.array(pace.acceleration)
     if pace.coordinated:
-        # The share of the way done, 0 to 1, is one trapezoid that neither axis finds too fast.
-        each, moves = np.where(way > 0.0, way, 1.0), np.any(way > 0.0, axis=-1)
-        limits = (np.where(way > 0.0, v / each, np.inf) for v in (velocity, acceleration))
+        # The completed share, 0 to 1, is one trapezoid within the limits of both axes.
+        divisor, moves = np.where(travel > 0.0, travel, 1.0), np.any(travel > 0.0, axis=-1)
+        limits = (np.where(travel > 0.0, v / divisor, np.inf) for v in (velocity, acceleration))
         fast, steep = (np.where(moves, np.min(v, axis=-1), 1.0) for v in limits)
         ramp, full = (np.where(moves, v, 0.0)[..., None] for v in _times(1.0, fast, steep))
         return MirrorSlew(a, b, np.broadcast_to(ramp, a.shape), np.broadcast_to(full, a.shape))
-    ramp, full = _times(way, velocity, acceleration)
+    ramp, full = _times(travel, velocity, acceleration)
     return MirrorSlew(a, b, ramp, full)
 
 
 def straight(start: ArrayLike, end: ArrayLike, duration: ArrayLike) -> MirrorSlew:
-    """Moves at constant rates, as a track between two time tags.
+    """Moves at constant rates, as tracks between time tags.
 
     start, end    (..., 2), counts
     duration      (...), s, 0 or above; 0 only where start and end agree
@@ -146,16 +153,16 @@ def straight(start: ArrayLike, end: ArrayLike, duration: ArrayLike) -> MirrorSle
     return MirrorSlew(a, b, np.zeros_like(full), full)
 
 
-def _times(way: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> tuple[NDArray, NDArray]:
-    """Length of a ramp and of the whole move, s."""
-    way, velocity, acceleration = np.broadcast_arrays(way, velocity, acceleration)
-    short = way < velocity**2 / acceleration
-    ramp = np.where(short, np.sqrt(way / acceleration), np.where(way > 0.0, velocity / acceleration, 0.0))
-    return ramp, np.where(short, 2.0 * ramp, way / velocity + ramp)
+def _times(travel: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> tuple[NDArray, NDArray]:
+    """Durations of a ramp and of the full move, s."""
+    travel, velocity, acceleration = np.broadcast_arrays(travel, velocity, acceleration)
+    short = travel < velocity**2 / acceleration
+    ramp = np.where(short, np.sqrt(travel / acceleration), np.where(travel > 0.0, velocity / acceleration, 0.0))
+    return ramp, np.where(short, 2.0 * ramp, travel / velocity + ramp)
 
 
 def _pairs(start: ArrayLike, end: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Both as floats of one shape (..., 2), refused where they are not, or not finite."""
+    """Both as floats of one shape (..., 2); others are refused."""
     a, b = np.broadcast_arrays(np.asarray(start, dtype=float), np.asarray(end, dtype=float))
     if a.shape[-1:] != (2,):
         raise ValidityError(f"counts of a slew have shape {a.shape}, expected (..., 2)")

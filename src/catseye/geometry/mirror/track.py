@@ -1,6 +1,6 @@
-"""Following a target between two instants: counts on a straight line in time, and how far from it the beam gets.
+"""Linear tracks in counts between two instants, and the beam's error.
 
-The ranger is told where the target will be at t0 and t1, computes the counts of both and runs both axes at a constant
+The ranger receives the target's places at t0 and t1, computes the counts of both and runs both axes at a constant
 rate in between. The exact counts are curved functions of time; with curvature N'' their chord is off by N'' h^2/8 in
 the middle of an interval h, at most by max|N''| h^2/8 anywhere (the remainder of linear interpolation).
 
@@ -31,7 +31,7 @@ HALVINGS = 60  # of an interval: its last bit
 
 @dataclass(frozen=True, eq=False)
 class CountLine:
-    """Counts that run at constant rates, (...) of them; `count_line` makes one.
+    """Counts at constant rates, (...) lines; `count_line` makes one.
 
     start, end    (..., 2) counts (Na, Ne) at t0 and t1, azimuth on the same turn
     interval      (...) s, t1 - t0, above 0
@@ -49,7 +49,7 @@ class CountLine:
         return (self.end - self.start) / self.interval[..., None]
 
     def at(self, since: ArrayLike) -> Array:
-        """(..., 2) counts, real numbers, so many seconds after t0; broadcasts against the lines.
+        """Counts (..., 2), real numbers, at seconds after t0; broadcasts against the lines.
 
         >>> count_line([0.0, 100.0], [32.0, 90.0], 0.128).at(0.064).tolist()
         [16.0, 95.0]
@@ -59,15 +59,17 @@ class CountLine:
 
 
 def count_line(start: ArrayLike, end: ArrayLike, interval: ArrayLike) -> CountLine:
-    """The line between two pointings, azimuth run the short way round, so that it does not jump where Theta wraps.
+    """Line between two pointings, azimuth by the shorter turn.
+
+    It does not jump where Theta wraps.
 
     start, end    (..., 2) counts (Na, Ne), both direct or both prime
     interval      (...) s, above 0
 
     A target that crosses Theta = -pi/2 has counts a whole turn apart on either side. The line stays on the turn of its
-    start; whether the stops allow its end is for `encoder.within` to say. Raises ValidityError for a bad interval.
+    start; `encoder.within` tests its end against the stops. Raises ValidityError for a bad interval.
 
-    Source: [PARKER04] eqs. 2.45, 2.46; the wrap of 2.19 taken out.
+    Source: [PARKER04] eqs. 2.45, 2.46; with the wrap of 2.19 removed.
 
     >>> count_line([74_990.0, 0.0], [-24_990.0, 0.0], 1.0).end.tolist()
     [75010.0, 0.0]
@@ -78,14 +80,16 @@ def count_line(start: ArrayLike, end: ArrayLike, interval: ArrayLike) -> CountLi
         raise ValidityError(f"interval {h[~((h > 0.0) & (h < np.inf))].flat[0]} s is not above 0: t1 must follow t0")
     first, last, h2 = np.broadcast_arrays(first, last, h[..., None])
     turn = np.array([COUNTS_PER_TURN, 0.0])
-    whole = np.rint((last[..., :1] - first[..., :1]) / COUNTS_PER_TURN)
-    return CountLine(first, last - whole * turn, h2[..., 0])
+    turns = np.rint((last[..., :1] - first[..., :1]) / COUNTS_PER_TURN)
+    return CountLine(first, last - turns * turn, h2[..., 0])
 
 
 def miss(station: MirrorStation, counts: ArrayLike, points: ArrayLike) -> Array:
-    """Distance (...), m, by which the beam at given counts passes a point; from one behind it, to its start.
+    """Distance (...), m, of the beam from a point.
 
-    station    ranger(s), broadcast against the rest
+    From a point behind the mirror, to the beam's start.
+
+    station    ranger(s), broadcast against the others
     counts     (..., 2) Na, Ne, direct or prime
     points     (..., 3), m, ground frame
 
@@ -93,9 +97,9 @@ def miss(station: MirrorStation, counts: ArrayLike, points: ArrayLike) -> Array:
     """
     origin, direction = ray(station, np.asarray(counts, dtype=float))
     away = np.asarray(points, dtype=float) - origin
-    behind = np.sum(away * direction, axis=-1) < 0.0
+    opposite = np.sum(away * direction, axis=-1) < 0.0
     passed = np.linalg.norm(np.cross(away, direction), axis=-1)
-    return np.where(behind, np.linalg.norm(away, axis=-1), passed)
+    return np.where(opposite, np.linalg.norm(away, axis=-1), passed)
 
 
 def apparent_motion(
@@ -107,13 +111,15 @@ def apparent_motion(
     spin: ArrayLike = (0.0, 0.0, 0.0),
     spin_rate: ArrayLike = (0.0, 0.0, 0.0),
 ) -> tuple[Array, Array, Array]:
-    """Place, velocity and acceleration (..., 3) of a target in the axes of a ranger that may itself move and turn.
+    """Place, velocity and acceleration (..., 3) of a target in ranger axes.
+
+    The ranger may itself move and turn.
 
     mirror_from_ground    (..., 3, 3), `MirrorStation.mirror_from_ground`
     relative              (..., 3), m, ground axes: target less scan point
     velocity              (..., 3), m/s, ground axes: of that vector
     acceleration          (..., 3), m/s^2, ground axes
-    spin, spin_rate       (..., 3), rad/s and rad/s^2, ground axes: the ranger's own turning; zero on the ground
+    spin, spin_rate       (..., 3), rad/s and rad/s^2, ground axes: the ranger's rotation; zero on the ground
 
     Source: kinematics of turning axes: v - w x r, and a - 2 w x v - w' x r + w x (w x r). Exact.
     """
@@ -129,12 +135,14 @@ def apparent_motion(
 
 
 def count_motion(vector: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> tuple[Array, Array]:
-    """Rates (..., 2), counts/s, and curvatures (..., 2), counts/s^2, of (Na, Ne) of a moving target, direct pointing.
+    """Rates (..., 2), counts/s, and curvatures (..., 2), counts/s^2, of a target.
+
+    Of (Na, Ne), direct pointing.
 
     vector, velocity, acceleration   (..., 3), m, m/s, m/s^2, mirror axes, from `apparent_motion`
 
     In the prime pointing the azimuth's are the same and the elevation's have the other sign (eq. 2.26). On the azimuth
-    axis itself there is no answer: NaN or infinity.
+    axis itself they are undefined: NaN or infinity.
 
     Source: [PARKER04] eqs. 2.14, 2.15, 2.21, 2.22, differentiated twice. Exact.
 
@@ -159,12 +167,12 @@ def count_motion(vector: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike
 
 
 def line_estimate(curvature: ArrayLike, interval: ArrayLike) -> Array:
-    """How far (..., 2), counts, the line is off in the middle of an interval, to first order.
+    """Mid-interval error (..., 2), counts, of the line, to first order.
 
     curvature    (..., 2), counts/s^2, of (Na, Ne), from `count_motion`
     interval     (...) s
 
-    Source: remainder of linear interpolation. For curvatures that hardly change meanwhile; not a limit.
+    Source: remainder of linear interpolation. For nearly constant curvatures; not a limit.
 
     >>> line_estimate([8.0, -4.0], 0.5).tolist()
     [0.25, 0.125]
@@ -176,18 +184,20 @@ def line_estimate(curvature: ArrayLike, interval: ArrayLike) -> Array:
 def line_bound(
     vector: ArrayLike, speed: ArrayLike, acceleration: ArrayLike, *, interval: ArrayLike
 ) -> tuple[Array, Array, Array]:
-    """What the line cannot exceed over an interval: off by counts (..., 2), by an angle (...) rad, by a way (...) m.
+    """Bounds of the line's error over an interval: counts, angle, distance.
+
+    Counts (..., 2), an angle (...) rad, a distance (...) m.
 
     vector          (..., 3), m, mirror axes: the target at t0
     speed           (...), m/s: its apparent speed at t0
-    acceleration    (...), m/s^2: what its apparent acceleration never exceeds during the interval
+    acceleration    (...), m/s^2: bound of its apparent acceleration during the interval
     interval        (...), s
 
-    However the target moves within these, it stays within reach = speed h + acceleration h^2/2 of where it was; the
+    However the target moves within these, it stays within reach = speed h + acceleration h^2/2 of its place at t0; the
     formulas at the top, taken at the worst place within reach, times h^2/8. Infinite where it could reach the azimuth
     axis. Raises ValidityError for a speed, acceleration or interval below 0 (a rate has a sign, a speed none) or NaN.
 
-    Source: derived at the top of this file. A strict bound, larger than what happens by a factor of some 2 to 5.
+    Source: derived at the top of this file. A strict bound, larger than the actual error by a factor of some 2 to 5.
 
     >>> counts, angle, way = line_bound([0.0, 120.0, 0.0], 1.0, 0.0, interval=0.128)
     >>> counts.round(5).tolist(), round(float(way), 7)
@@ -197,7 +207,7 @@ def line_bound(
     v0, a, h = (np.asarray(value, dtype=float) for value in (speed, acceleration, interval))
     for name, value in (("speed", v0), ("acceleration", a), ("interval", h)):
         if not np.all(value >= 0.0):
-            raise ValidityError(f"{name} {value[~(value >= 0.0)].flat[0]} is not 0 or more: its size is meant")
+            raise ValidityError(f"{name} {value[~(value >= 0.0)].flat[0]} is not 0 or more (a magnitude is expected)")
     reach, fastest = v0 * h + 0.5 * a * h**2, v0 + a * h
     axis, far = np.hypot(p[..., 0], p[..., 1]), np.linalg.norm(p, axis=-1)
     rho, r = axis - reach, far - reach
@@ -205,7 +215,7 @@ def line_bound(
         cotangent = (np.abs(p[..., 2]) + reach) / rho
         theta = (a / rho + (fastest / rho) ** 2) * h**2 / 8.0
         phi = (a / r + np.maximum(1.0, cotangent) * (fastest / r) ** 2) * h**2 / 8.0
-        sine = np.minimum(1.0, (axis + reach) / r + phi)  # along any way between beam and target
+        sine = np.minimum(1.0, (axis + reach) / r + phi)  # along any path between beam and target
         angle = np.hypot(phi, sine * theta)
     clear = rho > 0.0
     counts = np.stack([theta, phi], axis=-1) / BEAM_PER_COUNT
@@ -225,16 +235,16 @@ def longest_interval(
     limit_angle: float | None = None,
     longest: float = 3600.0,
 ) -> Array:
-    """The longest interval (...), s, over which the line is surely off by no more than a limit.
+    """Longest interval (...), s, that keeps the line's error within a limit.
 
     vector          (..., 3), m, mirror axes: the target at t0
     speed           (...), m/s: its apparent speed at t0
-    acceleration    (...), m/s^2: what its apparent acceleration never exceeds meanwhile
+    acceleration    (...), m/s^2: bound of its apparent acceleration meanwhile
     limit_counts    above 0: of either axis; a quarter by default
     limit_angle     rad, above 0: of the beam on the sky, instead of counts
-    longest         s, above 0: what is answered where even that holds the limit
+    longest         s, above 0: upper limit of the result
 
-    It holds the bound, so that nothing within the speeds and accelerations given ever exceeds the limit; 0 on the
+    It uses the bound, so that no motion within the given speeds and accelerations exceeds the limit; 0 on the
     azimuth axis itself. Raises ValidityError for limits that are not above 0.
 
     Source: `line_bound`, solved by halving from below.
@@ -247,17 +257,17 @@ def longest_interval(
         if not 0.0 < value < np.inf:
             raise ValidityError(f"{name} = {value} is not above 0 and finite")
 
-    def held(h: Array) -> NDArray[np.bool_]:
+    def within_limit(h: Array) -> NDArray[np.bool_]:
         counts, angle, _ = line_bound(vector, speed, acceleration, interval=h)
         off = np.max(counts, axis=-1) if limit_angle is None else angle
         return np.asarray(off <= limit)
 
     shape = np.broadcast_shapes(np.shape(vector)[:-1], np.shape(speed), np.shape(acceleration))
     low, high = np.zeros(shape), np.full(shape, float(longest))
-    low = np.where(held(high), high, low)
+    low = np.where(within_limit(high), high, low)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        good = held(middle)
+        good = within_limit(middle)
         low, high = np.where(good, middle, low), np.where(good, high, middle)
     return low
 

@@ -1,1 +1,1 @@
-"""Sun and stars, and time."""
+"""Positions of Sun and stars, and time tags."""

@@ -1,4 +1,4 @@
-"""Where a star stands: azimuth and zenith angle by time, for true north by Polaris or any other star."""
+"""Azimuth and zenith angle of a star, for true north by Polaris."""
 
 import warnings
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Star:
-    """A star as catalogues give it, ICRS at the epoch J2000.0.
+    """Catalogue star, ICRS at the epoch J2000.0.
 
     name
     right_ascension, declination   rad
@@ -64,7 +64,9 @@ def star_place(
     ut1_utc: ArrayLike = 0.0,
     pole: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[Floats, Floats]:
-    """Azimuth (clockwise from north, [0, 2 pi)) and zenith angle of a star, rad, without refraction.
+    """Azimuth (clockwise from north, [0, 2 pi)) and zenith angle of a star, rad.
+
+    Without refraction.
 
     star        from a catalogue
     mjd         (...), UTC as Modified Julian Date, 1972 to 2100
@@ -72,7 +74,7 @@ def star_place(
     longitude   (...), rad, astronomic, east positive
     height      m, above the ellipsoid (for the diurnal aberration and parallax alone)
     ut1_utc     (...), s, from the Earth rotation service; below 0.9 in size. Polaris moves by 0.2" of azimuth a second
-    pole        rad, x_p and y_p of the pole: left out, up to 0.6" of azimuth
+    pole        rad, x_p and y_p of the pole: if neglected, up to 0.6" of azimuth
 
     Refraction lifts along the vertical and leaves the azimuth alone. Proper motion, parallax, light deflection,
     aberration, precession-nutation IAU 2006/2000A, Earth rotation, diurnal aberration, pole.
@@ -96,7 +98,7 @@ def star_place(
         azimuth, zenith, *_ = erfa.atco13(
             star.right_ascension,
             star.declination,
-            star.motion_ra / np.cos(star.declination),  # what ERFA wants is the motion of right ascension itself
+            star.motion_ra / np.cos(star.declination),  # ERFA expects the motion of right ascension itself
             star.motion_dec,
             star.parallax_arcsec,
             star.radial_velocity_km_s,

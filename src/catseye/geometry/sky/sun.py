@@ -1,4 +1,4 @@
-"""Where the Sun stands, seen from a place on the ground: a unit vector in x east, y north, z up.
+"""Direction of the Sun from a place on the ground: unit vector in x east, y north, z up.
 
     UTC --leap seconds--> TAI --> TT --> Earth's place and velocity, Sun's place one light time earlier
                                           less the observer's own place (parallax, 8.8") --> direction in space
@@ -6,7 +6,7 @@
                                           precession and nutation --> true equator and equinox of date
     UTC --UT1 - UTC--> UT1 --> sidereal time --> axes that turn with the Earth --> east, north, up
 
-What is left out, and how much that is: motion of the pole, at most 0.6"; TDB less TT, 2 ms; the bending of light by the
+Neglected, with sizes: motion of the pole, at most 0.6"; TDB less TT, 2 ms; the bending of light by the
 Sun itself, which does not move its middle.
 
 z is the normal of the ellipsoid. Where the ground frame's z is the plumb line, the whole sky is turned by the
@@ -25,8 +25,8 @@ from catseye.errors import ValidityError
 EARLIEST_MJD, LATEST_MJD = 41_317.0, 88_069.0  # 1972, when leap seconds begin, to 2100, the end of the theory
 MJD_ZERO = 2_400_000.5  # JD
 EARTH_RATE = 7.292_115e-5  # rad/s
-SUN_RATE = 7.3e-5  # rad/s: no faster does the Sun move in the ground frame
-LOWEST = (np.sqrt(10.3) - 5.11) * DEGREE  # -1.9 degrees: the refraction is greatest, and held below
+SUN_RATE = 7.3e-5  # rad/s: bound of the Sun's motion in the ground frame
+LOWEST = (np.sqrt(10.3) - 5.11) * DEGREE  # -1.9 degrees: the refraction is greatest, and constant below
 
 
 def sun_direction(
@@ -37,16 +37,16 @@ def sun_direction(
     *,
     ut1_minus_utc: ArrayLike = 0.0,
 ) -> NDArray[np.float64]:
-    """Unit vector (..., 3) to the middle of the Sun as it is seen without air: x east, y north, z up.
+    """Unit vector (..., 3) to the Sun's middle without air: x east, y north, z up.
 
     mjd              (...), UTC, 41317 to 88069 (1972 to 2099)
     latitude         (...), rad, geodetic, -pi/2 to pi/2
     longitude        (...), rad, east positive
     height           (...), m above the ellipsoid, -1000 to 100 000
-    ut1_minus_utc    (...), s, -1 to 1; left at 0 it costs up to 13.5" in hour angle
+    ut1_minus_utc    (...), s, -1 to 1; at 0 the error is up to 13.5" in hour angle
 
-    Raises ValidityError outside these. Leap seconds are those that erfa knows; one announced later moves the hour angle
-    not at all (UT1 - UTC takes it up) and the Sun among the stars by 0.04".
+    Raises ValidityError outside these. Leap seconds are those in erfa; a later one does not change the hour angle
+    (UT1 - UTC compensates) and moves the Sun among the stars by 0.04".
 
     Source: [SOFA23], its astrometry and time cookbooks: pnm06a, gst06a, epv00, ab. Within 0.3" of the library PyMeeus
     (VSOP87) from 1972 to 2072, 0.7" of PyEphem and 1.2" of astropy's own route at equal UT1 - UTC.
@@ -66,20 +66,22 @@ def sun_direction(
     true_from_space = erfa.pnm06a(MJD_ZERO, tt)
     sidereal = erfa.gst06a(MJD_ZERO, ut1, MJD_ZERO, tt)
     place = np.stack(np.broadcast_arrays(*np.moveaxis(erfa.gd2gc(1, lam, phi, h), -1, 0)), axis=-1)
-    here = _turned(place, sidereal)
-    velocity = EARTH_RATE * np.stack([-here[..., 1], here[..., 0], np.zeros_like(here[..., 0])], axis=-1)
+    observer = _turned(place, sidereal)
+    velocity = EARTH_RATE * np.stack([-observer[..., 1], observer[..., 0], np.zeros_like(observer[..., 0])], axis=-1)
     space_from_true = np.swapaxes(true_from_space, -1, -2)
-    apparent = _seen_from(tt, _applied(space_from_true, here), _applied(space_from_true, velocity))
+    apparent = _seen_from(tt, _applied(space_from_true, observer), _applied(space_from_true, velocity))
     earth_fixed = _turned(_applied(true_from_space, apparent), -sidereal)
     return _east_north_up(earth_fixed, phi, lam)
 
 
 def apparent_geocentric(tt_mjd: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Right ascension in [0, 2 pi), declination, rad, and distance, m, of the Sun from the Earth's centre, (...) each.
+    """Right ascension in [0, 2 pi), declination, rad, distance, m, of the Sun, (...) each.
+
+    From the Earth's centre.
 
     tt_mjd    (...), Terrestrial Time, 15020 to 88069 (1900 to 2099)
 
-    True equator and equinox of date, with aberration: what an almanac prints. Raises ValidityError outside the years.
+    True equator and equinox of date, with aberration: as printed in an almanac. Raises ValidityError outside the years.
 
     Source: [SOFA23]. [MEEUS98] example 25.b is met within 0.06".
 
@@ -91,23 +93,25 @@ def apparent_geocentric(tt_mjd: ArrayLike) -> tuple[NDArray[np.float64], NDArray
 
     tt = _checked(tt_mjd, 15_020.0, LATEST_MJD, "tt_mjd", "TT as Modified Julian Day")
     still = np.zeros((*tt.shape, 3))
-    way = np.linalg.norm(_way_to_sun(tt, still)[0], axis=-1)
+    to_sun = np.linalg.norm(_sun_vector(tt, still)[0], axis=-1)
     x, y, z = np.moveaxis(_applied(erfa.pnm06a(MJD_ZERO, tt), _seen_from(tt, still, still)), -1, 0)
-    return np.arctan2(y, x) % TWO_PI, np.arctan2(z, np.hypot(x, y)), way
+    return np.arctan2(y, x) % TWO_PI, np.arctan2(z, np.hypot(x, y)), to_sun
 
 
 def refracted(direction: ArrayLike, pressure_hpa: ArrayLike, temperature_c: ArrayLike) -> NDArray[np.float64]:
-    """The direction (..., 3) in which a star or the Sun appears through the air: raised towards the zenith.
+    """Apparent direction (..., 3) of a star or the Sun through the air.
+
+    It is raised towards the zenith.
 
     direction        (..., 3), unit, x east, y north, z up, without air
     pressure_hpa     (...), at the observer, 0 to 1200; 0 is no air
     temperature_c    (...), at the observer, -80 to 60
 
-    Visible light; at 780 nm it is 1 % less. Below an altitude of -1.9 degrees it stays what it is there, 45'.
+    Visible light; at 780 nm it is 1 % less. Below an altitude of -1.9 degrees it is constant, 45'.
 
     Source: [MEEUS98] eq. 16.4 (Saemundsson) with its factor for pressure and temperature, within 6" of his eq. 16.3.
     Above 20 degrees it is within 7" (4 %) of erfa.refco; that two-term model does not reach the horizon, where it
-    matters most here, and where the layers of the air change any formula's answer by some minutes of arc.
+    matters most here, and where the layers of the air change any formula by some minutes of arc.
 
     >>> float(np.degrees(np.arcsin(refracted([0.0, 1.0, 0.0], 1010.0, 10.0)[2])).round(3))
     0.483
@@ -118,7 +122,7 @@ def refracted(direction: ArrayLike, pressure_hpa: ArrayLike, temperature_c: Arra
     level = np.hypot(east, north)
     altitude = np.arctan2(up, level)
     degrees = np.maximum(altitude, LOWEST) / DEGREE
-    minutes = 1.02 / np.tan((degrees + 10.3 / (degrees + 5.11)) * DEGREE) + 0.0019279  # so that the zenith stays
+    minutes = 1.02 / np.tan((degrees + 10.3 / (degrees + 5.11)) * DEGREE) + 0.0019279  # keeps the zenith fixed
     air = pressure / 1010.0 * (ZERO_CELSIUS_K + 10.0) / (ZERO_CELSIUS_K + temperature)
     raised = np.minimum(altitude + minutes / 60.0 * DEGREE * air, np.maximum(altitude, 0.5 * np.pi))
     shrink = np.cos(raised) / np.where(level > 0.0, level, 1.0)
@@ -126,7 +130,7 @@ def refracted(direction: ArrayLike, pressure_hpa: ArrayLike, temperature_c: Arra
 
 
 def altitude_azimuth(direction: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Altitude (...) above the horizon and azimuth (...) in [0, 2 pi) clockwise from north, rad.
+    """Altitude (...) and azimuth (...) in [0, 2 pi) clockwise from north, rad.
 
     direction    (..., 3), any length, x east, y north, z up
 
@@ -138,7 +142,7 @@ def altitude_azimuth(direction: ArrayLike) -> tuple[NDArray[np.float64], NDArray
 
 
 def _clocks(utc: NDArray[np.float64], dut1: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """TT and UT1 as Modified Julian Days; a microsecond is lost in one number, 0.015 milliseconds of arc."""
+    """TT and UT1 as Modified Julian Days, to a microsecond (0.015 milliseconds of arc)."""
     import erfa
 
     with warnings.catch_warnings():
@@ -150,31 +154,34 @@ def _clocks(utc: NDArray[np.float64], dut1: NDArray[np.float64]) -> tuple[NDArra
     return (tt[0] - MJD_ZERO) + tt[1], (ut1[0] - MJD_ZERO) + ut1[1]
 
 
-def _way_to_sun(tt: NDArray[np.float64], off: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """From `off` (..., 3), m, from the Earth's centre, to the Sun one light time ago, m; and the Earth's speed, m/s."""
+def _sun_vector(tt: NDArray[np.float64], off: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Vector to the Sun one light time ago, m, and the Earth's velocity, m/s.
+
+    off   (..., 3), m, observer from the Earth's centre
+    """
     import erfa
 
     about_sun, about_all = erfa.epv00(MJD_ZERO, tt)
-    way = -about_sun["p"] * erfa.DAU - off
+    to_sun = -about_sun["p"] * erfa.DAU - off
     # The Sun's own speed about the solar system's centre is 15 m/s, 0.01" in all: one step of the light time is enough.
     sun_velocity = (about_all["v"] - about_sun["v"]) * erfa.DAU / SECONDS_PER_DAY
-    light_time = np.linalg.norm(way, axis=-1, keepdims=True) / SPEED_OF_LIGHT
-    return way - sun_velocity * light_time, about_all["v"] * erfa.DAU / SECONDS_PER_DAY
+    light_time = np.linalg.norm(to_sun, axis=-1, keepdims=True) / SPEED_OF_LIGHT
+    return to_sun - sun_velocity * light_time, about_all["v"] * erfa.DAU / SECONDS_PER_DAY
 
 
 def _seen_from(tt: NDArray[np.float64], off: NDArray[np.float64], velocity: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit vector (..., 3) to the Sun in space axes, as an observer sees it who moves with the Earth and about it."""
+    """Unit vector (..., 3) to the Sun in space axes for a moving observer."""
     import erfa
 
-    way, earth_velocity = _way_to_sun(tt, off)
-    distance = np.linalg.norm(way, axis=-1)
+    to_sun, earth_velocity = _sun_vector(tt, off)
+    distance = np.linalg.norm(to_sun, axis=-1)
     beta = (earth_velocity + velocity) / SPEED_OF_LIGHT
     slow = np.sqrt(1.0 - np.sum(beta**2, axis=-1))
-    return erfa.ab(way / distance[..., None], beta, distance / erfa.DAU, slow)
+    return erfa.ab(to_sun / distance[..., None], beta, distance / erfa.DAU, slow)
 
 
 def _east_north_up(v: NDArray[np.float64], phi: NDArray[np.float64], lam: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Earth-fixed vectors (..., 3) along east, north and the normal at latitude phi and longitude lam."""
+    """Earth-fixed vectors (..., 3) along east, north and normal at latitude phi, longitude lam."""
     x, y, z = np.moveaxis(_turned(v, -lam), -1, 0)
     parts = (y, np.cos(phi) * z - np.sin(phi) * x, np.cos(phi) * x + np.sin(phi) * z)
     return np.stack(np.broadcast_arrays(*parts), axis=-1)
@@ -192,7 +199,7 @@ def _applied(matrix: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.
 
 
 def _checked(value: ArrayLike, low: float, high: float, name: str, unit: str) -> NDArray[np.float64]:
-    """The value as floats, refused where it is outside its range or not a number."""
+    """Float value, refused outside its range or if not a number."""
     array = np.asarray(value, dtype=float)
     bad = ~((array >= low) & (array <= high))
     if np.any(bad):

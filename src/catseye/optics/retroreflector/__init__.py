@@ -1,1 +1,1 @@
-"""Prisms, hollow cubes, cat's-eyes: where the target point is and what comes back."""
+"""Retroreflectors: prisms, hollow cubes, cat's-eyes."""

@@ -1,8 +1,8 @@
-"""A cube corner in the back of a servo mirror, which ranges to the mirror itself from afar.
+"""Cube corner in the back of a servo mirror, seen from afar.
 
 The notes (section 2.4) shoot "the retroreflector built into the back side of the mirror" half a turn of elevation from
-autocollimation: then the back looks where the face looked. What is wanted is the face, on which the scan point lies.
-The range ends at the cube's own point, nearer by what the plate is thick, less what the point lies within the glass:
+autocollimation: then the back looks where the face looked. The target is the face, on which the scan point lies.
+The range ends at the cube's own point, nearer by the thickness of the plate, less the depth of the point in the glass:
 
     to the face = measured + P_c + z,   z = setback of the cube's origin + z of its fiducial
 
@@ -22,13 +22,15 @@ from catseye.optics.retroreflector.solid_prism import SolidPrism
 
 @dataclass(frozen=True)
 class BackMirrorCube:
-    """A cube behind a mirror; axes from the reflecting face, z out of the back, x and y with the cube's.
+    """Cube behind a mirror, in axes of the reflecting face.
+
+    Origin in the face, z out of the back, x and y with the cube's.
 
     cube      whose z is the mirror's
     setback   (x, y, z) m, of the cube's origin (a prism's face, a hollow cube's corner) from the face's origin, where
               the mirror's two axes meet; z above 0 is behind the face, towards a ranger that sees the back
 
-    Source: [PARKER04] section 2.4, eq. 2.24, for what it is; the constant is geometry, exact.
+    Source: [PARKER04] section 2.4, eq. 2.24, for the arrangement; the constant is geometry, exact.
 
     >>> glass = SolidPrism(height=0.0127, aperture=0.0085, group=1.527077, phase=1.510811)
     >>> back = BackMirrorCube(glass, setback=(0.0, 0.0, 0.020))
@@ -45,18 +47,18 @@ class BackMirrorCube:
 
     @property
     def fiducial(self) -> tuple[float, float, float]:
-        """The reflecting face where the axes meet: the origin."""
+        """Reflecting face where the axes meet: the origin."""
         return (0.0, 0.0, 0.0)
 
     @property
     def point(self) -> tuple[float, float, float]:
-        """The cube's own fiducial point, in these axes."""
+        """Fiducial point of the cube, in these axes."""
         x, y, z = (float(a + b) for a, b in zip(self.setback, self.cube.fiducial, strict=True))
         return (x, y, z)
 
     @property
     def range_constant(self) -> float:
-        """From the measured length to the mirror's face."""
+        """Constant from the measured length to the mirror's face."""
         return self.cube.range_constant + self.point[2]
 
     @property
@@ -65,7 +67,10 @@ class BackMirrorCube:
         return self.cube.acceptance
 
     def range_change(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
-        """The cube's, and the lever from the face's origin to its point: z (cos I - 1) + sin I (x cos a + y sin a)."""
+        """Range change of cube and lever.
+
+        The lever from the face's origin to its point: z (cos I - 1) + sin I (x cos a + y sin a).
+        """
         angle, turn = np.broadcast_arrays(incidences(incidence), np.asarray(azimuth, dtype=float))
         x, y, z = self.point
         lever = -2.0 * z * np.sin(0.5 * angle) ** 2 + np.sin(angle) * (x * np.cos(turn) + y * np.sin(turn))

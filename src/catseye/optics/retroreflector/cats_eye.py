@@ -1,4 +1,6 @@
-"""The cat's-eye: two concentric half-balls of glass, the large one silvered; or one ball, where both radii are one.
+"""Cat's-eye of two concentric half-balls of glass, or one ball.
+
+The large half is silvered; with one ball both radii are equal.
 
 Its reference point is the common centre. Seen from anywhere, the ray through the centre meets the same glass.
 
@@ -35,7 +37,9 @@ NODES = 200  # over ray heights; the integrands are smooth: 1e-12 of their size
 
 
 def range_constant(r1: ArrayLike, r2: ArrayLike, n: ArrayLike) -> NDArray[np.float64]:
-    """Distance to add to the measured length for the glass of a cat's-eye, negative.
+    """Range constant of a cat's-eye's glass, m, negative.
+
+    It is added to the measured length.
 
     r1    m, radius of the small ball, through which the light enters
     r2    m, radius of the silvered large ball
@@ -52,7 +56,7 @@ def range_constant(r1: ArrayLike, r2: ArrayLike, n: ArrayLike) -> NDArray[np.flo
 
 
 def focal_radius(r1: ArrayLike, phase: ArrayLike) -> Array:
-    """Radius of the mirror that lies in the paraxial focus of the small ball, m.
+    """Mirror radius at the paraxial focus of the small ball, m.
 
     r1      m
     phase   phase index of the glass over that of the air, above 1
@@ -67,16 +71,18 @@ def focal_radius(r1: ArrayLike, phase: ArrayLike) -> Array:
 
 @cache
 def _nodes() -> tuple[Array, Array]:
-    """Nodes and weights of Gauss-Legendre on -1 to 1, found once."""
+    """Nodes and weights of Gauss-Legendre on -1 to 1, cached."""
     return np.polynomial.legendre.leggauss(NODES)
 
 
 @dataclass(frozen=True)
 class BallCatsEye:
-    """A cat's-eye of two half-balls; axes from the common centre, z out of the small ball's pole.
+    """Cat's-eye of two half-balls.
+
+    Axes from the common centre, z out of the small ball's pole.
 
     r1, r2               m, radius of the small ball, which the light enters, and of the large, silvered one
-    aperture             m, below r1: radius across the beam of what is used of it, by a stop or by the beam
+    aperture             m, below r1: used radius across the beam, by a stop or by the beam
     group, phase         indices of the glass over those of the air
     face_reflectance     of a coated small ball, each passage; None for bare glass
     mirror_reflectance   of the silvered ball, from within
@@ -107,26 +113,34 @@ class BallCatsEye:
 
     @property
     def fiducial(self) -> tuple[float, float, float]:
-        """The common centre: the origin."""
+        """Common centre of the balls: the origin."""
         return (0.0, 0.0, 0.0)
 
     @property
     def range_constant(self) -> float:
-        """Of the ray through the centre, at any incidence; `mean_path_change` is what a beam adds."""
+        """Range constant of the ray through the centre, at any incidence.
+
+        `mean_path_change` gives the effect of a beam.
+        """
         return float(range_constant(self.r1, self.r2, self.group))
 
     @property
     def acceptance(self) -> float:
-        """Where the half-balls' common plane begins to cut the aperture: arccos(aperture / R1)."""
+        """Incidence at which the common plane begins to cut the aperture.
+
+        arccos(aperture / R1).
+        """
         return float(np.arccos(self.aperture / self.r1))
 
     def range_change(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
-        """0: both spheres look the same from everywhere; NaN from behind."""
+        """Range change: 0, the same from everywhere; NaN from behind."""
         angle, _ = np.broadcast_arrays(incidences(incidence), np.asarray(azimuth, dtype=float))
         return np.where(angle < RIGHT, 0.0, np.nan)
 
     def clear_area(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
-        """m^2 across the beam: the aperture's circle within the foreshortened circle of the common plane.
+        """Clear area across the beam, m^2.
+
+        The aperture's circle within the foreshortened circle of the common plane.
 
         A ray and the one it comes back as must both pass the small half-ball: |x| sin I < z cos I, an ellipse of the
         semi-axes R1 cos I and R1. It cuts the circle at x = sqrt(R1^2 - aperture^2) cot I.
@@ -144,28 +158,30 @@ class BallCatsEye:
         return 2.0 * np.where(at >= a, 0.5 * np.pi * a**2, circle + np.where(c > 0.0, ellipse, 0.0))
 
     def return_share(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
-        """Clear area over the aperture's, times two passages of the small ball and the mirror.
+        """Returned share: clear area, two passages of the ball, and the mirror.
 
         Unpolarized and as on the axis: bare BK 7 loses 0.1 % more at an aperture of 0.3 R1.
         """
         bare = float(fresnel(1.0, self.phase)[0])
-        lost = bare if self.face_reflectance is None else self.face_reflectance
+        reflected = bare if self.face_reflectance is None else self.face_reflectance
         share = self.clear_area(incidence, azimuth) / (np.pi * self.aperture**2)
-        return share * (1.0 - lost) ** 2 * self.mirror_reflectance
+        return share * (1.0 - reflected) ** 2 * self.mirror_reflectance
 
     def sectors(self, incidence: float, azimuth: float = 0.0) -> Sectors:
-        """One: a mirror straight on, which leaves the polarization as it is, whatever the incidence; as on the axis.
+        """Single sector: a mirror, which preserves polarization at any incidence.
+
+        As on the axis.
 
         Raises ValidityError from behind.
         """
         area = self.clear_area(incidence, azimuth)
         if not area > 0.0:
-            raise ValidityError(f"incidence {incidence:.4g} rad: no part of the ball sends light back")
+            raise ValidityError(f"incidence {incidence:.4g} rad: no part of the ball returns light")
         amplitude = np.sqrt(self.return_share(incidence, azimuth) / area * np.pi) * self.aperture
         return Sectors(np.ones(1), np.array([-amplitude * np.eye(2)], dtype=np.complex128))
 
     def deviation(self, height: ArrayLike) -> Array:
-        """Angle by which a ray comes back converging, rad; below 0 diverging.
+        """Convergence angle of a returned ray, rad; below 0 diverging.
 
         height   m, of the ray off the centre, 0 to r1
         """
@@ -173,7 +189,7 @@ class BallCatsEye:
         return 2.0 * (np.arcsin(outer) - np.arcsin(inner) - np.arcsin(back))
 
     def path_change(self, height: ArrayLike) -> Array:
-        """Distance to add to the measured length of a ray beyond the range constant, m.
+        """Length correction of a ray beyond the range constant, m.
 
         height   m, of the ray off the centre, 0 to r1; counted to the plane across the returned ray
         """
@@ -185,18 +201,20 @@ class BallCatsEye:
         return self.group * (self.r1 * short(inner) + self.r2 * short(back)) - self.r1 * short(outer)
 
     def mean_path_change(self, beam_radius: float, offset: float = 0.0) -> float:
-        """`path_change`, mean over a Gaussian beam's power within the aperture, m: add it for a beam so wide.
+        """Mean `path_change` over a Gaussian beam within the aperture, m.
+
+        It is added to the measured length.
 
         beam_radius   m, above 0, at 1/e^2 of the intensity
         offset        m, of the beam's axis from the centre
 
-        A ranger that loses the rays that come back too far off weighs less of the beam: see `collected_share`.
+        A ranger that loses rays returned too far off averages less of the beam: see `collected_share`.
         """
         height, weight = self._beam(beam_radius, offset)
         return float(np.sum(weight * self.path_change(height)) / np.sum(weight))
 
     def blur(self, beam_radius: float) -> float:
-        """Root mean square deviation of a Gaussian beam's rays within the aperture, rad.
+        """Root mean square deviation of a beam's rays in the aperture, rad.
 
         beam_radius   m, above 0, at 1/e^2 of the intensity
         """
@@ -204,7 +222,9 @@ class BallCatsEye:
         return float(np.sqrt(np.sum(weight * self.deviation(height) ** 2) / np.sum(weight)))
 
     def best_radius(self, beam_radius: float) -> float:
-        """Radius R2 of the mirror that gives a Gaussian beam the least blur, m; group index and all else as they are.
+        """Mirror radius R2 for the least blur of a Gaussian beam, m.
+
+        Group index and all else as they are.
 
         beam_radius   m, above 0, at 1/e^2 of the intensity
         """
@@ -219,13 +239,15 @@ class BallCatsEye:
         return float(minimize_scalar(blur, bounds=(shortest, 1.02 * focus), method="bounded").x)
 
     def collected_share(self, distance: float, *, beam_radius: float, receiver: float) -> float:
-        """Share of a Gaussian beam's power on the aperture that comes back within a centred receiver, by rays.
+        """Geometrical share of a beam on the aperture returned to a receiver.
+
+        The receiver is centred.
 
         distance      m, above 0
         beam_radius   m, above 0, of the beam at the ball, at 1/e^2
         receiver      m, above 0: radius
 
-        Geometrical: diffraction at the ball's zones is left out, and glass and mirror are in `return_share`.
+        Geometrical: diffraction at the ball's zones is neglected, and glass and mirror are in `return_share`.
         """
         refuse_sizes(distance=distance, receiver=receiver)
         height, weight = self._beam(beam_radius, 0.0, 20 * NODES)  # the edge of the receiver is sharp
@@ -233,7 +255,7 @@ class BallCatsEye:
         return float(np.sum(weight[off <= receiver]) / np.sum(weight))
 
     def _sines(self, height: ArrayLike) -> tuple[Array, Array, Array]:
-        """Sines of the angles t, r and w of the module; NaN where a ray misses the ball."""
+        """Sines of the angles t, r, w; NaN where a ray misses."""
         y = np.asarray(height, dtype=float)
         if np.any(y < 0.0):
             raise ValidityError(f"ray height {float(np.min(y)):g} m is below 0")
@@ -241,7 +263,7 @@ class BallCatsEye:
         return y / self.r1, y / (self.phase * self.r1), y / (self.phase * self.r2)
 
     def _beam(self, beam_radius: float, offset: float, nodes: int = NODES) -> tuple[Array, Array]:
-        """Ray heights over the aperture and the power that a Gaussian beam has there."""
+        """Ray heights over the aperture and their power in a Gaussian beam."""
         refuse_sizes(beam_radius=beam_radius)
         x, w = _nodes()
         edges = np.linspace(0.0, self.aperture, nodes // NODES + 1)

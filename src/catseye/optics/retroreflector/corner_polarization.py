@@ -1,4 +1,4 @@
-"""Cube corners and polarized light: Jones matrices of the six ways round the three faces, and what they send back.
+"""Cube corners in polarized light: Jones matrices of six reflection orders.
 
 Axes of the reflector: z out of it towards the ranger, an edge at azimuth 0, as in `solid_prism` and `hollow_cube`.
 Light is described across the direction d to the ranger, in axes (u, v): u is x made square to d, v = d x u. Going and
@@ -6,11 +6,11 @@ coming use the same two axes, as the ranger sees them: u to the right and v up, 
 mirror straight on is -1, and a corner of three perfect mirrors +1, whatever the direction: each turns the field by half
 a turn about its normal, and three half turns about square axes are none.
 
-Every ray meets all three faces under the same three angles. Their order decides: six of them, each in one sector of the
-aperture. A ray that enters in one sector leaves in the opposite one, where another comes the same way backwards: their
+Every ray meets all three faces under the same three angles. There are six orders, each in one sector of the
+aperture. A ray that enters in one sector leaves in the opposite one, where another takes the reverse path: their
 matrices are each other's transpose.
 
-Reflection from a corner does not change how long a way is, but the six phases differ: on the axis of the far field the
+Reflection from a corner does not change the path length, but the six phases differ: on the axis of the far field the
 six add as amplitudes. Close by, and in all the returned light together, they add as powers.
 """
 
@@ -33,11 +33,11 @@ RAYS = 2880  # directions about the middle in which an aperture is divided among
 
 @dataclass(frozen=True)
 class Corner:
-    """A cube corner as polarized light meets it.
+    """Cube corner in polarized light.
 
     index       phase index of what fills it over that of the air: 1 for a hollow one
     mirror      what its three faces reflect, from within: see `optics.polarization.surface`
-    bare_face   a solid one has no antireflection coating, so that its face takes its share of s and p
+    bare_face   True for a solid one without antireflection coating, whose face reflects s and p
     """
 
     index: float
@@ -50,7 +50,7 @@ class Corner:
 
 
 def hollow_corner(metal: complex) -> Corner:
-    """Three metal mirrors.
+    """Cube corner of three metal mirrors.
 
     metal   index n + ik of the metal at the wavelength; infinite for a perfect conductor
 
@@ -59,14 +59,14 @@ def hollow_corner(metal: complex) -> Corner:
     >>> sector_jones(hollow_corner(complex("inf")), 0.3, 1.0)[2].real.round(12) + 0.0
     array([[1., 0.], [0., 1.]])
     """
-    return Corner(1.0, surface(inside=1.0, behind=metal))
+    return Corner(1.0, surface(inside=1.0, outside=metal))
 
 
-def solid_corner(index: float, behind: complex = 1.0, *, bare_face: bool = False) -> Corner:
-    """A prism of glass.
+def solid_corner(index: float, outside: complex = 1.0, *, bare_face: bool = False) -> Corner:
+    """Prism of glass as a cube corner.
 
     index       phase index of the glass over that of the air, above 1
-    behind      index behind its three faces: 1 for bare glass, n + ik for metal
+    outside     index behind its three faces: 1 for bare glass, n + ik for metal
     bare_face   as in `Corner`
 
     Source: `optics.polarization.reflection`. [PLAYER88] finds a quarter wave plate at an index that the abstract prints
@@ -76,20 +76,21 @@ def solid_corner(index: float, behind: complex = 1.0, *, bare_face: bool = False
     >>> round(float(np.degrees(retardance(sector_jones(solid_corner(1.767476), 0.0)[0]))), 4)
     90.0
     """
-    return Corner(index, surface(inside=index, behind=behind), bare_face)
+    return Corner(index, surface(inside=index, outside=outside), bare_face)
 
 
 def sector_jones(corner: Corner, incidence: float, azimuth: float = 0.0) -> Complex:
-    """Jones matrices (6, 2, 2) of the six orders of ORDERS, in the axes (u, v) above, power-normalized.
+    """Jones matrices (6, 2, 2) of ORDERS, axes (u, v), power-normalized.
 
-    corner      what it is made of
+    corner      the corner
     incidence   rad, 0 to below a right angle, of the direction to the ranger from z
     azimuth     rad, of that direction about z, from an edge
 
-    Raises ValidityError where a face cannot be met: beyond an incidence inside of 35.26 deg some corners are missed.
+    Raises ValidityError where a face cannot be reached: beyond an internal incidence of 35.26 deg some corners are
+    missed.
 
     Source: [YUN11] for the matrices in three dimensions; [LIU97] and [PECK62] for the six ways, straight on. Exact for
-    plane waves. The phase of the way itself, alike for all six, is left out.
+    plane waves. The phase of the path, equal for all six, is omitted.
 
     >>> j = sector_jones(solid_corner(1.5112), 0.0)
     >>> bool(np.allclose(j[0] @ j[0].conj().T, np.eye(2)))
@@ -115,9 +116,9 @@ def sector_jones(corner: Corner, incidence: float, azimuth: float = 0.0) -> Comp
 
 
 def sector_shares(corner: Corner, incidence: float, azimuth: float = 0.0, *, aperture: float, height: float) -> Array:
-    """Shares (6,) of the clear area that the orders of ORDERS take; they sum to 1.
+    """Shares (6,) of the clear area by ORDERS; they sum to 1.
 
-    corner             what it is made of
+    corner             the corner
     incidence, azimuth rad, as for `sector_jones`
     aperture, height   m, above 0: radius of the clear, round face, and the corner's depth behind it
 
@@ -138,16 +139,18 @@ def sector_shares(corner: Corner, incidence: float, azimuth: float = 0.0, *, ape
     middle = -height * inward[:2] / -inward[2]  # there the ray through the corner meets the face
     reach = np.minimum(_to_rim(out, middle, aperture), _to_rim(-out, middle, aperture))
     if not np.all(reach > 0.0):
-        raise ValidityError(f"incidence {incidence:.4g} rad: no part of the face sends light back")
-    # where along a ray offset by `out` the faces lie: the smaller the sooner
+        raise ValidityError(f"incidence {incidence:.4g} rad: no part of the face returns light")
+    # positions of the faces along a ray offset by `out`, nearest first
     when = (np.concatenate([out, np.zeros((RAYS, 1))], axis=1) @ EDGES.T) / -(EDGES @ inward)
     order = np.argsort(when, axis=1)
-    shares = [np.sum(reach[np.all(order == way, axis=1)] ** 2) for way in ORDERS]
+    shares = [np.sum(reach[np.all(order == sequence, axis=1)] ** 2) for sequence in ORDERS]
     return np.array(shares) / np.sum(reach**2)
 
 
 def far_field_jones(jones: ArrayLike, shares: ArrayLike | None = None) -> Complex:
-    """Jones matrix (2, 2) of the far field's axis, over that of an equal aperture that reflects perfectly.
+    """Jones matrix (2, 2) on the far field's axis, over a perfect reflector.
+
+    The reflector has equal aperture.
 
     jones    (6, 2, 2) of the sectors
     shares   (6,) of the area, a sixth each when not given; the light falls evenly
@@ -165,7 +168,7 @@ def far_field_jones(jones: ArrayLike, shares: ArrayLike | None = None) -> Comple
 def returned_power(
     jones: ArrayLike, field: ArrayLike, *, analyser: ArrayLike | None = None, shares: ArrayLike | None = None
 ) -> Array:
-    """Share (...) of the light's power that comes back, all of it together, through an analyser or without.
+    """Share (...) of the power returned in total, optionally through an analyser.
 
     jones      (6, 2, 2) of the sectors
     field      (..., 2) Jones vectors of the light that falls on it, of unit power
@@ -187,10 +190,12 @@ def returned_power(
 
 
 def through_plate(jones: ArrayLike, plate: ArrayLike) -> Complex:
-    """Jones matrices (..., 2, 2) of the way out through a plate, round the reflector, and back through the same plate.
+    """Jones matrices (..., 2, 2) of a reflector behind a plate.
 
-    jones   (..., 2, 2) of the reflector, in axes that stay
-    plate   (2, 2) of the way out; the way back is its transpose
+    Out through the plate, round the reflector, back through the plate.
+
+    jones   (..., 2, 2) of the reflector, in fixed axes
+    plate   (2, 2) of the outward path; the return path is its transpose
 
     Source: reciprocity, [CHIPMAN18] section 5.5. Exact without magnetic fields: not for a Faraday rotator.
 
@@ -210,7 +215,7 @@ def _weights(shares: ArrayLike | None) -> Array:
 def _axes(incidence: float, azimuth: float) -> tuple[Array, tuple[Array, Array]]:
     """Direction to the ranger and the axes across it."""
     if not 0.0 <= incidence < 0.5 * np.pi:
-        raise ValidityError(f"incidence {incidence:.4g} rad is not within 0 and a right angle")
+        raise ValidityError(f"incidence {incidence:.4g} rad is outside 0 to a right angle")
     sine = np.sin(incidence)
     toward = np.array([sine * np.cos(azimuth), sine * np.sin(azimuth), np.cos(incidence)])
     u = np.array([1.0, 0.0, 0.0]) - toward[0] * toward
@@ -219,27 +224,30 @@ def _axes(incidence: float, azimuth: float) -> tuple[Array, tuple[Array, Array]]
 
 
 def _into(corner: Corner, outside: Array) -> tuple[Array, Complex]:
-    """Direction within the corner of light that travels along `outside`, and the face's matrix."""
+    """Direction within the corner of light along `outside`, and the face's matrix."""
     flat = outside[:2] / corner.index
     inward = np.array([*flat, -np.sqrt(1.0 - flat @ flat)])
     return inward, transfer(outside, inward, _face_s(outside), *_face_gains(corner, outside, inward))
 
 
 def _out_of(corner: Corner, outside: Array) -> Complex:
-    """The face's matrix for light that leaves along `outside`: the way in, backwards."""
+    """Matrix of the face for light leaving along `outside`, by reversal."""
     flat = outside[:2] / corner.index
     within = np.array([*flat, np.sqrt(1.0 - flat @ flat)])
     return transfer(within, outside, _face_s(outside), *_face_gains(corner, outside, within))
 
 
 def _face_s(outside: Array) -> Array:
-    """Across the plane of incidence on the face."""
+    """Vector across the plane of incidence on the face."""
     size = np.hypot(*outside[:2])
     return np.array([1.0, 0.0, 0.0]) if size < 1e-12 else np.array([-outside[1], outside[0], 0.0]) / size
 
 
 def _face_gains(corner: Corner, outside: Array, inside: Array) -> tuple[float, float]:
-    """Amplitudes that the face lets through in s and p, squared shares of power; alike both ways."""
+    """Amplitudes transmitted by the face in s and p, as roots of power.
+
+    The same in both directions.
+    """
     if not corner.bare_face or corner.index == 1.0:
         return 1.0, 1.0
     c, d, n = abs(outside[2]), abs(inside[2]), corner.index
@@ -248,7 +256,7 @@ def _face_gains(corner: Corner, outside: Array, inside: Array) -> tuple[float, f
 
 
 def _to_rim(out: Array, middle: Array, aperture: float) -> Array:
-    """Way from `middle` along unit vectors `out` to the rim of the face; below 0 where it lies outside."""
+    """Distance from `middle` along `out` to the rim; below 0 outside."""
     along = out @ middle
     square = along**2 + aperture**2 - middle @ middle
     return np.where((square > 0.0) & (middle @ middle < aperture**2), np.sqrt(np.maximum(square, 0.0)) - along, -1.0)

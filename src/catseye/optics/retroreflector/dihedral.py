@@ -1,4 +1,4 @@
-"""What a cube corner with wrong right angles sends back: six beams, each a little aside.
+"""Cube corner with dihedral errors: six slightly deviated beams.
 
 With edges e_1, e_2, e_3 and faces across them whose normals have N_i . N_j = s_ij (the sine of what the dihedral angle
 exceeds a right angle by), light along d that meets the faces in the order i, j, k comes back, to first order, along
@@ -9,8 +9,8 @@ a rotation about the corner. At normal incidence, all errors equal, that is (4/3
 away from the axis for angles too wide, towards it for angles too narrow; n times as much behind the face of glass.
 
 The wave of each sector still seems to come from the corner: a lens that gathers all six on the detector sees no change
-of range but of second order, distance x deviation^2 / 4 (5 nm at 100 m for 3 arcsec). A bare detector in the beams'
-way sees `pupil_offset`.
+of range but of second order, distance x deviation^2 / 4 (5 nm at 100 m for 3 arcsec). A bare detector in the
+beams has `pupil_offset`.
 """
 
 from itertools import permutations
@@ -29,9 +29,11 @@ NODES = 64
 
 
 def deviations(errors: ArrayLike, index: float = 1.0) -> Array:
-    """Directions (6, 2) of the returned beams off the right one, rad, at normal incidence: x to the first edge, y.
+    """Deviations (6, 2) of the returned beams, rad, at normal incidence.
 
-    errors   (3,) rad: by how much the dihedral angles between faces 2 and 3, 3 and 1, 1 and 2 exceed a right angle
+    x to the first edge, y across.
+
+    errors   (3,) rad: excess of the dihedral angles between faces 2 and 3, 3 and 1, 1 and 2 over a right angle
     index    phase index of the glass over that of the air; 1 for a hollow corner
 
     Rows in the order of ORDERS, of the faces met first, second, last. Raises ValidityError beyond 0.01 rad.
@@ -55,13 +57,13 @@ def deviations(errors: ArrayLike, index: float = 1.0) -> Array:
 
 
 def equal_errors(deviation: ArrayLike, index: float = 1.0) -> Array:
-    """Error of all three dihedral angles, rad, that sends all six beams so far off.
+    """Equal dihedral error, rad, for a given deviation of all beams.
 
     deviation   rad, of a beam from the right direction: a maker's "180 deg within 3 arcsec"
     index       phase index of the glass over that of the air; 1 for a hollow corner
 
-    Source: [YODER58]; deviation / ((4/3) sqrt 6 n). Of the errors that keep within a deviation these are the worst on
-    the axis, since no beam stays there.
+    Source: [YODER58]; deviation / ((4/3) sqrt 6 n). Of all errors within a deviation these are the worst on
+    the axis, since no beam remains there.
 
     >>> round(float(equal_errors(3.0, 1.511)), 2)  # arcsec as well as rad
     0.61
@@ -70,7 +72,9 @@ def equal_errors(deviation: ArrayLike, index: float = 1.0) -> Array:
 
 
 def on_axis_share(deviation: float, *, aperture: float, beam_radius: float, wavelength: float) -> float:
-    """Far-field intensity on the axis over that of a perfect corner, all six beams `deviation` off it.
+    """On-axis far-field intensity over that of a perfect corner.
+
+    All six beams have `deviation`.
 
     deviation     rad
     aperture      m, above 0: radius of the clear face
@@ -89,15 +93,17 @@ def on_axis_share(deviation: float, *, aperture: float, beam_radius: float, wave
 
 
 def collected_share(deviation: ArrayLike, distance: ArrayLike, *, beam_radius: ArrayLike, receiver: ArrayLike) -> Array:
-    """Share of the returned light within a centred receiver over that of a perfect corner, near by.
+    """Share of returned light in a centred receiver over a perfect corner.
+
+    For short distances.
 
     deviation     rad, of all six beams
     distance      m, to the receiver
     beam_radius   m, above 0, of the returned beam at the receiver, at 1/e^2
     receiver      m, above 0: radius
 
-    Source: geometry, each beam a Gaussian moved aside by distance x deviation: good while that is less than what the
-    beam's own diffraction makes of a sector.
+    Source: geometry, each beam a Gaussian moved aside by distance x deviation: valid while that is less than
+    the diffraction of a sector.
 
     >>> round(float(collected_share(1.454e-5, 100.0, beam_radius=0.010, receiver=0.025)), 4)
     1.0
@@ -107,14 +113,16 @@ def collected_share(deviation: ArrayLike, distance: ArrayLike, *, beam_radius: A
 
 
 def pupil_offset(deviation: float, *, aperture: float, beam_radius: float) -> float:
-    """How much too long a range reads on a detector that stands in the six beams without a lens, m.
+    """Range error on a bare detector in the six beams, m.
+
+    Without a lens; positive where too long.
 
     deviation     rad, above 0 for beams that spread (angles too wide)
     aperture      m, above 0: radius of the clear face
     beam_radius   m, above 0, at 1/e^2: of the beam that lights it
 
     Source: half the mean of deviation x distance from the axis along the tilt; derived at the top of this file. A lens
-    takes it away.
+    removes it.
 
     >>> round(pupil_offset(1.454e-5, aperture=0.0254, beam_radius=0.010) * 1e6, 3)
     0.044
@@ -124,7 +132,7 @@ def pupil_offset(deviation: float, *, aperture: float, beam_radius: float) -> fl
 
 
 def _sector(aperture: float, beam_radius: float) -> tuple[Array, Array, Array]:
-    """Radii, angles from the sector's middle, and the amplitude's weights, over a sixth of the face."""
+    """Radii, angles from mid-sector, and amplitude weights, over a sixth of the face."""
     for name, value in (("aperture", aperture), ("beam_radius", beam_radius)):
         if not value > 0.0:
             raise ValidityError(f"{name} = {value} m is not above 0")

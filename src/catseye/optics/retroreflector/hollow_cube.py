@@ -1,4 +1,4 @@
-"""Three mirrors at right angles: the light never enters glass, the range ends at their corner."""
+"""Hollow cube corner of three mirrors; ranges end at their corner."""
 
 from dataclasses import dataclass
 
@@ -12,10 +12,12 @@ from catseye.optics.retroreflector.prism import clear_share
 
 @dataclass(frozen=True)
 class HollowCube:
-    """A hollow cube corner; axes from its corner, z along the cube's diagonal out of the opening.
+    """Hollow cube corner.
+
+    Axes from its corner, z along the cube's diagonal out of the opening.
 
     aperture      m, radius of the clear, round opening
-    height        m, from the opening to the corner; sqrt 2 of the aperture where the round is inscribed
+    height        m, from the opening to the corner; sqrt 2 of the aperture for an inscribed round
     reflectance   of each mirror, unpolarized, at the 55 deg at which light meets it
 
     Source: [YODER58] for the aperture; range constant 0 by definition, as [PARKER04] section 5.6 has it.
@@ -35,36 +37,41 @@ class HollowCube:
 
     @property
     def fiducial(self) -> tuple[float, float, float]:
-        """Where ranges end: the corner, which is the origin."""
+        """Fiducial point: the corner, which is the origin."""
         return (0.0, 0.0, 0.0)
 
     @property
     def range_constant(self) -> float:
-        """The range constant: 0, since all the way is air."""
+        """Range constant: 0, as the path is in air."""
         return 0.0
 
     @property
     def acceptance(self) -> float:
-        """Where no light is left that both enters and leaves by the opening."""
+        """Incidence at which no light both enters and leaves the opening."""
         return float(np.arctan(self.aperture / self.height))
 
     def range_change(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
-        """0: the way to the corner is straight, whatever mirrors fold it; NaN where the opening looks away."""
+        """Range change: 0; NaN where the opening looks away."""
         angle, _ = np.broadcast_arrays(incidences(incidence), np.asarray(azimuth, dtype=float))
         return np.where(angle < RIGHT, 0.0, np.nan)
 
     def clear_area(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
-        """m^2 across the beam, as `prism.clear_share`; alike at every azimuth."""
+        """Clear area across the beam, m^2, as `prism.clear_share`.
+
+        The same at every azimuth.
+        """
         angle, _ = np.broadcast_arrays(incidences(incidence), np.asarray(azimuth, dtype=float))
         share = clear_share(np.minimum(angle, RIGHT), aperture=self.aperture, height=self.height, index=1.0)
         return np.pi * self.aperture**2 * share
 
     def return_share(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
-        """Clear area over the opening's, times three mirrors."""
+        """Returned share: clear area over the opening's, times three mirrors."""
         return self.clear_area(incidence, azimuth) / (np.pi * self.aperture**2) * self.reflectance**3
 
     def sectors(self, incidence: float, azimuth: float = 0.0) -> Sectors:
-        """Six, of mirrors that reflect s and p alike: `corner_polarization.hollow_corner` knows what real metal does.
+        """Six sectors of mirrors that reflect s and p equally.
+
+        `corner_polarization.hollow_corner` has real metal.
 
         Raises ValidityError where no light is left that meets all three mirrors.
         """

@@ -1,11 +1,11 @@
-"""What every kind of retroreflector answers: where its range ends, how that changes, how much light comes back.
+"""Interface of all retroreflectors: fiducial point, range change, returned light.
 
     hollow_cube       three mirrors                                      corner
     solid_prism       cube corner of glass                               T, height / n below the face
     cats_eye          two half-balls, or one ball                        common centre
     back_mirror_cube  one of the cubes in the back of a servo mirror     the same, and the mirror's face behind it
 
-Each has axes of its own, z along its axis towards the ranger, and is used at an `incidence` from z and an `azimuth`
+Each has its own axes, z along its axis towards the ranger, and is used at an `incidence` from z and an `azimuth`
 about z, of the direction to the ranger. A new kind is one file with these members.
 """
 
@@ -22,7 +22,7 @@ RIGHT = 0.5 * np.pi
 
 
 class Sectors(NamedTuple):
-    """What a retroreflector does to polarized light: of each part of its clear area the share and the Jones matrix.
+    """Sectors of a retroreflector in polarized light: shares and Jones matrices.
 
     shares   (k,), summing to 1
     jones    (k, 2, 2) amplitudes with the losses, in the axes of `corner_polarization`: as the ranger sees them
@@ -33,14 +33,14 @@ class Sectors(NamedTuple):
 
 
 class Retroreflector(Protocol):
-    """One interface; lengths in metres, angles in radians.
+    """Retroreflector interface; lengths in metres, angles in radians.
 
-    fiducial         (x, y, z) of the point that a reduced range ends at, in its own axes
+    fiducial         (x, y, z) of the end point of a reduced range, in its own axes
     range_constant   to be added to the measured length at normal incidence; negative for glass
-    range_change     to be added besides at an incidence; NaN where it looks away
-    acceptance       largest incidence at which it serves as designed, whatever the azimuth
-    clear_area       m^2 across the beam: what enters there comes back
-    return_share     of the light that falls on the clear face seen straight on, what comes back
+    range_change     further correction at an incidence; NaN where it looks away
+    acceptance       largest incidence of use at any azimuth
+    clear_area       m^2 across the beam: light entering there returns
+    return_share     returned share of the light on the full clear face
     sectors          the same for polarized light, at one incidence: for `corner_polarization.returned_power`
     """
 
@@ -57,7 +57,7 @@ class Retroreflector(Protocol):
 
 
 def fresnel(cosine: ArrayLike, ratio: ArrayLike) -> tuple[Array, Array]:
-    """Reflectance of a bare surface across (s) and in (p) the plane of incidence; 1 where reflection is total.
+    """Reflectance of a bare surface in s and p; 1 in total reflection.
 
     cosine   of the angle of incidence, 0 to 1
     ratio    phase index behind the surface over the one before it
@@ -70,15 +70,18 @@ def fresnel(cosine: ArrayLike, ratio: ArrayLike) -> tuple[Array, Array]:
     c, n = np.asarray(cosine, dtype=float), np.asarray(ratio, dtype=float)
     square = 1.0 - (1.0 - c**2) / n**2
     total = square <= 0.0
-    behind = np.sqrt(np.where(total, 0.0, square))
+    refracted = np.sqrt(np.where(total, 0.0, square))
     with np.errstate(invalid="ignore", divide="ignore"):
-        s = ((c - n * behind) / (c + n * behind)) ** 2
-        p = ((n * c - behind) / (n * c + behind)) ** 2
+        s = ((c - n * refracted) / (c + n * refracted)) ** 2
+        p = ((n * c - refracted) / (n * c + refracted)) ** 2
     return np.where(total, 1.0, s), np.where(total, 1.0, p)
 
 
 def incidences(incidence: ArrayLike) -> Array:
-    """Angles of incidence as an array, refused outside 0 to pi; NaN stays, one shot at a time."""
+    """Angles of incidence as an array; outside 0 to pi refused.
+
+    NaN is passed on.
+    """
     angle = np.asarray(incidence, dtype=float)
     if np.any((angle < 0.0) | (angle > np.pi)):
         wrong = float(angle[(angle < 0.0) | (angle > np.pi)].flat[0])
@@ -87,21 +90,21 @@ def incidences(incidence: ArrayLike) -> Array:
 
 
 def refuse_sizes(**sizes: float) -> None:
-    """Every size must be above 0 and finite."""
+    """Raise ValidityError for a size not above 0 and finite."""
     for name, value in sizes.items():
         if not 0.0 < value < np.inf:
             raise ValidityError(f"{name} = {value:g} m is not above 0 and finite")
 
 
 def refuse_shares(**shares: float | None) -> None:
-    """Every share, where one is given, must be 0 to 1."""
+    """Raise ValidityError for a given share outside 0 to 1."""
     for name, value in shares.items():
         if value is not None and not 0.0 <= value <= 1.0:
             raise ValidityError(f"{name} = {value:g} is outside 0 to 1")
 
 
 def refuse_indices(phase: float, group: float) -> None:
-    """Indices of a glass over those of the air."""
+    """Raise ValidityError for an implausible index of glass over air."""
     for name, value in (("phase", phase), ("group", group)):
         if not 1.0 < value < 4.0:
             raise ValidityError(f"{name} index ratio {value:g} is outside 1 to 4: give glass over air, such as 1.5112")

@@ -1,8 +1,8 @@
-"""The solid cube-corner prism: reference point, range constant, and what changes when the light comes in obliquely.
+"""Solid cube-corner prism: reference point, range constant, oblique incidence.
 
 Unfolded, the prism is a slab of glass of thickness `height` with the corner at its far side. A plane wave at incidence
 I is delayed by n h cos r down to the corner, sin r = sin I / n. The reference point T lies h/n below the entry face, an
-air path of (h/n) cos I: chosen so that the two change alike, and the range hardly depends on how the prism is turned.
+air path of (h/n) cos I: chosen so that both change equally, and the range hardly depends on the prism's orientation.
 
 `n` is the group index of the glass over that of the air, throughout. Refraction follows the phase index n_p. With
 sin r = sin I / n_p the ray enters h tan r aside of the axis, which saves h tan r sin I of air, and runs h / cos r in
@@ -29,7 +29,7 @@ COSINE_TOLERANCE = 1e-9  # a dot product of unit vectors may exceed 1 by roundin
 
 
 def reference_depth(height: ArrayLike, n: ArrayLike) -> NDArray[np.float64]:
-    """Depth of the prism's reference point T below its entry face, in metres.
+    """Depth of the prism's reference point T below its face, m.
 
     height    m, from the entry face to the corner
     n         group index of the glass over that of the air, 1.4 to 2
@@ -43,7 +43,9 @@ def reference_depth(height: ArrayLike, n: ArrayLike) -> NDArray[np.float64]:
 
 
 def range_constant(height: ArrayLike, n: ArrayLike) -> NDArray[np.float64]:
-    """Distance to add to the measured length for the glass of a prism at normal incidence, negative.
+    """Range constant of a prism's glass at normal incidence, m, negative.
+
+    It is added to the measured length.
 
     height    m, from the entry face to the corner
     n         group index of the glass over that of the air, 1.4 to 2
@@ -60,16 +62,18 @@ def range_constant(height: ArrayLike, n: ArrayLike) -> NDArray[np.float64]:
 def obliquity_correction(
     height: ArrayLike, n: ArrayLike, cos_incidence: ArrayLike, *, phase: float | None = None
 ) -> NDArray[np.float64]:
-    """Distance to add to the measured length, beyond the range constant, for oblique incidence; never positive.
+    """Length correction for oblique incidence, m; never positive.
+
+    Beyond the range constant.
 
     height           m, from the entry face to the corner
     n                group index of the glass over that of the air, 1.4 to 2
     cos_incidence    cosine of the angle between the face's outward normal and the direction to the ranger, 0 to 1;
-                     below 0 the face looks away and the answer is NaN, one shot at a time
+                     below 0 the face looks away and the result is NaN, shot by shot
     phase            phase index of the glass over that of the air, which then refracts (`oblique_change`); None: B.1
 
-    Source: [GOLDMAN00] eq. B.1, in the form -(h/n) (1 - 1/n^2) (1 - c)^2 (1 + c) / ((1 + c_r) (c + c_r)), which is the
-    same number without its cancellation. See the module for how good B.1 itself is.
+    Source: [GOLDMAN00] eq. B.1, in the form -(h/n) (1 - 1/n^2) (1 - c)^2 (1 + c) / ((1 + c_r) (c + c_r)), the
+    same value without cancellation. See the module for the accuracy of B.1.
 
     >>> round(float(obliquity_correction(0.0381, 1.527077, np.cos(0.5))), 9)
     -0.000112581
@@ -83,14 +87,14 @@ def obliquity_correction(
 def obliquity_slope(
     height: ArrayLike, n: ArrayLike, cos_incidence: ArrayLike, *, phase: float | None = None
 ) -> NDArray[np.float64]:
-    """Change of the obliquity correction with the angle of incidence, in metres a radian; never positive.
+    """Slope of the obliquity correction by incidence, m/rad; never positive.
 
     height           m, from the entry face to the corner
     n                group index of the glass over that of the air, 1.4 to 2
     cos_incidence    cosine of the angle of incidence, 0 to 1 (below 0: NaN, the face looks away)
     phase            phase index of the glass over that of the air, which then refracts; None: B.1
 
-    Source: [GOLDMAN00] eq. B.1, or `oblique_change`, differentiated. As good as they.
+    Source: [GOLDMAN00] eq. B.1, or `oblique_change`, differentiated, with the same accuracy.
 
     >>> round(float(obliquity_slope(0.0381, 1.527077, np.cos(0.5))), 6)
     -0.000905
@@ -105,7 +109,9 @@ def obliquity_slope(
 
 
 def group_path(height: ArrayLike, incidence: ArrayLike, *, group: ArrayLike, phase: ArrayLike) -> NDArray[np.float64]:
-    """Group path from the wavefront through the pole of the face to the corner, m; NaN where the face looks away.
+    """Group path from the wavefront at the face's pole to the corner, m.
+
+    NaN where the face looks away.
 
     height      m, from the entry face to the corner
     incidence   rad, 0 to pi
@@ -124,10 +130,12 @@ def group_path(height: ArrayLike, incidence: ArrayLike, *, group: ArrayLike, pha
 def oblique_change(
     height: ArrayLike, incidence: ArrayLike, *, group: ArrayLike, phase: ArrayLike
 ) -> NDArray[np.float64]:
-    """Distance to add to the measured length, beyond the range constant, for oblique incidence: two indices.
+    """Length correction for oblique incidence with two indices, m.
+
+    Beyond the range constant.
 
     height      m, from the entry face to the corner
-    incidence   rad, 0 to pi; beyond a right angle the face looks away and the answer is NaN, one shot at a time
+    incidence   rad, 0 to pi; beyond a right angle the face looks away and the result is NaN, shot by shot
     group       group index of the glass over that of the air
     phase       phase index of the glass over that of the air; equal to `group` it is `obliquity_correction`, B.1
 
@@ -145,7 +153,9 @@ def oblique_change(
 
 
 def flat_depth(height: ArrayLike, *, group: ArrayLike, phase: ArrayLike) -> NDArray[np.float64]:
-    """Depth below the face of the point about which a small turn leaves the range unchanged, to second order, m.
+    """Depth of the point insensitive to small turns, m.
+
+    A turn about it leaves the range unchanged to second order.
 
     height   m, from the entry face to the corner
     group    group index of the glass over that of the air
@@ -162,9 +172,9 @@ def flat_depth(height: ArrayLike, *, group: ArrayLike, phase: ArrayLike) -> NDAr
 
 
 class WrongGlass(NamedTuple):
-    """What a prism's range reads too long when it is reduced as of another glass, m.
+    """Range error of a prism reduced with another glass, m.
 
-    about_point   to T, each glass's own: the difference of the range constants
+    about_point   to T of each glass: the difference of the range constants
     about_face    to the face, or to any point at a known depth below it
     """
 
@@ -173,16 +183,18 @@ class WrongGlass(NamedTuple):
 
 
 def wrong_glass(height: ArrayLike, *, assumed: ArrayLike, true: ArrayLike) -> WrongGlass:
-    """How much too long a range is at normal incidence when a prism's glass is not what its record says.
+    """Range error, m, from a wrong glass at normal incidence.
+
+    Positive where too long.
 
     height    m, from the entry face to the corner
-    assumed   group index over that of the air by which it was reduced
-    true      group index over that of the air of what it is made of
+    assumed   group index over that of the air, used in the reduction
+    true      group index over that of the air, of the actual glass
 
     The length within the glass is taken too short by (true - assumed) h, and so any point that is fixed in the prism
     lies that much nearer than reduced: `about_face`. The two range constants differ by more, 1 + 1/(n n') times, for
     the true T lies higher in the glass than the assumed one: `about_point`. N-BK7 taken for old BK 7, 1.15e-5 lower,
-    costs 0.44 um or 0.63 um in a 38.1 mm prism, by what is meant: both numbers are quoted.
+    gives 0.44 um (face) or 0.63 um (point) in a 38.1 mm prism.
 
     Source: [GOLDMAN00] eqs. 3.9 and 3.10, their difference. Exact.
 
@@ -198,15 +210,15 @@ def wrong_glass(height: ArrayLike, *, assumed: ArrayLike, true: ArrayLike) -> Wr
 def clear_share(
     incidence: ArrayLike, *, aperture: ArrayLike, height: ArrayLike, index: ArrayLike
 ) -> NDArray[np.float64]:
-    """Area of a cube corner that sends light back, over that of its clear face seen straight on; 0 to 1.
+    """Returning area of a cube corner over its clear face; 0 to 1.
 
     incidence   rad, 0 to a right angle, on the face
     aperture    m, above 0: radius of the clear, round face
     height      m, from the face to the corner
-    index       phase index of what fills the corner over that of the air; 1 for a hollow one
+    index       phase index of the filling over that of the air; 1 for a hollow one
 
-    What enters at p leaves at 2 q - p, with q the corner projected on the face along the ray: both must be clear, two
-    circles 2 height tan r apart, foreshortened by cos I. Uncoated glass returns less where a face stops reflecting
+    Light entering at p leaves at 2 q - p, with q the corner projected on the face along the ray: both must be clear,
+    two circles 2 height tan r apart, foreshortened by cos I. Uncoated glass returns less where a face stops reflecting
     totally (BK 7: from 20.3 deg on the side of an edge, see `solid_prism`): not counted here.
 
     Source: geometry of the unfolded corner, as in [GOLDMAN00] appendix B. Exact for a corner that reaches beyond its
@@ -235,7 +247,10 @@ def _two_index_change(h: Array, n_g: Array, n_p: Array | float, c: Array) -> Arr
 def _two_indices(
     height: ArrayLike, incidence: ArrayLike, group: ArrayLike, phase: ArrayLike
 ) -> tuple[NDArray[np.float64], ...]:
-    """Height, both indices, sine and cosine of incidence (NaN where the face looks away)."""
+    """Height, both indices, sine and cosine of incidence.
+
+    NaN where the face looks away.
+    """
     n_g, n_p = np.asarray(group, dtype=float), np.asarray(phase, dtype=float)
     for name, value in (("group", n_g), ("phase", n_p)):
         if np.any(value <= 1.0):
@@ -250,7 +265,10 @@ def _two_indices(
 
 
 def _cosines(height: ArrayLike, n: ArrayLike, cos_incidence: ArrayLike) -> tuple[NDArray[np.float64], ...]:
-    """Height, index, cosine of incidence (NaN where the face looks away) and cosine of refraction."""
+    """Height, index, cosines of incidence and refraction.
+
+    NaN where the face looks away.
+    """
     ratio = np.asarray(n, dtype=float)
     c = np.asarray(cos_incidence, dtype=float)
     if np.any(ratio <= 1.0):

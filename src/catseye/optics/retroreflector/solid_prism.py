@@ -1,8 +1,10 @@
-"""A cube corner of glass: delayed by the group index, bent by the phase index, held in by total reflection.
+"""Solid prism: delayed by group index, refracted by phase index.
+
+Total reflection confines the light.
 
 Inside, the light meets the three faces under angles whose cosines are its components along the three edges; a
-reflection only turns a component's sign, so that every ray meets the same three angles, in whatever order. An uncoated
-face lets light out where such a cosine exceeds sqrt(1 - 1/n^2). With the ranger's azimuth a from the nearest edge the
+reflection only changes a component's sign, so that every ray has the same three angles, in any order. An uncoated
+face transmits light where such a cosine exceeds sqrt(1 - 1/n^2). With the ranger's azimuth a from the nearest edge the
 largest is
 
     sqrt(2/3) cos a sin r + cos r / sqrt 3 = A cos(r - r0),    A^2 = 1/3 + 2/3 cos^2 a,    tan r0 = sqrt 2 cos a
@@ -34,7 +36,9 @@ SIXTH = np.pi / 3.0
 
 @dataclass(frozen=True)
 class SolidPrism:
-    """A solid cube-corner prism; axes from the middle of its face, z out of the face, an edge at azimuth 0.
+    """Solid cube-corner prism.
+
+    Axes from the middle of its face, z out of the face, an edge at azimuth 0.
 
     height, aperture     m, face to corner; radius of the clear, round face
     group                group index of the glass over that of the air: the memo's n
@@ -66,7 +70,7 @@ class SolidPrism:
 
     @property
     def fiducial(self) -> tuple[float, float, float]:
-        """T, height / n below the face."""
+        """Fiducial point T, height / n below the face."""
         return (0.0, 0.0, -float(prism.reference_depth(self.height, self.group)))
 
     @property
@@ -76,13 +80,18 @@ class SolidPrism:
 
     @property
     def acceptance(self) -> float:
-        """Where an uncoated corner begins to let light out, or a coated one has no clear face left."""
+        """Incidence at which light begins to leak, or no clear face is left.
+
+        The former for an uncoated corner, the latter for a coated one.
+        """
         bent = self.phase * np.sin(np.arctan(self.aperture / self.height))
         clear = float(np.arcsin(bent)) if bent < 1.0 else RIGHT
         return clear if self.corner_reflectance is not None else min(clear, float(self.total_reflection_limit(0.0)))
 
     def total_reflection_limit(self, azimuth: ArrayLike) -> Array:
-        """Incidence, rad, up to which all three bare faces reflect totally; a right angle where they always do.
+        """Incidence, rad, up to which all bare faces reflect totally.
+
+        A right angle where they always do.
 
         azimuth   rad, of the direction to the ranger, from an edge
 
@@ -92,16 +101,22 @@ class SolidPrism:
         size = np.sqrt((1.0 + 2.0 * np.cos(turned) ** 2) / 3.0)
         critical = np.sqrt(1.0 - self.phase**-2) / size
         inside = np.arctan(np.sqrt(2.0) * np.cos(turned)) - np.arccos(np.minimum(critical, 1.0))
-        outside = self.phase * np.sin(np.maximum(inside, 0.0))  # 0 where not even normal incidence is held in
+        outside = self.phase * np.sin(np.maximum(inside, 0.0))  # 0 where even normal incidence is not confined
         return np.where((critical >= 1.0) | (outside >= 1.0), RIGHT, np.arcsin(np.minimum(outside, 1.0)))
 
     def range_change(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
-        """m, by `prism.oblique_change`; alike at every azimuth; NaN where the face looks away."""
+        """Range change, m, by `prism.oblique_change`; the same at every azimuth.
+
+        NaN where the face looks away.
+        """
         angle, _ = np.broadcast_arrays(incidences(incidence), np.asarray(azimuth, dtype=float))
         return prism.oblique_change(self.height, angle, group=self.group, phase=self.phase)
 
     def clear_area(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
-        """m^2 across the beam, as `prism.clear_share`; alike at every azimuth."""
+        """Clear area across the beam, m^2, as `prism.clear_share`.
+
+        The same at every azimuth.
+        """
         angle, _ = np.broadcast_arrays(incidences(incidence), np.asarray(azimuth, dtype=float))
         share = prism.clear_share(
             np.minimum(angle, RIGHT), aperture=self.aperture, height=self.height, index=self.phase
@@ -109,28 +124,32 @@ class SolidPrism:
         return np.pi * self.aperture**2 * share
 
     def return_share(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
-        """Clear area over the face's, times two passages of the face and three reflections, of unpolarized light.
+        """Returned share of unpolarized light: clear area, faces, three reflections.
 
-        What polarization does within the six sectors is in `sectors`; it does not change the sum where reflection is
-        total.
+        Two passages of the face.
+
+        The effect of polarization within the six sectors is in `sectors`; it does not change the sum where reflection
+        is total.
         """
         angle, turn = np.broadcast_arrays(incidences(incidence), np.asarray(azimuth, dtype=float))
         bare = np.mean(fresnel(np.cos(np.minimum(angle, RIGHT)), self.phase), axis=0)
-        lost = bare if self.face_reflectance is None else self.face_reflectance
+        reflected = bare if self.face_reflectance is None else self.face_reflectance
         area = self.clear_area(angle, turn) / (np.pi * self.aperture**2)
-        return area * (1.0 - lost) ** 2 * self._corner(np.minimum(angle, RIGHT), turn)
+        return area * (1.0 - reflected) ** 2 * self._corner(np.minimum(angle, RIGHT), turn)
 
     def sectors(self, incidence: float, azimuth: float = 0.0) -> Sectors:
-        """Six; a coated face or corner reflects s and p alike, see `corner_polarization.Corner` for real films.
+        """Six sectors; coatings reflect s and p equally.
 
-        Raises ValidityError where no light is left that meets all three faces.
+        See `corner_polarization.Corner` for real films.
+
+        Raises ValidityError where no light meets all three faces.
         """
-        behind = 1.0 if self.corner_reflectance is None else complex("inf")
-        corner = solid_corner(self.phase, behind, bare_face=self.face_reflectance is None)
+        outside = 1.0 if self.corner_reflectance is None else complex("inf")
+        corner = solid_corner(self.phase, outside, bare_face=self.face_reflectance is None)
         shares = sector_shares(corner, incidence, azimuth, aperture=self.aperture, height=self.height)
         metal = 1.0 if self.corner_reflectance is None else self.corner_reflectance**1.5
-        kept = 1.0 if self.face_reflectance is None else 1.0 - self.face_reflectance
-        return Sectors(shares, metal * kept * sector_jones(corner, incidence, azimuth))
+        transmitted = 1.0 if self.face_reflectance is None else 1.0 - self.face_reflectance
+        return Sectors(shares, metal * transmitted * sector_jones(corner, incidence, azimuth))
 
     def _corner(self, incidence: Array, azimuth: Array) -> Array:
         """Product of the three faces' reflectances."""

@@ -1,4 +1,4 @@
-"""A prism at its temperature: height and index follow the glass, and with them range constant and reference point.
+"""Prism at a temperature: height, index, range constant and reference point.
 
 A height is measured at 20 °C, the reference temperature of dimensions. At another temperature the glass is longer by
 its expansion and slower by its index; both count, and for the same prism they add: 38.1 mm of BK 7 in air of 933 hPa
@@ -20,10 +20,10 @@ EXPANSION_C = (-30.0, 70.0)  # °C, for which makers give the mean expansion tha
 
 
 class WarmPrism(NamedTuple):
-    """A prism at a temperature.
+    """Prism at a temperature.
 
     height            m, face to corner
-    phase, group      its indices over those of the air about it
+    phase, group      its indices over those of the surrounding air
     range_constant    m, negative
     reference_depth   m, of its point below the face
     """
@@ -44,7 +44,7 @@ def warm_prism(
     air_phase: ArrayLike,
     air_group: ArrayLike,
 ) -> WarmPrism:
-    """A prism of a glass at a temperature, in given air.
+    """Prism of a glass at a temperature, in given air.
 
     height          m, above 0, at 20 °C
     glass           a name in GLASSES
@@ -54,7 +54,7 @@ def warm_prism(
     air_group       group index of that air
 
     Source: [GOLDMAN00] eqs. 3.9, 3.10 with height (1 + expansion (t - 20 °C)) and `index_over_air` at t. The expansion
-    is the mean of -30 to 70 °C: beyond it is off by up to a tenth of itself.
+    is the mean of -30 to 70 °C: beyond it is wrong by up to a tenth of itself.
 
     >>> found = warm_prism(0.0381, "N-BK7", 0.780, -20.0, air_phase=1.0, air_group=1.0)
     >>> round(float(found.height) * 1e3, 5), round(float(found.range_constant) * 1e3, 4)
@@ -81,7 +81,9 @@ def warm_prism_slopes(
     air_phase: ArrayLike,
     air_group: ArrayLike,
 ) -> WarmPrism:
-    """Derivatives by the temperature of the glass, per °C, of everything that `warm_prism` gives; the air stays.
+    """Derivatives of `warm_prism` by glass temperature, per °C.
+
+    The air is unchanged.
 
     Arguments as of `warm_prism`.
 

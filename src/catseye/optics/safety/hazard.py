@@ -1,7 +1,9 @@
-"""Laser safety of a beam: its class, how far it is a hazard to eyes, what comes back (sweeping: `sweep`).
+"""Laser safety of a standing beam: class, hazard distance, returned light.
 
-A warning for planning, never a certificate. The air takes nothing away, the beam is Gaussian, its centre hits the
-pupil, and nobody looks away sooner than the duration says.
+For sweeping beams see `sweep`.
+
+A warning for planning, never a certificate. Assumptions: no loss in air, a Gaussian beam, its centre on the
+pupil, and exposure over the full duration.
 """
 
 from dataclasses import dataclass
@@ -16,25 +18,25 @@ NOTICE = (
     "A warning for planning, not a certificate: only the standard itself, measurement and a laser safety officer "
     "decide on class and hazard zone."
 )
-AVERSION = 0.25  # s, until somebody turns away from visible light
-TIME_BASE, LONG_TIME_BASE = 100.0, 3e4  # s, of classes: unless viewing is intended; where it is
+AVERSION = 0.25  # s, aversion response to visible light
+TIME_BASE, LONG_TIME_BASE = 100.0, 3e4  # s, time base of classes: unless viewing is intended; where it is
 WIDEST = 1.0  # rad, full angle: the tangent of its half is 9 % more than the half
-NEAREST = 0.1  # m, at which a naked eye can be
-ROUNDING = 1e-12  # of a power: what units, exponential and root may leave of a value that is the limit itself
+NEAREST = 0.1  # m, nearest distance of a naked eye
+ROUNDING = 1e-12  # relative rounding of a power equal to the limit
 
 
 @dataclass(frozen=True)
 class LaserBeam:
-    """A continuous laser's beam.
+    """Beam of a continuous laser.
 
     power            W
     wavelength_um    um, 0.4 to 1.4
-    diameter         m, at 1/e^2 of the intensity, where it leaves
+    diameter         m, at 1/e^2 of the intensity, at the exit
     divergence       rad, full angle at 1/e^2, far away; up to 1
-    waist_distance   m, from there on to the narrowest place; below 0 behind it
+    waist_distance   m, from the exit to the waist; below 0 behind it
 
-    The diameters at 1/e of other makers are smaller by the square root of 2: given here, they err to the safe side.
-    Raises ValidityError for a beam that light cannot make.
+    The diameters at 1/e of other makers are smaller by the square root of 2: used here, they are conservative.
+    Raises ValidityError for a physically impossible beam.
     """
 
     power: float
@@ -49,7 +51,7 @@ class LaserBeam:
                 raise ValidityError(f"{name} = {getattr(self, name):g} {unit} is not above 0 and finite")
         if self.divergence > WIDEST:
             raise ValidityError(
-                f"divergence = {self.divergence:g} rad is above {WIDEST:g} rad: beams so wide are not reckoned here"
+                f"divergence = {self.divergence:g} rad is above {WIDEST:g} rad: such wide beams are not supported"
             )
         if not np.isfinite(self.waist_distance):
             raise ValidityError(f"waist_distance = {self.waist_distance:g} m is not finite")
@@ -58,13 +60,15 @@ class LaserBeam:
             least = 4e-6 * self.wavelength_um / (np.pi * self.diameter)
             raise ValidityError(
                 f"a divergence of {self.divergence * 1e3:.4g} mrad from {self.diameter * 1e3:.4g} mm with the waist "
-                f"{self.waist_distance:g} m away is no beam of light (expected {least * 1e3:.4g} mrad or more with the "
-                "waist where it leaves)"
+                f"{self.waist_distance:g} m away is impossible (expected {least * 1e3:.4g} mrad or more with the "
+                "waist at the exit)"
             )
 
     @classmethod
     def gaussian(cls, power: float, wavelength_um: float, waist: float, quality: float = 1.0) -> "LaserBeam":
-        """The beam of `gaussian_beam.radius` with its waist, a radius in m, where it leaves.
+        """Beam with its waist at the exit; waist is a radius, m.
+
+        As `gaussian_beam.radius`.
 
         >>> round(LaserBeam.gaussian(0.010, 0.780, 0.010).divergence * 1e3, 5)
         0.04966
@@ -77,28 +81,28 @@ class LaserBeam:
 
     @property
     def waist_diameter(self) -> float:
-        """m, where it is narrowest."""
+        """Diameter at the waist, m."""
         return float(np.sqrt(self._waist_squared))
 
     @property
     def quality(self) -> float:
-        """M^2, 1 for an ideal beam."""
+        """Beam quality M^2, 1 for an ideal beam."""
         return self.divergence * self.waist_diameter * np.pi / (4e-6 * self.wavelength_um)
 
     def diameter_at(self, distance: float) -> float:
-        """m, at 1/e^2, a distance in m from where it leaves."""
+        """Diameter at 1/e^2, m, at a distance, m, from the exit."""
         return float(np.hypot(self.waist_diameter, self.divergence * (distance - self.waist_distance)))
 
     def power_within(self, aperture: float, distance: float) -> float:
-        """W through a centred aperture of a diameter in m."""
+        """Power, W, through a centred aperture of a diameter, m."""
         return float(-self.power * np.expm1(-2.0 * (aperture / self.diameter_at(distance)) ** 2))
 
 
 @dataclass(frozen=True)
 class Viewer:
-    """What an eye looks through.
+    """Viewing aid of an eye, or none.
 
-    name            for people
+    name            display name
     entrance        m, diameter of the front lens; infinite for a naked eye
     magnification   1 for a naked eye
     transmission    0 to 1
@@ -117,7 +121,7 @@ class Viewer:
             )
 
     def collecting(self, aperture: float) -> float:
-        """Diameter, m, of the light in front that comes through an aperture in m at the eye."""
+        """Diameter, m, at the front of light through an eye aperture, m."""
         return min(self.entrance, self.magnification * aperture)
 
 
@@ -127,10 +131,10 @@ BINOCULARS = Viewer("7x50 binoculars", 0.050, 7.0, 0.9)  # transmission of good 
 
 @dataclass(frozen=True)
 class LaserClassification:
-    """A beam's class and why.
+    """Laser class with its reasons.
 
     laser_class    a name in CLASSES
-    reasons        one line each, for people
+    reasons        one line each
     emissions      W: under condition 1 (50 mm at 2 m), condition 3 (7 mm at 0.1 m)
     limits         W, of classes 1, 2 (visible only), 3R, 3B
     """
@@ -142,7 +146,9 @@ class LaserClassification:
 
 
 def hazard_zone(beam: LaserBeam, limits: tuple[ExposureLimit, ...], viewer: Viewer = NAKED) -> tuple[float, float]:
-    """Distances (from, to), m, between which the standing beam is more than a limit allows; (0, 0) if nowhere.
+    """Distances (from, to), m, where the standing beam exceeds a limit.
+
+    (0, 0) if nowhere.
 
     beam     the laser's
     limits   of `limits`; for the nominal ocular hazard distance those of the eye
@@ -166,15 +172,15 @@ def hazard_zone(beam: LaserBeam, limits: tuple[ExposureLimit, ...], viewer: View
 def classify(
     beam: LaserBeam, *, edition: str = "iec2014", long_viewing: bool = False, subtense: float = ALPHA_MIN
 ) -> LaserClassification:
-    """The class that the beam would have as a product's only accessible emission.
+    """Class of the beam as a product's only accessible emission.
 
-    beam           the laser's, standing still: a sweep counts only where nothing can stop it
+    beam           the laser's, standing still: a sweep counts only if it cannot stop
     edition        a name in `limits.EDITIONS`
-    long_viewing   looking into it for long is intended: 30 000 s instead of 100 s
+    long_viewing   True for intended long viewing: 30 000 s instead of 100 s
     subtense       rad, of the apparent source
 
-    The first class in the order 1, 1M, 2, 2M, 3R, 3B, 4 whose terms it keeps. Single faults, labels, class 1C and
-    several wavelengths are not looked at.
+    The first class in the order 1, 1M, 2, 2M, 3R, 3B, 4 whose limits it meets. Single faults, labels, class 1C and
+    several wavelengths are not considered.
 
     Source: [IEC14] clauses 4.3, 5.3 and table 10 (conditions 1 and 3; the loupe's condition 2 is gone); [ANSI14]
     section 3.3 measures alike.
@@ -215,7 +221,7 @@ def classify(
 
 
 def exceeds(power: float, limit: float) -> bool:
-    """True for a power above its limit; one that is the limit but for rounding keeps it.
+    """True for a power above its limit, with rounding tolerance.
 
     power, limit   W
 
@@ -226,7 +232,10 @@ def exceeds(power: float, limit: float) -> bool:
 
 
 def _milliwatts(*powers: float) -> list[str]:
-    """Powers, W, the limit last, as texts in mW with as many digits as tell each from the limit."""
+    """Powers, W, with the limit last, as texts in mW.
+
+    With enough digits to distinguish each from the limit.
+    """
     limit = powers[-1]
     for digits in range(4, 17):
         texts = [f"{power * 1e3:.{digits}g}" for power in powers]
@@ -248,7 +257,9 @@ def returned_power(
     viewer: Viewer = NAKED,
     aperture: float = PUPIL,
 ) -> float:
-    """W that a retroreflector sends into an eye beside the laser, in the middle of the light that comes back.
+    """Power, W, returned by a retroreflector into an eye beside the laser.
+
+    In the middle of the returned light.
 
     beam          the laser's, its waist where it leaves
     distance      m, above 0, to the retroreflector
@@ -257,7 +268,7 @@ def returned_power(
     viewer        what the eye looks through
     aperture      m, diameter over which the exposure is averaged: the pupil's for the retina, see `ExposureLimit`
 
-    Computed as for an ideal beam (M^2 = 1) of the same waist, which spreads least: the safe side.
+    Computed as for an ideal beam (M^2 = 1) of the same waist, which spreads least: conservative.
 
     Source: `gaussian_beam.returned_share`. Raises ValidityError as it does, and for a waist elsewhere.
 
@@ -266,7 +277,7 @@ def returned_power(
     1.654
     """
     if beam.waist_distance != 0.0:
-        raise ValidityError(f"waist {beam.waist_distance:g} m away: what comes back is known for a waist at the laser")
+        raise ValidityError(f"waist {beam.waist_distance:g} m away: the returned power needs a waist at the laser")
     if not 0.0 <= reflectance <= 1.0:
         raise ValidityError(f"reflectance {reflectance:g} is outside 0 to 1")
     share = gaussian_beam.returned_share(
@@ -280,7 +291,7 @@ def returned_power(
 
 
 def _zone(beam: LaserBeam, limit: ExposureLimit, viewer: Viewer) -> tuple[float, float]:
-    """Where one limit is exceeded."""
+    """Zone where one limit is exceeded."""
     share = limit.power / (viewer.transmission * beam.power)
     if not exceeds(1.0, share):
         return 0.0, 0.0

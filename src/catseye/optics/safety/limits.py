@@ -1,6 +1,8 @@
-"""Limits of exposure to continuous lasers of 400 to 1400 nm: what eye and skin may be given, what a class may emit.
+"""Exposure and class limits of continuous lasers, 400 to 1400 nm.
 
-Two editions, which agree but where it says so:
+Limits for eye and skin, and emission limits of classes.
+
+Two editions, which agree except where noted:
 
     iec2014    IEC 60825-1:2014 (edition 3): tables A.1, A.2 (eye), A.5 (skin), 3, 4 (class 1), 5 (class 2), 6, 7 (class
                3R), 8 (class 3B), 9 (factors). Its C3, C4, C6, C7 are the C_B, C_A, C_E, C_C below.
@@ -11,7 +13,7 @@ pupil (0.385 mW C_A); beyond 1200 nm ANSI has a limit for the cornea of its own,
 
 Lengths are metres, limits W/m^2 on the average over the exposure, angles radians: 1.5 mrad is 1.5e-3. At a border of
 durations the lower limit holds, at one of wavelengths that of the longer ones. All this is for planning: the standards
-themselves decide. They were not at hand when this was written: docs/safety.md says what it was compared with.
+themselves decide. They were not available for this file: docs/safety.md lists its comparisons.
 """
 
 from dataclasses import dataclass
@@ -45,9 +47,9 @@ class Factors(NamedTuple):
 
 @dataclass(frozen=True)
 class ExposureLimit:
-    """One limit of exposure.
+    """Limit of exposure of eye or skin.
 
-    name         what it protects from
+    name         hazard it protects from
     irradiance   W/m^2, on the average over duration and aperture
     aperture     m, diameter over which the exposure is averaged
     """
@@ -58,12 +60,12 @@ class ExposureLimit:
 
     @property
     def power(self) -> float:
-        """The limit as a power, W, through its aperture."""
+        """Limit as a power, W, through its aperture."""
         return self.irradiance * 0.25 * np.pi * self.aperture**2
 
 
 def factors(wavelength_um: float, duration: float = 100.0, subtense: float = ALPHA_MIN) -> Factors:
-    """The correction factors.
+    """Correction factors of an exposure.
 
     wavelength_um   um, 0.4 to 1.4
     duration        s, 1e-9 to 3e4
@@ -95,7 +97,7 @@ def factors(wavelength_um: float, duration: float = 100.0, subtense: float = ALP
 def eye_limits(
     wavelength_um: float, duration: float, subtense: float = ALPHA_MIN, *, edition: str = "iec2014"
 ) -> tuple[ExposureLimit, ...]:
-    """Every limit that the eye's exposure must keep; all of them count.
+    """All limits for exposure of the eye; each must be met.
 
     wavelength_um, duration, subtense   as for `factors`
     edition                             a name in EDITIONS
@@ -106,7 +108,7 @@ def eye_limits(
     >>> [(m.name, round(m.irradiance, 2)) for m in eye_limits(0.780, 100.0)]
     [('heat on the retina', 14.45)]
     """
-    _known(edition)
+    _check_edition(edition)
     f, nm = factors(wavelength_um, duration, subtense), _nanometres(wavelength_um)
     limits = [ExposureLimit("heat on the retina", _heat(nm, duration, f, subtense), PUPIL)]
     chemical = _chemistry(nm, duration, f, subtense)
@@ -166,7 +168,7 @@ def class_limit(
     >>> [round(class_limit(c, 0.780, 100.0) * 1e3, 3) for c in ("1", "3R", "3B")]
     [0.564, 2.891, 500.0]
     """
-    _known(edition)
+    _check_edition(edition)
     visible = _nanometres(wavelength_um) < 700
     if laser_class == "3B":
         return CLASS_3B
@@ -196,7 +198,7 @@ def _class_1(wavelength_um: float, duration: float, subtense: float, edition: st
 
 
 def _class_3r(wavelength_um: float, duration: float, subtense: float, edition: str) -> float:
-    """Five times class 1, which IEC rounds for points."""
+    """Class 3R limit: five times class 1, which IEC rounds for points."""
     if edition == "iec2014" and subtense <= ALPHA_MIN and duration >= 10.0 and wavelength_um >= 0.7:
         f = factors(wavelength_um, duration, subtense)
         return 2.0e-3 * f.c_a * f.c_c
@@ -204,7 +206,7 @@ def _class_3r(wavelength_um: float, duration: float, subtense: float, edition: s
 
 
 def _heat(nm: float, duration: float, f: Factors, subtense: float) -> float:
-    """W/m^2 of the retina's thermal limit."""
+    """Thermal limit of the retina, W/m^2."""
     tall = nm >= 1050
     if duration < f.t_i:
         return (2e-2 * f.c_c if tall else 2e-3 * f.c_a) * f.c_e / duration
@@ -214,9 +216,9 @@ def _heat(nm: float, duration: float, f: Factors, subtense: float) -> float:
 
 
 def _chemistry(nm: float, duration: float, f: Factors, subtense: float) -> float | None:
-    """W/m^2 of the retina's photochemical limit; None where there is none.
+    """Photochemical limit of the retina, W/m^2; None where absent.
 
-    Only light within gamma counts: an even source larger than that may give more by the square.
+    Only light within gamma counts: an even source larger than that is allowed more by the square.
     """
     early = duration >= 1.0 and nm <= 484 and ALPHA_MIN < subtense < 82e-3
     if nm > 600 or not (duration >= 10.0 or early):
@@ -225,12 +227,12 @@ def _chemistry(nm: float, duration: float, f: Factors, subtense: float) -> float
 
 
 def _cornea(nm: float, duration: float) -> float:
-    """W/m^2, [ANSI14] table 5c, 1200 to 1400 nm."""
+    """Corneal limit, W/m^2, [ANSI14] table 5c, 1200 to 1400 nm."""
     k = 10 ** (0.01 * (1400 - nm))
     if duration >= 10.0:
         return 1e4 * (0.03 * k + 0.07)
-    grown = 0.0 if duration < 1e-3 else (0.56 * duration**0.25 - 0.1 if duration < 4.0 else 0.7)
-    return 1e4 * (0.3 * k + grown) / duration
+    time_term = 0.0 if duration < 1e-3 else (0.56 * duration**0.25 - 0.1 if duration < 4.0 else 0.7)
+    return 1e4 * (0.3 * k + time_term) / duration
 
 
 def _corneal_aperture(duration: float) -> float:
@@ -240,7 +242,7 @@ def _corneal_aperture(duration: float) -> float:
 
 def _nanometres(wavelength_um: float) -> float:
     _within("wavelength", wavelength_um, 0.4, 1.4, "um")
-    return round(1e3 * wavelength_um, 9)  # 1.1 um is 1100 nm, not a rounding more
+    return round(1e3 * wavelength_um, 9)  # 1.1 um is 1100 nm exactly
 
 
 def _within(name: str, value: float, low: float, high: float, unit: str) -> None:
@@ -248,6 +250,6 @@ def _within(name: str, value: float, low: float, high: float, unit: str) -> None
         raise ValidityError(f"{name} {value:g} {unit} is outside {low:g}-{high:g} {unit}, where these limits are known")
 
 
-def _known(edition: str) -> None:
+def _check_edition(edition: str) -> None:
     if edition not in EDITIONS:
         raise ValidityError(f"edition {edition!r} is not one of {', '.join(EDITIONS)}")

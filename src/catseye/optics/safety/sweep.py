@@ -1,4 +1,4 @@
-"""Laser safety of a beam that sweeps past an eye: a train of pulses, and how far it is a hazard.
+"""Laser safety of a sweeping beam: pulse trains and hazard distance.
 
 As `hazard`: a warning for planning, never a certificate.
 """
@@ -13,16 +13,16 @@ from catseye.optics import gaussian_beam
 from catseye.optics.safety.hazard import NAKED, NEAREST, ROUNDING, TIME_BASE, LaserBeam, Viewer, hazard_zone
 from catseye.optics.safety.limits import ALPHA_MIN, SHORTEST, eye_limits, factors
 
-SEARCH = 150  # distances at which a sweeping beam is tried
+SEARCH = 150  # distances at which a sweeping beam is tested
 
 
 def sweep_pulse(
     beam: LaserBeam, distance: float, rate: float, *, aperture: float, transmission: float = 1.0
 ) -> tuple[float, float]:
-    """Energy, J, and duration at half power, s, of what an aperture gets while the beam's middle sweeps across it.
+    """Energy, J, and half-power duration, s, of a sweep across an aperture.
 
     beam           the laser's
-    distance       m, above 0, from what turns the beam
+    distance       m, above 0, from the scanning mirror
     rate           rad/s, above 0: of the beam, twice that of a mirror turning about a line in its face
     aperture       m, diameter
     transmission   share that comes through
@@ -50,7 +50,9 @@ def sweep_pulse(
 
 
 def repetition_factor(count: float, duration: float, subtense: float, *, wavelength_um: float, total: float) -> float:
-    """By how much the limit of one pulse shrinks where many follow: C_5 of IEC, C_P of others; 1 down to 0.2.
+    """Repetition factor of a pulse limit: C_5 of IEC, C_P of others.
+
+    From 1 down to 0.2.
 
     count           pulses within `total` or T_2, whichever is shorter
     duration        s, of one
@@ -86,16 +88,18 @@ def sweep_ratio(
     subtense: float = ALPHA_MIN,
     edition: str = "iec2014",
 ) -> float:
-    """How much of its limit an eye gets from a beam that sweeps over it: 1 is all.
+    """Exposure of an eye to a sweeping beam over its limit.
+
+    1 is the limit.
 
     beam, distance, rate   as for `sweep_pulse`
     duration               s, of the exposure
     period                 s, above 0, from one pass to the next; None for a single one
     viewer, subtense, edition   what the eye looks through; the source; a name in EDITIONS
 
-    The most of three rules: each pass alone; the average of all; each pass alone by a limit shrunk by
-    `repetition_factor`. A pass as long as the exposure, or as the period, is a standing beam, and none is worse than
-    that. An exposure beyond 100 s is no safer than 100 s of it, the time over which a dose of blue light is counted.
+    The largest of three rules: each pass alone; the average of all; each pass alone by a limit reduced by
+    `repetition_factor`. A pass as long as the exposure, or as the period, is a standing beam, the worst
+    case. An exposure beyond 100 s is no safer than 100 s of it, the time over which a dose of blue light is counted.
 
     Source: [IEC14] clause 4.3 f, rules 1 to 3.
 
@@ -105,24 +109,26 @@ def sweep_ratio(
     _refuse_sweep(rate, period)
     ratios = []
     if duration > TIME_BASE:
-        given: dict[str, Any] = {"period": period, "viewer": viewer, "subtense": subtense, "edition": edition}
-        ratios.append(sweep_ratio(beam, distance, rate, duration=TIME_BASE, **given))
+        options: dict[str, Any] = {"period": period, "viewer": viewer, "subtense": subtense, "edition": edition}
+        ratios.append(sweep_ratio(beam, distance, rate, duration=TIME_BASE, **options))
     for limit in eye_limits(beam.wavelength_um, duration, subtense, edition=edition):
         aperture = viewer.collecting(limit.aperture)
-        standing = viewer.transmission * beam.power_within(aperture, distance) / limit.power
+        steady = viewer.transmission * beam.power_within(aperture, distance) / limit.power
         energy, pulse = sweep_pulse(beam, distance, rate, aperture=aperture, transmission=viewer.transmission)
         if pulse >= min(duration, np.inf if period is None else period):
-            ratios.append(standing)
+            ratios.append(steady)
             continue
         longest = min(duration, factors(beam.wavelength_um, duration, subtense).t_2)
         count, train = (1.0 if period is None else float(np.ceil(t / period)) for t in (duration, longest))
-        ratios.append(min(standing, count * energy / (duration * limit.power)))
-        if limit.name == "chemistry on the retina":  # a dose: only the sum counts
+        ratios.append(min(steady, count * energy / (duration * limit.power)))
+        if limit.name == "chemistry on the retina":  # a dose: only the sum matters
             continue
         short = max(pulse, SHORTEST)
-        once = {m.name: m.power * short for m in eye_limits(beam.wavelength_um, short, subtense, edition=edition)}
+        single_pass = {
+            m.name: m.power * short for m in eye_limits(beam.wavelength_um, short, subtense, edition=edition)
+        }
         shrunk = repetition_factor(train, short, subtense, wavelength_um=beam.wavelength_um, total=duration)
-        ratios.append(min(standing, energy / (once[limit.name] * shrunk)))
+        ratios.append(min(steady, energy / (single_pass[limit.name] * shrunk)))
     return max(ratios)
 
 
@@ -136,9 +142,11 @@ def sweep_hazard_distance(
     subtense: float = ALPHA_MIN,
     edition: str = "iec2014",
 ) -> float:
-    """Distance, m, beyond which a sweeping beam gives no eye more than its limit; 0 if nowhere from 0.1 m on.
+    """Distance, m, beyond which a sweeping beam exceeds no eye limit.
 
-    Arguments as for `sweep_ratio`. Never beyond the zone of the standing beam, within which it is tried.
+    0 if nowhere from 0.1 m on.
+
+    Arguments as for `sweep_ratio`. Searched within the zone of the standing beam.
 
     >>> round(sweep_hazard_distance(LaserBeam(0.3, 0.780, 0.003, 1e-3), 0.5, duration=100.0), 1)
     75.8
@@ -150,14 +158,14 @@ def sweep_hazard_distance(
     from scipy.optimize import brentq
 
     def over(log_distance: float) -> float:
-        given: dict[str, Any] = {
+        options: dict[str, Any] = {
             "duration": duration,
             "period": period,
             "viewer": viewer,
             "subtense": subtense,
             "edition": edition,
         }
-        return sweep_ratio(beam, float(np.exp(log_distance)), rate, **given) - 1.0 - ROUNDING
+        return sweep_ratio(beam, float(np.exp(log_distance)), rate, **options) - 1.0 - ROUNDING
 
     tried: NDArray[np.float64] = np.linspace(np.log(NEAREST), np.log(far), SEARCH)
     for k in range(SEARCH - 1, -1, -1):
@@ -167,7 +175,7 @@ def sweep_hazard_distance(
 
 
 def _refuse_sweep(rate: float, period: float | None) -> None:
-    """Rate and period of a sweep must be above 0 and finite."""
+    """Raise ValidityError unless rate and period are above 0 and finite."""
     for name, value, unit in (("rate", rate, "rad/s"), ("period", 1.0 if period is None else period, "s")):
         if not 0.0 < value < np.inf:
             raise ValidityError(f"{name} = {value:g} {unit} is not above 0 and finite")

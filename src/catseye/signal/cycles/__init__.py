@@ -1,1 +1,1 @@
-"""Whole cycles: coarse lengths, several frequencies."""
+"""Whole cycles from coarse lengths or several modulation frequencies."""

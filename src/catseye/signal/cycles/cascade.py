@@ -1,4 +1,4 @@
-"""A length from the longest beat of several modulation frequencies down to the carrier, step by step."""
+"""Cascade from the longest beat of several modulations to the carrier."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -13,14 +13,14 @@ from catseye.signal.cycles.whole import whole_cycles
 
 @dataclass(frozen=True, eq=False)
 class CascadeLength:
-    """The length of the cascade, step by step.
+    """Lengths from the cascade, with the margin of each step.
 
     length   m, in air, after the last step: least squares of all phases with the cycles found
     cycles   (..., k) N of each frequency
     margin   (..., k - 1) m of length in air, by step after the longest beat: how much further it may have been off
     u        (..., k - 1) m, standard uncertainty of each step's misfit
-    thin     (...) a step whose misfit and SURE times u go beyond its margin, or the longest beat's length so near to a
-             limit that noise may have carried it over to the other one; or an input that is not finite (N is then 0)
+    thin     (...) True where a step's misfit plus SURE times u exceeds its margin, where the longest beat's length is
+             so near one limit that noise may have moved it to the other, or where an input is not finite (N is then 0)
     """
 
     length: NDArray[np.float64]
@@ -38,7 +38,7 @@ def cascade_length(
     low: float,
     group_index: ArrayLike = 1.0,
 ) -> CascadeLength:
-    """The length by steps from the longest beat with the lowest frequency to the shortest, then to that frequency.
+    """Length by steps from the longest beat to the lowest frequency.
 
     phase_fractions   (..., k) rad, from `fraction`
     frequencies_hz    (k,) two or more different, above 0
@@ -63,7 +63,7 @@ def cascade_length(
     n = np.asarray(group_index, dtype=float)
     u = float(checked_u_phase(u_phase, f)[0])
     k = len(f)
-    lift = np.eye(k)[1:] - np.eye(k)[0]  # phases of the beats with the lowest frequency, and at last its own
+    lift = np.eye(k)[1:] - np.eye(k)[0]  # phases of the beats with the lowest frequency, then of that frequency itself
     steps = np.concatenate([lift, np.eye(k)[:1]])
     half = SPEED_OF_LIGHT / (2.0 * np.append(f[1:] - f[0], f[0]))
     turned = np.mod(phase @ steps.T, TWO_PI)
@@ -74,19 +74,19 @@ def cascade_length(
     u_first = u * float(np.linalg.norm(by_phase[0]))
     edge = np.minimum(length - optical_low, optical_low + half[0] - length)
     margins, us, thin = [], [], np.asarray(~(edge > SURE * u_first))  # NaN is thin too
-    for before, now in pairwise(range(k)):
-        cycles, margin = whole_cycles(length, turned[..., now], half[now])
-        u_step = u * float(np.linalg.norm(by_phase[before] - by_phase[now]))
+    for previous, current in pairwise(range(k)):
+        cycles, margin = whole_cycles(length, turned[..., current], half[current])
+        u_step = u * float(np.linalg.norm(by_phase[previous] - by_phase[current]))
         thin = thin | ~(margin > SURE * u_step)
         margins.append(margin / n)
         us.append(np.full(length.shape, u_step) / n)
-        length = (cycles - turned[..., now] / TWO_PI) * half[now]
-    own = SPEED_OF_LIGHT / (2.0 * f)
-    whole = np.rint(length[..., None] / own + phase / TWO_PI)
-    each = (whole - phase / TWO_PI) * own
-    cycles = np.where(np.isfinite(whole), whole, 0.0).astype(np.int64)
-    weight = own**-2.0 / np.sum(own**-2.0)  # the same u_phase for all: u of length goes with the half wavelength
+        length = (cycles - turned[..., current] / TWO_PI) * half[current]
+    half_waves = SPEED_OF_LIGHT / (2.0 * f)
+    numbers = np.rint(length[..., None] / half_waves + phase / TWO_PI)
+    lengths = (numbers - phase / TWO_PI) * half_waves
+    cycles = np.where(np.isfinite(numbers), numbers, 0.0).astype(np.int64)
+    weight = half_waves**-2.0 / np.sum(half_waves**-2.0)  # one u_phase: u of a length goes as half wavelength
     back = np.argsort(order)
     return CascadeLength(
-        each @ weight / n, cycles[..., back], np.stack(margins, axis=-1), np.stack(us, axis=-1), np.asarray(thin)
+        lengths @ weight / n, cycles[..., back], np.stack(margins, axis=-1), np.stack(us, axis=-1), np.asarray(thin)
     )

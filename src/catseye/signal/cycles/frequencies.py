@@ -1,4 +1,4 @@
-"""Which modulation frequencies tell lengths apart, and how well."""
+"""Choose modulation frequencies that separate lengths; rate a set."""
 
 from dataclasses import dataclass
 
@@ -7,19 +7,19 @@ from numpy.typing import ArrayLike
 
 from catseye.constants import SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import ValidityError
-from catseye.signal.cycles.sets import SURE, beyond, checked_frequencies, checked_u_phase, cycle_sets
+from catseye.signal.cycles.sets import SURE, checked_frequencies, checked_u_phase, cycle_sets, upper_tail
 
 
 @dataclass(frozen=True)
 class ModulationSet:
-    """What a set of modulation frequencies can tell.
+    """Set of modulation frequencies, with the lengths it can separate.
 
     frequencies_hz     (k,) the lowest first
-    span               m, width of the limits within which lengths are told apart
+    span               m, width of the limits within which lengths are separated
     separation         least distance between the phases of two lengths, in standard uncertainties of the phases: a slip
                        takes noise of half of it
-    nearest            m, by how much those two lengths differ
-    first_alias        m, the shortest difference that 2 SURE standard uncertainties do not tell apart; None if none
+    nearest            m, difference of those two lengths
+    first_alias        m, shortest difference not separated by 2 SURE standard uncertainties; None if there is none
     u_length           m, standard uncertainty of a length
     slip_probability   bound on the probability of a slip, all other lengths within the span together
     """
@@ -34,25 +34,25 @@ class ModulationSet:
 
     @property
     def unambiguous(self) -> bool:
-        """Phases would have to be wrong by more than SURE standard uncertainties."""
+        """True if slips need phase errors above SURE standard uncertainties."""
         return self.separation >= 2.0 * SURE
 
 
 def modulation_set(
     frequencies_hz: ArrayLike, *, u_phase: ArrayLike, span: float, group_index: float = 1.0
 ) -> ModulationSet:
-    """How well phases at some frequencies tell lengths apart that lie within a span.
+    """Rate a set of frequencies by the lengths it separates.
 
     frequencies_hz   (k,) two or more different modulation frequencies, above 0
     u_phase          rad, above 0, of each phase fraction: one for all, or (k,)
     span             m, above 0: largest minus smallest length in question
     group_index      of the air at the carrier
 
-    All lengths up to the span whose phases come back near those of length zero are compared, none is left out.
+    All lengths up to the span whose phases come near those of length zero are compared, without exception.
     Raises ValidityError for values outside those limits.
 
     Source: [LOEFDAHL01] for the problem; the exact search is ours: chi-square is quadratic between the lengths at
-    which one of the whole cycles turns.
+    which one of the whole cycles changes.
 
     >>> plan = modulation_set([1500e6, 1500.5e6, 1510e6], u_phase=1e-3, span=200.0)
     >>> plan.unambiguous, round(plan.separation, 1), round(1e6 * plan.u_length, 1)
@@ -66,12 +66,12 @@ def modulation_set(
     if not np.isfinite(u).all():
         raise ValidityError(f"u_phase {u_phase!r} rad is not finite")
     candidates = cycle_sets(np.zeros((1, len(f))), half, 1.0 / u[None] ** 2, limits=(0.0, span * group_index))
-    other = np.any(candidates.cycles[0] != 0, axis=-1) & candidates.inside[0]
-    lengths, square = candidates.length[0, other] / group_index, candidates.misfit[0, other]
+    aliases = np.any(candidates.cycles[0] != 0, axis=-1) & candidates.inside[0]
+    lengths, square = candidates.length[0, aliases] / group_index, candidates.misfit[0, aliases]
     u_length = float(np.sum(u**-2.0) ** -0.5) / group_index
-    whole = 0.25 * float(np.min((half / u) ** 2))  # what was not compared misses one phase by half a turn or more
-    if not len(lengths) or float(square.min()) > whole:
-        lengths, square = np.append(lengths, np.nan), np.append(square, whole)
+    least_square = 0.25 * float(np.min((half / u) ** 2))  # all sets not compared miss one phase by half a turn or more
+    if not len(lengths) or float(square.min()) > least_square:
+        lengths, square = np.append(lengths, np.nan), np.append(square, least_square)
     near = np.sqrt(square)
     alias = lengths[near < 2.0 * SURE]
     return ModulationSet(
@@ -81,7 +81,7 @@ def modulation_set(
         float(lengths[np.argmax(near <= near.min() + 1e-6)]),
         float(alias.min()) if len(alias) else None,
         u_length,
-        float(min(1.0, np.sum(2.0 * beyond(0.5 * near)))),
+        float(min(1.0, np.sum(2.0 * upper_tail(0.5 * near)))),
     )
 
 
@@ -95,18 +95,18 @@ def choose_frequencies(
     most: int = 6,
     group_index: float = 1.0,
 ) -> ModulationSet:
-    """The fewest modulation frequencies that find a length within a span, with what they can tell.
+    """Fewest modulation frequencies that resolve lengths within a span.
 
     span          m, above 0: largest minus smallest length in question
     u_phase       rad, above 0, of each phase fraction
     lowest_hz     the lowest frequency
-    widest_hz     the most by which another may lie above it: the band of laser, detector and retroreflector mount
+    widest_hz     largest offset above it: the band of laser, detector and retroreflector mount
     step_hz       raster of the synthesiser
     most          frequencies at most
     group_index   of the air at the carrier
 
-    The first offset has a beat longer than the span, the others follow in geometric progression up to the widest; what
-    is returned has passed `modulation_set`, not only this rule. Raises ValidityError where no such plan with `most`
+    The first offset has a beat longer than the span, the others follow in geometric progression up to the widest; the
+    result is checked by `modulation_set`, not by this rule alone. Raises ValidityError where no such plan with `most`
     frequencies is good for SURE standard uncertainties.
 
     >>> choose_frequencies(200.0, u_phase=1e-3).frequencies_hz
@@ -117,7 +117,7 @@ def choose_frequencies(
     first = np.floor(SPEED_OF_LIGHT / (2.0 * group_index * span * 1.05) / step_hz) * step_hz
     if not step_hz <= first <= widest_hz:
         raise ValidityError(
-            f"a span of {span} m asks for frequencies {first} Hz apart: expected between the step, {step_hz} Hz, "
+            f"span {span} m needs frequencies {first} Hz apart: expected between the step, {step_hz} Hz, "
             f"and the widest, {widest_hz} Hz"
         )
     best = 0.0

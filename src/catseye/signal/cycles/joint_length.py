@@ -1,12 +1,12 @@
-"""A length from phases at several modulation frequencies, without a coarse length: the joint search and the cascade.
+"""Length from phases at several frequencies, without a coarse length.
 
 The group index of air belongs to the carrier, 780 nm; it is the same for every modulation frequency, so that one
-optical length n L carries all phases: n L = (N_k - phi_k/2 pi) c / 2 f_k. The electronics do have a phase of their own
-at every frequency: each phase_fraction must have been taken after a reference shot at the same frequency.
+optical length n L carries all phases: n L = (N_k - phi_k/2 pi) c / 2 f_k. The electronics have a different phase
+at each frequency: each phase_fraction must have been taken after a reference shot at the same frequency.
 
-The joint search is the better one: it weighs all phases at once and is exact. The cascade steps from the longest beat
+The joint search is better: it weights all phases at once and is exact. The cascade steps from the longest beat
 to the carrier; each step rests on the difference of two phases only, sqrt 2 noisier, so it slips first. It is kept
-because it shows in which step the margin is lost.
+to show in which step the margin is lost.
 """
 
 from dataclasses import dataclass
@@ -18,14 +18,17 @@ from numpy.typing import ArrayLike, NDArray
 from catseye.constants import SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import ValidityError
 from catseye.signal.cycles.frequencies import modulation_set
-from catseye.signal.cycles.sets import SURE, beyond, checked_frequencies, checked_u_phase, cycle_sets
+from catseye.signal.cycles.sets import SURE, checked_frequencies, checked_u_phase, cycle_sets, upper_tail
 
-HOPELESS = 1.0  # standard uncertainties of the phases that turn one length into another: then no shot is worth a search
-ROOM = 2_000_000  # lengths that are compared at once: some 100 MB
+HOPELESS = 1.0  # standard uncertainties of phase that separate two lengths: below it a search is pointless
+ROOM = 2_000_000  # lengths compared at once: some 100 MB
 
 
 class JointStatus(IntEnum):
-    """What came of one shot: FOUND, AMBIGUOUS (another length fits nearly as well), MISFIT (none fits), UNKNOWN."""
+    """Result of one shot.
+
+    FOUND; AMBIGUOUS: another length fits nearly as well; MISFIT: none fits; UNKNOWN: input not finite.
+    """
 
     FOUND = 0
     AMBIGUOUS = 1
@@ -38,12 +41,12 @@ class JointLength:
     """Lengths from k phases each; arrays over the shots.
 
     length             m, in air: approximate distance - D0 - Pc - dPc in the sense of `whole_cycles`; nan where unknown
-    u_length           m, standard uncertainty if the whole cycles are right: phases only, the index is taken as exact
+    u_length           m, standard uncertainty if the whole cycles are right: from the phases only, index taken as exact
     cycles             (..., k) N of each frequency
     misfit             chi-square of the phases, k - 1 degrees of freedom
     next_length        m, the length that fits second best
-    discrimination     by how much its chi-square is larger, at least
-    slip_probability   that the cycles are others; every length within the limits is as likely before
+    discrimination     chi-square of that length less that of the best, at least
+    slip_probability   probability of wrong cycles; all lengths within the limits are equally likely a priori
     status             int8 of `JointStatus`
     """
 
@@ -65,20 +68,20 @@ def joint_length(
     within: tuple[float, float],
     group_index: ArrayLike = 1.0,
 ) -> JointLength:
-    """The length that phases at several modulation frequencies have in common: exact search of all whole cycles.
+    """Length common to phases at several frequencies, by exact search.
 
     phase_fractions   (..., k) rad, from `fraction`, each against the reference at its own frequency
     frequencies_hz    (k,) two or more different, above 0
     u_phase           rad, above 0, of each phase fraction; broadcasts to (..., k)
-    within            m, the smallest and the largest length that is possible
+    within            m, smallest and largest possible length
     group_index       (...) mean along each path, at the carrier
 
-    Each length within the limits gives one set of nearest whole cycles; between two neighbouring turns of one of them
-    the set is the same and chi-square a parabola. So every set that can be best is compared. AMBIGUOUS where the next
-    one is not SURE standard uncertainties worse, MISFIT where the best misses its phases by more than SURE. A shot with
-    an input that is not finite is UNKNOWN. Raises ValidityError for values outside those limits, and for frequencies
-    with which one standard uncertainty of phase turns a length within the limits into another, even at the smallest
-    u_phase.
+    Each length within the limits gives one set of nearest whole cycles; between two neighbouring changes of one
+    of them the set is constant and chi-square a parabola. So every set that can be best is compared. AMBIGUOUS where
+    the next one is worse by less than SURE standard uncertainties, MISFIT where the best misses its phases by more than
+    SURE. A shot with an input that is not finite is UNKNOWN. Raises ValidityError for values outside those limits, and
+    for frequencies with which one standard uncertainty of phase confuses two lengths within the limits, even at the
+    smallest u_phase.
 
     Source: [PARKER04] eq. 5.18 for each frequency; [LOEFDAHL01] for the problem, the exact search is ours.
 
@@ -100,15 +103,15 @@ def joint_length(
     n = np.broadcast_to(np.asarray(group_index, dtype=float), phase.shape[:-1]).ravel()
     u_all = np.broadcast_to(checked_u_phase(u_phase, f), phase.shape).reshape(-1, len(f))
     flat = phase.reshape(-1, len(f))
-    known = np.isfinite(flat).all(axis=1) & np.isfinite(n) & np.isfinite(u_all).all(axis=1)
-    if np.any(n[known] <= 0.0):
-        raise ValidityError(f"group index {float(n[known].min())} is not above 0")
+    finite = np.isfinite(flat).all(axis=1) & np.isfinite(n) & np.isfinite(u_all).all(axis=1)
+    if np.any(n[finite] <= 0.0):
+        raise ValidityError(f"group index {float(n[finite].min())} is not above 0")
     half = SPEED_OF_LIGHT / (2.0 * f)
     out = _Answer.empty(len(flat), len(f))
-    if known.any():
-        _refuse_alias(f, u_all[known].min(axis=0), high - low, float(n[known].max()))
-        rows = np.flatnonzero(known)
-        size = max(1, int(ROOM / (np.sum((high - low) * n[known].max() / half + 3) * len(f))))
+    if finite.any():
+        _refuse_alias(f, u_all[finite].min(axis=0), high - low, float(n[finite].max()))
+        rows = np.flatnonzero(finite)
+        size = max(1, int(ROOM / (np.sum((high - low) * n[finite].max() / half + 3) * len(f))))
         for start in range(0, len(rows), size):
             part = rows[start : start + size]
             out.fill(part, flat[part], half, u_all[part] * half / TWO_PI, n[part], (low, high))
@@ -117,7 +120,7 @@ def joint_length(
 
 @dataclass(frozen=True, eq=False)
 class _Answer:
-    """The columns of `JointLength`, one row a shot, filled block by block."""
+    """Columns of `JointLength`, one row a shot."""
 
     floats: NDArray[np.float64]  # length, u_length, misfit, next_length, discrimination, slip_probability
     cycles: NDArray[np.int64]
@@ -137,7 +140,10 @@ class _Answer:
         n: NDArray[np.float64],
         within: tuple[float, float],
     ) -> None:
-        """The best and the next set of some shots; u are the phases' standard uncertainties as lengths."""
+        """Write the best and second best set of some shots.
+
+        u are the phases' standard uncertainties as lengths.
+        """
         low, high = within
         sets = cycle_sets(
             phase, half, u**-2.0, limits=(min(low * n.min(), low * n.max()), max(high * n.min(), high * n.max()))
@@ -152,12 +158,12 @@ class _Answer:
         with np.errstate(invalid="ignore"):
             chance = np.exp(-0.5 * (square - best[:, None]))
         chance[at, first] = 0.0
-        others = np.sum(chance, axis=1)
-        slip = others / (1.0 + others)
+        chance_sum = np.sum(chance, axis=1)
+        slip = chance_sum / (1.0 + chance_sum)
         square[at, first] = np.inf
         second = np.argmin(square, axis=1)
-        whole = 0.25 * np.min((half / u) ** 2, axis=1)  # a set that is nowhere nearest misses one phase by half a turn
-        apart = np.minimum(square[at, second], np.maximum(whole, best)) - best
+        least_misfit = 0.25 * np.min((half / u) ** 2, axis=1)  # a set never nearest misses one phase by half a turn
+        apart = np.minimum(square[at, second], np.maximum(least_misfit, best)) - best
         known_next = np.isfinite(square[at, second])
         self.floats[:, rows] = np.where(
             some,
@@ -173,7 +179,7 @@ class _Answer:
         )
         self.cycles[rows] = np.where(some[:, None], sets.cycles[at, first], 0.0).astype(np.int64)
         fits = some & (best <= _misfit_limit(len(half) - 1))
-        sure = slip <= 2.0 * float(beyond(SURE))
+        sure = slip <= 2.0 * float(upper_tail(SURE))
         self.status[rows] = np.where(
             ~fits, JointStatus.MISFIT, np.where(sure, JointStatus.FOUND, JointStatus.AMBIGUOUS)
         )
@@ -188,14 +194,14 @@ def _refuse_alias(f: NDArray[np.float64], u_phase: NDArray[np.float64], span: fl
     plan = modulation_set(f, u_phase=u_phase, span=span, group_index=group_index)
     if plan.separation < 2.0 * HOPELESS:
         raise ValidityError(
-            f"frequencies {', '.join(f'{v / 1e6:.9g}' for v in f)} MHz do not tell lengths {plan.nearest:.3f} m apart: "
-            f"{plan.separation / 2:.1f} standard uncertainties of phase (limit {HOPELESS:g}) turn one into the other; "
+            f"frequencies {', '.join(f'{v / 1e6:.9g}' for v in f)} MHz confuse lengths {plan.nearest:.3f} m apart: "
+            f"{plan.separation / 2:.1f} standard uncertainties of phase between them (limit {HOPELESS:g}); "
             f"bring limits closer than the {span:g} m given, or choose with choose_frequencies"
         )
 
 
 def _misfit_limit(degrees: int) -> float:
-    """Chi-square that good phases pass once in as many times as a normal variable passes SURE either way."""
+    """Chi-square limit with the two-sided probability of SURE standard deviations."""
     from scipy.special import chdtri
 
-    return float(chdtri(degrees, 2.0 * float(beyond(SURE))))
+    return float(chdtri(degrees, 2.0 * float(upper_tail(SURE))))

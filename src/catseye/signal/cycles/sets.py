@@ -1,4 +1,4 @@
-"""All sets of whole cycles that phases at several modulation frequencies can have between two lengths."""
+"""All sets of whole cycles between two lengths at several frequencies."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
 
-SURE = 5.0  # standard uncertainties of the phases that must not carry one length over to another
+SURE = 5.0  # standard uncertainties of phase that must not change one length into another
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,10 @@ class CycleSets:
 def cycle_sets(
     phase: NDArray[np.float64], half: NDArray[np.float64], weight: NDArray[np.float64], *, limits: tuple[float, float]
 ) -> CycleSets:
-    """All sets for shots (s, k) between two optical lengths; lengths are optical, misfits chi-square."""
+    """All sets for shots (s, k) between two optical lengths.
+
+    Lengths are optical, misfits chi-square.
+    """
     u_length = float(np.max(np.sum(weight, axis=1) ** -0.5))
     low, high = limits[0] - SURE * u_length, limits[1] + SURE * u_length
     turns = [
@@ -36,10 +39,10 @@ def cycle_sets(
     middle, real = 0.5 * (edges[:, 1:] + edges[:, :-1]), np.diff(edges) > 0.0
     part = phase[:, None, :] / TWO_PI
     cycles = np.rint(middle[..., None] / half + part)
-    each = (cycles - part) * half
+    lengths = (cycles - part) * half
     share = weight / np.sum(weight, axis=1, keepdims=True)
-    length = np.einsum("sck,sk->sc", each, share)
-    misfit = np.einsum("sck,sk->sc", (each - length[..., None]) ** 2, weight)
+    length = np.einsum("sck,sk->sc", lengths, share)
+    misfit = np.einsum("sck,sk->sc", (lengths - length[..., None]) ** 2, weight)
     return CycleSets(cycles, length, misfit, real & (length >= low) & (length <= high))
 
 
@@ -57,8 +60,8 @@ def checked_u_phase(u_phase: ArrayLike, f: NDArray[np.float64]) -> NDArray[np.fl
     return np.broadcast_to(u, np.broadcast_shapes(u.shape, f.shape))
 
 
-def beyond(sigmas: ArrayLike) -> NDArray[np.float64]:
-    """Probability that a normal variable lies above so many standard deviations."""
+def upper_tail(sigmas: ArrayLike) -> NDArray[np.float64]:
+    """Probability that a normal variable exceeds so many standard deviations."""
     from scipy.special import ndtr
 
     return np.asarray(ndtr(-np.asarray(sigmas, dtype=float)))

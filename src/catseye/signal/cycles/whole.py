@@ -1,4 +1,4 @@
-"""From a phase to a length: the fraction of a cycle, the whole cycles, and how near the wrong decision was.
+"""Phase to length: fraction, whole cycles and their margin.
 
 Phase falls as distance grows. The notes print eq. 5.14 and 5.17 with the wrong sign before 2 pi (n_i - n_0); eq. 5.12,
 5.15 and 5.18, used here, are right.
@@ -18,12 +18,12 @@ from catseye.errors import ValidityError
 
 
 def fraction(phase_target: ArrayLike, phase_reference: ArrayLike) -> NDArray[np.float64]:
-    """Phase of a target after its reference, in [0, 2 pi).
+    """Phase of a target relative to its reference, rad in [0, 2 pi).
 
     phase_target       rad, any
     phase_reference    rad, any: the phase of the internal reference (ZRG) at the same instant
 
-    Source: [PARKER04] eq. 5.13. Exact; a difference so little below zero that it rounds to 2 pi becomes 0.
+    Source: [PARKER04] eq. 5.13. Exact; a difference just below zero that rounds to 2 pi becomes 0.
 
     >>> round(float(fraction(0.5, 1.0)), 6)
     5.783185
@@ -35,13 +35,13 @@ def fraction(phase_target: ArrayLike, phase_reference: ArrayLike) -> NDArray[np.
 def whole_cycles(
     coarse_optical: ArrayLike, phase_fraction: ArrayLike, half_wavelength: ArrayLike
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Number of whole half wavelengths N in a coarse length, and the margin of that decision in metres.
+    """Whole half wavelengths N of a coarse length, with margin, m.
 
     coarse_optical     m, any: approximate distance - D0 - Pc - dPc, a length in the sense of (N - phi/2pi) lambda/2
     phase_fraction     rad, [0, 2 pi), from `fraction`
     half_wavelength    m, above 0: half the modulation's group wavelength in the air of the path
 
-    The margin, 0 to a quarter wavelength, is how much further the coarse length may be off before N changes: a quarter
+    The margin, 0 to a quarter wavelength, is the further error of the coarse length at which N changes: a quarter
     wavelength minus the misfit. Any coarse length within a quarter wavelength of the truth gives the right N. Where an
     input is not finite N is 0 and the margin NaN.
 
@@ -66,7 +66,9 @@ def whole_cycles(
 def unwrapped_length(
     whole_cycles: ArrayLike, phase_fraction: ArrayLike, half_wavelength: ArrayLike
 ) -> NDArray[np.float64]:
-    """Length of N whole half wavelengths less the phase's fraction, in metres; D = this + D0 + Pc + dPc.
+    """Length of N whole half wavelengths less the phase fraction, m.
+
+    D = this + D0 + Pc + dPc.
 
     whole_cycles       N, from the function of that name
     phase_fraction     rad, [0, 2 pi), from `fraction`
@@ -82,13 +84,13 @@ def unwrapped_length(
 
 
 def glass_phase(range_constant: ArrayLike, half_wavelength: ArrayLike) -> NDArray[np.float64]:
-    """The notes' glass calibration offset phi_ic, rad, of a target with a range constant Pc; any number of turns.
+    """Glass calibration offset phi_ic of the notes, rad, not wrapped.
 
-    range_constant     m, negative or 0: added to the measured length
+    range_constant     Pc, m, negative or 0: added to the measured length
     half_wavelength    m, above 0: half the modulation's group wavelength in air
 
-    5.19 takes phi_ic/2 pi from N - phi/2 pi, so that Pc = -phi_ic/2 pi half: light that is longer under way in glass
-    has a lower phase, and phi_ic is what it lacks. As a length Pc stays what it is when the air changes; phi_ic is not.
+    5.19 takes phi_ic/2 pi from N - phi/2 pi, so that Pc = -phi_ic/2 pi half: light delayed by glass
+    has a lower phase, and phi_ic is the deficit. The length Pc does not change with the air; phi_ic does.
 
     Source: [PARKER04] eq. 5.19. Exact.
 
@@ -102,7 +104,10 @@ def glass_phase(range_constant: ArrayLike, half_wavelength: ArrayLike) -> NDArra
 
 
 class CycleStatus(IntEnum):
-    """What the whole cycles of one shot are worth: SURE, THIN (another number is conceivable) or UNKNOWN (no input)."""
+    """Status of a shot's whole cycles.
+
+    SURE; THIN: another number is possible; UNKNOWN: no input.
+    """
 
     SURE = 0
     THIN = 1
@@ -111,13 +116,13 @@ class CycleStatus(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class CycleDecision:
-    """Whole cycles with what speaks for them, one value a shot.
+    """Whole cycles with margin and slip probability, one value a shot.
 
     cycles             N, the nearest integer; 0 where unknown
-    margin             m, how much further the coarse length may be off before N changes
+    margin             m, further error of the coarse length at which N changes
     misfit             m, coarse length minus the length that N gives
     u                  m, standard uncertainty of the misfit: coarse length and phase
-    slip_probability   that N is not the nearest but another integer, see `slip_probability`
+    slip_probability   probability that N is another integer, see `slip_probability`
     status             int8 of `CycleStatus`
     """
 
@@ -130,7 +135,7 @@ class CycleDecision:
 
     @property
     def thin(self) -> NDArray[np.bool_]:
-        """Where another number of cycles is conceivable."""
+        """True where another number of cycles is possible."""
         return self.status == CycleStatus.THIN
 
 
@@ -143,7 +148,7 @@ def decision(
     u_phase: ArrayLike,
     sigmas: float = 5.0,
 ) -> CycleDecision:
-    """Whole cycles by the nearest integer, and whether the margin is worth five standard uncertainties.
+    """Whole cycles by the nearest integer, with margin status.
 
     coarse_optical     m, as for `whole_cycles`
     phase_fraction     rad, [0, 2 pi), from `fraction`
@@ -152,9 +157,9 @@ def decision(
     u_phase            rad, of the phase difference, not negative
     sigmas             standard uncertainties of the misfit that must fit into the margin
 
-    With u the two together: SURE while |misfit| + 5 u stays under a quarter wavelength, else THIN. A coarse error e
+    With u combining both: SURE while |misfit| + 5 u stays under a quarter wavelength, else THIN. A coarse error e
     with |e| + 5 u_phase half / 2 pi under a quarter wavelength never slips, whatever u_coarse claims. A shot with an
-    input that is not finite is UNKNOWN and spoils no other. Raises ValidityError for a negative uncertainty or a half
+    input that is not finite is UNKNOWN and affects no other. Raises ValidityError for a negative uncertainty or a half
     wavelength that is not above 0.
 
     Source: [PARKER04] eq. 5.18 solved for N; the two uncertainties combined by [JCGM100] eq. 10.
@@ -167,29 +172,32 @@ def decision(
     u_length = np.asarray(u_phase, dtype=float) * half / TWO_PI
     for name, value in (("u_coarse", u_coarse), ("u_phase", u_phase)):
         if np.any(np.asarray(value) < 0.0):
-            raise ValidityError(f"{name} = {float(np.min(value))} is negative: a standard uncertainty is not")
+            raise ValidityError(f"{name} = {float(np.min(value))} is negative: a standard uncertainty cannot be")
     cycles, margin = whole_cycles(coarse_optical, phase_fraction, half)
     misfit = np.asarray(coarse_optical, dtype=float) - unwrapped_length(cycles, phase_fraction, half)
     u = np.hypot(np.asarray(u_coarse, dtype=float), u_length)
     cycles, margin, misfit, u, quarter = np.broadcast_arrays(cycles, margin, misfit, u, 0.5 * half)
-    known = np.isfinite(misfit) & np.isfinite(u)
+    finite = np.isfinite(misfit) & np.isfinite(u)
     with np.errstate(invalid="ignore"):
         thin = np.abs(misfit) + sigmas * u >= quarter
-    status = np.where(known, np.where(thin, CycleStatus.THIN, CycleStatus.SURE), CycleStatus.UNKNOWN)
-    slip = np.where(known, slip_probability(np.where(known, misfit, 0.0), np.where(known, u, 0.0), 2 * quarter), np.nan)
+    status = np.where(finite, np.where(thin, CycleStatus.THIN, CycleStatus.SURE), CycleStatus.UNKNOWN)
+    slip = np.where(
+        finite, slip_probability(np.where(finite, misfit, 0.0), np.where(finite, u, 0.0), 2 * quarter), np.nan
+    )
     return CycleDecision(cycles, margin, misfit, u, slip, status.astype(np.int8))
 
 
 def slip_probability(misfit: ArrayLike, u: ArrayLike, half_wavelength: ArrayLike) -> NDArray[np.float64]:
-    """Probability that the nearest integer is the wrong one, after the misfit was seen.
+    """Probability that the nearest integer is wrong, given the misfit.
 
     misfit             m, coarse minus unwrapped length, within half a `half_wavelength` of 0
     u                  m, standard uncertainty of the misfit, normal
     half_wavelength    m, above 0
 
-    Every integer is as likely before: with L the half wavelength, the weights are exp(-(misfit + k L)^2 / 2 u^2) over
-    all whole k, and all but k = 0 are a slip. Before a misfit is seen the probability is erfc(L / (2 sqrt 2 u)): the
-    mean of this one. Beyond u = L the sum over k turns into its Fourier series (Poisson), which then needs two terms.
+    A priori all integers are equally likely: with L the half wavelength, the weights are exp(-(misfit + k L)^2 / 2 u^2)
+    over all whole k, and all but k = 0 are a slip. Before a misfit is seen the probability is erfc(L / (2 sqrt 2 u)):
+    the mean of this one. Beyond u = L the sum over k turns into its Fourier series (Poisson), which then needs two
+    terms.
 
     Source: Bayes' theorem with the normal law; our own.
 
@@ -202,8 +210,8 @@ def slip_probability(misfit: ArrayLike, u: ArrayLike, half_wavelength: ArrayLike
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         narrow = np.minimum(s, period)[..., None]
         excess = k * period[..., None] * (2.0 * m[..., None] + k * period[..., None])  # (m + kL)^2 - m^2, never below 0
-        others = np.sum(np.where(narrow > 0.0, np.exp(-0.5 * excess / narrow**2), 1.0 * (excess <= 0.0)), axis=-1)
-        few = others / (1.0 + others)
+        alternatives = np.sum(np.where(narrow > 0.0, np.exp(-0.5 * excess / narrow**2), 1.0 * (excess <= 0.0)), axis=-1)
+        few = alternatives / (1.0 + alternatives)
         turn = TWO_PI / period
         waves = sum(2.0 * np.exp(-0.5 * (j * turn * s) ** 2) * np.cos(j * turn * m) for j in (1, 2))
         many = 1.0 - period * np.exp(-0.5 * (m / s) ** 2) / (s * np.sqrt(TWO_PI) * (1.0 + waves))
@@ -213,14 +221,16 @@ def slip_probability(misfit: ArrayLike, u: ArrayLike, half_wavelength: ArrayLike
 def memo_whole_cycles(
     coarse_optical: ArrayLike, phase_after_reference: ArrayLike, half_wavelength: ArrayLike
 ) -> NDArray[np.int64]:
-    """The triplet memo's whole cycles, to be reported beside ours and never used: the rule slips.
+    """Whole cycles by the triplet memo's rule, for comparison only.
+
+    The rule slips.
 
     coarse_optical          m, at least 0: D_TOPPL - Pc
     phase_after_reference   rad, above -2 pi and below 2 pi: Phi - (Phi_ZRG + Phi_Cal), not taken modulo 2 pi
     half_wavelength         m, above 0
 
     N = INT(coarse / half), plus one where Phi is above Phi_ZRG + Phi_Cal; D = (N - Phi_after/2 pi) half + Pc, so this
-    N may differ from ours by one without a slip where phase_after_reference is negative. The rule asks for a coarse
+    N may differ from ours by one without a slip where phase_after_reference is negative. The rule needs a coarse
     length on the same side of every multiple of the half wavelength as the true one: where D_TOPPL is shorter by d, a
     share d / half of all placements slips by one half wavelength, 2.8 % for the memo's 2.8 mm at 18 m. The memo's
     closed forms (3.11a, 3.15b, second 3.16) write the one as (1 - sgn)/2, which at equal phases is a half: 3.13a and

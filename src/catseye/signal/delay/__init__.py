@@ -1,1 +1,1 @@
-"""When a known sound arrives."""
+"""Arrival time of a known sound."""

@@ -1,10 +1,10 @@
-"""Arrival time of a known signal in a noisy recording, at the Cramer-Rao bound where the noise allows it.
+"""Arrival time of a known signal, at the Cramer-Rao bound.
 
     x(t) = a s(t - tau) + noise,   J(tau) = sum over k of Re W_k X_k conj(S_k) exp(i w_k tau)
 
-A stretch of the recording about the predicted arrival is transformed, the cross-spectrum transformed back gives J at
-whole samples, and Newton steps on the cross-spectrum itself find its maximum between them. So there is no floor: a
-parabola through three samples of J is off by a few hundredths of a sample however loud the signal is.
+A segment of the recording around the predicted arrival is transformed, the cross-spectrum transformed back gives J at
+whole samples, and Newton steps on the cross-spectrum itself find its maximum between them. So there is no error floor:
+a parabola through three samples of J is biased by a few hundredths of a sample at any signal level.
 
 Weights. `plain`, W = 1: maximum likelihood in white noise. `whitened`, W = 1/N_k with the noise's spectrum: maximum
 likelihood in coloured noise. `phat`, the phase transform, W = 1/|X_k conj S_k|: only phases count, which keeps the peak
@@ -14,13 +14,14 @@ Uncertainty. To first order the error of tau is Im(sum w W S* n exp) / (a sum w^
 
     u^2 = (1/2) sum w^2 W^2 |S|^2 N / (a sum w^2 W |S|^2)^2
 
-for noise of spectrum N, which the residual in the same stretch tells. With W = 1 and white noise it is the bound,
+for noise of spectrum N, estimated from the residual in the same segment. With W = 1 and white noise it is the bound,
 1/(snr beta^2), snr = a^2 sum s^2/sigma^2 (twice energy over noise density), beta^2 = sum s'^2/sum s^2; with W = 1/N it
 is the bound in coloured noise. The amplitude is unknown, but it costs nothing: sum s s' = 0.
 
-Threshold. Below some snr another lag wins now and then, and the scatter leaves the bound: side peaks of the signal's
-own correlation rho win with the chance Q(sqrt(snr (1 - rho)/2)), noise somewhere in the window of width T with at most
-(T beta/2 pi) exp(-snr/4)/sqrt 2 (`risk`). Where these pass 1e-4 the status says THRESHOLD and u is not claimed.
+Threshold. Below some snr another lag is sometimes highest, and the scatter exceeds the bound: side peaks of the
+signal's own correlation rho win with probability Q(sqrt(snr (1 - rho)/2)), noise somewhere in the window of width T
+with at most (T beta/2 pi) exp(-snr/4)/sqrt 2 (`risk`). Where these exceed 1e-4 the status is THRESHOLD and no u is
+given.
 """
 
 import sys
@@ -36,36 +37,37 @@ from catseye.errors import ValidityError
 from catseye.signal.delay.peak import FINE, HANN, DelayStatus, PeakSearch, cross_spectrum, find, transformed, windowed
 
 WEIGHTINGS = ("plain", "whitened", "phat")
-GUARD = 32  # samples beside the window: what the cut at the ends of a stretch does fades within them
-FAINTEST = 1e-6  # of the signal's strongest line: fainter lines carry nothing
-FAINTEST_PHASE = 1e-2  # the same for the phase transform, where all lines count alike
-LOWEST = 0.3  # of the signal's own correlation: lower side peaks count with the noise
-RISK = 1e-4  # chance of a wrong peak above which an arrival is in the threshold region
-BLOCK_SAMPLES = 2**18  # samples in work at a time
+GUARD = 32  # samples added to the window: the effect of cutting a segment fades within them
+FAINTEST = 1e-6  # of the signal's strongest line: weaker lines are not used
+FAINTEST_PHASE = 1e-2  # the same for the phase transform, where all lines have equal weight
+LOWEST = 0.3  # of the signal's autocorrelation: lower side peaks are treated as noise
+RISK = 1e-4  # probability of a wrong peak above which an arrival is in the threshold region
+BLOCK_SAMPLES = 2**18  # samples processed at a time
 COMPILED_FROM = 2000  # recordings: loading numba takes about as long as the plain form for these
 
 ECHO, SILENT = int(DelayStatus.ECHO), int(DelayStatus.SILENT)  # numpy is slow to compare with members
 
 TEXTS = {
     DelayStatus.GOOD: "good",
-    DelayStatus.ECHO: "another arrival has {rival:.0%} of its amplitude: it may pull the delay",
-    DelayStatus.THRESHOLD: "too weak: signal to noise {decibel:.0f} dB, where noise can win elsewhere in the window; "
+    DelayStatus.ECHO: "another arrival has {rival:.0%} of its amplitude: the delay may be biased",
+    DelayStatus.THRESHOLD: "too weak: signal to noise {decibel:.0f} dB, where noise can exceed the peak elsewhere; "
     "send louder or longer, or narrow the window",
-    DelayStatus.AMBIGUOUS: "two peaks are nearly as high ({rival:.0%}): which one is the arrival is not known; "
+    DelayStatus.AMBIGUOUS: "two peaks are nearly as high ({rival:.0%}): the arrival is ambiguous; "
     "narrow the window, or send a wider band",
-    DelayStatus.EDGE: "the highest correlation is at the window's edge; widen the window, or mend the expected delay",
+    DelayStatus.EDGE: "the highest correlation is at the window's edge; "
+    "widen the window, or correct the expected delay",
     DelayStatus.CLIPPED: "clipped: samples at the converter's ends; lower the gain",
-    DelayStatus.SILENT: "silent: nothing but one value; is the microphone on?",
+    DelayStatus.SILENT: "silent: all samples are equal; is the microphone on?",
     DelayStatus.NOT_FINITE: "not finite: a sample is NaN or infinite",
 }
 
 
 @dataclass(frozen=True, eq=False)
 class Delays:
-    """When the signal arrived in each recording.
+    """Arrival times of the signal, one element a recording.
 
     delay      s from the recording's first sample to the signal's first; NaN where there is none
-    u_delay    s, standard uncertainty; NaN where the status is graver than ECHO: there it is not the bound
+    u_delay    s, standard uncertainty; NaN where the status is worse than ECHO, as the bound does not hold there
     amplitude  of the signal, the template being 1
     snr        of the peak, its height over the noise's standard deviation there, squared: a^2 sum s^2/sigma^2 with
                plain weights in white noise, the ratio of powers times the samples of the template
@@ -81,23 +83,23 @@ class Delays:
     status: NDArray[np.int8]
 
     def text(self, *place: int) -> str:
-        """The status of one recording in words: what is wrong and what to do."""
+        """Status text of one recording: fault and remedy."""
         with np.errstate(divide="ignore"):
             decibel = float(10.0 * np.log10(self.snr[place]))
         return TEXTS[DelayStatus(int(self.status[place]))].format(decibel=decibel, rival=float(self.rival[place]))
 
 
 class DelayPlan:
-    """A signal ready to be found in many recordings: its spectra are made once.
+    """Signal with its spectra, ready to search recordings.
 
     template      (m,) samples of the signal from its start, at least 8
     sampling_hz   Hz, of template and recordings
-    window        s, half width: the arrival is sought that far on both sides of the expected one
+    window        s, half width of the search on both sides of the expected arrival
     weighting     "plain", "whitened" or "phat"
-    band_hz       lowest and highest frequency used; by default where the signal has any
-    noise         (..., k) samples of the noise alone, for "whitened": at least twice as long as the stretch in work
+    band_hz       lowest and highest frequency used; by default the signal's band
+    noise         (..., k) samples of the noise alone, for "whitened": at least twice as long as a segment
     full_scale    magnitude of a sample at the converter's ends; by default the integer type's, none for floats
-    compiled      whether to use the compiled form; None: for many recordings, and where numba is loaded already
+    compiled      True for the compiled form; None: for many recordings, and where numba is loaded already
 
     Raises ValidityError for a template without signal, values out of range, or "whitened" without noise.
 
@@ -138,9 +140,9 @@ class DelayPlan:
         self._choose_lines(spectrum, band_hz, noise)
 
     def _choose_lines(self, spectrum: NDArray, band_hz: tuple[float, float] | None, noise: ArrayLike | None) -> None:
-        """The lines of the spectrum that count, in one run, and what they weigh."""
+        """Choose one run of spectral lines and their weights."""
         power = np.abs(spectrum) ** 2
-        power[0] = power[-1] = 0.0  # neither a constant nor the highest line tells a delay
+        power[0] = power[-1] = 0.0  # the constant and the highest line contain no delay
         used = power > (FAINTEST_PHASE if self.weighting == "phat" else FAINTEST) * power.max()
         if band_hz is not None:
             hertz = np.arange(len(power)) * self.sampling_hz / self.stretch
@@ -155,19 +157,19 @@ class DelayPlan:
                 raise ValidityError("weighting 'whitened' needs the noise alone: give `noise`")
             weight /= noise_spectrum(noise, self.stretch)[run]
         expected = weight / np.maximum(power[run], 1e-300) if self.weighting == "phat" else weight
-        carried = expected * power[run]
-        total = float(np.sum(carried))
+        line_weight = expected * power[run]
+        total = float(np.sum(line_weight))
         omega = TWO_PI * np.arange(self.first, self.stop) / self.stretch
-        self.bandwidth = float(np.sqrt(np.sum(carried * omega**2) / total)) * self.sampling_hz
+        self.bandwidth = float(np.sqrt(np.sum(line_weight * omega**2) / total)) * self.sampling_hz
         fine = np.zeros(FINE * self.stretch // 2 + 1)
-        fine[run] = carried
+        fine[run] = line_weight
         side = np.fft.irfft(fine)[: FINE * (2 * self.half + 2) + 1] * (0.5 * FINE * self.stretch / total)
-        own = np.concatenate([side[:0:-1], side])
-        self.search = PeakSearch(omega, spectrum[run], weight, self.weighting == "phat", own, self.first, self.stretch,
-                             self.half, self._least_snr(side))  # fmt: skip
+        autocorrelation = np.concatenate([side[:0:-1], side])
+        self.search = PeakSearch(omega, spectrum[run], weight, self.weighting == "phat", autocorrelation, self.first,
+                             self.stretch, self.half, self._least_snr(side))  # fmt: skip
 
     def _least_snr(self, side: NDArray) -> float:
-        """The signal to noise from which on the chance of a wrong peak is below RISK; infinite for a tone."""
+        """Signal to noise where a wrong peak has probability RISK; infinite for a tone."""
         top = np.flatnonzero((side[1:-1] > side[:-2]) & (side[1:-1] >= side[2:])) + 1
         height = np.clip(side[top[top <= FINE * self.half]], 0.0, 1.0)
         self._side_peaks = height[height > LOWEST]
@@ -176,33 +178,36 @@ class DelayPlan:
         return float(snr[np.argmax(chance < RISK)]) if chance[-1] < RISK else np.inf
 
     def risk(self, snr: ArrayLike) -> NDArray[np.float64]:
-        """Chance that another lag than the arrival's has the highest correlation; snr as in `Delays`.
+        """Probability that another lag has the highest correlation; snr as in `Delays`.
 
-        The sum over the side peaks, two of each height, and noise anywhere in the window: it passes a level u with the
-        chance 1 - exp(-T beta/2 pi exp(-u^2/2)), u being the arrival's own height with its noise. Source: [RICE44]
+        The sum over the side peaks, two of each height, and noise anywhere in the window: it exceeds a level u with
+        probability 1 - exp(-T beta/2 pi exp(-u^2/2)), u being the arrival's own height with its noise. Source: [RICE44]
         section 3.6 for the rate. Good to 35 % below 0.2.
         """
         ratio = np.asarray(snr, float)
         lags = 2.0 * self.half * self.bandwidth / (self.sampling_hz * TWO_PI)
         argument = 0.5 * np.sqrt(ratio[..., None] * (1.0 - self._side_peaks))
-        beside = np.vectorize(erfc, otypes=[float])(argument).sum(axis=-1) if len(self._side_peaks) else 0.0
-        xi = np.linspace(-8.0, 8.0, 161)  # sigma: the arrival's own noise
+        side_peak_risk = np.vectorize(erfc, otypes=[float])(argument).sum(axis=-1) if len(self._side_peaks) else 0.0
+        xi = np.linspace(-8.0, 8.0, 161)  # sigma: noise of the arrival's height
         level = np.maximum(np.sqrt(ratio)[..., None] + xi, 0.0)
         share = np.exp(-0.5 * xi**2) / np.exp(-0.5 * xi**2).sum()
-        return -np.expm1(-lags * np.exp(-0.5 * level**2)) @ share + beside
+        return -np.expm1(-lags * np.exp(-0.5 * level**2)) @ share + side_peak_risk
 
     def bound(self, snr: ArrayLike) -> NDArray[np.float64]:
-        """Cramer-Rao bound of the delay in white noise, s: 1/(beta sqrt(snr)), snr as in `Delays`."""
+        """Cramer-Rao bound of the delay in white noise, s.
+
+        1/(beta sqrt(snr)), snr as in `Delays`.
+        """
         return 1.0 / (self.bandwidth * np.sqrt(np.asarray(snr, float)))
 
     def __call__(self, recordings: ArrayLike, expected: ArrayLike) -> Delays:
-        """Arrivals in recordings.
+        """Arrival times in recordings.
 
         recordings   (..., n), integers or floats, n at least template and window together
-        expected     s, delay expected in each, (...,) or one for all: the window is about it
+        expected     s, expected delay, (...,) or one for all: centre of the window
 
-        The gravest status is given; a recording never raises. Raises ValidityError for recordings that are too short,
-        and for an expected delay whose window reaches out of the recording.
+        The worst status is returned; a recording never raises. Raises ValidityError for recordings that are too short,
+        and for an expected delay whose window extends past the recording.
         """
         array = np.asarray(recordings)
         self._check(array)
@@ -213,7 +218,7 @@ class DelayPlan:
         form = self._form(len(rows))
         step = max(1, BLOCK_SAMPLES // self.stretch)
         arrivals, status = np.empty((len(rows), 5)), np.empty(len(rows), np.int8)
-        with np.errstate(all="ignore"):  # a recording that is not finite, or silent, answers NaN
+        with np.errstate(all="ignore"):  # a recording that is not finite, or silent, gives NaN
             for begin in range(0, len(rows), step):
                 part = slice(begin, begin + step)
                 piece = self._cut(rows[part], start[part])
@@ -227,7 +232,9 @@ class DelayPlan:
         return Delays(delay, u, amplitude, snr, rival, status.reshape(batch))
 
     def correlation(self, recording: ArrayLike, expected: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """J over the window, for a figure: delays in s, and J as the amplitude that a signal there would have.
+        """Correlation J over the window, for a figure.
+
+        Returns delays, s, and J as signal amplitude.
 
         recording   (n,) as for a call
         expected    s
@@ -242,7 +249,7 @@ class DelayPlan:
 
     def _check(self, array: NDArray) -> None:
         if array.ndim == 0 or array.dtype.kind not in "iuf":
-            raise ValidityError(f"a recording is no row of integers or floats ({array.dtype}, {array.ndim} axes)")
+            raise ValidityError(f"a recording is not a row of integers or floats ({array.dtype}, {array.ndim} axes)")
         if array.shape[-1] < self.length + 2 * self.half:
             raise ValidityError(
                 f"a recording of {array.shape[-1]} samples is shorter than template and window, "
@@ -250,13 +257,13 @@ class DelayPlan:
             )
 
     def _placed(self, expected: NDArray, n: int) -> tuple[NDArray, NDArray]:
-        """Where each stretch starts, and the window's first lag in it, samples."""
+        """Start of each segment and first lag in it, samples."""
         lag = np.rint(expected * self.sampling_hz)
         good = (lag >= self.half) & (lag <= n - self.length - self.half)
         if not good.all():
             latest = (n - self.length - self.half) / self.sampling_hz
             raise ValidityError(
-                f"expected delay {expected[np.argmin(good)]:.6g} s: its window reaches out of the recording "
+                f"expected delay {expected[np.argmin(good)]:.6g} s: its window extends past the recording "
                 f"(expected {self.half / self.sampling_hz:.6g} to {latest:.6g} s)"
             )
         low = lag.astype(np.int64) - self.half
@@ -279,7 +286,7 @@ class DelayPlan:
         return float(np.iinfo(piece.dtype).min), float(np.iinfo(piece.dtype).max)
 
     def _form(self, count: int) -> Callable[..., tuple[NDArray, NDArray]]:
-        """The compiled form where it pays, else the plain one."""
+        """Compiled form where it is faster, else the plain one."""
         loaded = sys.modules.get("catseye.signal.delay.kernel")
         if self.compiled is not False and loaded is not None and hasattr(loaded, "find"):
             return loaded.find
@@ -291,7 +298,9 @@ class DelayPlan:
 
 
 def fast_length(least: int) -> int:
-    """The smallest even product of 2, 3 and 5 that is at least that long: a quick Fourier transform.
+    """Smallest even product of 2, 3, 5 not below a length.
+
+    Fourier transforms of that length are fast.
 
     >>> fast_length(2049)
     2160
@@ -306,7 +315,7 @@ def fast_length(least: int) -> int:
 
 
 def noise_spectrum(noise: ArrayLike, stretch: int) -> NDArray[np.float64]:
-    """Power (stretch/2 + 1,) of noise by line, E|n_k|^2 of a stretch: the mean over Hann-windowed halves that overlap.
+    """Noise power by line, (stretch/2 + 1,): E|n_k|^2 of a segment.
 
     noise     (..., k) samples, k at least 2 stretches
     stretch   samples, even
@@ -327,7 +336,7 @@ def noise_spectrum(noise: ArrayLike, stretch: int) -> NDArray[np.float64]:
     lines = np.fft.rfft((blocks - blocks.mean(axis=-1, keepdims=True)) * hann)
     power = HANN * np.mean(np.abs(lines) ** 2, axis=tuple(range(lines.ndim - 1)))
     if not (np.isfinite(power).all() and power.max() > 0.0):
-        raise ValidityError("the noise is silent or not finite: it has no spectrum to weigh by")
+        raise ValidityError("the noise is silent or not finite: it has no spectrum for weighting")
     return np.maximum(power, 1e-12 * power.max())
 
 

@@ -1,4 +1,4 @@
-"""The compiled form of `peak`: one pass a recording, its lines turned by a recurrence instead of exponentials."""
+"""Compiled form of `peak`, with phase rotation by recurrence."""
 
 import numpy as np
 from numba import njit
@@ -26,13 +26,13 @@ EDGE, CLIPPED, SILENT, NOT_FINITE = (
     int(s) for s in (DelayStatus.EDGE, DelayStatus.CLIPPED, DelayStatus.SILENT, DelayStatus.NOT_FINITE)
 )
 
-# What numba kept of a kernel names `PeakSearch`; a kept form is looked for by a kernel's line.
+# Numba's cache refers to `PeakSearch` and finds a compiled kernel by its line number.
 _compiled = njit(cache=True, error_model="numpy", nogil=True)
-_inlined = njit(error_model="numpy")  # kept with their caller
+_inlined = njit(error_model="numpy")  # cached with their caller
 
 
 def find(piece, low, search: PeakSearch, ends):
-    """As `peak.find`, its plain form."""
+    """Compiled form of `peak.find`."""
     arrivals, status = np.empty((len(piece), 5)), np.empty(len(piece), np.int8)
     spectrum, scale = transformed(piece, search)
     padded = np.zeros((len(piece), search.stretch // 2 + 1), np.complex128)
@@ -71,20 +71,20 @@ def _damage(samples, bottom, top):
 
 
 @_inlined
-def _judged(lag, snr, apart, other, least_snr):
+def _judged(lag, snr, apart, strongest, least_snr):
     if np.isnan(lag):
         return EDGE
-    echo = other > AUDIBLE and other**2 * snr > CERTAIN**2
+    echo = strongest > AUDIBLE and strongest**2 * snr > CERTAIN**2
     if not snr >= least_snr:
         return THRESHOLD
-    if apart < TOLD_APART or (echo and other > SECOND):
+    if apart < TOLD_APART or (echo and strongest > SECOND):
         return AMBIGUOUS
     return ECHO if echo else GOOD
 
 
 @_inlined
 def _sums(cross, tau, omega, step):
-    """J, its slope and its bend at a lag, samples."""
+    """J, its slope and its curvature at a lag, samples."""
     turn, on = complex(np.cos(omega * tau), np.sin(omega * tau)), complex(np.cos(step * tau), np.sin(step * tau))
     height, slope, bend = 0.0, 0.0, 0.0
     for k in range(len(cross)):
@@ -99,7 +99,10 @@ def _sums(cross, tau, omega, step):
 
 @_inlined
 def _refined(cross, lag, omega, step):
-    """Lag and height of the peak near a whole one; NaN where Newton's steps lead away by more than a sample."""
+    """Lag and height of the peak near a whole lag.
+
+    NaN where Newton's steps go beyond a sample.
+    """
     tau = float(lag)
     for _ in range(NEWTON_STEPS):
         _, slope, bend = _sums(cross, tau, omega, step)
@@ -116,7 +119,7 @@ def _refined(cross, lag, omega, step):
 
 @_inlined
 def _two_peaks(c):
-    """Places of the highest and of the second highest peak, and the second's height over the first's."""
+    """Places of the two highest peaks, and their height ratio."""
     at = 0
     for i in range(len(c)):
         if c[i] > c[at]:
@@ -135,10 +138,10 @@ def _two_peaks(c):
 
 
 @_inlined
-def _own(own, lag):
-    place = min(max(lag * FINE + len(own) // 2, 0.0), len(own) - 1.001)
-    whole = int(place)
-    return own[whole] + (own[whole + 1] - own[whole]) * (place - whole)
+def _autocorrelation(autocorrelation, lag):
+    place = min(max(lag * FINE + len(autocorrelation) // 2, 0.0), len(autocorrelation) - 1.001)
+    index = int(place)
+    return autocorrelation[index] + (autocorrelation[index + 1] - autocorrelation[index]) * (place - index)
 
 
 @_inlined
@@ -146,21 +149,21 @@ def _noise(spectrum, tau, amplitude, template, weight, omega, step, scale):
     """Sums of W^2 |S|^2 N, plain and by omega squared: N of the residual under a Hann window, edges repeated."""
     turn, on = complex(np.cos(omega * tau), np.sin(omega * tau)), complex(np.cos(step * tau), np.sin(step * tau))
     count = len(template)
-    here = spectrum[0] * turn - amplitude * template[0]
-    before = here
+    current = spectrum[0] * turn - amplitude * template[0]
+    previous = current
     plain, squared = 0.0, 0.0
     for k in range(count):
-        after = here
+        following = current
         if k + 1 < count:
             turn *= on
-            after = spectrum[k + 1] * turn - amplitude * template[k + 1]
-        r = 0.5 * here - 0.25 * (before + after)
+            following = spectrum[k + 1] * turn - amplitude * template[k + 1]
+        r = 0.5 * current - 0.25 * (previous + following)
         s = template[k]
-        each = weight[k] ** 2 * (s.real**2 + s.imag**2) * scale * (r.real**2 + r.imag**2)
+        line = weight[k] ** 2 * (s.real**2 + s.imag**2) * scale * (r.real**2 + r.imag**2)
         w = omega + k * step
-        plain += each
-        squared += each * w * w
-        before, here = here, after
+        plain += line
+        squared += line * w * w
+        previous, current = current, following
     return plain, squared
 
 
@@ -178,15 +181,20 @@ def _amplitude(spectrum, tau, template, used, omega, step):
 
 
 @_inlined
-def _strongest_other(c, own, start, height):
-    """Amplitude of the strongest other arrival: what is left of J without the signal's own correlation."""
-    place = start * FINE + len(own) // 2
-    whole = int(place)
-    share, other = place - whole, 0.0
+def _strongest_arrival(c, autocorrelation, start, height):
+    """Amplitude of the strongest other arrival.
+
+    It is J less the signal's autocorrelation.
+    """
+    place = start * FINE + len(autocorrelation) // 2
+    first = int(place)
+    share, strongest = place - first, 0.0
     for i in range(len(c)):
-        j = whole + i * FINE
-        other = max(other, abs(c[i] / height - own[j] - (own[j + 1] - own[j]) * share))
-    return other
+        j = first + i * FINE
+        strongest = max(
+            strongest, abs(c[i] / height - autocorrelation[j] - (autocorrelation[j + 1] - autocorrelation[j]) * share)
+        )
+    return strongest
 
 
 @_compiled
@@ -198,16 +206,16 @@ def _rows(piece, ends, spectra, low, search, scale, out):
         search.omega[1] - search.omega[0],
         slice(search.first, search.first + len(search.omega)),
     )
-    template, own = search.template, search.own
+    template, autocorrelation = search.template, search.autocorrelation
     for b in range(len(spectrum)):
         cross = padded[b, lines]
         c = correlation[b, low[b] : low[b] + 2 * search.half + 1] * (0.5 * search.stretch)
         at, second_at, second = _two_peaks(c)
         lag, height = _refined(cross, at + low[b], omega, step)
         if second > RIVAL and not np.isnan(lag):
-            again, taller = _refined(cross, second_at + low[b], omega, step)
+            second_lag, taller = _refined(cross, second_at + low[b], omega, step)
             if taller > height:
-                lag, second_at = again, at
+                lag, second_at = second_lag, at
         inside = lag if not np.isnan(lag) else float(at + low[b])
         height, _, bend = _sums(cross, inside, omega, step)
         amplitude = _amplitude(spectrum[b], inside, template, search.weight, omega, step)
@@ -216,12 +224,12 @@ def _rows(piece, ends, spectra, low, search, scale, out):
         second = second * c[at] / height
         apart = np.inf
         if second > 0.0:
-            rho = _own(own, second_at + low[b] - inside)
+            rho = _autocorrelation(autocorrelation, second_at + low[b] - inside)
             apart = np.sqrt(snr) * (1.0 - second) / np.sqrt(2.0 * max(1.0 - rho, 1e-12))
-        other = _strongest_other(c, own, low[b] - inside, height)
+        strongest = _strongest_arrival(c, autocorrelation, low[b] - inside, height)
         damage = _damage(piece[b], ends[0], ends[1])
-        status[b] = max(damage, _judged(lag, snr, apart, other, search.least_snr))
-        rival = second if apart < TOLD_APART and second > other else other
+        status[b] = max(damage, _judged(lag, snr, apart, strongest, search.least_snr))
+        rival = second if apart < TOLD_APART and second > strongest else strongest
         arrivals[b, 0], arrivals[b, 1], arrivals[b, 2], arrivals[b, 3], arrivals[b, 4] = (
             lag,
             0.5 * squared / bend**2,

@@ -1,6 +1,6 @@
-"""Known signals for sound that is to be timed, as functions of time: zero before 0 and after their duration.
+"""Known acoustic signals, zero outside 0 to their duration.
 
-They start and end smoothly, so that samples hold them: what a signal has above half the sampling frequency folds back.
+They start and end smoothly, so that they can be sampled: components above half the sampling frequency are aliased.
 """
 
 from collections.abc import Callable
@@ -11,14 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
 
-TAPS: dict[int, tuple[int, ...]] = {  # exponents of a primitive polynomial beside its highest and its constant
+TAPS: dict[int, tuple[int, ...]] = {  # exponents of a primitive polynomial between the highest and the constant
     3: (2,), 4: (3,), 5: (3,), 6: (5,), 7: (6,), 8: (6, 5, 4), 9: (5,), 10: (7,), 11: (9,), 12: (6, 4, 1),
 }  # fmt: skip
 LONGEST = 1e7  # samples
 
 
 def chirp(time: ArrayLike, *, start_hz: float, stop_hz: float, duration: float, taper: float = 0.1) -> NDArray:
-    """Sine whose frequency runs linearly from start to stop.
+    """Sine with linear frequency sweep from start to stop.
 
     time               s, any shape
     start_hz, stop_hz  Hz, above 0, falling or rising
@@ -32,7 +32,7 @@ def chirp(time: ArrayLike, *, start_hz: float, stop_hz: float, duration: float, 
     """
     _above_zero(start_hz=start_hz, stop_hz=stop_hz, duration=duration)
     if not 0.0 <= taper <= 0.5:
-        raise ValidityError(f"taper {taper} is outside 0 to 0.5, a share of the duration at each end")
+        raise ValidityError(f"taper {taper} is outside 0 to 0.5, share of the duration at each end")
     t = np.asarray(time, float)
     angle = TWO_PI * (start_hz * t + 0.5 * (stop_hz - start_hz) * t * t / duration)
     inner = np.clip(np.minimum(t, duration - t) / (taper * duration if taper else 1e-300), 0.0, 1.0)
@@ -58,9 +58,9 @@ def pulse(time: ArrayLike, *, centre_hz: float, duration: float) -> NDArray:
 
 
 def maximum_length_chips(order: int) -> NDArray:
-    """One period of a maximum length sequence, 2^order - 1 chips of +1 and -1.
+    """One period of a maximum length sequence of chips +1, -1.
 
-    order   3 to 12
+    order   3 to 12; the length is 2^order - 1
 
     Its circular autocorrelation is 2^order - 1 at zero and -1 elsewhere. Raises ValidityError for another order.
 
@@ -79,10 +79,10 @@ def maximum_length_chips(order: int) -> NDArray:
 
 
 def maximum_length_sequence(time: ArrayLike, *, order: int, chip_hz: float, centre_hz: float = 0.0) -> NDArray:
-    """A maximum length sequence once, each chip a raised cosine two chips wide, on a carrier if one is given.
+    """Maximum length sequence of raised-cosine chips, on an optional carrier.
 
     time        s, any shape
-    order       3 to 12: it lasts (2^order + 1)/chip_hz
+    order       3 to 12: the duration is (2^order + 1)/chip_hz
     chip_hz     chips a second, above 0; the band reaches to chip_hz on either side of the carrier
     centre_hz   Hz, 0 for none
 
@@ -104,14 +104,14 @@ KINDS: dict[str, Callable[..., NDArray]] = {"chirp": chirp, "pulse": pulse, "mls
 
 
 def sampled(kind: str, sampling_hz: float, **values: float) -> NDArray:
-    """(m,) samples of a known signal from its start to its end.
+    """Samples (m,) of a known signal from start to end.
 
     kind          one of KINDS
     sampling_hz   Hz, more than twice its highest frequency
     values        as its function takes them
 
-    Raises ValidityError for an unknown kind, a value outside its function's limits, or a frequency that the samples
-    would not hold.
+    Raises ValidityError for an unknown kind, a value outside its function's limits, or a frequency above half
+    the sampling frequency.
 
     >>> len(sampled("chirp", 16e3, start_hz=1e3, stop_hz=3e3, duration=0.02))
     321
@@ -129,7 +129,7 @@ def sampled(kind: str, sampling_hz: float, **values: float) -> NDArray:
             highest = values["centre_hz"] + 2.0 / duration
     if not highest < 0.5 * sampling_hz:
         raise ValidityError(
-            f"a {kind} up to {highest:g} Hz is not held by {sampling_hz:g} samples a second; take more than twice it"
+            f"a {kind} up to {highest:g} Hz is not below half of {sampling_hz:g} samples a second; sample faster"
         )
     if not duration * sampling_hz < LONGEST:
         raise ValidityError(f"a {kind} of {duration:g} s has more than {LONGEST:g} samples; take a shorter one")

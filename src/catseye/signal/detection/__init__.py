@@ -1,1 +1,1 @@
-"""Samples to phase: synchronous detection, spectra, zero crossings, kernels."""
+"""Phase detection: synchronous detection, spectra, zero crossings, compiled kernels."""

@@ -1,7 +1,9 @@
-"""The compiled form of `phase.detect`, `buffers.has_long_run` and `running_phasor` for one buffer of 16-bit samples.
+"""Compiled detection of one buffer of 16-bit samples.
 
-For programs that look at each buffer as it comes: the plain forms, which are its test, spend half a millisecond on the
-ways of arrays. Import it only where buffers keep coming: 0.2 s to load, once.
+Does the work of `phase.detect`, `buffers.has_long_run` and `running_phasor`.
+
+For programs that process each buffer on arrival: the plain forms, which are its test, take half a millisecond of array
+overhead. Import it only for continuous streams: loading takes 0.2 s, once.
 """
 
 import numpy as np
@@ -15,7 +17,7 @@ OFFSET, SECOND, LOW, HIGH, CLIPPED, LONGEST, DROPPED, TOTAL, BETWEEN = 2, 3, 5, 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _moments(re, im, out):
-    """Sums of squares and products of departures from their mean, then those of the batches; NaN below 16 cycles."""
+    """Sums of squares and products of departures from the mean, then of batches; NaN below 16 cycles."""
     m = len(re)
     mean_re, mean_im = re.mean(), im.mean()
     xx = yy = xy = 0.0
@@ -39,11 +41,13 @@ def _moments(re, im, out):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def one_buffer(samples, n, ends, run, leaked, out, still):
-    """Statistics of samples (m n,) int16, in codes, into out (16,), and of the return that runs into still (8,).
+    """Statistics of one buffer (m n,) int16, in codes.
+
+    Writes out (16,), and for a running phase the moving return into still (8,).
 
     ends     lowest and highest code that count as clipped
-    run      rad a cycle that the phase moves; 0: `still` is left alone
-    leaked   codes, complex, what stands still in the samples
+    run      rad a cycle of phase motion; 0: `still` is not written
+    leaked   codes, complex, constant leakage in the samples
     still    re, im of the mean, then the six moments
     """
     m = len(samples) // n
@@ -77,12 +81,12 @@ def one_buffer(samples, n, ends, run, leaked, out, still):
     _moments(re, im, out[10:])
     out[9] = _dropped(re, im, out[0], out[1], out[10:]) if m >= FEWEST_FOR_DROPOUT else 0.0
     if run != 0.0:
-        _stand(re, im, n, run, leaked, still)
+        _stop_rotation(re, im, n, run, leaked, still)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _dropped(re, im, mean_re, mean_im, moments):
-    """Cycles that collapse, as `cycle_scatter.dropped_cycles`."""
+    """Count cycles that collapse, as `cycle_scatter.dropped_cycles`."""
     m, square = len(re), mean_re**2 + mean_im**2
     if square == 0.0:
         return 0
@@ -98,19 +102,19 @@ def _dropped(re, im, mean_re, mean_im, moments):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _stand(re, im, n, run, leaked, still):
-    """Each cycle turned back by how far the phase has run, as `running_phasor`."""
+def _stop_rotation(re, im, n, run, leaked, still):
+    """Turn each cycle back by the phase run, as `running_phasor`."""
     m = len(re)
-    kept, image = 0.0, 0j
+    direct, image = 0.0, 0j
     for j in range(n):
         within = run * (j - 0.5 * (n - 1)) / n
-        kept += np.cos(within)
+        direct += np.cos(within)
         image += np.exp(1j * (4.0 * np.pi * j / n - within))
-    kept, image = kept / n, image / n
-    scale = 1.0 / (kept**2 - abs(image) ** 2)
+    direct, image = direct / n, image / n
+    scale = 1.0 / (direct**2 - abs(image) ** 2)
     for k in range(m):
         z = complex(re[k], im[k]) - leaked
-        z = (kept * z - image * z.conjugate()) * scale * np.exp(-1j * run * (k - 0.5 * (m - 1)))
+        z = (direct * z - image * z.conjugate()) * scale * np.exp(-1j * run * (k - 0.5 * (m - 1)))
         re[k], im[k] = z.real, z.imag
     still[0], still[1] = re.mean(), im.mean()
     _moments(re, im, still[2:])

@@ -1,4 +1,4 @@
-"""What became of each buffer of a lot, as a value and in words: whatever comes in, every buffer gets its status."""
+"""Status of each buffer, as a value and in words."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -11,12 +11,15 @@ from catseye.errors import ValidityError
 from catseye.signal.detection.cycle_scatter import CycleScatter
 from catseye.signal.detection.phase import HARMONICS, Detection, detect
 
-SHORTEST_RUN = 8  # samples: fewer that are equal happen by chance where a cycle has few samples
-RUN_BLOCK = 2**20  # samples looked at for runs at a time
+SHORTEST_RUN = 8  # samples: fewer equal ones occur by chance where a cycle has few samples
+RUN_BLOCK = 2**20  # samples searched for runs at a time
 
 
 class BufferStatus(IntEnum):
-    """What became of one buffer, worse ones higher; those up to CLIPPED have a phasor, which can be bad above WEAK."""
+    """Status of one buffer, worse ones higher.
+
+    Up to CLIPPED there is a phasor, which can be bad above WEAK.
+    """
 
     GOOD = 0
     WEAK = 1
@@ -31,7 +34,7 @@ class BufferStatus(IntEnum):
 
 TEXTS = {
     BufferStatus.GOOD: "",
-    BufferStatus.WEAK: "amplitude {amplitude:.4g} V is below the limit of {weakest:.4g} V",
+    BufferStatus.WEAK: "amplitude {amplitude:.4g} V is below the limit {weakest:.4g} V",
     BufferStatus.NO_SCATTER: "{cycles} cycles of {n} samples do not show their noise, so the uncertainty "
     "is unknown; take at least 2 cycles, and noise above a converter step",
     BufferStatus.DROPOUT: "{dropped} of {cycles} cycles have less than half the amplitude; was the beam cut?",
@@ -45,11 +48,11 @@ TEXTS = {
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """b buffers, what they say and whether it can be used.
+    """Detection and status of b buffers.
 
     status              (b,) int8 of BufferStatus; `text` says it in words
     detection           of b buffers; NaN and zero counts where there is no phasor
-    length              (b,) samples; -1 where it is no row of samples
+    length              (b,) samples; -1 where it is not a row of samples
     samples_per_cycle   n
     cycles              the cycles expected; None: any whole number
     weakest             V, the limit for WEAK; 0: none
@@ -63,13 +66,13 @@ class Inspection:
     weakest: float
 
     def text(self, buffer: int) -> str:
-        """The status of one buffer in words: what is wrong and what to do."""
+        """Status text of one buffer: fault and remedy."""
         name = BufferStatus(self.status[buffer]).name.lower().replace("_", " ")
         detail = self.detail(buffer)
         return f"{name}: {detail}" if detail else name
 
     def detail(self, buffer: int) -> str:
-        """The same without the status."""
+        """Detail of one buffer without its status name."""
         n, detection = self.samples_per_cycle, self.detection
         expected = f"a whole number of cycles of {n}" if self.cycles is None else f"{self.cycles} cycles of {n}"
         return TEXTS[BufferStatus(self.status[buffer])].format(
@@ -96,7 +99,7 @@ def inspect_buffers(
     harmonics: Sequence[int] = HARMONICS,
     weakest: float = 0.0,
 ) -> Inspection:
-    """Detect each of a lot of buffers that may differ in length and may be bad, with a status each.
+    """Detect buffers of any length or quality, with a status each.
 
     buffers              (b, samples), or a sequence of b rows, which may be of any length and type
     samples_per_cycle    n, at least 3
@@ -104,10 +107,10 @@ def inspect_buffers(
     cycles               m expected; None takes any whole number of cycles
     converter_ends       as for `detect`
     harmonics            as for `detect`
-    weakest              V, amplitude below which a buffer is called weak; without it a weak return is good, and its
-                         uncertainty tells
+    weakest              V, amplitude below which a buffer is WEAK; without it a weak return is good, with a large
+                         uncertainty
 
-    The gravest status is given. Only the arguments raise (ValidityError), never a buffer.
+    The worst status is returned. Only the arguments raise (ValidityError), never a buffer.
 
     Source: [PARKER04] section 5.2; the rules for dropout in `cycle_scatter`, for stuck converters in `has_long_run`.
 
@@ -122,13 +125,13 @@ def inspect_buffers(
     if not 0.0 <= weakest < np.inf:
         raise ValidityError(f"weakest amplitude {weakest} V is not 0 or above and finite")
     if cycles is not None and cycles < 1:
-        raise ValidityError(f"{cycles} cycles are no buffer; at least 1 is")
+        raise ValidityError(f"{cycles} cycles are not a buffer; at least 1 is expected")
     n = int(samples_per_cycle)
-    # refuses what no buffer can mend
+    # raises for invalid arguments
     detect(np.zeros(2 * max(n, 1)), samples_per_cycle, volts_per_code, harmonics=harmonics)
     count = len(buffers)  # type: ignore[arg-type]
     status, length = np.zeros(count, dtype=np.int8), np.full(count, -1, dtype=np.int64)
-    detection = _nothing(count, len(tuple(harmonics)))
+    detection = _empty_detection(count, len(tuple(harmonics)))
     groups: dict[tuple[int, str], list[int]] = {}
     table = buffers if isinstance(buffers, np.ndarray) and buffers.ndim == 2 and buffers.dtype.kind in "iuf" else None
     rows: list[NDArray[np.generic]] = []
@@ -150,38 +153,43 @@ def inspect_buffers(
         block = table if table is not None else np.stack([rows[i] for i in members])
         part = detect(block, n, volts_per_code, converter_ends=converter_ends, harmonics=harmonics)
         status[members] = _judged(part, has_long_run(block, shortest_run(n)), weakest)
-        _put(detection, members, part)
+        _copy_rows(detection, members, part)
     return Inspection(status, detection, length, n, cycles, weakest)
 
 
 def status_of(detection: Detection, *, weakest: float = 0.0) -> NDArray[np.int8]:
-    """(...) BufferStatus of what was detected before; STUCK needs the samples and is not told here.
+    """BufferStatus (...) of earlier detections.
+
+    STUCK needs the samples and is not tested.
 
     detection   any shape
-    weakest     V, amplitude below which a buffer is called weak
+    weakest     V, amplitude below which a buffer is WEAK
     """
     return _judged(detection, np.zeros(detection.phasor.shape, dtype=bool), weakest)
 
 
 def shortest_run(samples_per_cycle: int) -> int:
-    """Equal samples in a row that a live signal does not show: more than half a cycle, and at least 8.
+    """Shortest run of equal samples that a live signal cannot show.
 
-    In half a cycle a sine changes by its amplitude or more, so only one below a converter step stays that long.
+    It is more than half a cycle, and at least 8.
+
+    In half a cycle a sine changes by its amplitude or more, so only a signal below a converter step stays constant that
+    long.
     """
     return max(samples_per_cycle // 2 + 1, SHORTEST_RUN)
 
 
 def has_long_run(samples: NDArray[np.generic], run: int) -> NDArray[np.bool_]:
-    """(b,) whether buffers (b, samples) hold a run of at least `run` equal samples.
+    """True (b,) for buffers with `run` equal samples in a row.
 
-    Such a run spans two neighbouring points of a grid of run//2 samples. Where these are equal the buffer is looked at
-    in full, the others are done with.
+    Such a run spans two neighbouring points of a grid of run//2 samples. Only where these are equal is the buffer
+    searched in full.
     """
     step = max(1, run // 2)
     answer = np.zeros(len(samples), dtype=bool)
-    at_once = max(1, RUN_BLOCK // max(1, samples.shape[-1]))
-    for start in range(0, len(samples), at_once):
-        block = samples[start : start + at_once]
+    block_rows = max(1, RUN_BLOCK // max(1, samples.shape[-1]))
+    for start in range(0, len(samples), block_rows):
+        block = samples[start : start + block_rows]
         grid = block[:, ::step]
         suspects = np.flatnonzero((grid[:, 1:] == grid[:, :-1]).any(axis=1))
         for i in suspects:
@@ -192,27 +200,27 @@ def has_long_run(samples: NDArray[np.generic], run: int) -> NDArray[np.bool_]:
 
 
 def _judged(detection: Detection, stuck: NDArray[np.bool_], weakest: float) -> NDArray[np.int8]:
-    """The gravest status that applies; the conditions stand in order of gravity."""
+    """Worst status that applies, tested in order of severity."""
     status = np.zeros(detection.phasor.shape, dtype=np.int8)
     status[detection.amplitude < weakest] = BufferStatus.WEAK
     status[~(detection.u_phasor > 0.0)] = BufferStatus.NO_SCATTER
     status[detection.scatter.dropped > 0] = BufferStatus.DROPOUT
     status[stuck] = BufferStatus.STUCK
     status[detection.clipped > 0] = BufferStatus.CLIPPED
-    known = np.isfinite(detection.phasor) & np.isfinite(detection.largest) & ~np.isinf(detection.u_phasor)
-    status[~known] = BufferStatus.NOT_FINITE
+    finite = np.isfinite(detection.phasor) & np.isfinite(detection.largest) & ~np.isinf(detection.u_phasor)
+    status[~finite] = BufferStatus.NOT_FINITE
     return status
 
 
 def _row(buffer: ArrayLike) -> NDArray[np.generic]:
-    """The buffer as an array; an empty pair of brackets of objects where it cannot be one."""
+    """Buffer as an array; an empty object array if invalid."""
     try:
         return np.asarray(buffer)
     except (ValueError, TypeError):
         return np.empty((), dtype=object)
 
 
-def _nothing(count: int, harmonics: int) -> Detection:
+def _empty_detection(count: int, harmonics: int) -> Detection:
     def nan(*tail: int) -> NDArray[np.float64]:
         return np.full((count, *tail), np.nan)
 
@@ -232,9 +240,9 @@ def _nothing(count: int, harmonics: int) -> Detection:
     )
 
 
-def _put(into: Detection, rows: Sequence[int], part: Detection) -> None:
-    for whole, piece in ((into, part), (into.scatter, part.scatter)):
-        for field in fields(whole):
-            target = getattr(whole, field.name)
+def _copy_rows(into: Detection, rows: Sequence[int], part: Detection) -> None:
+    for destination, source in ((into, part), (into.scatter, part.scatter)):
+        for field in fields(destination):
+            target = getattr(destination, field.name)
             if isinstance(target, np.ndarray):
-                target[rows] = getattr(piece, field.name)
+                target[rows] = getattr(source, field.name)

@@ -1,4 +1,4 @@
-"""Synchronous detection of a stream of interleaved channels, fed as it comes."""
+"""Synchronous detection of a stream of interleaved channels."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
@@ -14,7 +14,9 @@ from catseye.signal.detection.phase import BLOCK_SAMPLES, COMPILED_FROM, HARMONI
 
 @dataclass
 class ChannelStream:
-    """Buffers of c channels sampled in turn, cut from a stream whose chunks need not end with a cycle or a buffer.
+    """Cut buffers of c interleaved channels from a stream.
+
+    Chunks need not end with a cycle or a buffer.
 
     channels            c, at least 1
     samples_per_cycle   n of each channel, at least 3
@@ -23,7 +25,7 @@ class ChannelStream:
     converter_ends      as for `detect`
     harmonics           as for `detect`
 
-    It keeps the samples of the buffer in progress and nothing else. Channels are sampled one after the other in each
+    It stores only the samples of the buffer in progress. Channels are sampled one after the other in each
     time slot: a channel's phase is that of its own samples, so a converter that takes channel i a time tau_i after the
     slot adds 2 pi IF tau_i to it, which a reference taken on the same channel removes.
 
@@ -43,40 +45,40 @@ class ChannelStream:
     converter_ends: tuple[float, float] | None = None
     harmonics: Sequence[int] = HARMONICS
     waiting: int = field(default=0, init=False)  # time slots in the buffer in progress
-    _kept: NDArray[np.generic] | None = field(default=None, init=False, repr=False)
+    _pending: NDArray[np.generic] | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Refuse what could never give a buffer."""
+        """Refuse settings that can never give a buffer."""
         if self.channels < 1 or self.cycles < 1:
             raise ValidityError(f"{self.channels} channels of {self.cycles} cycles: expected at least 1 of each")
         self._detect(np.zeros((0, max(1, self.cycles) * int(self.samples_per_cycle), self.channels)))
 
     def feed(self, samples: ArrayLike) -> Detection:
-        """Take the next chunk and give what it completes, (buffers, channels); none is an empty Detection.
+        """Take the next chunk; return completed buffers, (buffers, channels).
 
-        samples   (t, c) codes or volts, of one type throughout; any t, a memory map too
+        samples   (t, c) codes or volts, of one type throughout; any t; may be a memory map
 
         Raises ValidityError, and takes nothing, for a chunk of another width or type.
         """
         chunk = np.asarray(samples)
         self._check(chunk)
         size = self.cycles * int(self.samples_per_cycle)
-        if self._kept is None:
-            self._kept = np.empty((size, self.channels), dtype=chunk.dtype)
+        if self._pending is None:
+            self._pending = np.empty((size, self.channels), dtype=chunk.dtype)
         parts = []
         used = 0
         if self.waiting:
             used = min(size - self.waiting, len(chunk))
-            self._kept[self.waiting : self.waiting + used] = chunk[:used]
+            self._pending[self.waiting : self.waiting + used] = chunk[:used]
             self.waiting += used
             if self.waiting < size:
                 return self._detect(np.empty((0, size, self.channels), dtype=chunk.dtype))
-            parts.append(self._detect(self._kept[None]))
-        whole = (len(chunk) - used) // size
-        parts.append(self._detect(chunk[used : used + whole * size].reshape(whole, size, self.channels)))
-        rest = chunk[used + whole * size :]
-        self._kept[: len(rest)] = rest
-        self.waiting = len(rest)
+            parts.append(self._detect(self._pending[None]))
+        complete = (len(chunk) - used) // size
+        parts.append(self._detect(chunk[used : used + complete * size].reshape(complete, size, self.channels)))
+        remainder = chunk[used + complete * size :]
+        self._pending[: len(remainder)] = remainder
+        self.waiting = len(remainder)
         return joined(parts)
 
     def _check(self, chunk: NDArray[np.generic]) -> None:
@@ -84,11 +86,11 @@ class ChannelStream:
             raise ValidityError(f"a chunk of shape {chunk.shape} is not (time, {self.channels} channels)")
         if chunk.dtype.kind not in "iuf":
             raise ValidityError(f"samples are of type {chunk.dtype}, expected integers or floats")
-        if self._kept is not None and chunk.dtype != self._kept.dtype:
-            raise ValidityError(f"a chunk of {chunk.dtype} follows {self._kept.dtype}: one stream has one type")
+        if self._pending is not None and chunk.dtype != self._pending.dtype:
+            raise ValidityError(f"a chunk of {chunk.dtype} follows {self._pending.dtype}: one stream has one type")
 
     def _detect(self, buffers: NDArray[np.generic]) -> Detection:
-        """Of (b, m n, c), some at a time, each channel's samples brought together."""
+        """Detect (b, m n, c) in blocks, by channel."""
         step = max(1, 4 * BLOCK_SAMPLES // (buffers.shape[1] * self.channels))
         return joined(
             [
@@ -107,15 +109,17 @@ class ChannelStream:
 def interleaved_phasors(
     samples: ArrayLike, samples_per_cycle: int, volts_per_code: float = 1.0, *, compiled: bool | None = None
 ) -> NDArray[np.complex128]:
-    """Phasors (..., c) of buffers of c channels sampled in turn, in V, folded where they lie: nothing is rearranged.
+    """Phasors (..., c) of buffers of c interleaved channels, V.
+
+    The samples are not rearranged.
 
     samples              (..., m n, c) codes or volts, as a converter interleaves them
     samples_per_cycle    n of each channel, at least 3
     volts_per_code       V, above 0
-    compiled             whether to use the compiled form, for int16 (None: from 2^25 samples on); the same to rounding
+    compiled             True for the compiled form, for int16 (None: from 2^25 samples on); the same to rounding
 
-    A cycle of all channels is one row of n c samples: rows are summed as of one channel, and trigonometry comes once a
-    buffer and channel. `ChannelStream` tells noise and health too.
+    A cycle of all channels is one row of n c samples: rows are summed as for one channel, and trigonometry is done once
+    a buffer and channel. `ChannelStream` also gives noise and status.
 
     Source: [PARKER04] eq. 5.5 and 5.6 channel by channel.
 
@@ -153,7 +157,7 @@ def interleaved_phasors(
 
 
 def joined(parts: Sequence[Detection]) -> Detection:
-    """Detections one after the other along their first axis."""
+    """Concatenate detections along their first axis."""
     return _joined(parts)
 
 

@@ -1,22 +1,22 @@
-"""What the cycles of a buffer say one by one: their phasors, how these scatter, and which of them collapse.
+"""Scatter of a buffer's cycles: their phasors, covariance and dropouts.
 
 The standard uncertainty of a buffer's phasor comes from here. Along the phasor its scatter is that of the amplitude,
-across it that of the phase. The two are kept apart, because they need not be alike: the receiver's noise is the same in
+across it that of the phase. The two are separate because they can differ: the receiver's noise is the same in
 both, but the oscillators' is only across, and the laser's intensity only along.
 
 White noise of standard deviation sigma gives each cycle's phasor the variance 2 sigma^2/n in either component, so the
 mean of m cycles has u^2 = 2 sigma^2/(m n) and the phase u = sqrt(2/(m n)) sigma/A. That is the Cramer-Rao bound: with
 s_j = A cos(2 pi j/n - phi) the Fisher information is sum (ds_j/dphi)^2/sigma^2 = A^2 m n/(2 sigma^2), and over whole
-cycles phi shares none with A, with the mean, or with other harmonics.
+cycles phi is uncorrelated with A, with the mean, or with other harmonics.
 
-Noise that is alike in neighbouring cycles does not average as m^(-1/2). So the cycles are also taken in eight batches
-one after the other: white noise makes the variance between batches, m-fold that of their mean, equal to that within
-them, and their ratio, the *colour*, has Fisher's distribution. Where it exceeds what white noise exceeds once in a
-hundred, the scatter of the batches is claimed instead. That is honest for noise that forgets within a batch. For slower
-noise it is a lower limit: a factor of 2 to 3 may be missing, mostly without the threshold (2.8 at 128 cycles) being
-passed, and below it noise that does forget can hide a factor of 1.5 too. What is slower than a buffer shows between
-buffers: see `signal.drift.walk` and the calibration "oscillator". Noise with a colour below 1 (a line that averages
-out) keeps the larger claim.
+Noise correlated between neighbouring cycles does not average as m^(-1/2). So the cycles are also divided into eight
+consecutive batches: white noise makes the variance between batches, m-fold that of their mean, equal to that within
+them, and their ratio, the *colour*, has Fisher's distribution. Where it exceeds the 1 % point
+of white noise, the scatter of the batches is used instead. That is correct for noise whose correlation ends within a
+batch. For slower noise it is a lower limit: a factor of 2 to 3 may be missing, mostly without the threshold (2.8 at 128
+cycles) being passed, and below it noise of short correlation can hide a factor of 1.5 too. Noise slower than a buffer
+shows between buffers: see `signal.drift.walk` and the calibration "oscillator". Noise with a colour below 1 (a line
+that averages out) keeps the larger uncertainty.
 """
 
 import math
@@ -33,14 +33,14 @@ from catseye.signal.detection.folding import exponentials, layout
 
 BATCHES = 8
 FEWEST_FOR_BATCHES = 2 * BATCHES  # cycles
-ALARM = 0.01  # how often white noise is taken for coloured
+ALARM = 0.01  # probability that white noise is classed as coloured
 FEWEST_FOR_DROPOUT = 8  # cycles
-COLLAPSE = 6.0  # standard deviations of a cycle, across, that half the amplitude must exceed to tell a dropout
+COLLAPSE = 6.0  # standard deviations of a cycle, across, that half the amplitude must exceed to detect a dropout
 
 
 @dataclass(frozen=True, eq=False)
 class CycleScatter:
-    """How the cycles' phasors scatter about their mean, one element a buffer.
+    """Scatter of cycle phasors about their mean, one element a buffer.
 
     cycles    m
     total     V^2, (..., 3): sums over the cycles of re re, im im, re im of the departures
@@ -54,7 +54,9 @@ class CycleScatter:
     dropped: NDArray[np.int64]
 
     def colour(self, phasor: ArrayLike) -> NDArray[np.float64]:
-        """(..., 2): variance between batches over that within, along and across the phasor; NaN where not told.
+        """Noise colour (..., 2): variance between batches over that within, along and across the phasor.
+
+        NaN where undefined.
 
         1 for white noise, with Fisher's distribution of 7 and m - 8 degrees of freedom.
         """
@@ -66,7 +68,10 @@ class CycleScatter:
         return np.where(m >= FEWEST_FOR_BATCHES, ratio, np.nan)
 
     def variance(self, phasor: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(..., 2) V^2, of the mean along and across the phasor, and (..., 2) its degrees of freedom; NaN for m = 1."""
+        """Variance (..., 2) of the mean along and across the phasor, V^2, and its degrees of freedom (..., 2).
+
+        NaN for m = 1.
+        """
         m = np.asarray(self.cycles)[..., None]
         limit = np.vectorize(colour_limit, otypes=[float])(m)
         coloured = self.colour(phasor) > limit
@@ -79,14 +84,16 @@ class CycleScatter:
 
 @cache
 def colour_limit(cycles: int) -> float:
-    """The colour beyond which a buffer of so many cycles has not white noise; infinite where it has no batches."""
+    """Noise colour limit for white noise; infinite without batches."""
     from scipy.special import fdtri
 
     return float(fdtri(BATCHES - 1, cycles - BATCHES, 1.0 - ALARM)) if cycles >= FEWEST_FOR_BATCHES else math.inf
 
 
 def variance_across(total: Sequence[float], between: Sequence[float], cycles: int, *, phasor: complex) -> float:
-    """V^2, of one buffer's mean across its phasor: `CycleScatter.variance` without arrays.
+    """Variance of one buffer's mean across its phasor, V^2.
+
+    The same as `CycleScatter.variance`, without arrays.
 
     total, between   (3) V^2, as there
     cycles           m, at least 2
@@ -98,13 +105,13 @@ def variance_across(total: Sequence[float], between: Sequence[float], cycles: in
     if cycles < FEWEST_FOR_BATCHES:
         return white
     batches = max(s * s * between[0] + c * c * between[1] - 2.0 * s * c * between[2], 0.0)
-    rest = (within - batches) / (cycles - BATCHES)
-    coloured = batches / (BATCHES - 1) > colour_limit(cycles) * rest
+    remainder = (within - batches) / (cycles - BATCHES)
+    coloured = batches / (BATCHES - 1) > colour_limit(cycles) * remainder
     return batches / ((BATCHES - 1.0) * cycles) if coloured else white
 
 
 def cycle_phasors(samples: ArrayLike, samples_per_cycle: int, volts_per_code: float = 1.0) -> NDArray[np.complex128]:
-    """Phasor of every cycle, (..., m) V: amplitude and phase of each, as the ranger's SEQ shows them.
+    """Phasor of each cycle, (..., m) V, as in the ranger's SEQ.
 
     samples              (..., m n), codes or volts
     samples_per_cycle    n, at least 3
@@ -126,14 +133,14 @@ def cycle_phasors(samples: ArrayLike, samples_per_cycle: int, volts_per_code: fl
 
 
 def weighed(cycles: NDArray[Any]) -> NDArray[np.complex128]:
-    """Phasors of cycles (..., n)."""
+    """Phasors of folded cycles (..., n)."""
     wave = exponentials(cycles.shape[-1], (1,))[:, 0]
     parts = cycles @ np.stack([wave.real, wave.imag], axis=1) * (2.0 / len(wave))
     return parts[..., 0] + 1j * parts[..., 1]
 
 
 def moments(departures: NDArray[np.complex128]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Sums of squares and products (b, 3) of departures (b, m) of mean zero, and those between batches."""
+    """Sums of squares and products (b, 3) of zero-mean departures (b, m), in total and between batches."""
     m = departures.shape[-1]
     total = _products(departures)
     if m < FEWEST_FOR_BATCHES:
@@ -146,14 +153,14 @@ def moments(departures: NDArray[np.complex128]) -> tuple[NDArray[np.float64], ND
 def dropped_cycles(
     departures: NDArray[np.complex128], phasor: NDArray[np.complex128], total: NDArray[np.float64]
 ) -> NDArray[np.int64]:
-    """Cycles (b,) whose amplitude along the mean phasor is below half of it, where noise does not do that.
+    """Count cycles (b,) of less than half amplitude, not caused by noise.
 
     departures   (b, m) of the cycles' phasors from their mean
     phasor       (b,) the mean
     total        (b, 3) from `moments`
 
-    Noise is judged across the phasor, where a beam that goes out adds nothing: half the amplitude must exceed six of
-    its standard deviations a cycle, which a weak beam's does not. Fewer than 8 cycles tell too little of the noise.
+    Noise is taken across the phasor, where an interrupted beam adds nothing: half the amplitude must exceed six of
+    its standard deviations a cycle, which excludes weak beams. Fewer than 8 cycles do not determine the noise.
     """
     m = departures.shape[-1]
     if m < FEWEST_FOR_DROPOUT:
@@ -171,7 +178,7 @@ def _products(z: NDArray[np.complex128]) -> NDArray[np.float64]:
 
 
 def _turned(products: NDArray[np.float64], phasor: ArrayLike) -> NDArray[np.float64]:
-    """(..., 2): sums of squares along and across the phasor; along the real axis where there is none."""
+    """Sums of squares (..., 2) along and across the phasor; along the real axis if it is zero."""
     z = np.asarray(phasor, dtype=complex)
     size = np.abs(z)
     lit = size > 0.0

@@ -1,4 +1,4 @@
-"""Buffers laid out as cycles, and the waves that a folded cycle is weighed with."""
+"""Buffers laid out as cycles, and the detection waves."""
 
 from typing import Any
 
@@ -7,16 +7,19 @@ from numpy.typing import NDArray
 
 from catseye.errors import ValidityError
 
-LANES = 128  # sums kept side by side while folding: short rows would leave most of the machine idle
-SAFE_ROWS = 2**15  # rows that 32 bits hold: 2^15 (-2^15) is -2^30, half of what they can
+LANES = 128  # parallel sums while folding: short rows would not fill the vector units
+SAFE_ROWS = 2**15  # rows that fit 32 bits: 2^15 (-2^15) is -2^30, half of their range
 
 
 def layout(array: NDArray[np.generic], samples_per_cycle: int) -> tuple[int, int]:
-    """Samples a cycle n and cycles m of buffers (..., m n); ValidityError where they do not fit."""
+    """Samples a cycle n, cycles m of buffers (..., m n).
+
+    Raises ValidityError where they do not fit.
+    """
     if array.dtype.kind not in "iuf":
         raise ValidityError(f"samples are of type {array.dtype}, expected integers or floats")
     if not np.isfinite(samples_per_cycle) or samples_per_cycle != int(samples_per_cycle) or samples_per_cycle < 3:
-        raise ValidityError(f"{samples_per_cycle} samples a cycle do not show a phase; at least 3 do")
+        raise ValidityError(f"{samples_per_cycle} samples a cycle do not determine a phase; at least 3 do")
     n = int(samples_per_cycle)
     length = array.shape[-1] if array.ndim else 0
     if length == 0 or length % n:
@@ -25,13 +28,13 @@ def layout(array: NDArray[np.generic], samples_per_cycle: int) -> tuple[int, int
 
 
 def exponentials(n: int, orders: tuple[int, ...]) -> NDArray[np.complex128]:
-    """exp(2 pi i k l / n), (n, orders): cosine as real part, sine as imaginary part."""
-    turns = np.outer(np.arange(n), orders) % n  # reduced first, so that large k l lose nothing
+    """Waves exp(2 pi i k l / n), (n, orders): cosine in the real part, sine in the imaginary."""
+    turns = np.outer(np.arange(n), orders) % n  # reduced first, so that large k l lose no precision
     return np.exp(2j * np.pi * turns / n)
 
 
 def fold(block: NDArray[Any]) -> NDArray[Any]:
-    """Sum of the m cycles of buffers (b, m, n), (b, n): the inner sums of eq. 5.5 and 5.6.
+    """Sum of the m cycles of buffers (b, m, n), (b, n): inner sums of eq. 5.5 and 5.6.
 
     Integers of up to 32 bits are summed as integers, exactly: 64 bits would take 2^32 cycles to overflow. Wider ones
     are taken as floats.

@@ -1,4 +1,4 @@
-"""The ranger's frequencies: what scale and which sign the phase has, and how far it is unambiguous."""
+"""Ranger frequencies: scale, sign and ambiguity of the phase."""
 
 import math
 from collections.abc import Iterable
@@ -16,7 +16,7 @@ from catseye.signal.cycles.whole import fraction
 
 @dataclass(frozen=True)
 class FrequencyPlan:
-    """Modulation of the laser and local oscillator of the mixer, which together decide scale and sign of the phase.
+    """Laser modulation and local oscillator: scale and sign of phase.
 
     reference_hz    Hz, above 0: the station's frequency standard
     multiple        whole number, at least 1: modulation = multiple x reference
@@ -55,40 +55,56 @@ class FrequencyPlan:
 
     @property
     def modulation_hz(self) -> float:
-        """Modulation of the laser, Hz."""
+        """Modulation frequency of the laser, Hz."""
         return self.multiple * self.reference_hz
 
     @property
     def phase_sign(self) -> int:
-        """Sign of the phase's change with distance: -1 for the oscillator above, +1 below."""
+        """Sign of d phase/d distance: -1 oscillator above, +1 below."""
         return -1 if self.oscillator == "above" else 1
 
     def local_oscillator_hz(self, intermediate_hz: float) -> float:
-        """Local oscillator, Hz, for an intermediate frequency in Hz."""
+        """Local oscillator, Hz, for an intermediate frequency, Hz."""
         return self.modulation_hz - self.phase_sign * intermediate_hz
 
     def half_wavelength(self, group_index: float = 1.0) -> float:
-        """Half the modulation's wavelength, m: the unambiguous range. Source: [PARKER04] eq. 5.16."""
+        """Half the modulation wavelength, m: the unambiguous range.
+
+        Source: [PARKER04] eq. 5.16.
+        """
         return SPEED_OF_LIGHT / (2.0 * group_index * self.modulation_hz)
 
     def range_per_radian(self, group_index: float = 1.0) -> float:
-        """Metres of range in a radian of phase, a magnitude: lambda/4 pi, of [PARKER04] eq. 5.8."""
+        """Range per radian of phase, m: lambda/4 pi.
+
+        A magnitude, of [PARKER04] eq. 5.8.
+        """
         return self.half_wavelength(group_index) / TWO_PI
 
     def phase_gradient(self, group_index: float = 1.0) -> float:
-        """d phi/d D, rad/m, with its sign. Source: [PARKER04] eq. 5.9."""
+        """Phase gradient d phi/d D, rad/m, with its sign.
+
+        Source: [PARKER04] eq. 5.9.
+        """
         return self.phase_sign / self.range_per_radian(group_index)
 
     def phase(self, distance: ArrayLike, group_index: ArrayLike = 1.0) -> NDArray[np.float64]:
-        """Phase in [0, 2 pi) that the way to a target and back gives, electronics left out. [PARKER04] eq. 5.11."""
+        """Phase of the path there and back, rad in [0, 2 pi).
+
+        Without the electronics.
+
+        Source: [PARKER04] eq. 5.11.
+        """
         turns = 2.0 * np.multiply(distance, group_index, dtype=float) * self.modulation_hz / SPEED_OF_LIGHT
         return fraction(self.phase_sign * TWO_PI * (turns - np.floor(turns)), 0.0)
 
     def range_scale_ppm(self, reference_offset_ppm: float = 0.0, modulation_offset_hz: float = 0.0) -> float:
-        """What a range reduced with the nominal frequency reads too much, ppm of the difference to the reference cube.
+        """Scale error of ranges reduced with the nominal frequency, ppm.
+
+        Positive where ranges are too long; it applies to the difference to the reference cube.
 
         reference_offset_ppm    ppm, true reference above the nominal one; it moves modulation and oscillator together
-        modulation_offset_hz    Hz, the synthesiser's own: true modulation above multiple x reference
+        modulation_offset_hz    Hz, of the synthesiser: true modulation above multiple x reference
 
         Phase is 2 pi f tau with the true f: f too high makes ranges too long. The IF comes from the sampling counter,
         so neither offset disturbs the lock of the samples; one of the oscillator alone does (`beat_hz`).
@@ -101,7 +117,9 @@ class FrequencyPlan:
     def beat_hz(
         self, intermediate_hz: float, *, received_offset_hz: float = 0.0, oscillator_offset_hz: float = 0.0
     ) -> float:
-        """Frequency of the mixed signal, Hz, where light (Doppler) or oscillator are off the plan.
+        """Frequency of the mixed signal with offsets, Hz.
+
+        The offsets come from Doppler shift or oscillator.
 
         intermediate_hz         Hz, the planned IF
         received_offset_hz      Hz, received modulation above the plan's
@@ -113,7 +131,7 @@ class FrequencyPlan:
 
 
 def synthetic_half_wavelength(first_hz: float, second_hz: float, group_index: float = 1.0) -> float:
-    """Half wavelength, m, of the difference of two modulations: the unambiguous range of phase_1 - phase_2.
+    """Half wavelength of the difference of two modulations, m: unambiguous range of phase_1 - phase_2.
 
     first_hz, second_hz    Hz, different
     group_index            of the path; both frequencies share it, for it belongs to the light
@@ -127,7 +145,9 @@ def synthetic_half_wavelength(first_hz: float, second_hz: float, group_index: fl
 
 
 def unambiguous_range(modulations_hz: Iterable[int], group_index: float = 1.0) -> float:
-    """Range after which exact phases at all modulations repeat together, m: half a wavelength of their common divisor.
+    """Range after which exact phases at all modulations repeat, m.
+
+    It is half a wavelength of their common divisor.
 
     modulations_hz    whole Hz, one or more
     group_index       of the path
@@ -147,7 +167,7 @@ def unambiguous_range(modulations_hz: Iterable[int], group_index: float = 1.0) -
 
 
 def whole_number(what: str, value: object, *, at_least: int) -> int:
-    """A whole number as a plain int, refused where it is none or too small."""
+    """Convert a whole number to int; refuse other values."""
     if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < at_least:
         raise ValidityError(f"{what} {value!r} is not a whole number of at least {at_least}")
     return int(value)

@@ -1,11 +1,11 @@
-"""Synchronous detection: amplitude and phase of the fundamental in samples locked to the modulation.
+"""Synchronous detection: amplitude and phase of locked samples.
 
-One idea serves one buffer, a batch, a file larger than memory and a stream of channels (`channels`): the cycles are
-folded with integer sums, and trigonometry comes once a buffer. `phasors` does only that; `detect` also tells how the
-samples scatter. Large arrays of 16-bit samples go to the compiled form in `phase_kernel`.
+One method serves a buffer, a batch, a file larger than memory and a stream of channels (`channels`): the cycles are
+folded with integer sums, and trigonometry is done once a buffer. `phasors` does only that; `detect` also gives the
+scatter of the samples. Large arrays of 16-bit samples go to the compiled form in `phase_kernel`.
 
-What lies at the fundamental cannot be told from the signal. Harmonic k is rejected exactly unless n divides k - 1 or
-k + 1: with n samples a cycle harmonic n - 1 is the fundamental's mirror image, so that B cos((n-1) x - psi) adds
+A disturbance at the fundamental cannot be separated from the signal. Harmonic k is rejected exactly unless n divides k
+- 1 or k + 1: with n samples a cycle harmonic n - 1 is the fundamental's mirror image, so that B cos((n-1) x - psi) adds
 B exp(-i psi) to the phasor. Clipping makes a sine smaller but leaves it even about its crest, on one side or on both:
 its phase moves only by the harmonics n - 1, n + 1, 2 n - 1, ... that fold back: up to 1.5/n^2 rad clipped on one side
 at half the amplitude or above, 4/n^2 rad on both; towards a square wave it is pi/n.
@@ -22,21 +22,21 @@ from catseye.signal.cycles.whole import fraction
 from catseye.signal.detection.cycle_scatter import CycleScatter, dropped_cycles, moments, weighed
 from catseye.signal.detection.folding import exponentials, fold, layout
 
-BLOCK_SAMPLES = 2**18  # samples in work at a time: 2 MB of float64, which stays in cache
+BLOCK_SAMPLES = 2**18  # samples processed at a time: 2 MB of float64, which fits the cache
 COMPILED_FROM = 2**25  # samples: loading numba takes about as long as the plain form for these
 HARMONICS = (2, 3)
 
 
 @dataclass(frozen=True, eq=False)
 class Detection:
-    """What a buffer of samples says, one element a buffer.
+    """Detected values of buffers of samples, one element a buffer.
 
     phasor       V, complex: (2/mn)(a + i b), the fundamental A exp(i phi) of s_j = A cos(2 pi j/n - phi)
-    u_phasor     V, standard uncertainty of each quadrature component of the phasor, the two taken as alike and the
-                 noise as white between cycles; NaN where no scatter shows. See u_amplitude and u_phase.
+    u_phasor     V, standard uncertainty of each quadrature component of the phasor, both taken as equal and the
+                 noise as white between cycles; NaN without scatter. See u_amplitude and u_phase.
     offset       V, the mean
-    overtones    V, complex (..., h), phasors B exp(i psi) of the harmonics asked, B cos(2 pi k j/n - psi); NaN where n
-                 samples a cycle cannot tell them; at k = n/2 only the cosine shows
+    overtones    V, complex (..., h), phasors B exp(i psi) of the chosen harmonics, B cos(2 pi k j/n - psi); NaN where n
+                 samples a cycle cannot resolve them; at k = n/2 only the cosine
     noise        V, rms of the samples about the folded waveform, n (m - 1) degrees of freedom
     largest      V, largest magnitude of a sample
     clipped      number of samples at the converter's ends
@@ -54,45 +54,58 @@ class Detection:
 
     @property
     def amplitude(self) -> NDArray[np.float64]:
-        """Amplitude of the fundamental, V. Source: [PARKER04] eq. 5.3. A weak one reads u^2/2A too large."""
+        """Amplitude of the fundamental, V.
+
+        A weak one reads u^2/2A too large. Source: [PARKER04] eq. 5.3.
+        """
         return np.abs(self.phasor)
 
     @property
     def phase(self) -> NDArray[np.float64]:
-        """Phase of the fundamental, rad in [0, 2 pi). Source: [PARKER04] eq. 5.4, with the quadrant it omits."""
+        """Phase of the fundamental, rad in [0, 2 pi).
+
+        Source: [PARKER04] eq. 5.4, with the quadrant it omits.
+        """
         return fraction(np.angle(self.phasor), 0.0)
 
     @property
     def harmonics(self) -> NDArray[np.float64]:
-        """Amplitudes of the harmonics asked, V, (..., h)."""
+        """Amplitudes of the chosen harmonics, V, (..., h)."""
         return np.abs(self.overtones)
 
     @property
     def distortion(self) -> NDArray[np.float64]:
-        """Total harmonic distortion: rms of the harmonics asked over the fundamental; infinite without one.
+        """Total harmonic distortion: rms of chosen harmonics over fundamental.
 
-        Harmonics that n samples cannot tell count as none. Noise alone makes it about u_phase sqrt(2 h).
+        Infinite without a fundamental. Harmonics that n samples cannot resolve count as zero. Noise alone makes it
+        about u_phase sqrt(2 h).
         """
         power = np.nansum(self.harmonics**2, axis=-1)
         return _over(np.where(np.isnan(self.phasor), np.nan, np.sqrt(power)), self.amplitude)
 
     @property
     def u_amplitude(self) -> NDArray[np.float64]:
-        """Standard uncertainty of the amplitude, V: scatter along the phasor, coloured noise allowed for."""
+        """Standard uncertainty of the amplitude, V, with coloured noise.
+
+        Scatter along the phasor.
+        """
         return np.sqrt(self._variance()[0][..., 0])
 
     @property
     def u_phase(self) -> NDArray[np.float64]:
-        """Standard uncertainty of the phase, rad: scatter across the phasor over the amplitude; infinite without one.
+        """Standard uncertainty of the phase, rad; infinite without amplitude.
 
-        Coloured noise is allowed for, see `cycle_scatter`. To first order: from about 0.3 rad on the phase is not
-        normal any more, and beyond 1 rad unknown.
+        Scatter across the phasor over the amplitude. Coloured noise is allowed for, see `cycle_scatter`. To first
+        order: from about 0.3 rad on the phase is not normal any more, and beyond 1 rad unknown.
         """
         return _over(np.sqrt(self._variance()[0][..., 1]), self.amplitude)
 
     @property
     def degrees(self) -> NDArray[np.float64]:
-        """(..., 2): degrees of freedom of u_amplitude and u_phase; NaN for a single cycle."""
+        """Degrees of freedom (..., 2) of u_amplitude and u_phase.
+
+        NaN for a single cycle.
+        """
         return self._variance()[1]
 
     def _variance(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -110,19 +123,19 @@ def detect(
     harmonics: Sequence[int] = HARMONICS,
     compiled: bool | None = None,
 ) -> Detection:
-    """Phasor, noise and health of buffers of samples that span whole cycles of the modulation.
+    """Phasor, noise and health of buffers of whole cycles.
 
     samples              (..., m n), codes or volts: m cycles of n samples each; a memory map is read block by block
     samples_per_cycle    n, at least 3
     volts_per_code       V, above 0
     converter_ends       lowest and highest code; by default those of the samples' integer type, none for floats
-    harmonics            orders asked, each at least 2
-    compiled             whether to use the compiled form, for int16 of two cycles and more (None: from 2^25 samples
+    harmonics            orders, each at least 2
+    compiled             True for the compiled form, for int16 of two cycles and more (None: from 2^25 samples
                          on); sums and counts are the same, noise and uncertainty to 1e-5
 
     Integer samples of up to 32 bits are summed over the cycles in 64 bits, as the notes do, and cannot overflow: that
     would take 2^32 cycles. Wider ones are taken as floats. The uncertainty is that of the mean of m cycles from their
-    own scatter, so it sees noise between cycles, not a disturbance locked to them (leakage, stray light). One cycle
+    own scatter, so it covers noise between cycles, not a disturbance locked to them (leakage, stray light). One cycle
     alone has no such scatter: then noise and uncertainty come from its residuals about mean and three harmonics.
     Raises ValidityError for buffers that are not whole cycles; `buffers` gives such a status instead.
 
@@ -136,21 +149,21 @@ def detect(
     """
     array = np.asarray(samples)
     n, m = _checked(array, samples_per_cycle, volts_per_code)
-    wanted = tuple(harmonics)
-    if any(not np.isfinite(k) or k != int(k) or k < 2 for k in wanted):
-        raise ValidityError(f"harmonics {list(wanted)} are not whole numbers of at least 2")
+    orders = tuple(harmonics)
+    if any(not np.isfinite(k) or k != int(k) or k < 2 for k in orders):
+        raise ValidityError(f"harmonics {list(orders)} are not whole numbers of at least 2")
     if converter_ends is None and array.dtype.kind in "iu":
         limits = np.iinfo(array.dtype)
         converter_ends = (limits.min, limits.max)
     fast = _compiled(array, m, compiled)
     buffers = array.reshape(-1, m * n)
-    codes = _Codes.of(len(buffers), len(wanted))
+    codes = _Codes.of(len(buffers), len(orders))
     step = max(1, (16 if fast else 1) * BLOCK_SAMPLES // (m * n))
-    with np.errstate(invalid="ignore", over="ignore"):  # NaN, infinity and 1e300 V answer NaN or infinity
+    with np.errstate(invalid="ignore", over="ignore"):  # NaN, infinity and 1e300 V give NaN or infinity
         for start in range(0, len(buffers), step):
             block = buffers[start : start + step].reshape(-1, m, n)
             part = codes.rows(start, len(block))
-            (_fast_block if fast else _plain_block)(block, wanted, part)
+            (_fast_block if fast else _plain_block)(block, orders, part)
             part.count_clipped(block, converter_ends)
     return codes.in_volts(volts_per_code, array.shape[:-1], m, n)
 
@@ -158,7 +171,9 @@ def detect(
 def phasors(
     samples: ArrayLike, samples_per_cycle: int, volts_per_code: float = 1.0, *, compiled: bool | None = None
 ) -> NDArray[np.complex128]:
-    """Phasors (...) of buffers in V, nothing else, as fast as memory gives the samples; arguments as for `detect`.
+    """Phasors (...) of buffers, V; limited by memory speed.
+
+    Arguments as for `detect`.
 
     Source: [PARKER04] eq. 5.5 and 5.6.
 
@@ -189,7 +204,7 @@ def phasors(
 
 @dataclass(frozen=True, eq=False)
 class _Codes:
-    """The answers of some buffers, in codes, to be filled block by block; see Detection."""
+    """Detections of some buffers, in codes; see Detection."""
 
     phasor: NDArray[np.complex128]
     offset: NDArray[np.float64]
@@ -216,7 +231,7 @@ class _Codes:
         )
 
     def rows(self, start: int, count: int) -> "_Codes":
-        """The detections of some rows, as views."""
+        """Detections of some rows, as views."""
         return _Codes(**{f.name: getattr(self, f.name)[start : start + count] for f in fields(self)})
 
     def count_clipped(self, block: NDArray[np.generic], ends: tuple[float, float] | None) -> None:
@@ -227,7 +242,7 @@ class _Codes:
             self.clipped[suspect] = np.count_nonzero((buffer <= ends[0]) | (buffer >= ends[1]))
 
     def spectrum(self, means: NDArray[np.complex128], n: int, harmonics: tuple[int, ...]) -> None:
-        """Offset, phasor and overtones from the means of s exp(2 pi i k j/n), k = 0, 1 and the harmonics."""
+        """Store offset, phasor and overtones from the means of s exp(2 pi i k j/n), k = 0, 1 and harmonics."""
         self.offset[:] = means[:, 0].real
         self.phasor[:] = 2.0 * means[:, 1]
         for i, k in enumerate(harmonics):
@@ -265,14 +280,14 @@ def _checked(array: NDArray[np.generic], samples_per_cycle: int, volts_per_code:
     return n, m
 
 
-def _compiled(array: NDArray[np.generic], m: int, asked: bool | None) -> bool:
+def _compiled(array: NDArray[np.generic], m: int, requested: bool | None) -> bool:
     serves = array.dtype == np.int16 and array.dtype.isnative and m > 1
-    if asked and not serves:
+    if requested and not serves:
         raise ValidityError(
             f"the compiled form serves native int16 buffers of two cycles and more, not {array.dtype} of {m}; "
             "leave `compiled` out"
         )
-    return serves and (array.size >= COMPILED_FROM if asked is None else asked)
+    return serves and (array.size >= COMPILED_FROM if requested is None else requested)
 
 
 def _fast_block(block: NDArray[np.generic], harmonics: tuple[int, ...], into: _Codes) -> None:
@@ -313,14 +328,14 @@ def _plain_block(block: NDArray[np.generic], harmonics: tuple[int, ...], into: _
 
 
 def _square_of_one_cycle(cycle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean square of single cycles (b, n) about their mean and first three harmonics; NaN when nothing is left over."""
+    """Mean square of single cycles (b, n) about mean and three harmonics; NaN without redundancy."""
     n = cycle.shape[-1]
-    known = 1 + 2 * 3
-    if n <= known:
+    fitted = 1 + 2 * 3
+    if n <= fitted:
         return np.full(len(cycle), np.nan)
     spectrum = np.fft.rfft(cycle, axis=-1)
     spectrum[:, :4] = 0.0
-    return np.sum(np.fft.irfft(spectrum, n, axis=-1) ** 2, axis=-1) / (n - known)
+    return np.sum(np.fft.irfft(spectrum, n, axis=-1) ** 2, axis=-1) / (n - fitted)
 
 
 def _over(numerator: NDArray[np.float64], amplitude: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,8 +1,8 @@
-"""The compiled form of `phase` for many buffers of 16-bit samples. Import it only when a problem is large.
+"""Compiled form of `phase` for many 16-bit buffers.
 
-Every buffer is read from memory once: it is folded with wide integer sums, and while it is still in the cache its
-scatter is taken about the rounded mean cycle. So the single precision of that second look is relative to the noise, not
-to the signal. The plain form in `phase` and `cycle_scatter` is its test.
+Import it only when a problem is large. Each buffer is read from memory once: it is folded with wide integer sums, and
+while it is still in the cache its scatter is computed about the rounded mean cycle. So the single precision of that
+second pass is relative to the noise, not to the signal. The plain form in `phase` and `cycle_scatter` is its test.
 """
 
 import numpy as np
@@ -11,14 +11,14 @@ from numba import njit
 from catseye.signal.detection.cycle_scatter import BATCHES, COLLAPSE, FEWEST_FOR_BATCHES, FEWEST_FOR_DROPOUT
 from catseye.signal.detection.folding import LANES, SAFE_ROWS
 
-_AGAIN = {"reassoc", "contract"}  # sums may be reordered: samples are integers, nothing here is infinite
-_compiled = njit(cache=True, error_model="numpy", fastmath=_AGAIN, nogil=True)
-_inlined = njit(error_model="numpy", fastmath=_AGAIN)  # kept with their caller
+_FAST_MATH = {"reassoc", "contract"}  # sums may be reordered: samples are integers, nothing here is infinite
+_compiled = njit(cache=True, error_model="numpy", fastmath=_FAST_MATH, nogil=True)
+_inlined = njit(error_model="numpy", fastmath=_FAST_MATH)  # cached with their caller
 
 
 @_inlined
 def _fold(samples, n, lanes, acc, total):
-    """Sum of the cycles of one buffer into total (n,) int64; acc (lanes,) int32, emptied before it could overflow."""
+    """Add the cycles of one buffer into total (n,) int64; acc (lanes,) int32 is emptied before overflow."""
     m, wide = len(samples) // n, lanes // n
     rows = m // wide
     total[:] = 0
@@ -55,7 +55,7 @@ def _sum(total, cosine, sine):
 
 @_compiled
 def phasors(buffers, n, cosine, sine, out):
-    """Sum of s exp(2 pi i j/n) of buffers (b, m n) int16 into out (b,) complex; cosine, sine (n,)."""
+    """Sum s exp(2 pi i j/n) of buffers (b, m n) int16 into out (b,) complex; cosine, sine (n,)."""
     lanes = n * max(1, LANES // n)
     acc, total = np.empty(lanes, np.int32), np.empty(n, np.int64)
     for b in range(len(buffers)):
@@ -65,7 +65,7 @@ def phasors(buffers, n, cosine, sine, out):
 
 @_compiled
 def totals(buffers, width, out):
-    """Sum of the rows of `width` samples of buffers (b, rows width) int16 into out (b, width) int64."""
+    """Sum the rows of `width` samples of buffers (b, rows width) int16 into out (b, width) int64."""
     lanes = width * max(1, LANES // width)
     acc = np.empty(lanes, np.int32)
     for b in range(len(buffers)):
@@ -82,7 +82,7 @@ def _ends(samples):
 
 @_inlined
 def _one(c, n, centre, cosine, sine, z):
-    """Departure of a cycle c (n,) from `centre` (n,): its sums into z (2,), its sum of squares."""
+    """Departure of one cycle c (n,) from `centre` (n,): sums into z (2,); returns the sum of squares."""
     re, im, square = np.float32(0.0), np.float32(0.0), np.float32(0.0)
     for j in range(n):
         r = np.float32(c[j]) - centre[j]
@@ -95,9 +95,9 @@ def _one(c, n, centre, cosine, sine, z):
 
 @_inlined
 def _departures(samples, n, m, centre, cosine, sine, z):
-    """Departures of all cycles: their sums into z (m, 2), their sum of squares.
+    """Departures of all cycles: sums into z (m, 2); returns the sum of squares.
 
-    Four cycles at a time share the loads of the waves, and the end of the sums: three times as fast for 16 a cycle.
+    Four cycles at a time share the loads of the waves and the final sums: three times as fast for 16 a cycle.
     """
     total = np.float64(0.0)
     k = 0
@@ -125,7 +125,7 @@ def _departures(samples, n, m, centre, cosine, sine, z):
 
 @_inlined
 def _moments(z, out):
-    """Centre z (m, 2); its squares and product, total and between batches, into out (6,)."""
+    """Centre z (m, 2); write its squares and product, total and between batches, into out (6,)."""
     m = len(z)
     x, y = 0.0, 0.0
     for k in range(m):
@@ -158,7 +158,7 @@ def _moments(z, out):
 
 @_inlined
 def _dropped(z, moments, x, y):
-    """Cycles z (m, 2), less their mean (x, y), that collapse; the rule of `cycle_scatter.dropped_cycles`."""
+    """Count collapsed cycles z (m, 2), less their mean (x, y), as `cycle_scatter.dropped_cycles`."""
     m, square = len(z), x * x + y * y
     if m < FEWEST_FOR_DROPOUT:
         return 0
@@ -174,9 +174,9 @@ def _dropped(z, moments, x, y):
 
 @_compiled
 def statistics(buffers, waves, spectrum, ends, moments, dropped):
-    """Everything that `phase` needs of buffers (b, m n) int16, in codes.
+    """Statistics of buffers (b, m n) int16, in codes, for `phase`.
 
-    waves     (orders, 2, n), cosine and sine of the harmonics asked; the second is the fundamental
+    waves     (orders, 2, n), cosine and sine of the harmonics; the second is the fundamental
     spectrum  (b, orders) complex, out: means of s exp(2 pi i k j/n)
     ends      (b, 2) int16, out: lowest and highest sample
     moments   (b, 7), out: sum of squares about the mean cycle, then as `cycle_scatter.moments` of the cycles' phasors

@@ -1,8 +1,9 @@
-"""The phase of a target that moves: each cycle turned back by how far the phase has run, then averaged.
+"""Phase of a moving target, from cycles corrected for motion.
 
-A range that changes by v takes the phase along by -4 pi f v / c a second. Over a buffer the plain mean is that of the
-middle with sin(x)/x of the amplitude, x half the run; but the run looks like slow noise, and what is leaked stands
-still while the return turns. Both are gone where the run is known to a few per cent, as the telescope's drives tell.
+A range rate v changes the phase by -4 pi f v / c a second. Over a buffer the plain mean is that of the
+middle with sin(x)/x of the amplitude, x half the run; but the run looks like slow noise, and the leakage is
+constant while the return turns. Both effects vanish where the run is known to a few per cent, as from the telescope's
+drives.
 """
 
 from dataclasses import dataclass
@@ -16,10 +17,10 @@ from catseye.signal.detection.cycle_scatter import cycle_phasors, moments
 
 @dataclass(frozen=True, eq=False)
 class RunningPhasor:
-    """The mean of a running return.
+    """Mean of a running return.
 
-    phasor    V, complex, of the return at the buffer's middle, without what is leaked
-    u_phasor  V, of each quadrature, the two taken alike; NaN of one cycle
+    phasor    V, complex, of the return at the buffer's middle, without leakage
+    u_phasor  V, of each quadrature, both taken as equal; NaN for one cycle
     total, between   V^2, (3,), as `cycle_scatter.CycleScatter` has them
     """
 
@@ -32,13 +33,13 @@ class RunningPhasor:
 def running_phasor(
     samples: ArrayLike, samples_per_cycle: int, volts_per_code: float, *, run: float, leaked: complex = 0j
 ) -> RunningPhasor:
-    """The phasor of one buffer whose phase runs evenly.
+    """Phasor of one buffer whose phase changes linearly.
 
     samples             (m n,) codes
     samples_per_cycle   n
     volts_per_code      V
     run                 rad a cycle, below pi in size
-    leaked              V, what stands still in the samples
+    leaked              V, constant leakage in the samples
 
     Raises ValidityError: no whole cycles, or a run that the cycles do not resolve.
 
@@ -53,13 +54,13 @@ def running_phasor(
     """
     if not abs(run) < np.pi:
         raise ValidityError(f"run {run} rad a cycle is not below pi: the cycles do not resolve it")
-    each = cycle_phasors(samples, samples_per_cycle, volts_per_code) - leaked
-    m, n = each.shape[-1], samples_per_cycle
+    cycles = cycle_phasors(samples, samples_per_cycle, volts_per_code) - leaked
+    m, n = cycles.shape[-1], samples_per_cycle
     within = np.exp(1j * run * (np.arange(n) - 0.5 * (n - 1)) / n)
-    kept = within.real.mean()
+    direct = within.real.mean()
     image = np.mean(within.conj() * np.exp(4j * np.pi * np.arange(n) / n))
-    each = (kept * each - image * each.conj()) / (kept**2 - abs(image) ** 2)
-    still = each * np.exp(-1j * run * (np.arange(m) - 0.5 * (m - 1)))
+    cycles = (direct * cycles - image * cycles.conj()) / (direct**2 - abs(image) ** 2)
+    still = cycles * np.exp(-1j * run * (np.arange(m) - 0.5 * (m - 1)))
     mean = still.mean()
     total, between = moments((still - mean)[None])
     u = float(np.sqrt((total[0, 0] + total[0, 1]) / (2.0 * (m - 1) * m))) if m > 1 else float("nan")

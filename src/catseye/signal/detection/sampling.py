@@ -1,7 +1,7 @@
-"""The ranger's sampling, and what it does to tones, harmonics, trigger jitter and moving targets.
+"""Ranger sampling: response to tones, jitter and moving targets.
 
-One sum carries this file: the mean of exp(2 pi i x j / n) over a buffer of m cycles of n samples (`buffer_mean`). A
-tone, a harmonic, a line in the phase and a moving target are all seen through it.
+This file rests on one sum: the mean of exp(2 pi i x j / n) over a buffer of m cycles of n samples (`buffer_mean`). The
+response to a tone, a harmonic, a line in the phase and a moving target follows from it.
 """
 
 import math
@@ -14,20 +14,20 @@ from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
 from catseye.signal.detection.frequency_plan import FrequencyPlan, whole_number
 
-BUFFER_SAMPLES = 65_536  # words that one transfer of the converter's board holds
+BUFFER_SAMPLES = 65_536  # words in one transfer of the converter's board
 SAMPLE_RATE_LIMIT_HZ = 100_000.0
 INTERMEDIATE_LIMIT_HZ = 10_000.0
 
 
 @dataclass(frozen=True)
 class SamplingPlan:
-    """How a buffer is taken: m cycles of n samples at the intermediate frequency, within the instrument's limits.
+    """Sampling of a buffer: m cycles of n samples.
 
     samples_per_cycle    n, at least 3 (two show no phase)
     cycles               m, at least 1; m n at most 65 536, what the converter's board holds
     intermediate_hz      Hz, above 0, at most 10 000; n times it at most 100 000
 
-    A value that breaks a limit raises ValidityError; the one at hand, frozen, stays as it was.
+    A value that breaks a limit raises ValidityError.
 
     >>> usual = SamplingPlan()
     >>> usual.samples, usual.duration, usual.ranges_per_second()
@@ -68,9 +68,12 @@ class SamplingPlan:
         cycles: int | None = None,
         intermediate_hz: float | None = None,
     ) -> "SamplingPlan":
-        """Another sampling with some values changed together; raises ValidityError where that breaks a limit."""
-        given = {"samples_per_cycle": samples_per_cycle, "cycles": cycles, "intermediate_hz": intermediate_hz}
-        return replace(self, **{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
+        """Copy with some values changed together.
+
+        Raises ValidityError if that breaks a limit.
+        """
+        changes = {"samples_per_cycle": samples_per_cycle, "cycles": cycles, "intermediate_hz": intermediate_hz}
+        return replace(self, **{name: value for name, value in changes.items() if value is not None})  # type: ignore[arg-type]
 
     @property
     def samples(self) -> int:
@@ -79,31 +82,36 @@ class SamplingPlan:
 
     @property
     def sample_rate_hz(self) -> float:
-        """Samples taken in a second."""
+        """Sampling rate, samples a second."""
         return self.samples_per_cycle * self.intermediate_hz
 
     @property
     def duration(self) -> float:
-        """Time of m cycles, s: the least time between buffers."""
+        """Duration of m cycles, s: the least time between buffers."""
         return self.cycles / self.intermediate_hz
 
     @property
     def centre(self) -> float:
-        """Time from the trigger (the first sample) to the middle of the samples, s, to which a moving phase belongs.
+        """Time from the trigger (first sample) to mid-buffer, s.
 
-        It is (m n - 1)/2 sample intervals, half an interval less than half the duration.
+        The epoch of a moving phase, it is (m n - 1)/2 sample intervals, half an interval less than half the duration.
         """
         return 0.5 * (self.samples - 1) / self.sample_rate_hz
 
     def ranges_per_second(self, overhead: float = 0.0) -> float:
-        """Upper bound of ranges a second where each shot costs `overhead` seconds (mirror, arithmetic) besides."""
+        """Upper bound of ranges a second.
+
+        overhead   s a shot, for mirror and arithmetic
+        """
         if not 0.0 <= overhead < math.inf:
             raise ValidityError(f"overhead {overhead} s is not 0 or more and finite")
         return 1.0 / (self.duration + overhead)
 
 
 def buffer_mean(turns: ArrayLike, sampling: SamplingPlan) -> NDArray[np.complex128]:
-    """Mean over a buffer of exp(2 pi i x j/n), j = 0 to m n - 1: what survives of a rotation by x turns a cycle.
+    """Mean over a buffer of exp(2 pi i x j/n), j = 0 to m n - 1.
+
+    It is the response to a rotation by x turns a cycle.
 
     turns       x, turns in a cycle of the IF, any, either sign
     sampling    n and m
@@ -123,7 +131,9 @@ def buffer_mean(turns: ArrayLike, sampling: SamplingPlan) -> NDArray[np.complex1
 
 @dataclass(frozen=True, eq=False)
 class ToneResponse:
-    """What synchronous detection makes of a tone B cos(2 pi f t - psi), t from the first sample.
+    """Detected response to a tone B cos(2 pi f t - psi).
+
+    Time t counts from the first sample.
 
     direct    complex: phasor B exp(i psi) is multiplied by this
     image     complex: and its conjugate B exp(-i psi) by this, the tone's other half, at negative frequency
@@ -133,23 +143,28 @@ class ToneResponse:
     image: NDArray[np.complex128]
 
     def phasor(self, amplitude: ArrayLike, phase: ArrayLike) -> NDArray[np.complex128]:
-        """Phasor that is detected for the tone's amplitude B (V) and phase psi (rad)."""
+        """Detected phasor for amplitude B (V) and phase psi (rad)."""
         turned = np.exp(1j * np.asarray(phase, dtype=float))
         return np.asarray(amplitude, dtype=float) * (self.direct * turned + self.image * turned.conj())
 
     @property
     def bound(self) -> NDArray[np.float64]:
-        """Largest magnitude that a tone of unit amplitude adds to the phasor, whatever its phase."""
+        """Largest phasor magnitude from a tone of unit amplitude."""
         return np.abs(self.direct) + np.abs(self.image)
 
     def phase_bias_bound(self, relative_amplitude: ArrayLike) -> NDArray[np.float64]:
-        """Largest change of the signal's phase, rad, by such a tone of this share of its amplitude; pi if it wins."""
+        """Largest phase change by a tone of relative amplitude `share`, rad.
+
+        pi if the tone is stronger.
+        """
         share = self.bound * np.asarray(relative_amplitude, dtype=float)
         return np.where(share < 1.0, np.arcsin(np.minimum(share, 1.0)), np.pi)
 
 
 def tone_response(sampling: SamplingPlan, frequency_hz: ArrayLike) -> ToneResponse:
-    """Exact response of the sums 5.1 and 5.2 to a tone of any frequency: signal off its lock, harmonic, line or spur.
+    """Exact response of the sums 5.1 and 5.2 to a tone of any frequency.
+
+    The tone may be the signal off its lock, a harmonic, a line or a spur.
 
     sampling        n, m and IF
     frequency_hz    Hz, any: of the tone as it reaches the converter
@@ -171,10 +186,12 @@ def tone_response(sampling: SamplingPlan, frequency_hz: ArrayLike) -> ToneRespon
 
 
 def aliasing_harmonics(samples_per_cycle: int, highest: int) -> list[int]:
-    """Orders 2 to `highest` of harmonics that fall on the fundamental: k n + 1 as it is, k n - 1 with phase reversed.
+    """Harmonics of order 2 to `highest` aliased to the fundamental.
+
+    k n + 1 as it is, k n - 1 with phase reversed.
 
     samples_per_cycle    n, at least 3
-    highest              last order looked at
+    highest              last order tested
 
     >>> aliasing_harmonics(16, 50)
     [15, 17, 31, 33, 47, 49]
@@ -184,7 +201,9 @@ def aliasing_harmonics(samples_per_cycle: int, highest: int) -> list[int]:
 
 
 def modulation_response(sampling: SamplingPlan, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
-    """What is left, in the phase of a buffer, of a small line exp(2 pi i f t) in phase (hum, vibration of the path).
+    """Response of a buffer's phase to a small line in phase.
+
+    The line exp(2 pi i f t) is hum or vibration of the path.
 
     sampling        n, m and IF
     frequency_hz    Hz, any
@@ -202,7 +221,7 @@ def modulation_response(sampling: SamplingPlan, frequency_hz: ArrayLike) -> NDAr
 
 
 def jitter_amplitude_factor(sampling: SamplingPlan, u_trigger: ArrayLike) -> NDArray[np.float64]:
-    """Factor on the amplitude by independent normal jitter of the sample times.
+    """Amplitude factor from independent normal jitter of sample times.
 
     sampling     IF
     u_trigger    s, standard uncertainty of each sample's time, 0 or more
@@ -215,7 +234,7 @@ def jitter_amplitude_factor(sampling: SamplingPlan, u_trigger: ArrayLike) -> NDA
 
 
 def jitter_u_phase(sampling: SamplingPlan, u_trigger: ArrayLike) -> NDArray[np.float64]:
-    """Standard uncertainty of a buffer's phase, rad, by independent normal jitter of its sample times.
+    """Standard uncertainty of phase from independent sample jitter, rad.
 
     sampling     n, m and IF
     u_trigger    s, standard uncertainty of each sample's time, 0 or more
@@ -237,12 +256,12 @@ def jitter_u_phase(sampling: SamplingPlan, u_trigger: ArrayLike) -> NDArray[np.f
 
 @dataclass(frozen=True, eq=False)
 class MotionEffect:
-    """What the motion of a target does to one buffer.
+    """Effect of a target's motion on one buffer.
 
     phase_rate              rad/s
     epoch                   s after the trigger: the time to which the phase belongs
     range_since_trigger     m, range at `epoch` less range at the trigger: added to a range at the trigger's time
-    range_of_acceleration   m, what the buffer reads more than the range at `epoch`, a ((mn)^2 - 1)/24 rate^2
+    range_of_acceleration   m, reading of the buffer less the range at `epoch`, a ((mn)^2 - 1)/24 rate^2
     amplitude_factor        of the amplitude that the same target gives at rest
     phase_bias_bound        rad, largest cyclic bias by the image
     """
@@ -263,7 +282,7 @@ def motion_effect(
     acceleration: ArrayLike = 0.0,
     group_index: float = 1.0,
 ) -> MotionEffect:
-    """Epoch, amplitude loss and bias of a buffer whose target moves along the line of sight.
+    """Epoch, amplitude loss and bias for a moving target.
 
     plan, sampling    frequencies and buffer
     range_rate        m/s at the middle of the buffer, above 0 as the distance grows

@@ -1,4 +1,4 @@
-"""Phase by Fourier transform: the bin of a locked signal, and the peak of a signal whose frequency is not known."""
+"""Phase by Fourier transform, for locked or unknown frequency."""
 
 from dataclasses import dataclass
 
@@ -9,20 +9,20 @@ from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
 from catseye.signal.cycles.whole import fraction
 
-BLOCK_SAMPLES = 2**18  # samples in work at a time
+BLOCK_SAMPLES = 2**18  # samples processed at a time
 LOWEST_BIN = 3  # a Hann window spreads the constant and the negative frequencies over the bins below
-NEWTON_STEPS = 4  # from 0.01 bin at worst; each step squares what is left
+NEWTON_STEPS = 4  # from 0.01 bin at worst; each step squares the error
 
 
 def bin_phasor(samples: ArrayLike, samples_per_cycle: int) -> NDArray[np.complex128]:
-    """Phasor A exp(i phi) of the fundamental of locked samples, by a whole Fourier transform.
+    """Phasor A exp(i phi) of locked samples, by Fourier transform.
 
     samples              (..., m n) V or codes: m cycles of n samples each
     samples_per_cycle    n, at least 3
 
-    The conjugate of bin m, times 2/mn: the same number as synchronous detection, at the cost of all the other bins.
+    The conjugate of bin m, times 2/mn: the same value as synchronous detection, but all other bins are computed too.
 
-    Raises ValidityError for buffers that are no whole cycles. Source: [PARKER04] eq. 5.1 to 5.4.
+    Raises ValidityError for buffers that are not whole cycles. Source: [PARKER04] eq. 5.1 to 5.4.
 
     >>> phasor = bin_phasor(3 * np.cos(2 * np.pi * np.arange(640) / 64 - 2.0), 64)
     >>> round(float(np.abs(phasor)), 9), round(float(np.angle(phasor)), 9)
@@ -31,7 +31,7 @@ def bin_phasor(samples: ArrayLike, samples_per_cycle: int) -> NDArray[np.complex
     array = _real(samples)
     n, length = samples_per_cycle, array.shape[-1]
     if n != int(n) or n < 3:
-        raise ValidityError(f"{n} samples a cycle do not show a phase; at least 3 do")
+        raise ValidityError(f"{n} samples a cycle do not determine a phase; at least 3 do")
     if length == 0 or length % int(n):
         raise ValidityError(f"a buffer of {length} samples is not a whole number of cycles of {n} samples")
     buffers = array.reshape(-1, length)
@@ -44,13 +44,15 @@ def bin_phasor(samples: ArrayLike, samples_per_cycle: int) -> NDArray[np.complex
 
 @dataclass(frozen=True, eq=False)
 class Tone:
-    """The strongest tone A cos(2 pi f t - phi) of each buffer, t from its first sample; NaN where none was found.
+    """Strongest tone A cos(2 pi f t - phi); NaN if none.
+
+    Time t counts from a buffer's first sample.
 
     frequency_hz     Hz
     amplitude        in the unit of the samples
     phase            rad in [0, 2 pi), at the first sample: phi
-    phase_centre     rad in [0, 2 pi), in the middle of the buffer, t_c: phi - 2 pi f t_c; the frequency found does not
-                     touch it, while that at the first sample has the larger variance through it
+    phase_centre     rad in [0, 2 pi), in the middle of the buffer, t_c: phi - 2 pi f t_c; uncorrelated with
+                     the estimated frequency, which adds variance to the phase at the first sample
     """
 
     frequency_hz: NDArray[np.float64]
@@ -60,17 +62,19 @@ class Tone:
 
 
 def strongest_tone(samples: ArrayLike, sample_rate_hz: float) -> Tone:
-    """Frequency, amplitude and phase of the strongest tone of unlocked samples: Hann window, interpolated peak.
+    """Strongest tone of unlocked samples.
+
+    Frequency, amplitude and phase, by Hann window and interpolated peak.
 
     samples           (..., k) V or codes, k at least 16; at least three cycles of the tone
     sample_rate_hz    samples a second, above 0
 
     The largest bin and its larger neighbour give a first frequency; Newton's method then climbs to the maximum of the
     windowed transform itself, at most four steps and never beyond a bin from the peak. For one tone in white noise the
-    variances are 1.5 (amplitude, phase in the middle) and 2.3 (frequency) times the Cramer-Rao bounds, the price of the
+    variances are 1.5 (amplitude, phase in the middle) and 2.3 (frequency) times the Cramer-Rao bounds, the cost of the
     window; in return a harmonic or the tone's own image p bins away adds less than about 1/p^3 of itself. A spur
-    stronger than the signal is taken for it. NaN where a sample is not finite, where nothing varies, or where the peak
-    lies at an end.
+    stronger than the signal is returned instead. NaN where a sample is not finite, where nothing varies, or where the
+    peak lies at an end.
 
     Raises ValidityError for buffers that are too short. Source: [RIFE74] (search, then climb; its bounds, for a complex
     tone, are half those of a real one), [HARRIS78] (the Hann window), [GRANDKE83] (first frequency from two bins).
@@ -115,7 +119,7 @@ def _blocks(count: int, length: int) -> list[slice]:
 
 
 def _peak(block: NDArray[np.generic]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Radians a sample, amplitude and phase in the middle of the strongest tone of (buffers, k); NaN where none is."""
+    """Strongest tone of (buffers, k): radians a sample, amplitude, phase in the middle; NaN if none."""
     length = block.shape[-1]
     time = np.arange(length) - (length - 1) / 2.0
     window = 0.5 + 0.5 * np.cos(TWO_PI * time / length)  # Hann, symmetric about the middle
@@ -124,11 +128,11 @@ def _peak(block: NDArray[np.generic]) -> tuple[NDArray[np.float64], NDArray[np.f
     inner = power[:, LOWEST_BIN:-1]
     peak = LOWEST_BIN + np.argmax(inner, axis=-1)
     row = np.arange(len(block))
-    top, left, right = power[row, peak], power[row, peak - 1], power[row, peak + 1]
+    top, lower, upper = power[row, peak], power[row, peak - 1], power[row, peak + 1]
     varies = block.min(axis=-1) < block.max(axis=-1)
-    peaked = np.isfinite(power).all(axis=-1) & varies & (top > 0.0) & (top >= left) & (top >= right)
-    ratio = np.where(peaked, np.maximum(left, right) / top, 0.5)  # (1 + d)/(2 - d) at d bins from the peak
-    shift = (2.0 * ratio - 1.0) / (1.0 + ratio) * np.where(right >= left, 1.0, -1.0)
+    peaked = np.isfinite(power).all(axis=-1) & varies & (top > 0.0) & (top >= lower) & (top >= upper)
+    ratio = np.where(peaked, np.maximum(lower, upper) / top, 0.5)  # (1 + d)/(2 - d) at d bins from the peak
+    shift = (2.0 * ratio - 1.0) / (1.0 + ratio) * np.where(upper >= lower, 1.0, -1.0)
     bin_width = TWO_PI / length
     omega = (peak + shift) * bin_width
 

@@ -1,6 +1,8 @@
-"""Phase from zero crossings, as the Clark-Hess meter takes it: for comparison with synchronous detection.
+"""Phase from zero crossings, as the Clark-Hess meter.
 
-What clipping does, derived. A pure cosine cut off on one side stays symmetric in time about its peak, and its mean, the
+For comparison with synchronous detection.
+
+Effect of clipping, derived. A pure cosine cut off on one side stays symmetric in time about its peak, and its mean, the
 comparator's level after AC coupling, drops by L. The rising edge comes early by arcsin(L/A), the falling one late by as
 much: a phase from *one* edge is biased, as section 5.2 of the notes says, but the *average of both edges*, which is
 what the Clark-Hess takes, is not; nor is the fundamental. The notes' example is wrong for the meter they name. The
@@ -19,12 +21,14 @@ from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
 from catseye.signal.cycles.whole import fraction
 
-BLOCK_SAMPLES = 2**18  # samples in work at a time: temporaries stay in cache
+BLOCK_SAMPLES = 2**18  # samples processed at a time: temporaries fit the cache
 
 
 @dataclass(frozen=True, eq=False)
 class Crossing:
-    """Phases by zero crossings, one element a buffer; NaN where no crossing was found or a sample is not finite.
+    """Phases by zero crossings, one element a buffer.
+
+    NaN without crossings, or where a sample is not finite.
 
     phase       rad in [0, 2 pi): the average of both edges
     rising      rad in [0, 2 pi), from rising edges alone
@@ -43,19 +47,21 @@ class Crossing:
 def crossing_phase(
     samples: ArrayLike, samples_per_cycle: int, *, level: float | None = None, hysteresis: float = 0.0
 ) -> Crossing:
-    """Phase phi of s = A cos(2 pi j/n - phi) from its crossings, against a reference square wave locked to the samples.
+    """Phase of s = A cos(2 pi j/n - phi) from zero crossings.
+
+    The reference is a square wave locked to the samples.
 
     samples              (..., m n) V or codes: m cycles of n samples each
     samples_per_cycle    n, at least 3
     level                the comparator's level; by default the mean of each buffer (AC coupling)
-    hysteresis           0 or more: the comparator trips upwards at level + this, downwards at level - this
+    hysteresis           0 or more: the comparator switches up at level + this, down at level - this
 
     Edges are placed by a straight line between two samples. That alone biases the phase by up to 0.016 (2 pi/n)^3 rad,
     both edges alike (n even): 0.24 um at 64 samples a cycle, 15 um at 16. White noise of rms s gives s/A sqrt(1/3m) on
     average, sqrt(n/6) times that of synchronous detection, as it uses four samples of each cycle. Hysteresis delays
     both edges: +arcsin(h/A), which makes phase depend on amplitude.
 
-    Raises ValidityError for buffers that are no whole cycles. Source: [PARKER04] section 5.2, first paragraph.
+    Raises ValidityError for buffers that are not whole cycles. Source: [PARKER04] section 5.2, first paragraph.
 
     >>> wave = np.cos(2 * np.pi * np.arange(640) / 64 - 2.0)
     >>> crossing = crossing_phase(np.minimum(wave, 0.5), 64)  # clipped: the edges part, their average stays
@@ -65,7 +71,7 @@ def crossing_phase(
     array = _real(samples, hysteresis)
     n = samples_per_cycle
     if n != int(n) or n < 3:
-        raise ValidityError(f"{n} samples a cycle do not show a phase; at least 3 do")
+        raise ValidityError(f"{n} samples a cycle do not determine a phase; at least 3 do")
     if array.shape[-1] == 0 or array.shape[-1] % int(n):
         raise ValidityError(f"a buffer of {array.shape[-1]} samples is not a whole number of cycles of {n} samples")
     buffers = array.reshape(-1, array.shape[-1])
@@ -74,14 +80,16 @@ def crossing_phase(
 
 
 def phase_between(samples: ArrayLike, reference: ArrayLike, *, hysteresis: float = 0.0) -> Crossing:
-    """Phase by which a signal lags a reference of the same frequency, whatever that is, from the crossings of both.
+    """Phase lag behind a reference of the same unknown frequency.
+
+    It uses the crossings of both.
 
     samples       (..., k) V or codes
     reference     (..., k) the other channel, taken at the same times, clean: one rising edge a cycle, at least two
     hysteresis    0 or more, in the unit of the samples, of both comparators
 
-    The period is the mean of the reference's. Both channels cross their own mean. The buffer may hold broken cycles;
-    the means are then a little off, which the average of both edges forgives. NaN where the reference shows no period.
+    The period is the mean of the reference's. Both channels cross their own mean. The buffer need not hold whole
+    cycles; the means are then slightly biased, which the average of both edges cancels. NaN without a period.
 
     Raises ValidityError for shapes that do not agree. Source: [PARKER04] section 5.2, first paragraph.
 
@@ -90,11 +98,11 @@ def phase_between(samples: ArrayLike, reference: ArrayLike, *, hysteresis: float
     >>> round(float(crossing.phase), 3)
     2.0
     """
-    signal, other = _real(samples, hysteresis), _real(reference, hysteresis)
-    if signal.shape != other.shape:
-        raise ValidityError(f"signal and reference have shapes {signal.shape} and {other.shape}; expected the same")
+    signal, clean = _real(samples, hysteresis), _real(reference, hysteresis)
+    if signal.shape != clean.shape:
+        raise ValidityError(f"signal and reference have shapes {signal.shape} and {clean.shape}; expected the same")
     length = signal.shape[-1]
-    signals, references = signal.reshape(-1, length), other.reshape(-1, length)
+    signals, references = signal.reshape(-1, length), clean.reshape(-1, length)
     period = _periods(references, hysteresis)
     rising, falling, edges = _edge_phases(signals, period, None, hysteresis)
     rising_0, falling_0, _ = _edge_phases(references, period, None, hysteresis)
@@ -115,7 +123,10 @@ def _real(samples: ArrayLike, hysteresis: float) -> NDArray[np.float64]:
 def _crossing(
     rising: NDArray[np.float64], falling: NDArray[np.float64], edges: NDArray[np.int64], shape: tuple[int, ...]
 ) -> Crossing:
-    """The answer from phases of both edges; they part by what the wave is longer above the level than below."""
+    """Crossing from the phases of both edges.
+
+    Their difference gives the duty cycle.
+    """
     apart = np.angle(np.exp(1j * (falling - rising)))
     return Crossing(
         phase=fraction(rising + 0.5 * apart, 0.0).reshape(shape),
@@ -129,7 +140,7 @@ def _crossing(
 def _edge_phases(
     buffers: NDArray[np.float64], period: NDArray[np.float64], level: float | None, hysteresis: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Phase from rising and from falling edges, and their numbers (count, 2); `period` (count,) in samples.
+    """Phases from rising and falling edges, and their numbers (count, 2); `period` (count,) in samples.
 
     cos(2 pi t - phi) rises through zero at 2 pi t = phi - pi/2 and falls at phi + pi/2.
     """
@@ -155,19 +166,22 @@ def _edge_phases(
 
 
 def _edges(height: NDArray[np.float64], hysteresis: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Row and time (in samples) of the upward trips of a comparator with hysteresis on (buffers, samples)."""
+    """Row and time (in samples) of the upward switching of a comparator with hysteresis on (buffers, samples)."""
     state = np.where(height > hysteresis, 1, np.where(height < -hysteresis, -1, 0))
     last = np.where(state != 0, np.arange(height.shape[-1]), 0)
     state = np.take_along_axis(
         state, np.maximum.accumulate(last, axis=-1), axis=-1
-    )  # within the band it keeps its state
+    )  # within the band the state is unchanged
     row, before = np.nonzero((state[:, :-1] < 0) & (state[:, 1:] > 0))
     low, high = height[row, before], height[row, before + 1]
     return row, before + (hysteresis - low) / (high - low)
 
 
 def _periods(references: NDArray[np.float64], hysteresis: float) -> NDArray[np.float64]:
-    """Mean period of each reference in samples, from its first to its last rising edge; NaN with fewer than two."""
+    """Mean period of each reference, samples; NaN without two edges.
+
+    First to last rising edge.
+    """
     period = np.full(len(references), np.nan)
     for i, wave in enumerate(references):
         if np.isfinite(wave).all():

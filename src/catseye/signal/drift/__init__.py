@@ -1,1 +1,1 @@
-"""Electronics that drift: reference shots, noise, random walks."""
+"""Drift of the electronics: reference shots, noise, random walks."""

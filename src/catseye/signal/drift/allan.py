@@ -1,8 +1,8 @@
-"""Noise against averaging time: the overlapping Allan deviation of a series, what each kind of noise makes of it.
+"""Overlapping Allan deviation of a series, and noise kinds.
 
 The series y is the reading itself (phase a cycle, range a buffer), equally spaced; averaging m of them, white noise
-falls as m^(-1/2), flicker stays, a random walk grows as m^(1/2). Clocks people call the same thing the deviation of
-fractional frequency, and y is their frequency.
+falls as m^(-1/2), flicker stays, a random walk grows as m^(1/2). For clocks this is the deviation of
+fractional frequency, with y the frequency.
 """
 
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ SLOPES = {"white": -1.0, "flicker": 0.0, "random walk": 1.0}  # of the variance 
 
 @dataclass(frozen=True, eq=False)
 class AllanDeviation:
-    """One element an averaging length.
+    """Allan deviations, one element an averaging length.
 
     size       m, readings averaged
     deviation  in the unit of the series
     degrees    equivalent degrees of freedom of its square
-    kind       noise that prevails there, one of KINDS, from the slope about it
+    kind       dominant noise there, one of KINDS, from the local slope
     """
 
     size: NDArray[np.int64]
@@ -32,7 +32,7 @@ class AllanDeviation:
     kind: tuple[str, ...]
 
     def interval(self, probability: float = 0.95) -> NDArray[np.float64]:
-        """(sizes, 2): limits that hold the true deviation with that probability, chi-square with `degrees`."""
+        """Confidence limits (sizes, 2), chi-square with `degrees`."""
         from scipy.stats import chi2
 
         tail = 0.5 * (1.0 - probability)
@@ -41,18 +41,22 @@ class AllanDeviation:
 
 
 def octaves(count: int) -> NDArray[np.int64]:
-    """Averaging lengths 1, 2, 4, ... of which a series of `count` readings holds at least four.
+    """Averaging lengths 1, 2, 4, ... for a series.
+
+    count   readings; each length has at least four
 
     >>> octaves(40).tolist()
     [1, 2, 4, 8]
     """
     if count < 4:
-        raise ValidityError(f"{count} readings show no noise against averaging (expected at least 4)")
+        raise ValidityError(f"{count} readings are too few for an Allan deviation (expected at least 4)")
     return 2 ** np.arange(int(np.log2(count // 4)) + 1)
 
 
 def allan_deviation(series: ArrayLike, sizes: ArrayLike | None = None) -> AllanDeviation:
-    """Overlapping Allan deviation: rms difference of neighbouring averages of m readings, over the square root of 2.
+    """Overlapping Allan deviation of a series.
+
+    Rms difference of neighbouring averages of m readings, over the square root of 2.
 
     series   (n,) readings at equal intervals, any unit, none missing, n at least 4; phases unwrapped
     sizes    m, whole numbers of 1 to n/2 (default `octaves(n)`)
@@ -75,7 +79,7 @@ def allan_deviation(series: ArrayLike, sizes: ArrayLike | None = None) -> AllanD
     if np.any(m != np.rint(m)) or np.any(m < 1) or np.any(2 * m > y.size):
         raise ValidityError(f"averaging lengths {m.tolist()} are not whole numbers of 1 to {y.size // 2}")
     m = m.astype(np.int64)
-    sums = np.concatenate([[0.0], np.cumsum(y - y.mean())])  # the mean does not matter, but its digits would
+    sums = np.concatenate([[0.0], np.cumsum(y - y.mean())])  # the mean cancels; removing it saves digits
     variance = np.array([_variance(sums, int(size)) for size in m])
     kind = _prevailing(m, variance)
     degrees = np.array([_degrees(k, y.size + 1, int(size)) for k, size in zip(kind, m, strict=True)])
@@ -83,7 +87,7 @@ def allan_deviation(series: ArrayLike, sizes: ArrayLike | None = None) -> AllanD
 
 
 def expected_variance(size: ArrayLike, *, white: float = 0.0, flicker: float = 0.0, walk: float = 0.0) -> NDArray:
-    """Allan variance that a mixture of noises makes of averages of m readings.
+    """Allan variance of averages for a mixture of noises.
 
     size      m, readings averaged
     white     standard deviation of a reading
@@ -114,7 +118,7 @@ def _flicker_variance(sizes: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def spur_variance(size: ArrayLike, *, amplitude: float, cycles_per_reading: float) -> NDArray:
-    """Allan variance that a sine makes of averages of m readings.
+    """Allan variance of averages of m readings for a sine.
 
     size                 m, readings averaged
     amplitude            of the sine, unit of the series
@@ -137,7 +141,7 @@ def _variance(sums: NDArray[np.float64], m: int) -> float:
 
 
 def _prevailing(m: NDArray[np.int64], variance: NDArray[np.float64]) -> tuple[str, ...]:
-    """The kind of noise whose slope is nearest to that of the variance about each length."""
+    """Noise kind of nearest slope, by averaging length."""
     if len(m) < 2 or np.any(variance <= 0.0):
         return ("white",) * len(m)
     slope = np.gradient(np.log(variance), np.log(m.astype(float)))
@@ -145,7 +149,10 @@ def _prevailing(m: NDArray[np.int64], variance: NDArray[np.float64]) -> tuple[st
 
 
 def _degrees(kind: str, points: int, m: int) -> float:
-    """Equivalent degrees of freedom of an overlapping variance; `points` is one more than the readings."""
+    """Equivalent degrees of freedom of an overlapping variance.
+
+    points   readings plus one
+    """
     n = float(points)
     if kind == "white":
         degrees = (3.0 * (n - 1.0) / (2.0 * m) - 2.0 * (n - 2.0) / n) * 4.0 * m**2 / (4.0 * m**2 + 5.0)

@@ -1,4 +1,4 @@
-"""The oscillator test: what kinds of noise a series of phases holds, and which lines (spurs) stand out of them.
+"""Oscillator test: noise kinds and spectral lines of a series.
 
 The density of a series at equal intervals, one-sided, in unit^2 per cycle a reading, with v the frequency in cycles a
 reading and s = sin(pi v):
@@ -22,17 +22,19 @@ TAPER_CORRELATION = 1.0 + 2.0 * (2.0 / 3.0) ** 2 + 2.0 * (1.0 / 6.0) ** 2  # sum
 ITERATIONS = 50
 MOST_SPURS = 20
 CLIMBS = 100
-ROUNDING = 1e-13  # of the largest reading: what lines and drift leave below it is arithmetic, not noise
+ROUNDING = 1e-13  # of the largest reading: smaller residuals of lines and drift are rounding, not noise
 
 
 @dataclass(frozen=True)
 class Spur:
-    """A line in the spectrum: amplitude sin(2 pi frequency t + phase), t from the middle of the series.
+    """Spectral line amplitude sin(2 pi frequency t + phase).
 
-    frequency_hz, u_frequency_hz   between 0 and half the sampling rate; what is faster shows folded into that
+    Time t counts from the middle of the series.
+
+    frequency_hz, u_frequency_hz   between 0 and half the sampling rate; faster lines are aliased
     amplitude, u_amplitude         unit of the series
     phase                          rad, at the middle of the series
-    false_alarm                    probability that noise alone shows one so strong anywhere in the spectrum
+    false_alarm                    probability of so strong a line from noise alone, anywhere in the spectrum
     """
 
     frequency_hz: float
@@ -45,12 +47,12 @@ class Spur:
 
 @dataclass(frozen=True, eq=False)
 class NoiseSpectrum:
-    """What a series holds.
+    """Noise parts, lines and drift of a series.
 
     squares      (3,) white^2, flicker^2, walk^2, each 0 or more; unit of the series squared
     covariance   (3, 3) of these
     spurs        lines, strongest first
-    drift        of the straight line that was taken out first, unit of the series a second
+    drift        slope of the straight line removed first, unit of the series a second
     frequency    (k,) Hz; density (k,) of the tapered series with its lines, unit^2/Hz; model (k,) without them
     """
 
@@ -74,22 +76,22 @@ class NoiseSpectrum:
 
     @property
     def walk(self) -> float:
-        """Standard deviation of a step from one reading to the next."""
+        """Standard deviation of a step between readings."""
         return float(np.sqrt(self.squares[2]))
 
 
 def noise_spectrum(series: ArrayLike, interval: float, *, false_alarm: float = 0.001) -> NoiseSpectrum:
-    """White, flicker and random-walk parts of a series, and its spurs.
+    """White, flicker and random-walk parts, and spurs, of a series.
 
     series       (n,) readings at equal intervals, none missing, at least 64; phases unwrapped
     interval     s, above 0, from reading to reading
     false_alarm  probability of calling noise a spur, over the whole spectrum, 0 to 1
 
-    A straight line (oscillators that differ in frequency, warming) is taken out first: it is no noise. Likelihood of
+    A straight line (oscillators that differ in frequency, warming) is removed first: it is not noise. Likelihood of
     the tapered periodogram's ordinates, each exponential about the model; spurs are found one by one, strongest first,
-    fitted together and taken out; one that settles on another is none and ends the search. A part that comes out
-    negative is held at zero; its variance in `covariance` is that at zero. The covariance counts the correlation that
-    the taper makes.
+    fitted together and removed; one that converges to another is invalid and ends the search. A negative
+    part is held at zero; its variance in `covariance` is that at zero. The covariance includes the correlation from
+    the taper.
 
     Raises ValidityError for a series that is too short, constant, or has gaps.
 
@@ -108,22 +110,22 @@ def noise_spectrum(series: ArrayLike, interval: float, *, false_alarm: float = 0
     largest = float(np.max(np.abs(y)))
     y = y - slope * time
     if np.sqrt(np.mean(y**2)) <= ROUNDING * largest:
-        raise ValidityError(f"all {n} readings lie on a straight line: no noise shows (a dead channel?)")
+        raise ValidityError(f"all {n} readings lie on a straight line: no noise (a dead channel?)")
     v = np.arange(FIRST_ORDINATE, (n + 1) // 2) / n
     basis = _basis(v)
     lines: list[float] = []
     first: NDArray[np.float64] | None = None
     chances: list[float] = []
     while True:
-        parts, rest = _fit_lines(y, time, lines)
-        ordinates = _periodogram(rest)[FIRST_ORDINATE : FIRST_ORDINATE + len(v)]
+        parts, residuals = _fit_lines(y, time, lines)
+        ordinates = _periodogram(residuals)[FIRST_ORDINATE : FIRST_ORDINATE + len(v)]
         first = ordinates if first is None else first
         squares, information = _whittle(ordinates, basis)
         model = basis @ squares
         strength = ordinates / model
         top = int(np.argmax(strength))
         chance = float(-np.expm1(len(v) * np.log1p(-np.exp(-min(strength[top], 700.0)))))
-        if chance > false_alarm or len(lines) == MOST_SPURS or np.sqrt(np.mean(rest**2)) <= ROUNDING * largest:
+        if chance > false_alarm or len(lines) == MOST_SPURS or np.sqrt(np.mean(residuals**2)) <= ROUNDING * largest:
             break
         longer = _refined(y, time, [*lines, float(v[top])])
         if np.any(np.diff(np.sort(longer)) < 1.0 / n):
@@ -150,12 +152,12 @@ def noise_spectrum(series: ArrayLike, interval: float, *, false_alarm: float = 0
 def _checked(series: ArrayLike, interval: float, false_alarm: float) -> NDArray[np.float64]:
     y = np.asarray(series, dtype=float)
     if y.ndim != 1 or y.size < FEWEST:
-        raise ValidityError(f"a series of shape {y.shape} shows no spectrum (expected at least {FEWEST} readings)")
+        raise ValidityError(f"a series of shape {y.shape} has too few readings (expected at least {FEWEST})")
     if not np.all(np.isfinite(y)):
         where = int(np.flatnonzero(~np.isfinite(y))[0])
         raise ValidityError(f"reading {where} of the series is {y[where]} (expected numbers at equal intervals)")
     if np.ptp(y) == 0.0:
-        raise ValidityError(f"all {y.size} readings are {y[0]}: no noise shows (a dead channel?)")
+        raise ValidityError(f"all {y.size} readings are {y[0]}: no noise (a dead channel?)")
     if not 0.0 < interval < np.inf:
         raise ValidityError(f"interval {interval} s is not above 0 and finite")
     if not 0.0 < false_alarm < 1.0:
@@ -164,24 +166,24 @@ def _checked(series: ArrayLike, interval: float, false_alarm: float) -> NDArray[
 
 
 def _basis(v: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(k, 3) densities of unit white, flicker and walk."""
+    """Densities (k, 3) of unit white, flicker and walk."""
     s = np.sin(np.pi * v)
     return np.stack([np.full_like(s, 2.0), np.pi / s, 0.5 / s**2], axis=1)
 
 
 def _periodogram(y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """One-sided density in cycles a reading, Hann taper."""
+    """One-sided density per cycle a reading, Hann taper."""
     n = y.size
     taper = 0.5 - 0.5 * np.cos(TWO_PI * (np.arange(n) + 0.5) / n)
     return 2.0 * np.abs(np.fft.rfft(taper * y)) ** 2 / np.sum(taper**2)
 
 
 def _whittle(ordinates: NDArray[np.float64], basis: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
-    """Squares of the three noises, none negative, by maximum likelihood, and the information (3, 3) there."""
+    """Squares of the three noises by maximum likelihood, none negative, and the information (3, 3)."""
     from scipy.optimize import minimize
 
     parts = np.full(3, 1.0 / 3.0)
-    for _ in range(CLIMBS):  # each climb raises the likelihood and keeps all parts above zero
+    for _ in range(CLIMBS):  # each step raises the likelihood and keeps all parts above zero
         weighted = basis / (basis @ parts)[:, None]
         parts = parts * np.sqrt((ordinates / (basis @ parts)) @ weighted / weighted.sum(axis=0))
     scale = np.maximum(parts, 1e-6 * ordinates.mean() / basis.mean(axis=0))
@@ -199,13 +201,13 @@ def _whittle(ordinates: NDArray[np.float64], basis: NDArray[np.float64]) -> tupl
 
 
 def _waves(time: NDArray[np.float64], lines: list[float]) -> NDArray[np.float64]:
-    """(n, 2 lines) sines and cosines."""
+    """Sines and cosines (n, 2 lines)."""
     turn = TWO_PI * np.outer(time, lines)
     return np.concatenate([np.sin(turn), np.cos(turn)], axis=1)
 
 
 def _fit_lines(y: NDArray, time: NDArray, lines: list[float]) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
-    """Phasors c (lines,) with y = Re(-i c e^{2 pi i v t}) = |c| sin(2 pi v t + arg c), and what they leave."""
+    """Phasors c (lines,) with y = Re(-i c e^{2 pi i v t}) = |c| sin(2 pi v t + arg c), and residuals."""
     if not lines:
         return np.zeros(0, dtype=complex), y
     waves = _waves(time, lines)
@@ -214,12 +216,12 @@ def _fit_lines(y: NDArray, time: NDArray, lines: list[float]) -> tuple[NDArray[n
 
 
 def _refined(y: NDArray, time: NDArray, lines: list[float]) -> list[float]:
-    """Frequencies moved to least squares by Gauss-Newton steps, never further than half an ordinate at a time."""
+    """Refine frequencies by Gauss-Newton steps of at most half an ordinate."""
     for _ in range(ITERATIONS):
-        parts, rest = _fit_lines(y, time, lines)
+        parts, residuals = _fit_lines(y, time, lines)
         turn = TWO_PI * np.outer(time, lines)
         slope = TWO_PI * time[:, None] * np.real(parts * np.exp(1j * turn))  # d/dv of |c| sin(turn + arg c)
-        step = np.linalg.lstsq(np.concatenate([slope, _waves(time, lines)], axis=1), rest, rcond=None)[0]
+        step = np.linalg.lstsq(np.concatenate([slope, _waves(time, lines)], axis=1), residuals, rcond=None)[0]
         move = np.clip(step[: len(lines)], -0.5 / y.size, 0.5 / y.size)
         lines = [float(np.clip(v + d, 0.5 / y.size, 0.5)) for v, d in zip(lines, move, strict=True)]
         if np.all(np.abs(move) < 1e-6 / y.size):

@@ -1,4 +1,4 @@
-"""Electronic drift removed by the reference cube: the phase of the electronics between reference shots.
+"""Drift of the electronics between reference shots, to be removed.
 
 The drift is a random walk of variance random_walk^2 a second; 10 mrad per root hour is 1.67e-4 rad per root second.
 """
@@ -15,7 +15,9 @@ def drift_at(
     time: np.ndarray,
     random_walk: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Phase of the electronics at given times, and its full covariance, from reference shots of a random walk.
+    """Phase of the electronics with full covariance, from reference shots.
+
+    The drift is a random walk.
 
     reference_time      (r,) s, any order, at least one
     reference_phase     (r,) rad, unwrapped
@@ -23,11 +25,11 @@ def drift_at(
     time                (m,) s
     random_walk         growth of the drift, rad per square root of a second
 
-    Returns (m,) rad and (m, m) rad^2. Between references the answer is a weighted line and its variance a parabola
-    that vanishes only as far as the references are exact; beyond them it is the last level and grows with time.
-    Shots that share references are correlated, and so are neighbours in one gap. Nothing is assumed of the first
-    level (flat prior). Work and memory grow with (r + m)^2, and r^3: some thousands of either; for the diagonal alone,
-    `drift_along` goes on to millions.
+    Returns (m,) rad and (m, m) rad^2. Between references the phase is a weighted line and its variance a parabola
+    that vanishes only as far as the references are exact; beyond them the phase is the last level and its variance
+    grows with time. Shots that share references are correlated, and so are neighbours in one gap. The first
+    level has a flat prior. Work and memory grow with (r + m)^2, and r^3: some thousands of either; for the diagonal
+    alone, `drift_along` goes on to millions.
 
     Source: best linear unbiased prediction of a Wiener process from noisy values; [PARKER04] section 5.4 asks for it
     without naming a rule. Exact for a random walk; a smooth warm-up transient T'' bends it by T'' gap^2 / 8.
@@ -42,7 +44,7 @@ def drift_at(
     # A random walk from any origin before all times; a flat prior on its level makes the origin irrelevant.
     walk = random_walk**2 * (np.minimum(t[:, None], t) - t.min())
     reference_covariance = walk[:r, :r] + np.diag(np.asarray(reference_variance, dtype=float))
-    # Two references at one time and without noise would repeat each other: a part in 1e12 keeps them apart.
+    # Two exact references at one time would be singular: a variance of a part in 1e12 avoids that.
     reference_covariance = reference_covariance + np.eye(r) * 1e-12 * max(
         float(np.trace(reference_covariance)) / r, random_walk**2, 1e-30
     )
@@ -51,9 +53,9 @@ def drift_at(
     level_variance = 1.0 / (ones @ weight @ ones)
     level = level_variance * (ones @ weight @ np.asarray(reference_phase, dtype=float))
     gain = walk[r:, :r] @ weight
-    rest = 1.0 - gain @ ones
+    remainder = 1.0 - gain @ ones
     mean = level + gain @ (np.asarray(reference_phase, dtype=float) - level)
-    covariance = walk[r:, r:] - gain @ walk[:r, r:] + level_variance * rest[:, None] * rest
+    covariance = walk[r:, r:] - gain @ walk[:r, r:] + level_variance * remainder[:, None] * remainder
     return mean, 0.5 * (covariance + covariance.T)
 
 
@@ -65,12 +67,12 @@ def drift_along(
     time: np.ndarray,
     random_walk: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Phase of the electronics at given times, and its standard uncertainty alone: (m,) rad each.
+    """Phase and standard uncertainty of the electronics, (m,) rad each.
 
-    Arguments as for `drift_at`, of which it gives the mean and the root of the diagonal, in r + m steps.
+    Arguments as for `drift_at`, the same mean and root of the diagonal, in r + m steps.
 
-    Source: smoother of two filters: a random walk seen from before and from behind are independent witnesses of the
-    present. Exact.
+    Source: smoother of two filters: forward and backward filters of a random walk are independent
+    estimates. Exact.
 
     >>> phase, u = drift_along(np.array([0.0, 100.0]), np.array([0.0, 0.01]), np.zeros(2), time=np.array([50.0]),
     ...                        random_walk=1e-4)
@@ -79,21 +81,21 @@ def drift_along(
     """
     at = np.asarray(time, dtype=float)
     t, y, v = _sorted_references(reference_time, reference_phase, reference_variance, random_walk)
-    behind = np.searchsorted(t, at, side="right") - 1  # the last reference not after it; -1 for none
+    preceding = np.searchsorted(t, at, side="right") - 1  # the last reference not later; -1 for none
     _, _, mean, spread = _filtered(t, y, v, random_walk)
     _, _, back_mean, back_spread = (a[::-1] for a in _filtered(-t[::-1], y[::-1], v[::-1], random_walk))
-    left, right = np.maximum(behind, 0), np.minimum(behind + 1, len(t) - 1)
-    before = np.where(behind >= 0, spread[left] + random_walk**2 * (at - t[left]), np.inf)
-    after = np.where(behind + 1 < len(t), back_spread[right] + random_walk**2 * (t[right] - at), np.inf)
-    return _joined(mean[left], before, back_mean[right], after)
+    lower, upper = np.maximum(preceding, 0), np.minimum(preceding + 1, len(t) - 1)
+    before = np.where(preceding >= 0, spread[lower] + random_walk**2 * (at - t[lower]), np.inf)
+    after = np.where(preceding + 1 < len(t), back_spread[upper] + random_walk**2 * (t[upper] - at), np.inf)
+    return _joined(mean[lower], before, back_mean[upper], after)
 
 
 def reference_surprise(
     reference_time: np.ndarray, reference_phase: np.ndarray, reference_variance: np.ndarray, *, random_walk: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """How far each reference shot lies from what the others predict: difference (r,) and its standard uncertainty.
+    """Leave-one-out prediction error of each reference shot, with uncertainty.
 
-    Arguments as for `drift_at`; at least two references. Of a single reference nothing can be said: (nan, nan).
+    Arguments as for `drift_at`; at least two references; (r,) rad each; a single one gives (nan, nan).
 
     >>> d, u = reference_surprise(np.array([0.0, 1.0, 2.0]), np.array([0.0, 0.5, 0.0]), np.full(3, 1e-6),
     ...                           random_walk=1e-3)
@@ -116,7 +118,7 @@ def reference_surprise(
 def _sorted_references(
     time: ArrayLike, phase: ArrayLike, variance: ArrayLike, random_walk: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """In order of time, with the floor of their variance by which `drift_at` keeps exact ones apart."""
+    """Sort references by time, with the variance floor of `drift_at`."""
     t = np.asarray(time, dtype=float)
     order = np.argsort(t, kind="stable")
     v = np.asarray(variance, dtype=float)
@@ -128,7 +130,10 @@ def _sorted_references(
 def _filtered(
     t: np.ndarray, y: np.ndarray, v: np.ndarray, random_walk: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Kalman filter of a walk from a flat prior: mean and variance before and after each reference is seen."""
+    """Kalman filter of a walk from a flat prior.
+
+    Returns mean and variance before and after each reference.
+    """
     r = len(t)
     before, spread, mean, variance = np.zeros(r), np.full(r, np.inf), np.empty(r), np.empty(r)
     mean[0], variance[0] = y[0], v[0]
@@ -140,6 +145,9 @@ def _filtered(
 
 
 def _joined(a: np.ndarray, variance_a: np.ndarray, b: np.ndarray, variance_b: np.ndarray) -> tuple:
-    """Weighted mean of two independent values and its standard uncertainty; an infinite variance means no value."""
+    """Weighted mean of two independent values, with standard uncertainty.
+
+    Infinite variance means no value.
+    """
     weight_a, weight_b = 1.0 / variance_a, 1.0 / variance_b
     return (weight_a * a + weight_b * b) / (weight_a + weight_b), 1.0 / np.sqrt(weight_a + weight_b)

@@ -1,8 +1,10 @@
-"""The electronics' walk between reference shots as hidden parameters, so that errors that shots share become columns.
+"""Walk of the electronics between reference shots as hidden states.
 
-`drift_at` says how the walk's errors at m shots are correlated: a full matrix. Here the same errors are sums of a few
-parameters each, and a rest that is a shot's own: the walk at the reference shots on either side, and the strongest
-modes of the bridge between them.
+Errors shared by shots become columns.
+
+`drift_at` gives the full covariance matrix of the walk's errors at m shots. Here the same errors are sums of a few
+parameters each, and an independent remainder of each shot: the walk at the reference shots on either side, and the
+strongest modes of the bridge between them.
 """
 
 from dataclasses import dataclass, replace
@@ -12,16 +14,18 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class DriftStates:
-    """Errors of a phase at m shots: sum of slopes * states[columns] and an independent rest.
+    """Phase errors at m shots: shared states plus independent remainder.
+
+    The errors are sum of slopes * states[columns], plus the remainder.
 
     columns         (m, w) states of each shot, -1 for none
     slopes          (m, w) rad a unit
-    own             (m,) rad^2, variance of the rest
+    own             (m,) rad^2, variance of the remainder
     prior_columns   (s, 2), -1 for none, and
-    prior_slopes    (s, 2): s independent combinations of the states with mean 0 and variance 1, which say all that is
-                    known of them
+    prior_slopes    (s, 2): s independent combinations of the states with mean 0 and variance 1, their complete
+                    prior
     strength        of the last states, the bridges' modes: variance over the shots' noise
-    neglected       strength of the strongest mode that is left to the rest
+    neglected       strength of the strongest mode moved to the remainder
     """
 
     columns: np.ndarray
@@ -34,41 +38,46 @@ class DriftStates:
 
     @property
     def count(self) -> int:
-        """Number s of states that a ranger has."""
+        """Number s of states of a ranger."""
         return len(self.prior_columns)
 
     def without(self, weak: float) -> "DriftStates":
-        """Modes of this strength and less left to the shots' own errors: their variance counts, their correlation not.
+        """Move modes up to this strength to the independent errors.
 
-        weak   0 leaves all
+        Their variance counts, their correlation does not.
+
+        weak   0 keeps all
         """
         first = self.count - len(self.strength)
-        kept = np.concatenate([np.ones(first, dtype=bool), self.strength > weak])
-        if kept.all():
+        retained = np.concatenate([np.ones(first, dtype=bool), self.strength > weak])
+        if retained.all():
             return self
-        number = np.append(np.where(kept, np.cumsum(kept) - 1, -1), -1)
-        gone = (self.columns >= 0) & ~np.append(kept, True)[self.columns]
+        number = np.append(np.where(retained, np.cumsum(retained) - 1, -1), -1)
+        dropped = (self.columns >= 0) & ~np.append(retained, True)[self.columns]
         columns = number[self.columns]
-        order = np.argsort(columns[:, 2:] < 0, axis=1, kind="stable") + 2  # what is left stands first
+        order = np.argsort(columns[:, 2:] < 0, axis=1, kind="stable") + 2  # retained columns first
         width = int((columns[:, 2:] >= 0).sum(axis=1).max(initial=0))
         order = np.concatenate([np.broadcast_to([0, 1], (len(columns), 2)), order[:, :width]], axis=1)
         return DriftStates(
             np.take_along_axis(columns, order, axis=1),
-            np.take_along_axis(np.where(gone, 0.0, self.slopes), order, axis=1),
-            self.own + np.sum(np.where(gone, self.slopes, 0.0) ** 2, axis=1),
-            np.where(self.prior_columns < 0, -1, number[self.prior_columns])[kept],
-            self.prior_slopes[kept],
-            self.strength[kept[first:]],
-            float(self.strength[~kept[first:]].max()),
+            np.take_along_axis(np.where(dropped, 0.0, self.slopes), order, axis=1),
+            self.own + np.sum(np.where(dropped, self.slopes, 0.0) ** 2, axis=1),
+            np.where(self.prior_columns < 0, -1, number[self.prior_columns])[retained],
+            self.prior_slopes[retained],
+            self.strength[retained[first:]],
+            float(self.strength[~retained[first:]].max()),
         )
 
     def of(self, keep: np.ndarray) -> "DriftStates":
-        """The same states at some of the shots, (m,) bool."""
+        """States of selected shots, (m,) bool."""
         return replace(self, columns=self.columns[keep], slopes=self.slopes[keep], own=self.own[keep])
 
     @property
     def covariance(self) -> np.ndarray:
-        """(m, m) rad^2 of the errors, for some thousands of shots at most."""
+        """Covariance (m, m) of the errors, rad^2.
+
+        For some thousands of shots at most.
+        """
         s, m = self.count, len(self.own)
         prior, design = np.zeros((s, s + 1)), np.zeros((m, s + 1))
         np.add.at(prior, (np.arange(s)[:, None], self.prior_columns), self.prior_slopes)
@@ -86,21 +95,21 @@ def drift_states(
     random_walk: float,
     noise: np.ndarray,
 ) -> DriftStates:
-    """The errors of `drift_at`'s phases as states. Exact; `DriftStates.without` makes them fewer.
+    """Errors of `drift_at`'s phases as states; exact (`DriftStates.without` reduces them).
 
     reference_time      (r,) s, any order, at least one
     reference_variance  (r,) rad^2, of the reference phases themselves
     time                (m,) s
     random_walk         growth of the drift, rad per square root of a second
-    noise               (m,) rad^2, above 0, of everything that a shot has by itself
+    noise               (m,) rad^2, above 0, independent noise of each shot
 
     Given its two ends, a walk between them is a straight line and a bridge, independent of all other bridges: variance
     q (t - a)(b - t) / (b - a), which falls off with the square of a mode's number. Before the first reference and after
-    the last it is a walk from that. The ends given the references are a chain of states with a tridiagonal precision,
-    here the two diagonals of its Cholesky factor.
+    the last it is a walk starting there. The ends given the references are a chain of states with a tridiagonal
+    precision, here the two diagonals of its Cholesky factor.
 
-    Source: conditioning of a Wiener process, as `drift_at`; Karhunen-Loeve expansion of the bridge, taken numerically
-    on the shots there are.
+    Source: conditioning of a Wiener process, as `drift_at`; Karhunen-Loeve expansion of the bridge, computed
+    numerically at the shots.
 
     >>> one = drift_states(np.array([0.0, 100.0]), np.full(2, 1e-12), time=np.array([50.0]), random_walk=1e-4,
     ...                    noise=np.ones(1))
@@ -111,26 +120,26 @@ def drift_states(
     t, noise, q = np.asarray(time, dtype=float), np.asarray(noise, dtype=float), random_walk**2
     r, m = len(knot), len(t)
     prior_columns, prior_slopes = _chain(knot, variance, q)
-    behind = np.searchsorted(knot, t, side="right") - 1
-    before, after = np.maximum(behind, 0), np.minimum(behind + 1, r - 1)
-    span = np.where(after > before, knot[after] - knot[before], 1.0)
-    share = np.where(after > before, (t - knot[before]) / span, 0.0)
-    columns = [np.stack([before, np.where((after > before) & (share > 0.0), after, -1)], axis=1)]
+    preceding = np.searchsorted(knot, t, side="right") - 1
+    lower, upper = np.maximum(preceding, 0), np.minimum(preceding + 1, r - 1)
+    span = np.where(upper > lower, knot[upper] - knot[lower], 1.0)
+    share = np.where(upper > lower, (t - knot[lower]) / span, 0.0)
+    columns = [np.stack([lower, np.where((upper > lower) & (share > 0.0), upper, -1)], axis=1)]
     slopes = [np.stack([1.0 - share, share], axis=1)]
     states = r
     strength: list[np.ndarray] = []
     modes: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-    order = np.argsort(behind, kind="stable")
-    for rows in np.split(order, np.flatnonzero(np.diff(behind[order])) + 1) if m else []:
-        at = int(behind[rows[0]])
+    order = np.argsort(preceding, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(preceding[order])) + 1) if m else []:
+        at = int(preceding[rows[0]])
         bridge = q * _bridge(t[rows], knot, at)
         root = np.sqrt(noise[rows])
         values, vectors = np.linalg.eigh(bridge / root[:, None] / root)
-        kept = values > 1e-12 * values[-1]
-        loading = (root[:, None] * vectors[:, kept] * np.sqrt(values[kept]))[:, ::-1]
-        strength.append(values[kept][::-1])
-        modes.append((rows, states + np.arange(kept.sum()), loading))
-        states += int(kept.sum())
+        significant = values > 1e-12 * values[-1]
+        loading = (root[:, None] * vectors[:, significant] * np.sqrt(values[significant]))[:, ::-1]
+        strength.append(values[significant][::-1])
+        modes.append((rows, states + np.arange(significant.sum()), loading))
+        states += int(significant.sum())
     width = max((len(own_columns) for _, own_columns, _ in modes), default=0)
     mode_columns, mode_slopes = np.full((m, width), -1), np.zeros((m, width))
     for rows, own_columns, loading in modes:
@@ -148,7 +157,7 @@ def drift_states(
 
 
 def _knots(time: np.ndarray, variance: np.ndarray, random_walk: float) -> tuple[np.ndarray, np.ndarray]:
-    """Times of the references in order, each once, and their variances with the floor of `drift_at`."""
+    """Sorted distinct reference times, and variances with `drift_at`'s floor."""
     scale = float(np.mean(variance + random_walk**2 * (time - time.min())))
     weight = 1.0 / (variance + 1e-12 * max(scale, random_walk**2, 1e-30))
     knot, which = np.unique(time, return_inverse=True)
@@ -156,9 +165,12 @@ def _knots(time: np.ndarray, variance: np.ndarray, random_walk: float) -> tuple[
 
 
 def _chain(knot: np.ndarray, variance: np.ndarray, q: float) -> tuple[np.ndarray, np.ndarray]:
-    """Columns and slopes (r, 2) of independent combinations of the walk at the references, given these."""
+    """Columns and slopes (r, 2) of independent combinations of states.
+
+    The states are the walk at the references.
+    """
     r = len(knot)
-    step = np.maximum(q * np.diff(knot), 1e-6 * variance.min())  # without a walk the ends are as good as one
+    step = np.maximum(q * np.diff(knot), 1e-6 * variance.min())  # without a walk the ends are equal
     diagonal = 1.0 / variance
     diagonal[:-1] += 1.0 / step
     diagonal[1:] += 1.0 / step
@@ -172,7 +184,7 @@ def _chain(knot: np.ndarray, variance: np.ndarray, q: float) -> tuple[np.ndarray
 
 
 def _bridge(t: np.ndarray, knot: np.ndarray, at: int) -> np.ndarray:
-    """(g, g) s: covariance over q of the walk at times t beyond knot `at`, its ends given; -1 is before the first."""
+    """Bridge covariance (g, g) over q, s, at times t beyond knot `at`, given its ends; -1: before the first."""
     if at < 0:
         return np.minimum(knot[0] - t[:, None], knot[0] - t)
     s = t - knot[at]

@@ -1,4 +1,4 @@
-"""How fast the phase of the electronics walks, from the reference shots themselves, and how often they are needed."""
+"""Random walk of the electronics' phase, and reference interval needed."""
 
 from dataclasses import dataclass
 
@@ -7,21 +7,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.errors import EstimationError, ValidityError
 
-ITERATIONS = 200  # of the likelihood's climb; it takes some ten
-HALVINGS = 40  # of a step that leads down
+ITERATIONS = 200  # steps of the maximization; it takes some ten
+HALVINGS = 40  # of a step that lowers the likelihood
 SETTLED = 1e-9  # of a variance: the last step
 
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """The random walk that reference shots show.
+    """Random walk estimated from reference shots.
 
     random_walk     rad per square root of a second
     u_random_walk   rad per square root of a second; infinite where the estimate is 0
-    white           rad, standard deviation of a noise of the references beyond the given one; 0 where not asked for
+    white           rad, standard deviation of further noise of the references; 0 where not estimated
     u_white         rad; infinite where the estimate is 0
     covariance      (2, 2) of random_walk^2 and white^2, by the information at the estimate; of the walk alone, the
-                    other elements zero, where white was not asked for
+                    other elements zero, where white was not estimated
     degrees         equivalent degrees of freedom of random_walk^2
     """
 
@@ -33,7 +33,7 @@ class Walk:
     degrees: float
 
     def interval(self, probability: float = 0.95) -> tuple[float, float]:
-        """Limits that hold the true random walk with that probability, chi-square with `degrees`.
+        """Confidence limits of the random walk, chi-square with `degrees`.
 
         Exact for references without noise, an approximation where their noise outweighs the walk; (0, infinity) where
         the estimate is 0.
@@ -55,19 +55,19 @@ def estimate_walk(
     series: ArrayLike | None = None,
     white: bool = False,
 ) -> Walk:
-    """Random walk, and on request the white noise beyond the given one, from the reference shots themselves.
+    """Random walk, optionally with white noise, from reference shots.
 
     reference_time, reference_phase, reference_variance   as for `drift_at`: s, rad (unwrapped), rad^2
-    series   (r,) label of the ranger of each: they share the coefficients, not the levels; by default one
-    white    whether to solve for a further noise of the references
+    series   (r,) label of the ranger of each reference; series share coefficients, not levels; default: one
+    white    True to solve for further noise of the references
 
     Restricted maximum likelihood: that of the differences of neighbours, in which no level is left. Three or four
-    references of a ranger say little of it; those of a night of rangers do.
+    references of one ranger are not enough; those of several rangers over a night are.
 
     Raises EstimationError with no more differences than unknowns, or where all references are of one time.
 
     Source: [PATTERSON71]; without noise it is the mean of difference^2/gap. Biased upwards a little where the walk is
-    near 0, since it cannot be below; otherwise scatters as it says.
+    near 0, since it cannot be below; otherwise its scatter agrees with its uncertainty.
 
     >>> w = estimate_walk(np.array([0.0, 4.0, 5.0]), np.array([0.0, 2e-3, 1e-3]), np.zeros(3))
     >>> round(w.random_walk, 9), w.degrees
@@ -78,14 +78,14 @@ def estimate_walk(
     unknowns = 2 if white else 1
     if count <= unknowns or not any(np.any(gap > 0.0) for _, gap, *_ in blocks):
         raise EstimationError(
-            f"{count} differences of reference shots do not show {unknowns} kinds of noise "
+            f"{count} differences of reference shots do not determine {unknowns} kinds of noise "
             f"(expected at least {unknowns + 1}, at different times)"
         )
     theta, information = _most_likely(blocks, white)
     covariance = np.zeros((2, 2))
     k = 2 if white else 1
     if np.linalg.cond(information[:k, :k] / np.sqrt(np.outer(*[np.diag(information)[:k]] * 2))) > 1e10:
-        raise EstimationError("walk and white noise look alike in these reference shots: vary the gaps, or hold one")
+        raise EstimationError("reference shots do not separate walk and white noise: vary the gaps, or fix one")
     covariance[:k, :k] = np.linalg.inv(information[:k, :k])
     root = np.sqrt(theta)
     u = np.sqrt(np.diag(covariance))
@@ -96,7 +96,7 @@ def estimate_walk(
 
 @dataclass(frozen=True)
 class WalkTest:
-    """Whether given coefficients fit the reference shots.
+    """Chi-square test of given coefficients against reference shots.
 
     statistic    differences of neighbours over their covariance, squared and summed
     degrees      of freedom: differences
@@ -110,7 +110,10 @@ class WalkTest:
 
     @property
     def passed(self) -> bool:
-        """Too small a statistic fails as too large a one: a walk believed too large wastes what the references say."""
+        """True if the statistic is within both limits.
+
+        Too small a statistic means an overestimated walk.
+        """
         return self.low <= self.statistic <= self.high
 
 
@@ -123,7 +126,7 @@ def walk_test(
     series: ArrayLike | None = None,
     probability: float = 0.95,
 ) -> WalkTest:
-    """Chi-square test of a random walk that others have given, with a limit on either side.
+    """Chi-square test, with both limits, of a given random walk.
 
     reference_time, reference_phase, reference_variance, series   as for `estimate_walk`
     random_walk   rad per square root of a second
@@ -138,7 +141,7 @@ def walk_test(
     blocks = _differences(reference_time, reference_phase, reference_variance, series)
     degrees = sum(len(d) for d, *_ in blocks)
     if not degrees:
-        raise EstimationError("no two reference shots of one series: nothing tells a random walk")
+        raise EstimationError("no series has two reference shots: a random walk cannot be estimated")
     statistic = 0.0
     for d, gap, noise, _ in blocks:
         statistic += float(d @ np.linalg.solve(random_walk**2 * np.diag(gap) + noise, d))
@@ -150,37 +153,39 @@ def walk_test(
 def midpoint_uncertainty(
     gap: ArrayLike, random_walk: ArrayLike, u_reference: ArrayLike, *, endless: bool = False
 ) -> NDArray[np.float64]:
-    """Standard uncertainty of the electronics' phase midway between two reference shots, where it is largest; rad.
+    """Standard uncertainty midway between two reference shots, rad.
+
+    The maximum for the electronics' phase.
 
     gap           s, from reference to reference
     random_walk   rad per square root of a second
     u_reference   rad, of each reference
-    endless       whether more references follow on both sides at the same gaps, by which the two are better known
+    endless       True if more references follow on both sides at the same gaps, which improves both
 
     With q the square of the random walk, u^2 = q gap/4 + u_reference^2/2 between two alone, and
-    sqrt((q gap/2)^2 + q gap u_reference^2)/2 in an endless row.
+    sqrt((q gap/2)^2 + q gap u_reference^2)/2 in an endless series.
 
     Source: `drift_at` in the middle; the steady state of two filters. Exact.
 
     >>> f"{float(midpoint_uncertainty(100.0, 1e-4, 0.0)):.1e}"
     '5.0e-04'
     """
-    grown = np.asarray(random_walk, dtype=float) ** 2 * np.asarray(gap, dtype=float)
+    growth = np.asarray(random_walk, dtype=float) ** 2 * np.asarray(gap, dtype=float)
     v = np.asarray(u_reference, dtype=float) ** 2
-    return np.sqrt(0.5 * np.sqrt(0.25 * grown**2 + grown * v) if endless else 0.25 * grown + 0.5 * v)
+    return np.sqrt(0.5 * np.sqrt(0.25 * growth**2 + growth * v) if endless else 0.25 * growth + 0.5 * v)
 
 
 def longest_gap(
     u_phase: ArrayLike, random_walk: ArrayLike, u_reference: ArrayLike, *, endless: bool = False
 ) -> NDArray[np.float64]:
-    """Longest time between reference shots, s, that keeps the electronics' phase within a standard uncertainty.
+    """Longest time between reference shots, s, for a given uncertainty.
 
-    u_phase       rad, wanted everywhere between them; a range's u is u_phase wavelength/(4 pi)
+    u_phase       rad, limit everywhere between them; a range's u is u_phase wavelength/(4 pi)
     random_walk   rad per square root of a second, above 0
     u_reference   rad, of each reference
     endless       as for `midpoint_uncertainty`, whose inverse this is
 
-    Raises ValidityError where two references alone do not reach it however soon: u_phase below u_reference/sqrt(2).
+    Raises ValidityError where two references do not reach it at any gap: u_phase below u_reference/sqrt(2).
 
     >>> round(float(longest_gap(5e-4, 1e-4, 0.0)), 6)
     100.0
@@ -200,7 +205,7 @@ def longest_gap(
 
 
 def _differences(time: ArrayLike, phase: ArrayLike, variance: ArrayLike, series: ArrayLike | None) -> list[tuple]:
-    """For each series of two or more: differences (k,), gaps (k,), noise (k, k), and that of a unit white noise."""
+    """Differences (k,), gaps (k,), noise (k, k) and unit white noise, for each series of two or more."""
     t, y, v = (np.asarray(a, dtype=float) for a in (time, phase, variance))
     labels = np.zeros(len(t), dtype=int) if series is None else np.unique(np.asarray(series), return_inverse=True)[1]
     blocks = []
@@ -214,19 +219,22 @@ def _differences(time: ArrayLike, phase: ArrayLike, variance: ArrayLike, series:
 
 
 def _most_likely(blocks: list[tuple], white: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Variances (walk a second, white) of the highest restricted likelihood, none below 0, and their information."""
+    """Variances (walk a second, white) of the highest restricted likelihood, none below 0, with information."""
     total = sum(float(d @ d + np.trace(noise)) for d, _, noise, _ in blocks)
     if total == 0.0:
-        raise EstimationError("all reference phases are equal and without noise: nothing tells a random walk")
+        raise EstimationError("all reference phases are equal and without noise: a random walk cannot be estimated")
     unit = total / np.array([sum(float(gap.sum()) for _, gap, *_ in blocks), sum(2.0 * len(d) for d, *_ in blocks)])
-    # The likelihood of two components may have more than one summit: mostly walk, mostly white, both.
+    # The likelihood of two components may have several maxima: mostly walk, mostly white, both.
     starts = [(1.0, 0.1), (0.01, 1.0), (0.3, 0.5)] if white else [(1.0, 0.0)]
     summits = [_climbed(np.array(start) * unit, blocks, white) for start in starts]
     return min(summits, key=lambda s: s[0])[1:]
 
 
 def _climbed(theta: np.ndarray, blocks: list[tuple], white: bool) -> tuple[float, np.ndarray, np.ndarray]:
-    """Fisher's scoring from a start, each component stopped at 0: value, variances, information."""
+    """Climb by Fisher's scoring: value, variances, information.
+
+    Each component is stopped at 0.
+    """
     value, slope, information = _likelihood(theta, blocks)
     for _ in range(ITERATIONS):
         free = (theta > 0.0) | (slope < 0.0)
@@ -242,13 +250,13 @@ def _climbed(theta: np.ndarray, blocks: list[tuple], white: bool) -> tuple[float
                 break
             step = 0.5 * step
         else:
-            return value, theta, information  # no step leads higher: rounding
+            return value, theta, information  # no step raises the likelihood: rounding
         moved = np.abs(further - theta)
         theta, (value, slope, information) = further, reached
         if np.all(moved <= SETTLED * theta):
             return value, theta, information
     raise EstimationError(
-        f"the random walk did not settle in {ITERATIONS} steps: give fewer unknowns, or more references"
+        f"the random walk did not converge in {ITERATIONS} steps: give fewer unknowns, or more references"
     )
 
 

@@ -1,1 +1,1 @@
-"""Known ways in which a phase lies: leakage, cyclic terms, many paths, amplitude."""
+"""Systematic phase errors: leakage, cyclic terms, multipath, amplitude coupling."""

@@ -1,8 +1,8 @@
-"""Amplitude-to-phase coupling: electronics that answer a stronger return with another phase.
+"""Amplitude-to-phase coupling of the electronics.
 
 [PARKER04] chapter 6, item 5, warns of it (non-linear capacitors). The model is a line in the logarithm of amplitude: a
 capacitance that follows the signal's level by a power law, or a limiter's delay, does so over a decade or two. The
-model is tested, not believed: see `AmplitudeFit.probability`.
+model is tested, not assumed: see `AmplitudeFit.probability`.
 """
 
 from dataclasses import dataclass
@@ -20,10 +20,12 @@ Array = NDArray[np.float64]
 def amplitude_phase(
     amplitude: ArrayLike, reference_amplitude: ArrayLike, coefficient: ArrayLike, *, quadratic: ArrayLike = 0.0
 ) -> Array:
-    """Radians that the electronics add to the measured phase: coefficient ln(a) + quadratic ln(a)^2.
+    """Phase added by the electronics at an amplitude, rad.
+
+    It is coefficient ln(a) + quadratic ln(a)^2.
 
     amplitude             V, above 0; a = amplitude / reference_amplitude
-    reference_amplitude   V, above 0: there nothing is added
+    reference_amplitude   V, above 0: where the phase added is 0
     coefficient           rad a factor e of amplitude
     quadratic             rad a factor e squared
 
@@ -46,7 +48,7 @@ def remove_amplitude_phase(
     coefficient: ArrayLike,
     quadratic: ArrayLike = 0.0,
 ) -> Array:
-    """Phase as it would have been measured at the reference amplitude, in radians; not wrapped.
+    """Phase corrected to the reference amplitude, rad; not wrapped.
 
     phase   rad, as measured; the others as for `amplitude_phase`
 
@@ -58,7 +60,7 @@ def remove_amplitude_phase(
 
 
 def amplitude_by_coefficient(amplitude: ArrayLike, reference_amplitude: ArrayLike) -> Array:
-    """Derivatives of `amplitude_phase` by coefficient and by quadratic, (..., 2).
+    """Derivatives (..., 2) of `amplitude_phase` by coefficient and by quadratic.
 
     amplitude, reference_amplitude   V, above 0
 
@@ -71,15 +73,15 @@ def amplitude_by_coefficient(amplitude: ArrayLike, reference_amplitude: ArrayLik
 
 @dataclass(frozen=True, eq=False)
 class AmplitudeFit:
-    """The coupling that readings of one target at several attenuations show.
+    """Coupling from readings of one target at several attenuations.
 
     coefficient   rad a factor e, with u_coefficient
-    quadratic     rad a factor e squared, with u_quadratic; both 0 where it was not asked for
+    quadratic     rad a factor e squared, with u_quadratic; both 0 where it was not estimated
     phase         rad in [0, 2 pi), of the target at the reference amplitude
     covariance    (2, 2), or (3, 3) with the quadratic term: coefficient, phase, quadratic
-    fit           the least squares behind it: residuals (rad), variance factor, degrees of freedom
+    fit           the least-squares fit: residuals (rad), variance factor, degrees of freedom
     curvature     t of the next power of ln(amplitude), left out of the fit, with the given uncertainties
-    probability   that such a t, or a larger one, arises where the model holds; NaN without redundancy
+    probability   of such a t, or a larger one, where the model holds; NaN without redundancy
     """
 
     coefficient: float
@@ -93,7 +95,7 @@ class AmplitudeFit:
     probability: float
 
     def suffices(self, level: float = 0.05) -> bool | None:
-        """Whether the model needs no further power, tested at that level; None where the readings do not say."""
+        """True if no further power is significant; None if undetermined."""
         return None if np.isnan(self.probability) else bool(self.probability >= level)
 
 
@@ -106,19 +108,21 @@ def fit_amplitude_phase(
     quadratic: bool = False,
     others: ArrayLike | None = None,
 ) -> AmplitudeFit:
-    """Coupling from readings of one target, which does not move, at several attenuations.
+    """Fit the coupling to readings at several attenuations.
+
+    All readings are of one fixed target.
 
     amplitude             (n,) V
     phase                 (n,) rad, any turn, after the electronics' drift and the leakage
     u_phase               rad, standard uncertainty: (n,), or their covariance (n, n), rad^2
     reference_amplitude   V, to which coefficient and phase refer
-    quadratic             whether to solve for the term in ln^2 as well
-    others                (n, q) columns besides (time, for a drift; the phase that a filter's glass adds)
+    quadratic             True to solve for the term in ln^2 as well
+    others                (n, q) further columns (time, for a drift; the phase that a filter's glass adds)
 
-    Phases are counted from that of the strongest reading, the shorter way round. The leakage must be gone before: what
-    is left of it turns a weak phasor more and looks like coupling.
+    Phases are counted from that of the strongest reading, the shorter way round. The leakage must be subtracted
+    first: a residual turns a weak phasor more and looks like coupling.
 
-    Raises ValidityError for amplitudes not above 0, EstimationError where the attenuations do not tell the terms.
+    Raises ValidityError for amplitudes not above 0, EstimationError where the attenuations do not separate the terms.
 
     Source: [FOERSTNER16] chapter 4; the test of one more power of the same. Exact for the model.
 
@@ -132,8 +136,8 @@ def fit_amplitude_phase(
     start = float(measured[int(np.argmax(level))])
     turned = np.angle(np.exp(1j * (measured - start)))
     columns = [level, np.ones_like(level)] + ([level**2] if quadratic else [])
-    beside = np.empty((len(level), 0)) if others is None else np.asarray(others, dtype=float)
-    design = np.concatenate([np.stack(columns, axis=1), beside], axis=1)
+    further = np.empty((len(level), 0)) if others is None else np.asarray(others, dtype=float)
+    design = np.concatenate([np.stack(columns, axis=1), further], axis=1)
     fit = fit_columns(design, turned, u_phase)
     used = len(columns)
     curvature, probability = _next_power(design, level ** (3 if quadratic else 2), turned, u_phase)
@@ -151,7 +155,10 @@ def fit_amplitude_phase(
 
 
 def _next_power(design: Array, power: Array, turned: Array, u_phase: ArrayLike) -> tuple[float, float]:
-    """t of one more column, and the probability of so large a t by the normal distribution; NaN where undefined."""
+    """Standardised coefficient t of one more column, with its two-sided normal probability.
+
+    NaN where undefined.
+    """
     from scipy.stats import norm
 
     try:

@@ -1,4 +1,4 @@
-"""A linear fit of readings with given uncertainties: what cyclic terms and amplitude coupling are found by."""
+"""Linear fit for cyclic terms and amplitude coupling."""
 
 from dataclasses import dataclass
 
@@ -7,14 +7,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.errors import EstimationError, ValidityError
 
-WORST_CONDITION = 1e8  # of columns scaled to one length: beyond it half of the digits are lost
+WORST_CONDITION = 1e8  # of columns scaled to unit length: beyond it half of the digits are lost
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class LinearFit:
-    """What a linear fit says.
+    """Coefficients, covariance and tests of a linear fit.
 
     coefficient          (p,) in the order of the columns
     covariance           (p, p), from the given uncertainties alone
@@ -31,7 +31,7 @@ class LinearFit:
 
     @property
     def u(self) -> Array:
-        """(p,) standard uncertainties."""
+        """Standard uncertainties (p,)."""
         return np.sqrt(np.diag(self.covariance))
 
 
@@ -42,8 +42,8 @@ def fit_columns(design: ArrayLike, observed: ArrayLike, spread: ArrayLike) -> Li
     observed   (n,)
     spread     standard uncertainty, one number or (n,), above 0; or the full covariance, (n, n)
 
-    Raises ValidityError for readings or uncertainties that are none, EstimationError where the columns cannot be told
-    apart.
+    Raises ValidityError for invalid readings or uncertainties, EstimationError where the columns cannot be
+    separated.
 
     Source: Gauss and Markov; [FOERSTNER16] chapter 4. Exact but for rounding.
 
@@ -67,9 +67,7 @@ def fit_columns(design: ArrayLike, observed: ArrayLike, spread: ArrayLike) -> Li
         white, white_y = np.linalg.solve(factor, a), np.linalg.solve(factor, y)
     length = np.linalg.norm(white, axis=0)
     if a.shape[0] < a.shape[1] or np.any(length == 0.0) or np.linalg.cond(white / length) > WORST_CONDITION:
-        raise EstimationError(
-            f"{len(y)} readings do not tell {a.shape[1]} coefficients apart: leave one out, or spread"
-        )
+        raise EstimationError(f"{len(y)} readings do not separate {a.shape[1]} coefficients: leave one out, or spread")
     inverse = np.linalg.pinv(white / length) / length[:, None]
     coefficient = inverse @ white_y
     degrees = len(y) - a.shape[1]

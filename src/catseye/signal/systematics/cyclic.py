@@ -1,4 +1,4 @@
-"""Cyclic deviation: what a range reads too long, as a wave of the phase itself; where it comes from; its estimation.
+"""Cyclic deviation of a range: causes and estimation.
 
 x is the phase after the electronics', in radians, as measured. It falls by 2 pi for each half wavelength of distance.
 A phase read too high by d is a range read too long by -d wavelength/(4 pi).
@@ -14,13 +14,15 @@ from catseye.constants import TWO_PI
 from catseye.errors import EstimationError, ValidityError
 from catseye.signal.systematics.columns import LinearFit, fit_columns
 
-WORST_INFLATION = 5.0  # of a coefficient's standard uncertainty against phases spread evenly over the circle
+WORST_INFLATION = 5.0  # of a coefficient's standard uncertainty over that of evenly spread phases
 
 Array = NDArray[np.float64]
 
 
 def cyclic_range(phase_fraction: ArrayLike, cosine: ArrayLike, sine: ArrayLike) -> Array:
-    """Metres that a range reads too long: sum over k of cosine[k-1] cos(k x) + sine[k-1] sin(k x).
+    """Cyclic range error, m, as a Fourier series of x.
+
+    The sum over k of cosine[k-1] cos(k x) + sine[k-1] sin(k x), positive where the range reads too long.
 
     phase_fraction   (...) rad, x, phase after the electronics'; any turn
     cosine, sine     (K,) m each, orders 1 to K; empty for none
@@ -37,7 +39,7 @@ def cyclic_range(phase_fraction: ArrayLike, cosine: ArrayLike, sine: ArrayLike) 
 
 
 def cyclic_slope(phase_fraction: ArrayLike, cosine: ArrayLike, sine: ArrayLike) -> Array:
-    """Derivative of `cyclic_range` by x, in metres a radian.
+    """Derivative of `cyclic_range` by x, m/rad.
 
     phase_fraction   (...) rad, x
     cosine, sine     (K,) m each
@@ -53,7 +55,7 @@ def cyclic_slope(phase_fraction: ArrayLike, cosine: ArrayLike, sine: ArrayLike) 
 
 
 def cyclic_design(phase_fraction: ArrayLike, orders: int | Sequence[int]) -> Array:
-    """Derivatives of `cyclic_range` by its coefficients: cosines of all orders first, then sines; (..., 2K).
+    """Derivatives (..., 2K) of `cyclic_range`: all cosines, then all sines.
 
     phase_fraction   (...) rad, x
     orders           K for orders 1 to K, or the orders themselves, each at least 1
@@ -68,7 +70,9 @@ def cyclic_design(phase_fraction: ArrayLike, orders: int | Sequence[int]) -> Arr
 
 
 def leakage_range(phase_fraction: ArrayLike, relative_leakage: ArrayLike, wavelength: ArrayLike) -> Array:
-    """Metres read too long because of a leakage that was not subtracted, as a wave of the measured phase.
+    """Range error from unsubtracted leakage, m, positive too long.
+
+    A wave of the measured phase.
 
     phase_fraction     rad, x, of light and leakage together
     relative_leakage   complex, leakage phasor over the light's amplitude, turned back by the electronics' phase;
@@ -77,8 +81,8 @@ def leakage_range(phase_fraction: ArrayLike, relative_leakage: ArrayLike, wavele
 
     The sine rule in the triangle of light, leakage and their sum gives x - x_light = arcsin(r sin(a - x)), a the angle
     of the leakage. It has odd orders only: 1 with r wavelength/(4 pi), 3 with r^3/24 in place of r. As a wave of the
-    light's own phase the same deviation has every order k with r^k/k. What the leakage does to the reference is one
-    constant, not contained here.
+    light's own phase the same deviation has every order k with r^k/k. The effect of the leakage on the reference is a
+    constant, not included here.
 
     Raises ValidityError where the leakage is not smaller than the light.
 
@@ -89,13 +93,15 @@ def leakage_range(phase_fraction: ArrayLike, relative_leakage: ArrayLike, wavele
     """
     leakage = np.asarray(relative_leakage, dtype=complex)
     if np.any(np.abs(leakage) >= 1.0):
-        raise ValidityError(f"leakage of {np.abs(leakage).max():.3g} of the light is not below 1: it rules the phase")
+        raise ValidityError(f"leakage {np.abs(leakage).max():.3g} of the light is not below 1: it dominates the phase")
     turned = leakage * np.exp(-1j * np.asarray(phase_fraction, dtype=float))
     return -np.arcsin(turned.imag) * np.asarray(wavelength, dtype=float) / (2.0 * TWO_PI)
 
 
 def imbalance_range(phase_fraction: ArrayLike, *, gain: ArrayLike, skew: ArrayLike, wavelength: ArrayLike) -> Array:
-    """Metres read too long where sine and cosine channel are not alike: cos x and (1 + gain) sin(x + skew).
+    """Range error from unequal quadrature channels, m.
+
+    The channels are cos x and (1 + gain) sin(x + skew).
 
     phase_fraction   rad, x, as measured by these two channels
     gain             of the sine channel over the cosine channel, less 1; above -1
@@ -125,12 +131,12 @@ def imbalance_range(phase_fraction: ArrayLike, *, gain: ArrayLike, skew: ArrayLi
 
 
 def cyclic_orders(curve: ArrayLike, orders: int) -> tuple[float, Array, Array]:
-    """Mean, cosine and sine coefficients of a deviation given at x = 2 pi j/n, j = 0 to n - 1.
+    """Mean, cosine and sine coefficients of a deviation sampled at x = 2 pi j/n, j = 0 to n - 1.
 
     curve    (n,) m
     orders   K, below n/2
 
-    Raises ValidityError where n points do not tell K orders.
+    Raises ValidityError where n points do not resolve K orders.
 
     >>> x = 2 * np.pi * np.arange(8) / 8
     >>> mean, cosine, sine = cyclic_orders(1.0 + 3.0 * np.sin(2 * x), 2)
@@ -139,19 +145,19 @@ def cyclic_orders(curve: ArrayLike, orders: int) -> tuple[float, Array, Array]:
     """
     y = np.asarray(curve, dtype=float)
     if y.ndim != 1 or not 0 < orders < y.size / 2:
-        raise ValidityError(f"{y.size} points of a cycle do not tell {orders} orders (expected more than two an order)")
+        raise ValidityError(f"{y.size} points of a cycle do not resolve {orders} orders (expected over two an order)")
     spectrum = np.fft.rfft(y)[: orders + 1] * (2.0 / y.size)
     return 0.5 * float(spectrum[0].real), spectrum[1:].real, -spectrum[1:].imag
 
 
 @dataclass(frozen=True, eq=False)
 class Separability:
-    """Which orders given phases tell apart.
+    """Orders that given phases can separate.
 
     orders      those that can be estimated together, the lowest first
     inflation   (K,) of orders 1 to K: standard uncertainty of the order's worse coefficient, with the orders before it,
-                over that of phases spread evenly, sigma sqrt(2/n); infinite where it is not defined, or not asked
-    condition   of the kept columns, each scaled to one length
+                over that of phases spread evenly, sigma sqrt(2/n); infinite where undefined or not requested
+    condition   number of the retained columns, scaled to unit length
     """
 
     orders: tuple[int, ...]
@@ -162,16 +168,16 @@ class Separability:
 def separable_orders(
     phase_fraction: ArrayLike, orders: int, *, others: ArrayLike | None = None, worst: float = WORST_INFLATION
 ) -> Separability:
-    """Orders that phases tell from each other and from what else is estimated with them.
+    """Orders separable from each other and from nuisance columns.
 
     phase_fraction   (n,) rad
-    orders           K, the highest order asked for
-    others           (n, q) columns estimated besides: by default one, the constant
+    orders           K, the highest order requested
+    others           (n, q) columns estimated as well: by default one, the constant
     worst            inflation of any coefficient's standard uncertainty beyond which an order is left out
 
-    Orders are added until any coefficient goes beyond `worst`; none is kept above one that is not, which would be taken
-    for it. A rail of less than a half wavelength does not tell order 1 from a constant; phases at 2 pi j/n do not tell
-    order k from n - k.
+    Orders are added until any coefficient goes beyond `worst`; none is retained above an excluded one, which would be
+    mistaken for it. A rail of less than a half wavelength does not separate order 1 from a constant; phases at 2 pi j/n
+    do not separate order k from n - k.
 
     Raises ValidityError for orders below 0.
 
@@ -179,12 +185,12 @@ def separable_orders(
     (1, 2)
     """
     x = np.asarray(phase_fraction, dtype=float)
-    beside = np.ones((len(x), 1)) if others is None else np.asarray(others, dtype=float)
-    kept: tuple[int, ...] = ()
+    further = np.ones((len(x), 1)) if others is None else np.asarray(others, dtype=float)
+    retained: tuple[int, ...] = ()
     inflation = np.full(len(_orders(orders)), np.inf)
     for order in range(1, orders + 1):
-        trial = (*kept, order)
-        design = np.concatenate([cyclic_design(x, trial), beside], axis=1)
+        trial = (*retained, order)
+        design = np.concatenate([cyclic_design(x, trial), further], axis=1)
         try:
             u = fit_columns(design, np.zeros(len(x)), np.sqrt(len(x) / 2.0)).u
         except EstimationError:
@@ -193,9 +199,9 @@ def separable_orders(
         inflation[order - 1] = max(u[k - 1], u[2 * k - 1])
         if max(u[: 2 * k]) > worst:
             break
-        kept = trial
-    columns = np.concatenate([cyclic_design(x, kept) if kept else np.empty((len(x), 0)), beside], axis=1)
-    return Separability(kept, inflation, float(np.linalg.cond(columns / np.linalg.norm(columns, axis=0))))
+        retained = trial
+    columns = np.concatenate([cyclic_design(x, retained) if retained else np.empty((len(x), 0)), further], axis=1)
+    return Separability(retained, inflation, float(np.linalg.cond(columns / np.linalg.norm(columns, axis=0))))
 
 
 def fit_cyclic(
@@ -206,15 +212,17 @@ def fit_cyclic(
     orders: int,
     others: ArrayLike | None = None,
 ) -> tuple[Array, Array, LinearFit]:
-    """Cosine and sine coefficients (K,) of a range's deviation, and the whole fit: cosines, sines, then the others.
+    """Fit cosine and sine coefficients (K,) to a range's deviation.
+
+    Also returns the whole fit: cosines, sines, then the nuisance columns.
 
     phase_fraction   (n,) rad, x
-    deviation        (n,) m, range less what is held for true
+    deviation        (n,) m, range less its reference value
     spread           m, standard uncertainty, one number or (n,); or the covariance (n, n), m^2
     orders           K
-    others           (n, q) columns estimated besides: by default one, the constant
+    others           (n, q) columns estimated as well: by default one, the constant
 
-    Raises EstimationError where the phases do not tell the orders apart: see `separable_orders`.
+    Raises EstimationError where the phases do not separate the orders: see `separable_orders`.
 
     >>> x = np.linspace(0.0, 6.0, 20)
     >>> cosine, sine, fit = fit_cyclic(x, cyclic_range(x, [4e-6], [1e-6]) + 1e-4, 1e-6, orders=1)
@@ -222,8 +230,8 @@ def fit_cyclic(
     '4.00e-06 1.00e-06 1.00e-04'
     """
     x = np.asarray(phase_fraction, dtype=float)
-    beside = np.ones((len(x), 1)) if others is None else np.asarray(others, dtype=float)
-    fit = fit_columns(np.concatenate([cyclic_design(x, orders), beside], axis=1), deviation, spread)
+    further = np.ones((len(x), 1)) if others is None else np.asarray(others, dtype=float)
+    fit = fit_columns(np.concatenate([cyclic_design(x, orders), further], axis=1), deviation, spread)
     return fit.coefficient[:orders], fit.coefficient[orders : 2 * orders], fit
 
 
@@ -235,7 +243,7 @@ def _coefficients(cosine: ArrayLike, sine: ArrayLike) -> tuple[Array, Array]:
 
 
 def _orders(orders: int | Sequence[int]) -> NDArray[np.int64]:
-    given = np.arange(1, orders + 1) if isinstance(orders, int | np.integer) else np.asarray(orders, dtype=np.int64)
-    if np.any(given < 1) or (isinstance(orders, int | np.integer) and orders < 0):
+    numbers = np.arange(1, orders + 1) if isinstance(orders, int | np.integer) else np.asarray(orders, dtype=np.int64)
+    if np.any(numbers < 1) or (isinstance(orders, int | np.integer) and orders < 0):
         raise ValidityError(f"orders {orders} of a cyclic deviation are not whole numbers of at least 1")
-    return given
+    return numbers

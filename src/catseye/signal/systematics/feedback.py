@@ -1,8 +1,8 @@
-"""Light back into the laser, and light that interferes with itself: the phase then moves at the scale of the light.
+"""Optical feedback and interference: errors at the light's period.
 
 The modulation's phase is tied to the optical path: it swings through a whole period for each half wavelength of light
-(390 nm) that the target moves. Nobody knows a path to that, so from shot to shot it is noise, and on a path that keeps
-still a bias. Derived here: the interference, its averages and correlations. Models: that the laser answers a change of
+(390 nm) that the target moves. No path is known to that, so from shot to shot it is noise, and on a constant
+path a bias. Derived here: the interference, its averages and correlations. Models: that the laser answers a change of
 its power by a phase in proportion (`regulation_phase`), and [LANG80]'s laser (`feedback_parameter`, `feedback_fringe`).
 """
 
@@ -12,13 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
 
-HALVINGS = 60  # of the interval that holds a fringe's phase: below rounding
+HALVINGS = 60  # halvings of the interval of a fringe's phase: below rounding
 
 Array = NDArray[np.float64]
 
 
 def optical_phase(distance: ArrayLike, optical_wavelength: ArrayLike) -> Array:
-    """Phase of light after its way there and back, rad, not wrapped: 4 pi distance/optical wavelength.
+    """Optical phase there and back, rad, not wrapped.
+
+    4 pi distance/optical wavelength.
 
     distance             m, one way
     optical_wavelength   m, in air: that of the light, not of its modulation
@@ -30,7 +32,7 @@ def optical_phase(distance: ArrayLike, optical_wavelength: ArrayLike) -> Array:
 
 
 def fringe_contrast(returned: ArrayLike, coherence: ArrayLike = 1.0) -> Array:
-    """Amplitude of the relative change of power by interference with returned light: 2 coherence sqrt(returned).
+    """Relative power change by interference, amplitude: 2 coherence sqrt(returned).
 
     returned    power that comes back in the same mode, over the power it meets, 0 to 1
     coherence   0 to 1: contrast lost to linewidth, to chirp, to speckle and to polarisation
@@ -50,13 +52,15 @@ def fringe_contrast(returned: ArrayLike, coherence: ArrayLike = 1.0) -> Array:
 
 
 def regulation_phase(contrast: ArrayLike, optical_phase: ArrayLike, coefficient: ArrayLike) -> Array:
-    """Phase, rad, that the power regulation adds to the modulation: coefficient times the relative change of power.
+    """Phase that power regulation adds to the modulation, rad.
 
-    contrast        amplitude of that change, see `fringe_contrast`
+    Coefficient times relative power change.
+
+    contrast        amplitude of the relative power change, see `fringe_contrast`
     optical_phase   rad, of the light that returns
     coefficient     rad for each unit of relative change, measured by changing the set power
 
-    A model: the loop sees fringes as slow changes of power, and moves the bias, and with it the phase, in proportion.
+    A model: the loop takes fringes for slow changes of power, and moves the bias, and with it the phase, in proportion.
     True within the loop's bandwidth; faster fringes do not reach the bias. A phase too high is a range too short.
 
     Source: [PARKER04] chapter 6, item 4, names the cause.
@@ -68,7 +72,7 @@ def regulation_phase(contrast: ArrayLike, optical_phase: ArrayLike, coefficient:
 
 
 def interference_phase(contrast: ArrayLike, optical_phase: ArrayLike, modulation_phase: ArrayLike) -> Array:
-    """Phase, rad, that interference of the light with itself after a detour adds to the modulation.
+    """Phase that interference adds to the modulation, rad.
 
     contrast           amplitude of the fringe, 0 to below 1, see `fringe_contrast`
     optical_phase      rad, theta, of the detour
@@ -94,7 +98,7 @@ def interference_phase(contrast: ArrayLike, optical_phase: ArrayLike, modulation
 
 
 def fringe_average(fringes: ArrayLike) -> Array:
-    """What is left of a fringe's amplitude in a shot during which a number of fringes passes evenly: |sinc|.
+    """Fringe amplitude left after steady motion in a shot: |sinc|.
 
     fringes   passed in the shot: twice the change of distance over the optical wavelength
 
@@ -107,7 +111,9 @@ def fringe_average(fringes: ArrayLike) -> Array:
 
 
 def dephasing(u_displacement: ArrayLike, optical_wavelength: ArrayLike) -> Array:
-    """Correlation of fringes between two shots, or what a fast random motion leaves of a fringe in one; 0 to 1.
+    """Fringe correlation after random motion, 0 to 1.
+
+    It is the correlation between two shots, or the amplitude left of a fringe in one.
 
     u_displacement       m, standard deviation of the change of distance between the shots, or of the motion in a shot
     optical_wavelength   m
@@ -123,10 +129,10 @@ def dephasing(u_displacement: ArrayLike, optical_wavelength: ArrayLike) -> Array
 def fringe_uncertainty(
     largest: ArrayLike, *, averaging: ArrayLike = 1.0, shots: ArrayLike = 1, correlation: ArrayLike = 1.0
 ) -> Array:
-    """Standard uncertainty of the mean of shots whose fringe phase may be any.
+    """Standard uncertainty of a mean of shots with unknown fringe phase.
 
-    largest       what a fringe does at most, any unit
-    averaging     what one shot leaves of it, see `fringe_average` and `dephasing`
+    largest       largest effect of a fringe, any unit
+    averaging     share remaining in one shot, see `fringe_average` and `dephasing`
     shots         their number
     correlation   between any two of them, 0 to 1, see `dephasing`; 1, a path at rest, averages nothing
 
@@ -153,7 +159,9 @@ def feedback_parameter(
     facet_reflectance: ArrayLike,
     enhancement: ArrayLike,
 ) -> Array:
-    """Feedback parameter C of a laser diode: above 1 the laser has several modes to choose from, and jumps.
+    """Feedback parameter C of a laser diode.
+
+    Above 1 the laser has several modes and jumps.
 
     returned            power that comes back into the laser's mode, over the emitted, 0 to 1
     path                m, optical path from the facet to the reflector, one way
@@ -162,7 +170,7 @@ def feedback_parameter(
     enhancement         linewidth enhancement factor alpha (2 to 6)
 
     C = (path/laser_path) (1 - R) sqrt(returned/R) sqrt(1 + alpha^2). It grows with the distance: at 100 m a billionth
-    of the power is far above 1, so that an isolator, or a retroreflector that offsets the beam, is a must.
+    of the power is far above 1, so that an isolator, or a retroreflector that offsets the beam, is necessary.
 
     Raises ValidityError for a reflectance outside these limits.
 
@@ -180,14 +188,14 @@ def feedback_parameter(
 
 
 def feedback_fringe(solitary_phase: ArrayLike, parameter: ArrayLike, enhancement: ArrayLike) -> Array:
-    """Phase of the returned light, rad, in a laser that the returned light itself has detuned.
+    """Phase of the returned light in a laser detuned by it, rad.
 
     solitary_phase   rad, as `optical_phase` at the frequency of the laser alone
     parameter        C, 0 to below 1
     enhancement      linewidth enhancement factor alpha
 
-    Solves phase + C sin(phase + arctan alpha) = solitary phase. The cosine of it leans like a saw: over all distances
-    its mean square stays 1/2, and its mean becomes C/(2 sqrt(1 + alpha^2)).
+    Solves phase + C sin(phase + arctan alpha) = solitary phase. Its cosine is a skewed sawtooth: over all distances
+    its mean square is 1/2, and its mean becomes C/(2 sqrt(1 + alpha^2)).
 
     Raises ValidityError for C of 1 and more, where the equation has several solutions and the laser jumps.
 

@@ -1,7 +1,7 @@
-"""The part of the signal that never left the instrument: taken out, estimated, and what is left of it as a range.
+"""Leakage phasor inside the instrument: subtraction, estimation, remaining range error.
 
-A leakage is one phasor, added to that of the light: its real and imaginary part are two parameters that every shot of a
-ranger shares, reference shots included. Covariances (2, 2) are of real and imaginary part, V^2.
+A leakage is one phasor, added to that of the light: its real and imaginary part are two parameters common to all shots
+of a ranger, reference shots included. Covariances (2, 2) are of real and imaginary part, V^2.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ Phasors = NDArray[np.complex128]
 
 
 def subtract_leakage(phasor: ArrayLike, leakage_amplitude: ArrayLike, leakage_phase: ArrayLike) -> Phasors:
-    """Phasor of the light alone.
+    """Phasor of the light alone, V.
 
     phasor               V, complex, as detected: light plus leakage
     leakage_amplitude    V, at least 0, measured with the beam blocked
@@ -36,7 +36,9 @@ def subtract_leakage(phasor: ArrayLike, leakage_amplitude: ArrayLike, leakage_ph
 
 
 def light_covariance(u_phasor: ArrayLike, leakage_covariance: ArrayLike) -> Array:
-    """Covariance of the light's phasor after the subtraction, (..., 2, 2) V^2: both parts' own.
+    """Covariance of the light's phasor, (..., 2, 2) V^2.
+
+    It combines detection and leakage.
 
     u_phasor             (...) V, standard uncertainty of each quadrature of the detected phasor
     leakage_covariance   (2, 2) V^2
@@ -54,7 +56,7 @@ def polar_covariance(phasor: ArrayLike, covariance: ArrayLike) -> Array:
     phasor       (...) V, complex, not 0
     covariance   (..., 2, 2) V^2, of its real and imaginary part
 
-    First order: good where the uncertainty is a small part of the amplitude (at a fifth u_phase is 2 % more).
+    First order: valid where the uncertainty is a small part of the amplitude (at a fifth u_phase is 2 % more).
 
     >>> polar_covariance(2.0j, np.diag([4e-4, 1e-4])).round(9).tolist()
     [[0.0001, 0.0], [0.0, 0.0001]]
@@ -67,10 +69,10 @@ def polar_covariance(phasor: ArrayLike, covariance: ArrayLike) -> Array:
 
 
 def phase_by_leakage(light: ArrayLike, reference: ArrayLike | None = None) -> Array:
-    """Derivatives of the light's phase by real and imaginary part of the leakage taken out, (..., 2) rad/V.
+    """Derivatives of light phase by leakage parts, (..., 2) rad/V.
 
     light       V, complex, after the subtraction, not 0
-    reference   V, complex: with it, of the phase after the reference's, on which the same leakage acts
+    reference   V, complex: if given, of the phase relative to the reference's, with the same leakage
 
     More leakage taken out along the real axis turns a phasor A exp(i phi) by sin(phi)/A, along the imaginary axis by
     -cos(phi)/A. Where target and reference have one amplitude and phase the two cancel.
@@ -88,35 +90,35 @@ def phase_by_leakage(light: ArrayLike, reference: ArrayLike | None = None) -> Ar
 def phase_covariance(
     light: ArrayLike, u_phasor: ArrayLike, leakage_covariance: ArrayLike, *, reference: ArrayLike | None = None
 ) -> Array:
-    """Covariance of the phases of n shots that one leakage was taken from, (n, n) rad^2.
+    """Phase covariance of n shots sharing one leakage, (n, n) rad^2.
 
     light                (n,) V, complex, after the subtraction
     u_phasor             (n,) V or one number, standard uncertainty of each quadrature
     leakage_covariance   (2, 2) V^2
-    reference            (n,) V, complex: with it, of the phases after the references'; the references' own noise is not
-                         in it (see `drift_at`)
+    reference            (n,) V, complex: if given, of the phases relative to the references'; without the references'
+                         noise (see `drift_at`)
 
     >>> phase_covariance([1.0, 2.0], 0.0, np.diag([0.0, 4e-6])).round(12).tolist()
     [[4e-06, 2e-06], [2e-06, 1e-06]]
     """
     z = np.asarray(light, dtype=complex)
     slope = phase_by_leakage(z, reference)
-    own = np.broadcast_to((np.asarray(u_phasor, dtype=float) / np.abs(z)) ** 2, z.shape)
-    return np.diag(own) + slope @ np.asarray(leakage_covariance, dtype=float) @ slope.T
+    shot_variance = np.broadcast_to((np.asarray(u_phasor, dtype=float) / np.abs(z)) ** 2, z.shape)
+    return np.diag(shot_variance) + slope @ np.asarray(leakage_covariance, dtype=float) @ slope.T
 
 
 @dataclass(frozen=True, eq=False)
 class Leakage:
-    """An estimated leakage.
+    """Estimated leakage, with covariance and residuals.
 
     phasor               V, complex
     covariance           (2, 2) V^2, of the estimate
-    covariance_in_use    (2, 2) V^2, of the leakage at another time: with its scatter between sessions where that shows
-    residual             V, (n,): complex, or from the circle (above 0 outside) where only that shows
+    covariance_in_use    (2, 2) V^2, of the leakage at another time: with its scatter between sessions if estimated
+    residual             V, (n,): complex, or from the circle (above 0 outside) for a circle fit
     variance_factor      of the residuals against the given uncertainties; NaN where none were given
     degrees_of_freedom   of the covariance
-    drift                how much slower than white noise the buffers wander within their sessions, standard normal
-                         where they do not (3 says: more sessions, or less time each); NaN with fewer than 4 in each
+    drift                test of slow drift within the sessions against white noise, standard normal without drift
+                         (at 3: take more sessions, or shorter ones); NaN with fewer than 4 in each
     """
 
     phasor: complex
@@ -129,16 +131,18 @@ class Leakage:
 
 
 def blocked_leakage(phasor: ArrayLike, session: ArrayLike | None = None) -> Leakage:
-    """Leakage from buffers taken with the beam blocked: the mean of the sessions' means, with their scatter.
+    """Leakage from buffers with the beam blocked.
+
+    Mean of the session means, with their scatter.
 
     phasor    (n,) V, complex, in order of time
     session   (n,) label of each buffer's session; by default one session
 
-    With several sessions the uncertainty is their means' scatter, whatever drifts within or between them; a leakage met
-    later scatters by once more of that (slightly too much: it holds the noise of a session's mean). With one session it
-    is the buffers' scatter, true only where `drift` shows none, and nothing is known of other times.
+    With several sessions the uncertainty is their means' scatter, whatever drifts within or between them; a later
+    leakage has that scatter in addition (slightly too much: it includes the noise of a session's mean). With one
+    session it is the buffers' scatter, valid only where `drift` is insignificant, and not for other times.
 
-    Raises ValidityError for a phasor that is no number, EstimationError for fewer than 3 sessions, or 3 buffers in one
+    Raises ValidityError for a phasor that is not finite, EstimationError for fewer than 3 sessions, or 3 buffers in one
     session: a (2, 2) scatter needs that.
 
     Source: [JCGM100] 4.2.3, standard uncertainty of a mean; drift by the ratio of successive differences.
@@ -155,7 +159,7 @@ def blocked_leakage(phasor: ArrayLike, session: ArrayLike | None = None) -> Leak
     units = means if count > 1 else z
     if len(units) < 3:
         what = f"{count} sessions" if count > 1 else f"{len(z)} buffers in one session"
-        raise EstimationError(f"{what} show no scatter of a leakage (expected at least 3)")
+        raise EstimationError(f"{what} do not determine the scatter of a leakage (expected at least 3)")
     scatter = np.cov(np.stack([units.real, units.imag]))
     covariance = scatter / len(units)
     return Leakage(
@@ -170,16 +174,18 @@ def blocked_leakage(phasor: ArrayLike, session: ArrayLike | None = None) -> Leak
 
 
 def circle_leakage(phasor: ArrayLike, u_phasor: ArrayLike) -> Leakage:
-    """Leakage as the centre of the circle on which phasors of constant amplitude and any phase lie.
+    """Leakage as the centre of a circle of phasors.
+
+    The phasors have constant amplitude and any phase.
 
     phasor     (n,) V, complex, of a retroreflector moved over a half wavelength or more
     u_phasor   V, standard uncertainty of each quadrature, (n,) or one number, above 0
 
-    Nothing need be known of the phases. An amplitude that varies with the phase by e cos(x - a) cannot be told from a
-    leakage: the rail must be aimed. On a short arc centre and radius go together, and the covariance says so. It is of
-    first order; the bias is of second order (a few u^2/radius on a quarter of the circle).
+    The phases need not be known. An amplitude that varies with the phase by e cos(x - a) cannot be separated from a
+    leakage: the rail must be aligned. On a short arc centre and radius are correlated, as the covariance shows. It is
+    of first order; the bias is of second order (a few u^2/radius on a quarter of the circle).
 
-    Raises ValidityError for phasors or uncertainties that are none, EstimationError where the phasors show no circle.
+    Raises ValidityError for invalid phasors or uncertainties, EstimationError where the phasors do not form a circle.
 
     Source: least squares of the distances from a circle, by Gauss and Newton from the algebraic fit of Kasa.
 
@@ -190,7 +196,7 @@ def circle_leakage(phasor: ArrayLike, u_phasor: ArrayLike) -> Leakage:
     z, u = np.asarray(phasor, dtype=complex), np.asarray(u_phasor, dtype=float)
     _expect_readings(z, u)
     if len(z) < 4:
-        raise EstimationError(f"{len(z)} phasors do not show a circle and its fit (expected at least 4)")
+        raise EstimationError(f"{len(z)} phasors do not determine a circle (expected at least 4)")
     u = np.broadcast_to(u, z.shape)
     point = _algebraic_circle(z)
     for _ in range(ITERATIONS):
@@ -212,23 +218,25 @@ def circle_leakage(phasor: ArrayLike, u_phasor: ArrayLike) -> Leakage:
             factor = float(np.sum((residual / u) ** 2)) / degrees
             centre = covariance[:2, :2]
             return Leakage(complex(point[0], point[1]), centre, centre, residual, factor, degrees)
-    raise EstimationError("the phasors show no circle: move the retroreflector over more of a half wavelength")
+    raise EstimationError("the phasors do not form a circle: move the retroreflector over more of a half wavelength")
 
 
 def rail_leakage(
     phasor: ArrayLike, phase: ArrayLike, u_phasor: ArrayLike, *, fading: ArrayLike | None = None
 ) -> Leakage:
-    """Leakage from phasors of a return whose phase is known but for a constant: an interferometer reads the rail.
+    """Leakage from phasors on a rail measured by interferometer.
+
+    The phase is known but for a constant.
 
     phasor     (n,) V, complex
-    phase      (n,) rad, -4 pi n_g f D/c of the retroreflector, falling with distance; any constant may be missing
+    phase      (n,) rad, -4 pi n_g f D/c of the retroreflector, falling with distance; the constant is free
     u_phasor   V, standard uncertainty of each quadrature, (n,) or one number, above 0
     fading     (n,) along which the amplitude may vary in a line (the distance, the time); by default it is constant
 
     Solves phasor = leakage + (g + h fading) exp(i phase) for three complex numbers: linear, and unlike the circle not
-    deceived by a rail that is not aimed. A known phase with the wrong sign shows as a variance factor far from 1.
+    biased by a misaligned rail. A phase with the wrong sign gives a variance factor far from 1.
 
-    Raises ValidityError for phasors or uncertainties that are none, EstimationError where the phases do not tell
+    Raises ValidityError for invalid phasors or uncertainties, EstimationError where the phases do not separate
     leakage from light.
 
     Source: complex least squares with circular noise, [FOERSTNER16] chapter 4. Exact for the model.
@@ -247,7 +255,7 @@ def rail_leakage(
         columns.append(turning * (along - along.mean()) / max(float(np.ptp(along)), np.finfo(float).tiny))
     design = np.stack(columns, axis=1) / u[:, None]
     if len(z) <= len(columns) or np.linalg.cond(design * u.mean()) > 1e6:
-        raise EstimationError(f"{len(z)} phasors do not tell leakage from light: move the retroreflector further")
+        raise EstimationError(f"{len(z)} phasors do not separate leakage from light: move the retroreflector further")
     inverse = np.linalg.pinv(design)
     residual = z - (design * u[:, None]) @ (inverse @ (z / u))
     covariance = float(np.sum(np.abs(inverse[0]) ** 2)) * np.eye(2)
@@ -257,7 +265,9 @@ def rail_leakage(
 
 
 def quadrature_range_error(noise_to_signal: ArrayLike, wavelength: ArrayLike) -> Array:
-    """Largest range error, in metres, from a disturbance of the signal's own frequency: the one in quadrature.
+    """Range error from a disturbance in quadrature, m.
+
+    The disturbance has the signal's own frequency.
 
     noise_to_signal    amplitude of the disturbance over that of the signal, 0 to 1
     wavelength         m, the modulation's group wavelength in air
@@ -272,13 +282,15 @@ def quadrature_range_error(noise_to_signal: ArrayLike, wavelength: ArrayLike) ->
 
 
 def worst_range_error(noise_to_signal: ArrayLike, wavelength: ArrayLike) -> Array:
-    """Largest range error, in metres, from a disturbance of the signal's own frequency in any direction.
+    """Largest range error from a disturbance at any phase, m.
+
+    The disturbance has the signal's own frequency.
 
     noise_to_signal    amplitude of the disturbance over that of the undisturbed signal, 0 to 1
     wavelength         m, the modulation's group wavelength in air
 
-    The sum of both is turned most where it stands at right angles to the disturbance: arcsin(r), the notes' 5.7 has
-    arctan(r). Raises ValidityError outside 0 to 1, where the disturbance rules the phase.
+    The sum is turned most where it is at right angles to the disturbance: arcsin(r), the notes' 5.7 has
+    arctan(r). Raises ValidityError outside 0 to 1, where the disturbance dominates the phase.
 
     >>> round(float(worst_range_error(0.1, 0.2) / quadrature_range_error(0.1, 0.2)), 5)
     1.005
@@ -288,7 +300,7 @@ def worst_range_error(noise_to_signal: ArrayLike, wavelength: ArrayLike) -> Arra
 
 
 def rms_range_error(noise_to_signal: ArrayLike, wavelength: ArrayLike) -> Array:
-    """Root mean square range error, in metres, from a disturbance whose phase may be any.
+    """Root mean square range error for random disturbance phase, m.
 
     noise_to_signal    amplitude of the disturbance over that of the undisturbed signal, 0 to 1
     wavelength         m, the modulation's group wavelength in air
@@ -323,7 +335,7 @@ def _expect_readings(z: Phasors, u: Array) -> None:
 
 
 def _algebraic_circle(z: Phasors) -> Array:
-    """Centre and radius by linear least squares of |z|^2 = 2 x a + 2 y b + c, counted from the middle."""
+    """Centre and radius by linear least squares of |z|^2 = 2 x a + 2 y b + c, from the mean."""
     middle = z.mean()
     w = z - middle
     design = np.stack([2.0 * w.real, 2.0 * w.imag, np.ones(len(w))], axis=1)
@@ -332,7 +344,7 @@ def _algebraic_circle(z: Phasors) -> Array:
 
 
 def _drift(z: Phasors, labels: NDArray[np.int64], count: int) -> float:
-    """One less the von Neumann ratio of all sessions, over its standard deviation for white circular noise."""
+    """Drift test of all sessions: 1 less the von Neumann ratio, over its sigma for white circular noise."""
     steps = squares = variance = 0.0
     for k in range(count):
         phasors = z[labels == k]

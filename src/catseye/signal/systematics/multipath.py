@@ -1,8 +1,9 @@
-"""Light that comes to the detector by more than one path: the modulation's phasors add, and the phase is of the sum.
+"""Multipath: phase of the sum of several light paths.
 
-A share is the modulation's amplitude by a further path over that by the direct one. Powers add here, as of light that
-does not interfere; where the paths are coherent, see `feedback.interference_phase`. Later light makes a short detour
-read longer, a detour of half a modulation wavelength nothing, a longer one shorter.
+Modulation phasors of the paths add. A share is the modulation's amplitude by a further path over that by the direct
+one. Powers add here, as of light that does not interfere; where the paths are coherent, see
+`feedback.interference_phase`. Delayed light makes the range too long for a short detour, unchanged for half a
+modulation wavelength, too short for a longer one.
 """
 
 import numpy as np
@@ -15,10 +16,10 @@ Array = NDArray[np.float64]
 
 
 def multipath_error(shares: ArrayLike, excess_paths: ArrayLike, wavelength: ArrayLike) -> Array:
-    """Metres that a range reads too long because of further paths.
+    """Range error from further light paths, m, positive where too long.
 
     shares         (..., p) of the direct light, each at least 0, their sum below 1
-    excess_paths   (..., p) m, whole detour of each path against the direct one (twice a distance, for there and back)
+    excess_paths   (..., p) m, full detour of each path against the direct one (twice a distance, for there and back)
     wavelength     m, the modulation's group wavelength in air
 
     The phasor over that of the direct light is 1 + sum s exp(-2 pi i e/wavelength), its phase turned into range. For
@@ -38,10 +39,12 @@ def multipath_error(shares: ArrayLike, excess_paths: ArrayLike, wavelength: Arra
 
 
 def two_retroreflectors(share: ArrayLike, separation: ArrayLike, wavelength: ArrayLike) -> Array:
-    """Metres that a range reads too long because a second retroreflector stands in the beam.
+    """Range error from a second retroreflector in the beam, m.
+
+    Positive where too long.
 
     share         its return over that of the first, 0 to below 1
-    separation    m, how much further away it is; below zero where it is nearer
+    separation    m, its distance beyond the first; below zero where it is nearer
     wavelength    m, the modulation's group wavelength in air
 
     Raises ValidityError for a share outside these limits.
@@ -55,17 +58,19 @@ def two_retroreflectors(share: ArrayLike, separation: ArrayLike, wavelength: Arr
 
 
 def cats_eye_error(path: ArrayLike, share: ArrayLike, wavelength: ArrayLike) -> Array:
-    """Metres that a range reads too long because the detector at its focus sends light out once more.
+    """Range error from light sent out again by the detector, m.
+
+    Positive where too long; the detector is at the focus (cat's-eye).
 
     path         m, one way from detector to target, optical path over the index that is in the wavelength
     share        returned once more for each return, 0 to below 1: see `share_a_pass`
     wavelength   m, the modulation's group wavelength in air
 
-    Each further round turns by -psi, psi = 4 pi path/wavelength, and keeps the share q: the geometric series sums to
+    Each further round turns by -psi, psi = 4 pi path/wavelength, with the share q: the geometric series sums to
     1/(1 - q exp(-i psi)) of the direct light. The range is too long by wavelength/(4 pi) arctan(q sin psi/(1 - q cos
     psi)), q sin psi to first order: period half a wavelength of distance, a cyclic deviation of order 1 and less of
-    higher ones (q^k/k), at most arcsin(q). Where the beam outgrows its target, a second round keeps less than the
-    first: give `multipath_error` its shares.
+    higher ones (q^k/k), at most arcsin(q). Where the beam is wider than its target, a second round returns less than
+    the first: give `multipath_error` its shares.
 
     Raises ValidityError for a share outside these limits.
 
@@ -80,15 +85,17 @@ def cats_eye_error(path: ArrayLike, share: ArrayLike, wavelength: ArrayLike) -> 
     return np.arctan2(q * np.sin(psi), 1.0 - q * np.cos(psi)) * w / (2.0 * TWO_PI)
 
 
-def cats_eye_cyclic(share: float, wavelength: float, orders: int, *, beyond: float = 0.0) -> tuple[Array, Array]:
-    """Cosine and sine coefficients (K,), metres, of the cat's-eye's deviation as a wave of the light's own phase x.
+def cats_eye_cyclic(share: float, wavelength: float, orders: int, *, extra_path: float = 0.0) -> tuple[Array, Array]:
+    """Cyclic coefficients (K,), cosine and sine, m, of cat's-eye error.
+
+    A wave of the light's own phase x.
 
     share        returned once more for each return, 0 to below 1
     wavelength   m, the modulation's group wavelength in air
     orders       K
-    beyond       m, the path from detector to target less the distance that x counts: D0, plus mirror to detector
+    extra_path   m, the path from detector to target less the distance that x counts: D0, plus mirror to detector
 
-    With psi = 4 pi beyond/wavelength - x. Raises ValidityError for a share outside these limits.
+    With psi = 4 pi extra_path/wavelength - x. Raises ValidityError for a share outside these limits.
 
     Source: Fourier series of -arg(1 - q exp(-i psi)): q^k/k sin(k psi) wavelength/(4 pi). Exact.
 
@@ -98,20 +105,22 @@ def cats_eye_cyclic(share: float, wavelength: float, orders: int, *, beyond: flo
     q = float(_shares(np.array([share]))[0])
     k = np.arange(1, orders + 1)
     size = q**k / k * wavelength / (2.0 * TWO_PI)
-    turn = k * 2.0 * TWO_PI * beyond / wavelength
+    turn = k * 2.0 * TWO_PI * extra_path / wavelength
     return size * np.sin(turn), -size * np.cos(turn)
 
 
 def share_a_pass(
-    detector_reflectance: ArrayLike, recollected: ArrayLike, two_way: ArrayLike, *, mirrors: ArrayLike = 1.0
+    detector_reflectance: ArrayLike, recollected: ArrayLike, path_transmission: ArrayLike, *, mirrors: ArrayLike = 1.0
 ) -> Array:
-    """Share of a return that comes back once more: what the detector reflects, the lens takes up, the target returns.
+    """Share of a return that comes back once more.
+
+    Detector, lens and target combined.
 
     detector_reflectance   of its face and window together, 0 to 1
     recollected            of that, the part that leaves in the beam again, 0 to 1 (1 for a mirror in the focus; for a
                            white scatterer the sine squared of the lens's half angle)
-    two_way                of that, the part that the target sends back to the detector, 0 to 1
-    mirrors                transmission of all else on the way there and back, 0 to 1
+    path_transmission      of that, the part that the target sends back to the detector, 0 to 1
+    mirrors                transmission of all other parts, both directions, 0 to 1
 
     Raises ValidityError for a number outside 0 to 1.
 
@@ -122,7 +131,7 @@ def share_a_pass(
     for name, value in (
         ("reflectance of the detector", detector_reflectance),
         ("recollected part", recollected),
-        ("two-way transmission", two_way),
+        ("two-way transmission", path_transmission),
         ("transmission of the mirrors", mirrors),
     ):
         factor = np.asarray(value, dtype=float)
@@ -134,7 +143,7 @@ def share_a_pass(
 
 
 def largest_share(range_error: ArrayLike, wavelength: ArrayLike) -> Array:
-    """Share of a further path that moves no range by more than a limit, whatever its detour.
+    """Share of a path that shifts no range beyond a limit.
 
     range_error   m, above 0, at most an eighth of the wavelength
     wavelength    m, the modulation's group wavelength in air
@@ -150,7 +159,7 @@ def largest_share(range_error: ArrayLike, wavelength: ArrayLike) -> Array:
     error, w = np.asarray(range_error, dtype=float), np.asarray(wavelength, dtype=float)
     if np.any((error <= 0.0) | (error > w / 8.0)):
         raise ValidityError(
-            f"a limit of {error.min():.3g} to {error.max():.3g} m is not within 0 to an eighth wavelength"
+            f"a limit of {error.min():.3g} to {error.max():.3g} m is not within 0 to an eighth of a wavelength"
         )
     return np.sin(2.0 * TWO_PI * error / w)
 
@@ -159,6 +168,6 @@ def _shares(shares: ArrayLike) -> Array:
     s = np.asarray(shares, dtype=float)
     if np.any(s < 0.0) or np.any(np.sum(s, axis=-1) >= 1.0):
         raise ValidityError(
-            "shares of further paths are below 0 or sum to 1 or more: the direct light is not the first"
+            "shares of further paths are below 0 or sum to 1 or more: the direct light is not the strongest"
         )
     return s

@@ -1,1 +1,1 @@
-"""Shaking: spectra, modes, a filter that foretells."""
+"""Vibration: spectra, modes, and a filter that predicts."""

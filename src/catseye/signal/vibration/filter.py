@@ -1,21 +1,22 @@
-"""Vibration of the structure, followed and foretold: a phase-locked filter of one or more modes.
+"""Phase-locked filter to track and predict structural vibration.
 
-What is seen is a displacement with one or more axes: the spot on a quadrant detector (two), or a point that ground
-rangers track (three). Each mode is a damped oscillator, driven by a white force (wind, motors):
+The filter has one or more modes. The observation is a displacement with one or more axes: the spot on a quadrant
+detector (two), or a point that ground rangers track (three). Each mode is a damped oscillator, driven by a white force
+(wind, motors):
 
     y(t) = sum_k Re z_k(t) + offset,     dz_k = (-d_k + i w_k) z_k dt - i force_k dt / w_k,
 
 w = 2 pi f the damped frequency and d = zeta w/sqrt(1 - zeta^2) the decay. The real part of z_k (complex for each axis)
 is the displacement, its imaginary part holds the velocity, (-d Re z - velocity)/w, where the force enters; but for
 terms of the order zeta, |z| is the amplitude and arg z the phase. The force keeps each quadrature at the stationary
-covariance S_k between the axes. An extended Kalman filter carries all z_k, the frequencies (which walk slowly) and the
-offsets with their full covariance: its oscillators lock their phases to what is seen, start without knowledge of the
-phase (z = 0 with the covariance S), coast through lost samples, and foretell the displacement with an honest
-uncertainty, because the force to come is in it. Kicks that are not of the size of S (the start of a slew) are not
-foretold; the innovations show them. The damping is held at what the mode says.
+covariance S_k between the axes. An extended Kalman filter estimates all z_k, the frequencies (which walk slowly) and
+the offsets with their full covariance: its oscillators lock their phases to the observations, start without knowledge
+of the phase (z = 0 with the covariance S), coast through lost samples, and predict the displacement with a realistic
+uncertainty, because it includes the future force. Kicks larger than S (the start of a slew) are not predicted; the
+innovations show them. The damping is held at the mode's value.
 
 A sample may be the mean over a window (a ranger's buffer of 128 ms, sampled some 7 times a second): a mode then shows
-with its mean over the window, and a mode above half the sampling rate may be followed if its frequency is known well
+with its mean over the window, and a mode above half the sampling rate may be tracked if its frequency is known well
 enough beforehand.
 """
 
@@ -30,22 +31,22 @@ from catseye.errors import ValidityError
 
 Array = NDArray[np.float64]
 
-PARTS = 8  # of a window, from one to the next of which the force is carried
-ROUNDING = 1e-9  # s: windows that touch may seem to overlap by so much
+PARTS = 8  # of a window, for the force within it
+ROUNDING = 1e-9  # s: rounding overlap of adjacent windows
 
 
 @dataclass(frozen=True, eq=False)
 class Mode:
-    """One mode of vibration as the filter starts with it.
+    """Mode of vibration with which the filter starts.
 
     frequency_hz        Hz, above 0, damped
     damping_ratio       of critical, above 0, below 1
     covariance          (A, A) m^2, stationary, of each quadrature between the axes; its diagonal is the mean square
     u_frequency_hz      Hz, 0 or more
-    u_damping           of the natural logarithm of the damping ratio; for the reader, the filter holds the damping
+    u_damping           of the natural logarithm of the damping ratio; information only, the filter holds the damping
     drift_hz            Hz per square root of a second, the walk of the frequency
 
-    Raises ValidityError for a number outside these, and for a covariance that is none.
+    Raises ValidityError for a number outside these, and for an invalid covariance.
     """
 
     frequency_hz: float
@@ -82,16 +83,16 @@ class Mode:
 
     @property
     def decay(self) -> float:
-        """1/s, at which its amplitude falls without force."""
+        """Amplitude decay rate without force, 1/s."""
         return float(decay_of(self.angular, self.damping_ratio))
 
 
 @dataclass(frozen=True, eq=False)
 class FilterState:
-    """What the filter knows at one time.
+    """Filter state at one time.
 
     time         s
-    modes        as they were when it started, m of them
+    modes        as at the start, m of them
     mean         (n,): for each mode real parts of z (A), imaginary parts (A); then m angular frequencies, rad/s; then
                  A offsets, m; n = m (2 A + 1) + A
     covariance   (n, n)
@@ -114,14 +115,17 @@ class FilterState:
         return self.mean[at] / TWO_PI, np.sqrt(np.diag(self.covariance)[at]) / TWO_PI
 
     def amplitudes(self) -> tuple[Array, Array]:
-        """Amplitude (m, A) of each mode and axis, m, and its standard uncertainty; first order, so only above u."""
+        """Amplitude (m, A), m, with its standard uncertainty.
+
+        First order, so valid only above u.
+        """
         z, q = self.quadratures()
         size = np.maximum(np.linalg.norm(z, axis=-1), np.finfo(float).tiny)
         along = z / size[..., None]
         return size, np.sqrt(np.einsum("mai,maij,maj->ma", along, q, along))
 
     def phases(self) -> tuple[Array, Array]:
-        """Phase (m, A), rad, so that the displacement is amplitude cos(phase); and its standard uncertainty."""
+        """Phase (m, A), rad, with standard uncertainty: amplitude cos(phase)."""
         z, q = self.quadratures()
         size = np.maximum(np.linalg.norm(z, axis=-1), np.finfo(float).tiny)
         across = np.stack([-z[..., 1], z[..., 0]], axis=-1) / size[..., None] ** 2
@@ -134,7 +138,7 @@ class FilterState:
         return self.mean[pairs], self.covariance[pairs[..., :, None], pairs[..., None, :]]
 
     def advanced(self, time: float) -> "FilterState":
-        """The state at a later time, without a look at anything.
+        """State at a later time, without an observation.
 
         time    s, not before the state's
         """
@@ -142,30 +146,33 @@ class FilterState:
         return replace(self, time=time, mean=mean, covariance=slope @ self.covariance @ slope.T + noise)
 
     def _moved(self, step: float) -> tuple[Array, Array, Array]:
-        """Mean after a step, its derivatives by the mean before it, and the covariance that force and walks add."""
+        """Mean after a step, derivatives, and added covariance.
+
+        Force and walks add covariance.
+        """
         if not step >= 0.0:
             raise ValidityError(f"a time lies {-step:.6g} s before the filter's: samples must come in order")
         m, axes = len(self.modes), self.axes
         n, at = len(self.mean), _frequencies(m, axes)
         mean, slope, noise = self.mean.copy(), np.eye(n), np.zeros((n, n))
         for k, mode in enumerate(self.modes):
-            own, w = slice(2 * axes * k, 2 * axes * (k + 1)), at[k]
+            block, w = slice(2 * axes * k, 2 * axes * (k + 1)), at[k]
             turn = _turn(np.exp((1j * self.mean[w] - mode.decay) * step), axes)
-            mean[own] = turn @ self.mean[own]
-            quarter = _turn(1j, axes) @ mean[own]  # derivative by phase
-            slope[own, own], slope[own, w] = turn, step * quarter
+            mean[block] = turn @ self.mean[block]
+            quarter = _turn(1j, axes) @ mean[block]  # derivative by phase
+            slope[block, block], slope[block, w] = turn, step * quarter
             fresh, walk = driven(self.mean[w], mode.decay, step), (TWO_PI * mode.drift_hz) ** 2
-            noise[own, own] = np.kron(fresh, mode.covariance) + np.outer(quarter, quarter) * walk * step**3 / 3
-            noise[own, w] = noise[w, own] = quarter * walk * step**2 / 2
+            noise[block, block] = np.kron(fresh, mode.covariance) + np.outer(quarter, quarter) * walk * step**3 / 3
+            noise[block, w] = noise[w, block] = quarter * walk * step**2 / 2
             noise[w, w] = walk * step
         offsets = np.arange(n - axes, n)
         noise[offsets, offsets] = self.offset_walk**2 * step
         return mean, slope, noise
 
     def expected_sample(self, window: float = 0.0) -> tuple[Array, Array, Array]:
-        """Displacement (A,) m that a sample of now shows, its derivatives (A, n), and the force's part in a window.
+        """Expected displacement (A,) m of a sample, its derivatives (A, n), and the force's part in a window.
 
-        window    s, over which the sample is the mean, its middle now; 0 for an instant
+        window    s, averaging window of the sample, centred on the state's time; 0 for an instant
         """
         m, axes = len(self.modes), self.axes
         at, rows = _frequencies(m, axes), np.zeros((axes, len(self.mean)))
@@ -181,18 +188,18 @@ class FilterState:
             inner += mode.covariance * driven_within(self.mean[at[k]], mode.decay, window)
         return value, rows, inner
 
-    def looked(
+    def updated(
         self, time: float, sample: ArrayLike, noise: ArrayLike, window: float = 0.0
     ) -> tuple["FilterState", Array, Array]:
-        """The state after a sample; the innovation (A,) m, observed minus foretold; and its covariance (A, A).
+        """State after a sample; the innovation (A,) m, observed minus predicted; its covariance (A, A).
 
         time     s, of the sample, the middle of its window
         sample   (A,) m; NaN where lost, and then the innovation is NaN
         noise    (A, A) m^2, covariance of the sample
-        window   s, over which it is the mean; it begins where the last one ended, or later
+        window   s, averaging window; it begins at the end of the last one, or later
 
         The state is then that of the end of the window, but for a half of the last of its PARTS. Within a part the
-        mode is taken as undisturbed but for its own variance; from part to part the force is carried exactly.
+        mode is taken as undisturbed except for its variance; from part to part the force is propagated exactly.
         """
         parts = PARTS if window > 0.0 else 1
         part, state = window / parts, self
@@ -202,36 +209,36 @@ class FilterState:
             when = time + (k + 0.5) * part - 0.5 * window
             mean, slope, fresh = state._moved(0.0 if abs(when - state.time) < ROUNDING else when - state.time)
             state = replace(state, time=when, mean=mean, covariance=slope @ state.covariance @ slope.T + fresh)
-            shown, rows, inner = state.expected_sample(part)
+            expected, rows, inner = state.expected_sample(part)
             cross = slope @ cross
             shared = rows @ cross / parts
             spread = spread + shared + shared.T + (rows @ state.covariance @ rows.T + inner) / parts**2
             cross = cross + state.covariance @ rows.T / parts
-            value = value + shown / parts
+            value = value + expected / parts
         innovation = np.asarray(sample, dtype=float) - value
-        there = np.isfinite(innovation)
-        if not there.any():
+        valid = np.isfinite(innovation)
+        if not valid.any():
             return state, innovation, spread
-        gain = np.linalg.solve(spread[np.ix_(there, there)], cross[:, there].T).T
-        q = state.covariance - gain @ cross[:, there].T
+        gain = np.linalg.solve(spread[np.ix_(valid, valid)], cross[:, valid].T).T
+        q = state.covariance - gain @ cross[:, valid].T
         return (
-            replace(state, mean=state.mean + gain @ innovation[there], covariance=0.5 * (q + q.T)),
+            replace(state, mean=state.mean + gain @ innovation[valid], covariance=0.5 * (q + q.T)),
             innovation,
             spread,
         )
 
     def predicted(self, times: ArrayLike) -> tuple[Array, Array]:
-        """Displacement (..., A), m, without the offset, and its covariance (..., A, A) m^2, at times to come.
+        """Predicted displacement (..., A), m, without the offset, and its covariance (..., A, A) m^2.
 
         times    (...), s, not before the state's
         """
-        each, spread = self.predicted_modes(times)
-        m, axes = each.shape[-2:]
+        by_mode, spread = self.predicted_modes(times)
+        m, axes = by_mode.shape[-2:]
         blocks = spread.reshape(*spread.shape[:-2], m, axes, m, axes)
-        return each.sum(axis=-2), blocks.sum(axis=(-4, -2))
+        return by_mode.sum(axis=-2), blocks.sum(axis=(-4, -2))
 
     def predicted_modes(self, times: ArrayLike) -> tuple[Array, Array]:
-        """Displacement (..., m, A) of each mode, m, and their covariance (..., m A, m A) m^2, at times to come.
+        """Predicted displacement (..., m, A) of each mode, m, and its covariance (..., m A, m A) m^2.
 
         times    (...), s, not before the state's
         """
@@ -248,11 +255,11 @@ class FilterState:
 
 @dataclass(frozen=True, eq=False)
 class FilterTrack:
-    """What the filter did with a row of samples.
+    """Filter results over a series of samples.
 
     state         after the last
-    innovations   (N, A) m, observed minus foretold; NaN where lost
-    spreads       (N, A, A) m^2, the covariance that the filter claimed for them
+    innovations   (N, A) m, observed minus predicted; NaN where lost
+    spreads       (N, A, A) m^2, their predicted covariance
     """
 
     state: FilterState
@@ -267,14 +274,16 @@ class FilterTrack:
 
 
 def start(time: float, modes: Sequence[Mode], *, u_offset: float, offset_walk: float = 0.0) -> FilterState:
-    """The filter before its first sample: no phase is known, the amplitudes are as large as they usually are.
+    """Filter state before the first sample.
+
+    Unknown phase, amplitudes of stationary size.
 
     time          s
     modes         one or more, with the same axes
-    u_offset      m, of the displacement at rest, which is expected 0
+    u_offset      m, of the displacement at rest, whose expectation is 0
     offset_walk   m per square root of a second
 
-    Raises ValidityError for modes of different axes or none.
+    Raises ValidityError for modes of different axes, or no modes.
 
     >>> start(0.0, [Mode(7.0, 0.01, np.diag([1e-6, 4e-6]), 0.1)], u_offset=0.01).mean.round(6).tolist()
     [0.0, 0.0, 0.0, 0.0, 43.982297, 0.0, 0.0]
@@ -301,13 +310,13 @@ def start(time: float, modes: Sequence[Mode], *, u_offset: float, offset_walk: f
 def follow(
     state: FilterState, times: ArrayLike, samples: ArrayLike, *, noise: ArrayLike, window: float = 0.0
 ) -> FilterTrack:
-    """The filter led through samples.
+    """Run the filter through samples.
 
     state     before them
     times     (N,) s, in order; of the middle of each window
     samples   (N, A) m; NaN where lost
     noise     (A, A) or (N, A, A) m^2, covariance of a sample; white
-    window    s, over which each sample is the mean; 0 for an instant
+    window    s, averaging window of each sample; 0 for an instant
 
     Source: [JAZWINSKI70], the extended Kalman filter; the model is at the top of this file.
 
@@ -325,12 +334,12 @@ def follow(
     r = np.broadcast_to(np.asarray(noise, dtype=float), (*y.shape, state.axes))
     innovations, spreads = np.empty_like(y), np.empty((*y.shape, state.axes))
     for i in range(len(when)):
-        state, innovations[i], spreads[i] = state.looked(float(when[i]), y[i], r[i], window)
+        state, innovations[i], spreads[i] = state.updated(float(when[i]), y[i], r[i], window)
     return FilterTrack(state, innovations, spreads)
 
 
 def window_gain(w: ArrayLike, d: ArrayLike, window: float) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """What a mean over a window shows of a mode, (...), complex, and its derivative by the angular frequency.
+    """Gain of a mean over a window on a mode, (...), complex, and its derivative by angular frequency.
 
     w, d      (...), angular frequency, rad/s, and decay, 1/s
     window    s; 0 gives 1
@@ -350,13 +359,19 @@ def window_gain(w: ArrayLike, d: ArrayLike, window: float) -> tuple[NDArray[np.c
 
 
 def decay_of(w: ArrayLike, damping_ratio: ArrayLike) -> Array:
-    """1/s, decay of a mode of damped angular frequency w, rad/s, and damping ratio, of critical. Exact."""
+    """Decay rate of a damped mode, 1/s.
+
+    w               rad/s, damped angular frequency
+    damping_ratio   of critical
+
+    Exact.
+    """
     zeta = np.asarray(damping_ratio, dtype=float)
     return zeta * np.asarray(w, dtype=float) / np.sqrt(1.0 - zeta**2)
 
 
 def driven(w: ArrayLike, d: ArrayLike, step: float) -> Array:
-    """Covariance (..., 2, 2) of real and imaginary part that the force brings in a step, for the size S = 1.
+    """Covariance (..., 2, 2) of both quadratures added by the force in a step, for S = 1.
 
     w, d    (...), damped angular frequency, rad/s, and decay, 1/s
     step    s; infinity gives the stationary covariance
@@ -379,12 +394,12 @@ def driven(w: ArrayLike, d: ArrayLike, step: float) -> Array:
 
 
 def driven_within(w: ArrayLike, d: ArrayLike, window: float) -> Array:
-    """Variance (...) that the force adds to a mean over a window, given the state in its middle, for the size S = 1.
+    """Variance (...) that the force adds to a window mean, given the state in its middle, for S = 1.
 
     w, d, window    as for `window_gain`
 
-    Each half brings 4 d times the integral of ((1 - cos w r)/(w window))^2 over it. Its correlation with the states to
-    come is left out; for the short parts of a window it is small.
+    Each half brings 4 d times the integral of ((1 - cos w r)/(w window))^2 over it. Its correlation with later
+    states is neglected; for the short parts of a window it is small.
     """
     w, d, half = np.asarray(w, dtype=float), np.asarray(d, dtype=float), 0.5 * window
     x = w * half
@@ -395,11 +410,11 @@ def driven_within(w: ArrayLike, d: ArrayLike, window: float) -> Array:
 
 
 def _frequencies(modes: int, axes: int) -> NDArray[np.intp]:
-    """Where the angular frequencies stand in the state."""
+    """Indices of the angular frequencies in the state."""
     return 2 * axes * modes + np.arange(modes)
 
 
 def _turn(factor: complex, axes: int) -> Array:
-    """A complex factor as a matrix on real parts and imaginary parts."""
+    """Complex factor as a matrix on real parts and imaginary parts."""
     one = np.eye(axes)
     return np.block([[one * factor.real, -one * factor.imag], [one * factor.imag, one * factor.real]])

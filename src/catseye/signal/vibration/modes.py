@@ -1,4 +1,4 @@
-"""The modes of a vibration found in a stretch of samples, for `filter` to start with."""
+"""Vibration modes from a series of samples, for `filter`."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,12 +11,12 @@ from catseye.errors import EstimationError, ValidityError
 from catseye.signal.vibration.filter import Array, Mode, decay_of, driven, driven_within, start, window_gain
 
 DAMPING_PRIOR = (0.01, 1.5)  # ratio, and standard deviation of its logarithm: structures have 0.2 to 5 percent
-PASSES = 30  # of scoring; it takes some ten
+PASSES = 30  # scoring steps; it takes some ten
 SETTLED = 1e-3  # of a standard uncertainty, squared: the last step
-SLACK = 0.3  # of the samples' own scatter: the noise of the filter that takes a mode away to find the next
-FREQUENCIES = 4000  # most of the first search
+SLACK = 0.3  # of the samples' scatter: noise of the filter that removes a mode to find the next
+FREQUENCIES = 4000  # upper limit of the first search
 MOST_DAMPING = 0.5  # ratio, while searching
-WIDE = 1e3  # times the largest sample: the prior of an offset of which nothing is known
+WIDE = 1e3  # times the largest sample: prior of an unknown offset
 
 
 def find_modes(
@@ -29,20 +29,20 @@ def find_modes(
     near_hz: Sequence[float] | None = None,
     drift_hz: float = 0.0,
 ) -> tuple[Mode, ...]:
-    """Frequencies, dampings and sizes of the modes in a stretch of samples, by maximum likelihood.
+    """Frequencies, dampings, sizes of modes, by maximum likelihood.
 
     times      (N,) s, rising, any gaps
     samples    (N, A) m; NaN where lost
     count      of modes
     u_sample   m, above 0, white noise of each axis
-    window     s, over which each sample is the mean
+    window     s, averaging window of each sample
     near_hz    first guesses; without them the highest peaks of the spectrum below half the sampling rate
     drift_hz   walk of the frequencies, passed on to the modes
 
-    The likelihood is the Kalman filter's own (axes apart, offsets free, the force within a window taken as white),
-    climbed by Fisher's scoring; the dampings have a wide prior, 1 % within a factor of 4.5, since a short stretch says
-    little of them. The covariance between axes comes from the filtered states, and widens the uncertainties where axes
-    swing together. Raises EstimationError with too few samples or where it does not settle.
+    The likelihood is that of the Kalman filter (axes separate, offsets free, the force within a window taken as white),
+    maximized by Fisher's scoring; the dampings have a wide prior, 1 % within a factor of 4.5, since a short series
+    hardly determines them. The covariance between axes comes from the filtered states, and increases the uncertainties
+    where axes move together. Raises EstimationError with too few samples or without convergence.
 
     Source: [SCHWEPPE65], the likelihood of innovations.
 
@@ -57,22 +57,22 @@ def find_modes(
             f"samples have shape {y.shape}, times {t.shape}, modes {count}: expected (N, A), (N,), 1 up"
         )
     if not np.all(np.diff(t) > 0.0) or not 0.0 < u_sample < np.inf:
-        raise ValidityError(f"times do not rise, or u_sample = {u_sample} m is not above 0 and finite")
+        raise ValidityError(f"times do not increase, or u_sample = {u_sample} m is not above 0 and finite")
     if near_hz is not None and (len(near_hz) != count or not all(0.0 < f < np.inf for f in near_hz)):
         raise ValidityError(f"near_hz = {list(near_hz)} for {count} modes (expected one above 0 for each)")
-    there = np.isfinite(y)
-    if there.sum(axis=0).min() < 8 * count:
+    valid = np.isfinite(y)
+    if valid.sum(axis=0).min() < 8 * count:
         raise EstimationError(
-            f"{there.sum(axis=0).min()} samples do not show {count} modes (expected {8 * count} at least)"
+            f"{valid.sum(axis=0).min()} samples do not determine {count} modes (expected {8 * count} at least)"
         )
-    modes, shown = np.zeros((0, 2 + y.shape[1])), y
+    modes, residual = np.zeros((0, 2 + y.shape[1])), y
     for k in range(count):
-        guess = near_hz[k] if near_hz is not None else _peak(t, shown)
-        modes = np.vstack([modes, _begun(guess, t, y, u_sample, window)])
-        # the next mode is the highest peak of what a slack filter of those before it does not foretell
+        guess = near_hz[k] if near_hz is not None else _peak(t, residual)
+        modes = np.vstack([modes, _initial(guess, t, y, u_sample, window)])
+        # the next mode is the highest peak left by a loose filter of the modes before it
         slack = max(u_sample, SLACK * float(np.sqrt(np.nanmean(np.nanvar(y, axis=0)))))
         innovations, variances = _innovations(_joined(modes)[None], t, y, slack, window, k + 1)
-        shown = np.where(there, (innovations / np.sqrt(variances)).reshape(y.shape), np.nan)
+        residual = np.where(valid, (innovations / np.sqrt(variances)).reshape(y.shape), np.nan)
     theta, information = _climbed(_joined(modes), t, y, u_sample, window, count)
     covariance = np.linalg.inv(information)
     u = np.sqrt(np.diag(covariance))
@@ -82,7 +82,7 @@ def find_modes(
         worst = int(np.argmax(damping))
         raise EstimationError(
             f"the mode at {frequency[worst]:.4g} Hz has the damping ratio {damping[worst]:.3g} (expected below "
-            f"{MOST_DAMPING}): it is no vibration; look for fewer modes"
+            f"{MOST_DAMPING}): not a vibration; look for fewer modes"
         )
     apart = tuple(
         Mode(float(frequency[k]), float(damping[k]), np.diag(sizes[k] ** 2), u[k] / TWO_PI, u[count + k], drift_hz)
@@ -92,7 +92,7 @@ def find_modes(
 
 
 def _climbed(theta: Array, t: Array, y: Array, u_sample: float, window: float, count: int) -> tuple[Array, Array]:
-    """Parameters of the highest likelihood with the dampings' prior, and their information."""
+    """Maximum-likelihood parameters with damping prior, and information."""
     scale = np.concatenate([np.full(count, 0.1 / (t[-1] - t[0])), np.full(len(theta) - count, 0.05)])
     tried, best, best_information = theta, -np.inf, np.eye(len(theta))
     step: Array = np.zeros(len(theta))
@@ -100,21 +100,21 @@ def _climbed(theta: Array, t: Array, y: Array, u_sample: float, window: float, c
         value, gradient, information = _scored(tried, scale, t, y, u_sample, window, count)
         if value > best:
             theta, best, best_information = tried, value, information
-            wanted = np.asarray(np.linalg.solve(information, gradient), dtype=float)
+            full_step = np.asarray(np.linalg.solve(information, gradient), dtype=float)
             reach = np.concatenate([np.full(count, 3.0 / (t[-1] - t[0])), np.full(len(theta) - count, 1.0)])
-            step = wanted * min(1.0, float(np.min(reach / np.maximum(np.abs(wanted), 1e-300))))
+            step = full_step * min(1.0, float(np.min(reach / np.maximum(np.abs(full_step), 1e-300))))
         else:
-            step = 0.5 * step  # too far
+            step = 0.5 * step  # overshoot
         if float(step @ best_information @ step) < SETTLED:
             return theta, best_information
         tried = theta + step
-    raise EstimationError(f"modes did not settle in {PASSES} passes: give fewer modes, near_hz, or a longer stretch")
+    raise EstimationError(f"modes did not converge in {PASSES} passes: give fewer modes, near_hz, or a longer stretch")
 
 
 def _scored(
     theta: Array, scale: Array, t: Array, y: Array, u_sample: float, window: float, count: int
 ) -> tuple[float, Array, Array]:
-    """Logarithm of the likelihood, its gradient and the expected information, by differences of innovations."""
+    """Log-likelihood, its gradient and expected information, by differences of innovations."""
     p = len(theta)
     candidates = np.concatenate([theta[None], theta + np.diag(scale), theta - np.diag(scale)])
     v, f = _innovations(candidates, t, y, u_sample, window, count)
@@ -134,7 +134,7 @@ def _scored(
 def _innovations(
     candidates: Array, t: Array, y: Array, u_sample: float, window: float, count: int
 ) -> tuple[Array, Array]:
-    """Innovations (P, N A) and variances for P sets of parameters at once, each axis by itself; lost ones 0, 1."""
+    """Innovations (P, N A) and variances for P sets of parameters, axes separate; lost ones 0, 1."""
     p, axes = len(candidates), y.shape[1]
     w = candidates[:, :count]
     d = decay_of(w, np.minimum(np.exp(candidates[:, count : 2 * count]), MOST_DAMPING))
@@ -142,8 +142,8 @@ def _innovations(
     n = 2 * count + 1
     row = np.zeros((p, 1, n))
     for k in range(count):
-        shown = window_gain(w[:, k], d[:, k], window)[0]
-        row[:, 0, 2 * k], row[:, 0, 2 * k + 1] = shown.real, -shown.imag
+        averaging = window_gain(w[:, k], d[:, k], window)[0]
+        row[:, 0, 2 * k], row[:, 0, 2 * k + 1] = averaging.real, -averaging.imag
     row[:, 0, -1] = 1.0
     noise = u_sample**2 + np.sum(power * driven_within(w, d, window)[:, None, :], axis=-1)
     mean: Array = np.zeros((p, axes, n))
@@ -151,10 +151,10 @@ def _innovations(
     q[..., :-1, :-1] = _fresh(w, d, power, np.inf)
     q[..., -1, -1] = (WIDE * float(np.nanmax(np.abs(y)) + u_sample)) ** 2
     innovations, variances = np.zeros((p, len(t), axes)), np.ones((p, len(t), axes))
-    before, last = float(t[0]), 0.0
+    previous, last = float(t[0]), 0.0
     move, fresh = np.broadcast_to(np.eye(n), (p, 1, n, n)), np.zeros((p, axes, n - 1, n - 1))
-    for i, now in enumerate(t):
-        step = now - before
+    for i, instant in enumerate(t):
+        step = instant - previous
         if step > 0.0:
             if abs(step - last) > 1e-12:
                 move, last = _moves(w, d, step), step
@@ -162,30 +162,30 @@ def _innovations(
             mean = (move @ mean[..., None])[..., 0]
             q = move @ q @ np.swapaxes(move, -1, -2)
             q[..., :-1, :-1] += fresh
-            before = now
+            previous = instant
         qh = (q @ row[..., None])[..., 0]
         f = np.sum(qh * row, axis=-1) + noise
-        lost = ~np.isfinite(y[i])
-        v = np.where(lost, 0.0, y[i] - np.sum(mean * row, axis=-1))
-        gain = np.where(lost[:, None], 0.0, qh / f[..., None])
+        missing = ~np.isfinite(y[i])
+        v = np.where(missing, 0.0, y[i] - np.sum(mean * row, axis=-1))
+        gain = np.where(missing[:, None], 0.0, qh / f[..., None])
         mean = mean + gain * v[..., None]
         q = q - gain[..., :, None] * qh[..., None, :]
-        innovations[:, i], variances[:, i] = v, np.where(lost, 1.0, f)
+        innovations[:, i], variances[:, i] = v, np.where(missing, 1.0, f)
     return innovations.reshape(p, -1), variances.reshape(p, -1)
 
 
 def _fresh(w: Array, d: Array, power: Array, step: float) -> Array:
-    """Covariance (P, A, 2m, 2m) that the force brings in a step."""
+    """Covariance (P, A, 2m, 2m) added by the force in a step."""
     p, axes, count = power.shape
     blocks = driven(w, d, step)[:, None] * power[..., None, None]  # (P, A, m, 2, 2)
-    whole = np.zeros((p, axes, 2 * count, 2 * count))
+    covariance = np.zeros((p, axes, 2 * count, 2 * count))
     for k in range(count):
-        whole[:, :, 2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = blocks[:, :, k]
-    return whole
+        covariance[:, :, 2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = blocks[:, :, k]
+    return covariance
 
 
 def _moves(w: Array, d: Array, step: float) -> Array:
-    """Transition (P, 1, n, n) over a step."""
+    """Transition matrix (P, 1, n, n) of a step."""
     p, count = w.shape
     move = np.zeros((p, 1, 2 * count + 1, 2 * count + 1))
     size = np.exp(-d * step)
@@ -198,15 +198,15 @@ def _moves(w: Array, d: Array, step: float) -> Array:
 
 
 def _correlated(modes: tuple[Mode, ...], t: Array, y: Array, u_sample: float, window: float) -> tuple[Mode, ...]:
-    """The modes with the correlation between axes that their filtered states show."""
+    """Modes with the correlation between axes from their filtered states."""
     axes = y.shape[1]
     if axes == 1:
         return modes
     state = start(float(t[0]) - 0.5 * window, modes, u_offset=WIDE * float(np.nanmax(np.abs(y))))
     sums = np.zeros((len(modes), axes, axes))
-    for now, sample in zip(t, y, strict=True):
-        state = state.looked(float(now), sample, np.eye(axes) * u_sample**2, window)[0]
-        if now > 0.5 * (t[0] + t[-1]):  # locked by then
+    for instant, sample in zip(t, y, strict=True):
+        state = state.updated(float(instant), sample, np.eye(axes) * u_sample**2, window)[0]
+        if instant > 0.5 * (t[0] + t[-1]):  # locked by then
             z = state.quadratures()[0]
             sums += np.einsum("mai,mbi->mab", z, z)
     correlated = []
@@ -215,7 +215,7 @@ def _correlated(modes: tuple[Mode, ...], t: Array, y: Array, u_sample: float, wi
         sigma = np.sqrt(np.diag(mode.covariance))
         correlation = product / np.maximum(np.outer(size, size), np.finfo(float).tiny)
         np.fill_diagonal(correlation, 1.0)
-        # axes taken as independent count their information twice where they swing together: the scores' own variance
+        # axes taken as independent count shared information twice: use the variance of the scores
         more = float(np.sqrt(np.sum(correlation**2) / axes))
         spread = {"u_frequency_hz": mode.u_frequency_hz * more, "u_damping": mode.u_damping * more}
         correlated.append(replace(mode, covariance=correlation * np.outer(sigma, sigma), **spread))
@@ -223,7 +223,7 @@ def _correlated(modes: tuple[Mode, ...], t: Array, y: Array, u_sample: float, wi
 
 
 def _peak(t: Array, y: Array) -> float:
-    """Frequency, Hz, of the highest peak of the power summed over axes."""
+    """Frequency of the highest peak of the power summed over axes, Hz."""
     span, highest = t[-1] - t[0], 0.5 / float(np.median(np.diff(t)))
     grid = np.linspace(1.0 / span, highest, min(FREQUENCIES, int(4 * highest * span)))
     power = np.zeros(len(grid))
@@ -233,20 +233,20 @@ def _peak(t: Array, y: Array) -> float:
 
 
 def _waves(frequencies_hz: Array, t: Array, y: Array) -> Array:
-    """Amplitude (f, A) of the wave of each frequency in the samples, tapered at both ends."""
+    """Wave amplitude (f, A) of each frequency in the samples, tapered at both ends."""
     taper = np.where(np.isfinite(y), (0.5 - 0.5 * np.cos(TWO_PI * (t - t[0]) / (t[-1] - t[0])))[:, None], 0.0)
     clean = np.where(np.isfinite(y), y - np.nanmean(y, axis=0), 0.0)
     waves = np.exp(-1j * TWO_PI * np.outer(frequencies_hz, t))
     return 2.0 * np.abs(waves @ (clean * taper)) / np.sum(taper, axis=0)
 
 
-def _begun(frequency_hz: float, t: Array, y: Array, u_sample: float, window: float) -> Array:
-    """A mode to begin with (2 + A,): angular frequency, logarithms of damping and of size on each axis."""
+def _initial(frequency_hz: float, t: Array, y: Array, u_sample: float, window: float) -> Array:
+    """Initial parameters of a mode (2 + A,): angular frequency, log damping, log size on each axis."""
     gain = abs(complex(window_gain(TWO_PI * frequency_hz, 0.0, window)[0]))
     size = np.maximum(_waves(np.array([frequency_hz]), t, y)[0] / np.sqrt(2.0) / gain, u_sample)
     return np.array([TWO_PI * frequency_hz, np.log(DAMPING_PRIOR[0]), *np.log(size)])
 
 
 def _joined(modes: Array) -> Array:
-    """Rows of modes as one vector: frequencies, dampings, sizes."""
+    """Mode rows as one vector: frequencies, dampings, sizes."""
     return np.concatenate([modes[:, 0], modes[:, 1], modes[:, 2:].ravel()])

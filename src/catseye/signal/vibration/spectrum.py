@@ -1,12 +1,12 @@
-"""Power spectra and cross spectra of displacements, evenly sampled or not, and what may hide behind a peak.
+"""Power and cross spectra of displacements, with alias tests.
 
-One-sided densities: the integral of S(f) over f > 0 is the variance. Each channel has its own times (a ranger its own
-rhythm); a stretch of them is tapered and transformed at its true times, and stretches that overlap by half are
-averaged. Evenly sampled channels give Welch's estimate to the last digit.
+Sampling may be uneven. One-sided densities: the integral of S(f) over f > 0 is the variance. Each channel has its own
+times (each ranger its own rate); a segment is tapered and transformed at its true times, and segments that overlap by
+half are averaged. Evenly sampled channels give Welch's estimate to the last digit.
 
-A ranger that measures 7.8 times a second shows everything below 3.9 Hz: a wave of 5 Hz appears at 2.8 Hz and nothing
-in its own numbers tells. Rangers that measure at other instants do tell: at the true frequency their amplitudes have
-one phase (or its opposite), at an alias they have not.
+A ranger that measures 7.8 times a second shows all waves below 3.9 Hz: a wave of 5 Hz appears at 2.8 Hz, and its own
+data cannot show that. Rangers that measure at other instants can: at the true frequency their amplitudes have
+one phase (or its opposite), at an alias they do not.
 """
 
 from collections.abc import Sequence
@@ -19,10 +19,10 @@ from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
 
 Array = NDArray[np.float64]
-LEAST = 8  # samples of a channel in a stretch
-LEAST_GAIN = 0.2  # of a buffer's mean: below it what a sample shows of a wave is not carried back
-EVEN = 1e-6  # of the interval, rms: times as even as this have a Nyquist frequency in the strict sense
-PIECE = 4_000_000  # numbers in work at a time
+LEAST = 8  # samples of a channel in a segment
+LEAST_GAIN = 0.2  # of a buffer's mean: below it a wave is not corrected for averaging
+EVEN = 1e-6  # of the interval, rms: times this even have a strict Nyquist frequency
+PIECE = 4_000_000  # numbers processed at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +49,11 @@ class Spectrum:
 
     @property
     def nyquist_hz(self) -> Array:
-        """(A,) half the sampling rate: what lies above it appears below."""
+        """Half the sampling rate, (A,) Hz; higher frequencies are aliased below it."""
         return 0.5 * self.rate_hz
 
     def interval(self, probability: float = 0.95) -> Array:
-        """(F, A, 2) m^2/Hz: limits that hold the true density with that probability, chi-square with `degrees`."""
+        """Limits (F, A, 2), m^2/Hz, that hold the true density with a probability, chi-square with `degrees`."""
         from scipy.stats import chi2
 
         tail = 0.5 * (1.0 - probability)
@@ -61,17 +61,17 @@ class Spectrum:
         return self.density[..., None] * self.degrees / quantiles
 
     def coherence(self, a: int, b: int) -> Array:
-        """(F,) squared, 0 to 1, of two channels."""
+        """Squared coherence (F,) of two channels, 0 to 1."""
         product = self.cross[:, a, a].real * self.cross[:, b, b].real
         return np.abs(self.cross[:, a, b]) ** 2 / np.maximum(product, np.finfo(float).tiny)
 
-    def before_the_mean(self, window: float) -> "Spectrum":
-        """The spectrum of what moved, where samples are means over a window.
+    def without_averaging(self, window: float) -> "Spectrum":
+        """Spectrum corrected for samples that are means over a window.
 
         window    s: 0.128 of a ranger's buffer
 
         Divided by (sin x / x)^2, x = pi f window; NaN where that gain is below LEAST_GAIN, 0.2. Noise of the samples
-        themselves, which no window dampened, grows with it.
+        themselves, which the window did not attenuate, is amplified.
         """
         gain = np.sinc(self.frequency_hz * window)
         factor = np.where(np.abs(gain) >= LEAST_GAIN, 1.0 / np.maximum(np.abs(gain), LEAST_GAIN) ** 2, np.nan)
@@ -86,19 +86,19 @@ def spectrum(
     highest_hz: float | None = None,
     tapered: bool = True,
 ) -> Spectrum:
-    """Densities and cross densities of channels, each with its own times.
+    """Densities and cross densities of channels with separate times.
 
     times        A of (N_a,) s, rising, any gaps; one clock
     samples      A of (N_a,) m
-    stretch      s, length of what is transformed at once; the whole, where it is None
-    highest_hz   of the frequencies; half the highest mean rate where it is None
+    stretch      s, segment length; None: the full series
+    highest_hz   highest frequency; None: half the highest mean rate
     tapered      with Hann's window; without it neighbouring frequencies leak
 
-    Frequencies are multiples of 1 / stretch. Each stretch's mean is taken out; one with less than 8 samples of a
-    channel is left out. With K stretches overlapping by half there are 2 K / (1 + (K - 1)/(18 K)) degrees of freedom.
+    Frequencies are multiples of 1 / stretch. Each segment's mean is removed; one with fewer than 8 samples of a
+    channel is skipped. With K segments overlapping by half there are 2 K / (1 + (K - 1)/(18 K)) degrees of freedom.
     Unevenly sampled noise spreads a floor over all frequencies; its integral up to half the mean rate is the variance.
 
-    Raises ValidityError for times that do not rise, numbers that are not finite, or no stretch with enough samples.
+    Raises ValidityError for times that do not increase, numbers that are not finite, or no segment with enough samples.
 
     Source: [WELCH67] (averaging, degrees of freedom), [SCARGLE82] eq. 6 (uneven times). Checked against scipy's.
 
@@ -112,16 +112,16 @@ def spectrum(
     _refuse(t, y)
     first, last = min(x[0] for x in t), max(x[-1] for x in t)
     interval = [float(np.median(np.diff(x))) for x in t]
-    whole = last - first + min(interval)  # a sample stands for the interval after it
-    length = whole if stretch is None else float(stretch)
-    if not 0.0 < length <= whole * (1.0 + 1e-9):
-        raise ValidityError(f"a stretch of {length:.6g} s of {whole:.6g} s (expected above 0 and no longer)")
-    starts = first + 0.5 * length * np.arange(int(np.floor(2.0 * (whole / length - 1.0) + 1e-6)) + 1)
+    total = last - first + min(interval)  # a sample stands for the interval after it
+    length = total if stretch is None else float(stretch)
+    if not 0.0 < length <= total * (1.0 + 1e-9):
+        raise ValidityError(f"a segment of {length:.6g} s of {total:.6g} s (expected above 0 and no longer)")
+    starts = first + 0.5 * length * np.arange(int(np.floor(2.0 * (total / length - 1.0) + 1e-6)) + 1)
     rate = np.array([(len(x) - 1) / (x[-1] - x[0]) for x in t])
     top = 0.5 * float(rate.max()) if highest_hz is None else float(highest_hz)
     frequency = np.arange(1, int(np.floor(top * length + 1e-6)) + 1) / length
     if not len(frequency):
-        raise ValidityError(f"no frequency up to {top:.6g} Hz in stretches of {length:.6g} s (expected longer ones)")
+        raise ValidityError(f"no frequency up to {top:.6g} Hz in segments of {length:.6g} s (expected longer ones)")
     cross, used = np.zeros((len(frequency), len(t), len(t)), dtype=complex), 0
     for start in starts:
         waves = _waves(start, length, frequency, t, y, tapered)
@@ -129,21 +129,21 @@ def spectrum(
             cross += waves.conj()[:, :, None] * waves[:, None, :]
             used += 1
     if not used:
-        raise ValidityError(f"no stretch of {length:.6g} s holds {LEAST} samples of each channel: take longer ones")
-    both = np.ones_like(frequency)
+        raise ValidityError(f"no segment of {length:.6g} s holds {LEAST} samples of each channel: take longer ones")
+    sides = np.ones_like(frequency)
     if len({len(x) for x in t}) == 1 and all(np.std(np.diff(x)) < EVEN * np.mean(np.diff(x)) for x in t):
-        both = np.where(np.abs(frequency - 0.5 * rate[0]) < 1e-6 * rate[0], 0.5, 1.0)  # Nyquist's has no other side
+        sides = np.where(np.abs(frequency - 0.5 * rate[0]) < 1e-6 * rate[0], 0.5, 1.0)  # Nyquist: one side
     shared = 1.0 / 18.0 if tapered else 0.5  # twice the squared correlation of neighbours that overlap by half
     degrees = 2.0 * used / (1.0 + shared * (used - 1.0) / used)
     width = (1.5 if tapered else 1.0) / length
-    scaled: NDArray[np.complex128] = cross * (2.0 / used * both)[:, None, None].astype(complex)
+    scaled: NDArray[np.complex128] = cross * (2.0 / used * sides)[:, None, None].astype(complex)
     return Spectrum(frequency, scaled, degrees, width, rate)
 
 
 def _waves(
     start: float, length: float, frequency: Array, t: Sequence[Array], y: Sequence[Array], tapered: bool
 ) -> NDArray[np.complex128] | None:
-    """(F, A) of one stretch, such that twice |wave|^2 is the density; None where a channel has too few samples."""
+    """Waves (F, A) of one segment, with twice |wave|^2 the density; None with too few samples."""
     waves = np.empty((len(frequency), len(t)), dtype=complex)
     for a, (when, values) in enumerate(zip(t, y, strict=True)):
         low, high = np.searchsorted(when, [start - 1e-9 * length, start + length * (1.0 - 1e-9)])
@@ -167,12 +167,12 @@ def _refuse(t: Sequence[Array], y: Sequence[Array]) -> None:
                 f"channel {a}: times {when.shape}, samples {values.shape} (expected both (n,), {LEAST} at least)"
             )
         if not (np.isfinite(values).all() and np.all(np.diff(when) > 0.0)):
-            raise ValidityError(f"channel {a}: times do not rise, or a sample is not finite (leave lost ones out)")
+            raise ValidityError(f"channel {a}: times do not increase, or a sample is not finite (leave lost ones out)")
 
 
 @dataclass(frozen=True)
 class Peak:
-    """A peak of the density summed over channels.
+    """Peak of the density summed over channels.
 
     frequency_hz   of its top, a parabola through the logarithms of three densities
     density        m^2/Hz, there
@@ -185,13 +185,13 @@ class Peak:
 
 
 def peaks(spectrum: Spectrum, *, probability: float = 0.999, about_hz: float | None = None) -> tuple[Peak, ...]:
-    """Where the density stands above its surroundings by more than chance makes of it, the highest first.
+    """Peaks of the density above the level of chance, highest first.
 
     spectrum         a spectrum
-    probability   that the highest of all frequencies of a smooth spectrum is not taken for a peak
-    about_hz      half width of the surroundings; 12 bandwidths where it is None
+    probability   that no frequency of a smooth spectrum is taken for a peak
+    about_hz      half width of the surroundings; None: 12 bandwidths
 
-    A smooth background is judged by its median; of a band broader than the surroundings only the edges show.
+    The background is the local median; of a band broader than the surroundings only the edges are found.
     """
     from scipy.ndimage import median_filter
     from scipy.stats import chi2
@@ -202,7 +202,7 @@ def peaks(spectrum: Spectrum, *, probability: float = 0.999, about_hz: float | N
     degrees = spectrum.degrees * _effective(spectrum)
     background = median_filter(total, size=2 * half + 1, mode="nearest") * degrees / chi2.ppf(0.5, degrees)
     limit = chi2.ppf(probability ** (1.0 / max(len(total), 1)), degrees) / degrees
-    # the median of so many independent frequencies is itself uncertain: pi/2 the variance of a mean
+    # the median of independent frequencies is uncertain too: pi/2 times the variance of a mean
     limit *= 1.0 + 2.0 * np.sqrt(np.pi / degrees * spectrum.bandwidth_hz / ((2 * half + 1) * step))
     inner = np.arange(1, len(total) - 1)
     tops = inner[(total[inner] > total[inner - 1]) & (total[inner] >= total[inner + 1])]
@@ -219,13 +219,13 @@ def peaks(spectrum: Spectrum, *, probability: float = 0.999, about_hz: float | N
 
 
 def _effective(spectrum: Spectrum) -> float:
-    """How many independent channels the sum of densities is of: (sum)^2 / sum of squares; 1 where one prevails."""
+    """Effective number of independent channels in the summed density: (sum)^2 / sum of squares; 1 if one dominates."""
     mean = spectrum.density.mean(axis=0)
     return float(mean.sum() ** 2 / np.sum(mean**2))
 
 
 def aliases(frequency_hz: float, rate_hz: float, highest_hz: float) -> tuple[float, ...]:
-    """All frequencies up to the highest that a channel of this rate shows alike, the lowest first.
+    """All frequencies up to the highest that are aliases at a channel's rate, lowest first.
 
     >>> aliases(2.8, 7.8, 12.0)
     (2.8, 5.0, 10.6)
@@ -238,35 +238,37 @@ def aliases(frequency_hz: float, rate_hz: float, highest_hz: float) -> tuple[flo
 def likely_alias(
     times: Sequence[ArrayLike], samples: Sequence[ArrayLike], candidates_hz: Sequence[float], *, stretch: float
 ) -> tuple[float, Array]:
-    """Which of some frequencies a wave seen by several channels has, and how well each fits.
+    """Most likely frequency among aliases, with each candidate's fit.
+
+    The wave is seen by several channels.
 
     times, samples   as for `spectrum`
     candidates_hz    such as `aliases` gives
-    stretch          s, over which the wave keeps its phase
+    stretch          s, segment over which the wave keeps its phase
 
-    One mode moves all points in phase or against it: the real part of the cross densities then holds all that their
-    largest eigenvalue does. At an alias each channel's phase is off by 2 pi times the difference of frequencies times
-    the offset of its rhythm. Returned is the first of the best and the share (C,), 1 at most, of the summed density
-    that real shapes hold; where two shares are nearly alike (one channel, one rhythm), nothing is known.
+    One mode moves all points in phase or in antiphase: the largest eigenvalue of the cross densities then comes from
+    their real part alone. At an alias each channel's phase is wrong by 2 pi times the difference of frequencies times
+    the offset of its sampling. Returns the first of the best and the share (C,), 1 at most, of the summed density
+    that real shapes hold; where two shares are nearly equal (one channel, one rate), the result is undetermined.
     """
     t = [np.asarray(x, dtype=float) for x in times]
     y = [np.asarray(x, dtype=float) for x in samples]
     _refuse(t, y)
     first, last = min(x[0] for x in t), max(x[-1] for x in t)
-    asked = np.asarray(candidates_hz, dtype=float)
-    total = np.zeros((len(asked), len(t), len(t)), dtype=complex)
+    candidates = np.asarray(candidates_hz, dtype=float)
+    total = np.zeros((len(candidates), len(t), len(t)), dtype=complex)
     for start in np.arange(first, max(last - stretch, first) + 1e-9, 0.5 * stretch):
-        waves = _waves(start, stretch, asked, t, y, True)
+        waves = _waves(start, stretch, candidates, t, y, True)
         if waves is not None:
             total += waves.conj()[:, :, None] * waves[:, None, :]
     scale = np.maximum(np.einsum("faa->f", total).real, np.finfo(float).tiny)
     share = np.linalg.eigvalsh(total.real)[:, -1] / scale
-    return float(asked[int(np.argmax(share))]), share
+    return float(candidates[int(np.argmax(share))]), share
 
 
 @dataclass(frozen=True, eq=False)
 class ModeShape:
-    """How channels move together about a frequency.
+    """Relative motion of channels at a frequency.
 
     frequency_hz   the middle of the band
     rms            (A,) m, of each channel in the band, noise included
@@ -283,11 +285,11 @@ class ModeShape:
 
 
 def shape_at(spectrum: Spectrum, frequency_hz: float, *, half_width_hz: float | None = None) -> ModeShape:
-    """The shape of a mode from the cross densities about its frequency.
+    """Mode shape from the cross densities about a frequency.
 
     spectrum           a spectrum of two channels or more
     frequency_hz    of the mode
-    half_width_hz   of the band; 2 bandwidths where it is None
+    half_width_hz   of the band; None: 2 bandwidths
 
     Source: [BRINCKER01] (singular vectors of the spectral matrix are mode shapes); u of a ratio from its coherence
     c, averaged over K: sqrt((1 - c) / (2 K c)) of it, [BENDAT10] chapter 9; NaN where the coherence is below 0.05.

@@ -1,1 +1,1 @@
-"""Time that is passed in: a clock of the world, and an event loop in virtual time."""
+"""Simulated clocks: manual time, and an event loop in virtual time."""

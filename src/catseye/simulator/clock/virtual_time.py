@@ -1,14 +1,14 @@
-"""Time as fast as the work is done: an event loop whose clock jumps to the next timer when nothing is ready.
+"""Virtual time: an event loop whose clock jumps to the next timer.
 
-The same servers, clients and coordinator run in it as in real time, without sockets (`MemoryNetwork`) and without
-chance: callbacks run in the order in which they were asked for, and no time passes while they work.
+The same servers, clients and coordinator run in it as in real time, without sockets (`MemoryNetwork`) and
+deterministically: callbacks run in the order of their requests, and no time passes while they run.
 
     loop = VirtualLoop()
     clock = VirtualClock(loop, start_mjd=52889.125)
     loop.run_until_complete(story(clock, MemoryNetwork()))
 
-What happens outside (a thread, a process, a real socket) takes no virtual time. Jobs of `run_in_executor` are waited
-for before time jumps; for anything else that is outside say so: `with loop.outside(): await asyncio.wrap_future(f)`.
+Work outside (a thread, a process, a real socket) takes no virtual time. Jobs of `run_in_executor` are awaited
+before time jumps; for any other work outside use: `with loop.outside(): await asyncio.wrap_future(f)`.
 """
 
 import asyncio
@@ -26,7 +26,7 @@ P = TypeVar("P", bound=asyncio.BaseProtocol)
 
 
 class _Jumping(selectors.DefaultSelector):
-    """A selector that does not wait but jumps; the loop's own time is here, in ns from 0."""
+    """Selector that jumps instead of waiting; holds the loop's time, ns from 0."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -40,9 +40,9 @@ class _Jumping(selectors.DefaultSelector):
         if ready or (timeout is not None and due is None):
             return ready
         if self.outside:
-            return super().select(None)  # a thread that is done writes to the loop's own pipe
+            return super().select(None)  # a finished thread writes to the loop's pipe
         if timeout is None or due is None:
-            raise CatseyeError("nothing can happen any more: no timer is set, nothing is ready (expected either)")
+            raise CatseyeError("deadlock: no timer is set and nothing is ready (expected either)")
         self.now_ns = max(self.now_ns, round(due * PER_SECOND))
         while self.now_ns / PER_SECOND + RESOLUTION <= due:  # a double's steps are longer than 1 ns after three months
             self.now_ns += 1
@@ -50,7 +50,7 @@ class _Jumping(selectors.DefaultSelector):
 
 
 class VirtualLoop(asyncio.SelectorEventLoop):
-    """An event loop in virtual time, which begins at 0."""
+    """Event loop in virtual time, which begins at 0."""
 
     def __init__(self) -> None:
         self._jumping = _Jumping()
@@ -59,7 +59,10 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         self._jumping.due = self._due
 
     def _due(self) -> float | None:
-        """When the next timer is; None where time must not move. What asyncio tells its selector is capped at a day."""
+        """Time of the next timer; None where time must not move.
+
+        asyncio caps the timeout of its selector at a day.
+        """
         if self._ready or self._stopping or not self._scheduled:  # type: ignore[attr-defined]
             return None
         return float(self._scheduled[0]._when)  # type: ignore[attr-defined]
@@ -75,7 +78,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 
     @contextmanager
     def outside(self) -> Iterator[None]:
-        """Time stands still inside: something is awaited that happens outside the loop."""
+        """Stop virtual time while something outside the loop is awaited."""
         self._jumping.outside += 1
         try:
             yield
@@ -85,7 +88,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def run_in_executor(  # type: ignore[override]
         self, executor: Any, func: Callable[..., Any], *args: Any
     ) -> "asyncio.Future[Any]":
-        """As any loop's; time stands still until it is done."""
+        """Run in an executor; virtual time stops until it is done."""
         future = super().run_in_executor(executor, func, *args)
         self._jumping.outside += 1
         future.add_done_callback(self._came_back)
@@ -96,9 +99,9 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 
 
 class VirtualClock:
-    """UTC of a virtual world.
+    """UTC of a simulated world in virtual time.
 
-    loop        whose time it is
+    loop        source of the time
     start_mjd   MJD when the loop's time is 0
     """
 
@@ -111,7 +114,7 @@ class VirtualClock:
 
 
 class MemoryNetwork:
-    """Connections without sockets: what one end writes the other is given, in order, `latency` s later.
+    """Network connections without sockets, delivered in order after `latency` s.
 
     latency   s, one way
     """
@@ -122,7 +125,7 @@ class MemoryNetwork:
         self._next_port = 49_152
 
     async def serve(self, factory: Callable[[], asyncio.Protocol], host: str, port: int) -> "MemoryListener":
-        """Listen; port 0 takes a free one. Raises OSError: taken."""
+        """Listen; port 0 takes a free one. Raises OSError if taken."""
         if port == 0:
             port, self._next_port = self._next_port, self._next_port + 1
         if (host, port) in self._listeners:
@@ -131,26 +134,26 @@ class MemoryNetwork:
         return MemoryListener(self, host, port)
 
     async def connect(self, factory: Callable[[], P], host: str, port: int) -> P:
-        """Both ends, connected. Raises ConnectionRefusedError: nobody listens."""
+        """Connected near end. Raises ConnectionRefusedError if nobody listens."""
         accepting = self._listeners.get((host, port))
         if accepting is None:
             raise ConnectionRefusedError(111, "connection refused")
         loop = asyncio.get_running_loop()
         near, far = factory(), accepting()
-        here, there = MemoryTransport(loop, near, self.latency), MemoryTransport(loop, far, self.latency)
-        here.peer, there.peer = there, here
-        near.connection_made(here)
-        far.connection_made(there)
+        local, remote = MemoryTransport(loop, near, self.latency), MemoryTransport(loop, far, self.latency)
+        local.peer, remote.peer = remote, local
+        near.connection_made(local)
+        far.connection_made(remote)
         await asyncio.sleep(0)
         return near
 
     def forget(self, host: str, port: int) -> None:
-        """Nobody listens there any more."""
+        """Stop listening at an address."""
         self._listeners.pop((host, port), None)
 
 
 class MemoryListener:
-    """A port of a `MemoryNetwork`."""
+    """Listening port of a `MemoryNetwork`."""
 
     def __init__(self, network: MemoryNetwork, host: str, port: int):
         self._network, self._host, self.port = network, host, port
@@ -160,7 +163,10 @@ class MemoryListener:
 
 
 class MemoryTransport(asyncio.Transport):
-    """One end: `write` queues for the peer; what a paused peer has not taken counts as unsent."""
+    """One end of a connection: `write` queues for the peer.
+
+    Bytes not taken by a paused peer count as unsent.
+    """
 
     def __init__(self, loop: asyncio.AbstractEventLoop, protocol: asyncio.BaseProtocol, latency: float):
         super().__init__()
@@ -168,7 +174,7 @@ class MemoryTransport(asyncio.Transport):
         self.peer: MemoryTransport | None = None
         self._sent: deque[bytes] = deque()  # on the way to the peer
         self._unsent = 0  # bytes of them
-        self._arrived = 0  # of them that have come as far as the peer, which may be paused
+        self._arrived = 0  # of them that have reached the peer, which may be paused
         self._reading, self._closing, self._lost = True, False, False
 
     def write(self, data: bytes | bytearray | memoryview) -> None:
@@ -179,13 +185,13 @@ class MemoryTransport(asyncio.Transport):
         self._later(self._arrive)
 
     def close(self) -> None:
-        """Closed when what was written has arrived."""
+        """Close once all written data has arrived."""
         if not self._closing:
             self._closing = True
             self._later(self._finish)
 
     def abort(self) -> None:
-        """Closed at once: what was written is lost."""
+        """Close immediately; data in transit is lost."""
         if not self._lost:
             self._forget()
             self._closing = True
@@ -208,7 +214,7 @@ class MemoryTransport(asyncio.Transport):
         return self._reading and not self._closing
 
     def get_write_buffer_size(self) -> int:
-        """Bytes that the peer has not taken."""
+        """Number of bytes the peer has not taken."""
         return self._unsent
 
     def get_extra_info(self, name: str, default: Any = None) -> Any:
@@ -236,7 +242,7 @@ class MemoryTransport(asyncio.Transport):
             self._finish()
 
     def _finish(self) -> None:
-        """The end of the stream has arrived."""
+        """Deliver the end of the stream."""
         if self._lost or (self._sent and self.peer is not None and not self.peer._lost):
             return
         self._lose()

@@ -1,10 +1,10 @@
-"""Time that moves only when told."""
+"""Manual clock that moves only on request."""
 
 from catseye.clock import PER_DAY, PER_SECOND
 
 
 class ManualClock:
-    """A clock that stands still until somebody lets time pass.
+    """Clock that stands still until advanced.
 
     >>> clock = ManualClock(52889.125)
     >>> clock.advance(0.5)
@@ -20,5 +20,5 @@ class ManualClock:
         return self._now
 
     def advance(self, seconds: float) -> None:
-        """Let time pass, 0 or more s."""
+        """Advance the time by 0 or more s."""
         self._now += max(0, round(seconds * PER_SECOND))

@@ -1,1 +1,1 @@
-"""Twins of laboratory instruments: refractometer, sound, triplet stand, panel tool."""
+"""Simulated laboratory instruments: refractometer, sound, triplet stand, panel tool."""

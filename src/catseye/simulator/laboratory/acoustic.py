@@ -1,6 +1,8 @@
-"""Recordings of sound that ran through moving air: the twin of a loudspeaker and a microphone at both ends of a path.
+"""Simulated recordings of sound along a path through moving air.
 
-The travel time is the integral of 1/(sqrt(c² - w_across²) + w_along) over the path, c by a formula of its own. The
+There is a loudspeaker and a microphone at both ends.
+
+The travel time is the integral of 1/(sqrt(c² - w_across²) + w_along) over the path, c by a separate formula. The
 signal is a function of time and is evaluated where it arrives, never shifted as samples.
 """
 
@@ -11,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
-# [CRAMER93] eq. 15 and table III, coded here a second time on purpose: temperature, humidity, pressure, carbon dioxide
+# [CRAMER93] eq. 15 and table III, coded twice on purpose: temperature, humidity, pressure, carbon dioxide
 A = (331.5024, 0.603055, -0.000528, 51.471935, 0.1495874, -0.000782, -1.82e-7, 3.73e-8, -2.93e-10, -85.20931, -0.228525,
      5.91e-5, -2.835149, -2.15e-13, 29.179762, 0.000486)  # fmt: skip
 
@@ -45,14 +47,14 @@ def sound_speed(temperature_c, pressure_hpa, humidity_percent, *, co2_ppm=450.0)
 
 @dataclass(frozen=True)
 class SoundPath:
-    """The air between A and B, functions of the share of the way from A, 0 to 1.
+    """Air between A and B as functions of the share of the path, 0 to 1.
 
     length             m
     temperature_c      °C
     wind_along         m/s, from A to B
     wind_across        m/s
-    pressure_hpa, humidity_percent, co2_ppm   the same all along
-    dispersion_ppm     what the sound's frequency adds to its speed (relaxation of nitrogen and oxygen)
+    pressure_hpa, humidity_percent, co2_ppm   constant along the path
+    dispersion_ppm     relative increase of speed at the sound's frequency (relaxation of nitrogen and oxygen)
     """
 
     length: float
@@ -65,7 +67,7 @@ class SoundPath:
     dispersion_ppm: float = 0.0
 
     def travel_times(self) -> tuple[float, float]:
-        """Travel times from A to B and from B to A, s, by Gauss-Legendre quadrature."""
+        """Travel times from A to B and B to A, s, by Gauss-Legendre quadrature."""
         share = 0.5 * (NODES + 1.0)
         c = sound_speed(self.temperature_c(share), self.pressure_hpa, self.humidity_percent, co2_ppm=self.co2_ppm)
         c = c * (1.0 + 1e-6 * self.dispersion_ppm)
@@ -79,17 +81,17 @@ class SoundPath:
 
 @dataclass(frozen=True)
 class Recorder:
-    """A microphone with its converter.
+    """Microphone with its converter.
 
     sampling_hz    Hz
     bits           of the converter, whose ends are plus and minus 1 V
     noise_volt     rms of white noise
     rumble_volt    rms of noise that falls with frequency (wind on the microphone), a first-order walk
     rumble_hz      its corner
-    level_volt     amplitude of the signal at 1 m from the loudspeaker: it falls with the distance run
-    echoes         (extra way in m, share of the amplitude that is left at the reflection, below zero turns it over)
+    level_volt     amplitude of the signal at 1 m from the loudspeaker: it falls with the distance
+    echoes         (extra path in m, share of the amplitude after the reflection, below zero inverts it)
     delay          s, of loudspeaker, microphone and electronics
-    clock_ahead    s, what this recorder's clock is ahead of the emission's
+    clock_ahead    s, lead of this recorder's clock over the emission's
     offset_volt    constant
     """
 
@@ -114,29 +116,29 @@ class Recorder:
         samples: int,
         rng: np.random.Generator,
     ) -> NDArray:
-        """(samples,) of what the microphone gives: every signal with its echoes, and noise.
+        """Microphone voltages (samples,): all signals with echoes, and noise.
 
         signal        function of time, zero outside its duration
         emissions     s, when each signal starts
         travel_time   s, one for all or one each
-        distance      m, 0 for a loop-back wire, which neither fades nor echoes
+        distance      m, 0 for a loop-back wire, without fading or echoes
         """
         time = np.arange(samples) / self.sampling_hz - self.clock_ahead
-        heard = self._noise(samples, rng) + self.offset_volt
+        voltage = self._noise(samples, rng) + self.offset_volt
         flights = np.broadcast_to(np.asarray(travel_time, float), (len(emissions),))
         for emission, flight in zip(emissions, flights, strict=True):
             direct = time - emission - flight - self.delay
             if distance == 0.0:
-                heard += 0.5 * signal(direct)
+                voltage += 0.5 * signal(direct)
                 continue
-            heard += self.level_volt / distance * signal(direct)
+            voltage += self.level_volt / distance * signal(direct)
             for extra, share in self.echoes:
                 late = extra * flight / distance
-                heard += share * self.level_volt / (distance + extra) * signal(direct - late)
-        return heard
+                voltage += share * self.level_volt / (distance + extra) * signal(direct - late)
+        return voltage
 
     def codes(self, volts: NDArray) -> NDArray[np.int32]:
-        """What the converter makes of them: rounded, and cut at its ends."""
+        """Converter codes of the voltages, rounded and clipped."""
         top = 2 ** (self.bits - 1)
         return np.clip(np.rint(volts * top), -top, top - 1).astype(np.int32)
 

@@ -1,8 +1,8 @@
-"""A crew with a panel setting instrument on panels that are solid bodies, by geometry alone.
+"""Simulated panel setting: a crew measures solid panels, by geometry alone.
 
 Each panel is a piece of the paraboloid, moved and turned as a rigid body, with a twist and bumps on it. The tool stands
-on its shaft; where each gauge's line meets the solid panel is sought along the line, and which panel it meets by
-crossing the panel's outline. Nothing here is linear, and nothing of the reduction is used but the records.
+on its shaft; each gauge's intersection with the solid panel is searched along its line, and the panel is found by
+crossing the outlines. Nothing here is linear, and only the records of the reduction are used.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from catseye.records.panels.layout import PanelLayout
 
 @dataclass(frozen=True, eq=False)
 class SolidPanels:
-    """Panels as they stand: design pieces moved by v -> middle + R (v - middle) + shift, reflector frame.
+    """Panels as rigid bodies: v -> middle + R (v - middle) + shift, reflector frame.
 
     middle    (p, 3) m
     shift     (p, 3) m
@@ -37,7 +37,10 @@ class SolidPanels:
     bump_phase: np.ndarray
 
     def shape(self, panel: np.ndarray, xy: np.ndarray) -> np.ndarray:
-        """(n,) m, how far the panel's own surface lies over its design at places of the design (n, 2)."""
+        """Height of the panel's surface over its design, (n,) m.
+
+        At places of the design (n, 2).
+        """
         arm = xy - self.middle[panel, :2]
         out = self.middle[panel, :2] / np.linalg.norm(self.middle[panel, :2], axis=1)[:, None]
         along = np.sum(arm * out, axis=1)
@@ -47,12 +50,12 @@ class SolidPanels:
         return self.twist[panel] * along * across / (half[:, 0] * half[:, 1]) + np.sum(self.bumps[panel] * wave, axis=1)
 
     def meets(self, panel: np.ndarray, start: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """(n,) m along a line from a start to the panel's surface, by secants."""
+        """Distance (n,) m along a line to the panel's surface, by secants."""
 
         def outside(s: np.ndarray) -> np.ndarray:
             point = start + s[:, None] * direction
-            rest = point - self.middle[panel] - self.shift[panel]
-            design = self.middle[panel] + np.einsum("nji,nj->ni", self.rotation[panel], rest)
+            offset = point - self.middle[panel] - self.shift[panel]
+            design = self.middle[panel] + np.einsum("nji,nj->ni", self.rotation[panel], offset)
             rise = design[:, 2] - np.sum(design[:, :2] ** 2, axis=1) / (4.0 * self.layout.focal_length)
             length = np.sqrt(1.0 + np.sum(design[:, :2] ** 2, axis=1) / (2.0 * self.layout.focal_length) ** 2)
             return rise / length - self.shape(panel, design[:, :2])
@@ -68,7 +71,7 @@ class SolidPanels:
         return b
 
     def heights(self) -> np.ndarray:
-        """(p, 4) m along the design's normals: how far the panels' corners lie over the paraboloid."""
+        """Height (p, 4) m of panel corners over the paraboloid, along normals."""
         p = np.repeat(np.arange(len(self.layout.panels)), 4)
         xy = self.layout.xy[self.layout.quad].reshape(-1, 2)
         point, _, _, normal = frame_at(xy, self.layout.focal_length)
@@ -76,7 +79,10 @@ class SolidPanels:
 
 
 def frame_at(xy: np.ndarray, focal_length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Points (n, 3) of the paraboloid, and outwards, round, normal there: gradients of z - (x² + y²)/4f, crossed."""
+    """Points (n, 3) of the paraboloid with outward, round and normal axes.
+
+    Gradients of z - (x² + y²)/4f, crossed.
+    """
     point = np.column_stack([xy, np.sum(xy**2, axis=1) / (4.0 * focal_length)])
     normal = np.column_stack([-xy / (2.0 * focal_length), np.ones(len(xy))])
     normal /= np.linalg.norm(normal, axis=1)[:, None]
@@ -94,7 +100,7 @@ def solid_panels(
     twist: float = 3e-5,
     bump: float = 0.0,
 ) -> SolidPanels:
-    """Panels set by nobody: each moved and turned by chance.
+    """Randomly displaced panels, before setting.
 
     piston   m along the normal; slope rad about two axes; twist m at its corners; bump m rms of the surface
     """
@@ -125,7 +131,7 @@ def solid_panels(
 
 
 def _rotations(vector: np.ndarray) -> np.ndarray:
-    """(p, 3, 3) rotations by rotation vectors, Rodrigues."""
+    """Rotations (p, 3, 3) of rotation vectors, Rodrigues."""
     angle = np.linalg.norm(vector, axis=1)[:, None, None]
     x, y, z = vector.T
     o = np.zeros_like(x)
@@ -134,7 +140,7 @@ def _rotations(vector: np.ndarray) -> np.ndarray:
 
 
 def panel_at(layout: PanelLayout, xy: np.ndarray) -> int:
-    """The panel whose outline goes round a place once, by crossings; -1 if none."""
+    """Index of the panel whose outline encloses a place; -1 if none."""
     a = layout.xy[layout.quad] - xy
     b = np.roll(a, -1, axis=1)
     up = (a[..., 1] <= 0.0) != (b[..., 1] <= 0.0)
@@ -146,12 +152,12 @@ def panel_at(layout: PanelLayout, xy: np.ndarray) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Crew:
-    """Who reads, and how: systematic effects are drawn once a session.
+    """Crew and its errors; systematic effects are drawn once a session.
 
-    rng            of everything that varies
+    rng            random generator of all variations
     gauge          m, repeatability of a reading
     zero           m, of a gauge's zero in a session
-    lean           rad, the shaft leans by so much at each corner, in both directions
+    lean           rad, lean of the shaft at each corner, in both directions
     inclinometer   rad, noise of a reading of the lean; nan: no inclinometer
     level          rad, zero of the inclinometers in a session
     shaft          m, how far shafts stand off the design
@@ -175,7 +181,7 @@ HEADER = (
 
 @dataclass(frozen=True, eq=False)
 class CornerTour:
-    """Where a crew takes its tool.
+    """Places where a crew uses its tool.
 
     turns          of the tool at each corner, quarter turns
     corners        numbers; all if None, in sessions of `a_day`, each by the next of `members`
@@ -197,7 +203,7 @@ def panel_readings(
     tour: CornerTour | None = None,
     shafts: np.ndarray | None = None,
 ) -> tuple[list[str], np.ndarray]:
-    """Rows of READINGS.csv with its header, and the heights (c,) of all shafts, m.
+    """Rows of READINGS.csv with header, and heights (c,) of all shafts, m.
 
     solid      panels as they stand
     sheet      of the instrument: places, linearity, scale, temperature, sag of its gauges
@@ -225,26 +231,29 @@ def panel_readings(
     return lines, stands
 
 
-def _shown(true: np.ndarray, sheet: PanelInstrument, warm: float) -> np.ndarray:
-    """(4,) m that gauges show for displacements (4,): scale, linearity undone by bisection, temperature, digits."""
-    shown = np.empty(4)
+def _gauge_readings(true: np.ndarray, sheet: PanelInstrument, warm: float) -> np.ndarray:
+    """Gauge readings (4,) m for displacements (4,).
+
+    With scale, linearity undone by bisection, temperature, digits.
+    """
+    readings = np.empty(4)
     for k, g in enumerate(sheet.gauge):
-        wanted = (true[k] + g.zero_um_per_c * 1e-6 * (warm - sheet.flat_temperature_c)) * (1.0 + g.scale_ppm * 1e-6)
-        low, high = wanted - 1e-3, wanted + 1e-3
+        target = (true[k] + g.zero_um_per_c * 1e-6 * (warm - sheet.flat_temperature_c)) * (1.0 + g.scale_ppm * 1e-6)
+        low, high = target - 1e-3, target + 1e-3
         at, correction = (np.array(v) for v in zip(*g.linearity, strict=True)) if g.linearity else ([0.0], [0.0])
         for _ in range(60):
             middle = 0.5 * (low + high)
-            if middle + np.interp(middle, np.array(at) * 1e-3, np.array(correction) * 1e-6) < wanted:
+            if middle + np.interp(middle, np.array(at) * 1e-3, np.array(correction) * 1e-6) < target:
                 low = middle
             else:
                 high = middle
-        shown[k] = np.round(0.5 * (low + high) / (sheet.resolution_um * 1e-6)) * sheet.resolution_um * 1e-6
-    return shown
+        readings[k] = np.round(0.5 * (low + high) / (sheet.resolution_um * 1e-6)) * sheet.resolution_um * 1e-6
+    return readings
 
 
 def _on_flat(sheet: PanelInstrument, crew: Crew, place: tuple[str, str], zero: np.ndarray, warm: float) -> str:
-    shown = _shown(zero + crew.rng.normal(0.0, crew.gauge, 4), sheet, warm)
-    cells = ",".join(f"{v / MILLIMETRE:.3f}" for v in shown)
+    readings = _gauge_readings(zero + crew.rng.normal(0.0, crew.gauge, 4), sheet, warm)
+    cells = ",".join(f"{v / MILLIMETRE:.3f}" for v in readings)
     return f"FLAT,0,{place[0]},{place[1]},{cells},,,{warm:.1f},"
 
 
@@ -258,7 +267,10 @@ def _placement(
     elevation_deg: float,
     stand: float,
 ) -> str:
-    """One row: the tool on its shaft, turned, leaning; gauges run along its axis to what they meet."""
+    """One row: the tool on its shaft, turned and leaning.
+
+    Gauges run along its axis to the surface.
+    """
     (corner, turn), (zero, level, lean, warm) = where, effects
     layout = solid.layout
     point, out, round_, normal = (v[0] for v in frame_at(layout.xy[[corner]], layout.focal_length))
@@ -278,8 +290,10 @@ def _placement(
     elevation = np.radians(elevation_deg)
     up = np.array([0.0, -np.cos(elevation), np.sin(elevation)])
     droop = np.array([g.sag_um for g in sheet.gauge]) * 1e-6 * (1.0 - float(normal @ up))
-    shown = _shown(np.where(on, length, 0.0) - droop + zero + crew.rng.normal(0.0, crew.gauge, 4), sheet, warm)
-    cells = ",".join(f"{v / MILLIMETRE:.3f}" if ok else "" for v, ok in zip(shown, on, strict=True))
+    readings = _gauge_readings(
+        np.where(on, length, 0.0) - droop + zero + crew.rng.normal(0.0, crew.gauge, 4), sheet, warm
+    )
+    cells = ",".join(f"{v / MILLIMETRE:.3f}" if ok else "" for v, ok in zip(readings, on, strict=True))
     leans = ","
     if np.isfinite(crew.inclinometer):
         read = np.array([axis @ x, axis @ y]) + level + crew.rng.normal(0.0, crew.inclinometer, 2)
@@ -288,7 +302,9 @@ def _placement(
 
 
 def screwed(solid: SolidPanels, corner_moves: np.ndarray) -> SolidPanels:
-    """Panels after their corners were moved by (p, 4) m along the normals: each turned to fit, twisted by the rest.
+    """Panels after corner moves (p, 4) m along the normals.
+
+    Each is turned to fit, and twisted by the remainder.
 
     corner_moves   in the layout's order
     """

@@ -1,4 +1,4 @@
-"""A night of one refractometer path: air integrated along it, the phase from the time of flight, what the sensors read.
+"""Simulated night of one refractometer path: air, phase, sensor readings.
 
 Nothing of the reduction's formulas is used: the light takes 2 integral n ds / c, the phase is minus that many periods.
 """
@@ -22,21 +22,21 @@ HEAD_HEIGHT, TARGET_HEIGHT, D0 = 1.6, 2.2, 0.180  # m
 
 @dataclass(frozen=True)
 class PathPlan:
-    """What the night is like; offsets are what a sensor reads too much.
+    """Plan of the night; offsets are positive for readings too high.
 
     path_length          m, D - D0
     hours, interval_s    length of the night, and time between readings
     thermometers         spread evenly along the path
     u_thermometer_c, u_barometer_hpa, u_hygrometer_percent   spread of the sensors' offsets
-    noise_c, eddies_c    of a thermometer's reading: white, and hanging together over `eddy_s`
+    noise_c, eddies_c    of a thermometer's reading: white, and correlated over `eddy_s`
     noise_hpa, noise_percent   of the others
     phase_noise          rad
     walk_mrad_per_root_hour, drift_mrad_per_hour   of the electronics
-    swing_c, patch_c     daily swing of the air's temperature; a warm place in the middle fifth of the path
-    strays               share of phases with light from elsewhere in the return; and of weather read wrong
+    swing_c, patch_c     daily swing of the air's temperature; a warm section in the middle fifth of the path
+    strays               share of phases with a stray reflection in the return; and of wrong weather readings
     jumps                time (h) -> m that the target moved away
-    gaps                 from and to (h): nothing was read
-    weather_gaps         from and to (h): only phases were read
+    gaps                 from and to (h): no readings
+    weather_gaps         from and to (h): phases only
     """
 
     path_length: float = 100.0
@@ -65,12 +65,12 @@ class PathPlan:
 
 @dataclass(frozen=True, eq=False)
 class PathNight:
-    """What the files would hold, m readings, and the truth.
+    """File contents, m readings, and the truth.
 
     phase           (m,) rad in [0, 2 pi)
     temperature_c   (m, k); nan where no weather was read, as in the next two
     index           (m,) true group refractivity, mean over the path
-    electronics     (m,) rad that the electronics added
+    electronics     (m,) rad, added by the electronics
     offsets_c       (k,) of the thermometers
     wrong_phase, wrong_weather   (m,) bool: planted
     """
@@ -88,7 +88,7 @@ class PathNight:
     wrong_weather: np.ndarray
 
     def write(self, file: Path, **sheet: object) -> Path:
-        """FILE.csv and FILE.toml; `sheet` changes or adds keys of the latter."""
+        """Write FILE.csv and FILE.toml; `sheet` changes or adds keys of the latter."""
         plan = self.plan
         names = [f"temperature_{k + 1}_c" for k in range(plan.thermometers)]
         with file.open("w", newline="", encoding="utf-8") as stream:
@@ -118,10 +118,10 @@ class PathNight:
 
 
 def simulate_path_night(seed: int, plan: PathPlan | None = None) -> PathNight:
-    """A night of one path, from one seed.
+    """Simulate a night of one path from one seed.
 
     seed   of every random draw
-    plan   what the night is like; an ordinary one without
+    plan   plan of the night; by default an ordinary one
     """
     plan, streams = plan or PathPlan(), Streams(seed)
     seconds = np.arange(0.0, plan.hours * 3600.0, plan.interval_s)
@@ -177,15 +177,15 @@ def _air(plan: PathPlan, place: np.ndarray, seconds: np.ndarray, streams: Stream
 def _sensors(
     plan: PathPlan, seconds: np.ndarray, wrong: np.ndarray, streams: Streams
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """What thermometers (m, k), barometer and hygrometer read, and the thermometers' offsets."""
+    """Readings of thermometers (m, k), barometer, hygrometer, and thermometer offsets."""
     place = (np.arange(plan.thermometers) + 0.5) / plan.thermometers
     _, temperature, pressure, humidity = _air(plan, place, seconds, streams)
     rng, k = streams("sensors"), plan.thermometers
     offsets = plan.u_thermometer_c * rng.normal(size=k)
-    kept = np.exp(-np.diff(seconds, prepend=seconds[0]) / plan.eddy_s)
+    correlation = np.exp(-np.diff(seconds, prepend=seconds[0]) / plan.eddy_s)
     eddies = rng.normal(size=(len(seconds), k))
     for i in range(1, len(seconds)):
-        eddies[i] = kept[i] * eddies[i - 1] + np.sqrt(1.0 - kept[i] ** 2) * eddies[i]
+        eddies[i] = correlation[i] * eddies[i - 1] + np.sqrt(1.0 - correlation[i] ** 2) * eddies[i]
     read = temperature + offsets + plan.eddies_c * eddies + plan.noise_c * rng.normal(size=temperature.shape)
     read[wrong, rng.integers(0, k, len(seconds))[wrong]] += rng.choice((-10.0, 10.0, 1.5, -1.5), int(wrong.sum()))
     barometer = pressure.mean(axis=1) + plan.u_barometer_hpa * rng.normal()

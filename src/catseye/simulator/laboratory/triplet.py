@@ -1,7 +1,7 @@
-"""A triplet unit on the surface plate and on the laboratory range, built in three dimensions; phases by tracing rays.
+"""Simulated triplet unit on surface plate and laboratory range, by ray tracing.
 
-Nothing of the reduction is used. A unit is a list of points and directions on its plate. It is put against stops that
-are turned against the beam, turned over about the long axis of its plate, and put there again; each path is the ray
+Nothing of the reduction is used. A unit is a list of points and directions on its plate. It is set against stops that
+are turned against the beam, turned over about the long axis of its plate, and set there again; each path is the ray
 from the scan point to the corner (or to the ball's centre) that Fermat's principle picks, and its delay.
 
 Axes of the unit: x from the left prism to the right, y up, z out of the plate on the prism side, origin in the
@@ -22,7 +22,7 @@ PHASE_TO_GROUP = 1.511186 / 1.527463  # of old BK 7 at 0.780 um
 
 @dataclass(frozen=True, eq=False)
 class TripletScenes:
-    """True units and places on the range, one value a case, (m,); metres, radians.
+    """True units and places on the range, (m,) each; metres, radians.
 
     height_1, height_2        of the prisms, face to corner
     radius_1, radius_2        of the ball: small sphere, silvered sphere
@@ -70,7 +70,10 @@ class TripletScenes:
 
     @property
     def h_corr(self) -> Array:
-        """The truth: ball's centre above the mid-point of the reference points, along the plate's normal."""
+        """True h_corr: ball's centre above the reference points' mid-point.
+
+        Along the plate's normal.
+        """
         return self.ball - 0.5 * (self.fiducial_1 + self.fiducial_2)
 
     def part(self, rows: slice) -> "TripletScenes":
@@ -79,7 +82,9 @@ class TripletScenes:
 
 @dataclass(frozen=True, eq=False)
 class TripletSheets:
-    """What the laboratory writes down, without noise, (m,) each; metres, radians, names as on the sheet.
+    """Laboratory data sheet without noise, (m,) each; metres, radians.
+
+    Names as on the sheet.
 
     phi_1, phi_2, phi_bcfp     phases in [0, 2 pi)
     l_1, l_2, l_bt             heights on the surface plate of the prisms' faces and the ball's vertex
@@ -105,7 +110,7 @@ class TripletSheets:
 
 
 def random_scenes(rng: np.random.Generator, cases: int, *, tilt: float = 1.5e-3, offset: float = 0.05) -> TripletScenes:
-    """Units as made, with paint, and places on the range as found, at random.
+    """Random units with paint, and random places on the range.
 
     tilt     rad, standard deviation of the stops against the beam
     offset   m, of the scan point across the beam
@@ -133,7 +138,7 @@ def random_scenes(rng: np.random.Generator, cases: int, *, tilt: float = 1.5e-3,
 
 
 def triplet_sheets(scene: TripletScenes) -> TripletSheets:
-    """The sheet of each case: plate, data sheet, and the three phases."""
+    """Data sheet of each case: plate, constants, and three phases."""
     scan = _scan_point(scene)
     optical = []
     for side, sign in ((1, -0.5), (2, 0.5)):
@@ -150,8 +155,8 @@ def triplet_sheets(scene: TripletScenes) -> TripletSheets:
     zero, zero_fp = scene.phi_zrg + scene.phi_cal, scene.phi_zrg_fp + scene.phi_cal
     cycle = 0.5 * LIGHT / scene.frequency
     phases = [
-        np.mod(start - 2.0 * np.pi * way / cycle, 2.0 * np.pi)
-        for start, way in zip((zero, zero, zero_fp), optical, strict=True)
+        np.mod(start - 2.0 * np.pi * path / cycle, 2.0 * np.pi)
+        for start, path in zip((zero, zero, zero_fp), optical, strict=True)
     ]
     n = scene.ratio
     face = [getattr(scene, f"fiducial_{k}") + getattr(scene, f"height_{k}") / n for k in (1, 2)]
@@ -166,19 +171,19 @@ def triplet_sheets(scene: TripletScenes) -> TripletSheets:
 
 
 def _projected(scene: TripletScenes) -> Array:
-    """The prisms' spacing as seen along the plate's normal."""
+    """Spacing of the prisms as seen along the plate's normal."""
     rise = scene.fiducial_2 - scene.fiducial_1
     return np.sqrt(scene.spacing**2 - rise**2)
 
 
 def _leaning(lean: Array) -> Array:
-    """Unit normals (m, 3) that lean out of z by the two small angles about x and y."""
+    """Unit normals (m, 3) tilted from z by two small angles about x and y."""
     out = np.stack([np.sin(lean[:, 1]), -np.sin(lean[:, 0]), np.ones(len(lean))], axis=-1)
     return out / np.linalg.norm(out, axis=-1, keepdims=True)
 
 
 def _turned_over(point: Array) -> Array:
-    """Half a turn about the unit's x."""
+    """Rotate half a turn about the unit's x."""
     return point * np.array([1.0, -1.0, -1.0])
 
 
@@ -190,7 +195,10 @@ def _placed(point: Array, roll: Array) -> Array:
 
 
 def _scan_point(scene: TripletScenes) -> Array:
-    """The scan point in the axes of the stops, (m, 3): the stops' middle, a level beam, and two rotations."""
+    """Scan point (m, 3) in the axes of the stops.
+
+    From the stops' middle, a level beam, and two rotations.
+    """
     # in the laboratory the beam runs along -z and meets the stops' plane at (aside, above), `depth` from the ranger
     beam = np.stack([np.zeros_like(scene.yaw), np.zeros_like(scene.yaw), scene.depth], axis=-1)
     cy, sy, cp, sp = np.cos(scene.yaw), np.sin(scene.yaw), np.cos(scene.pitch), np.sin(scene.pitch)
@@ -203,10 +211,10 @@ def _scan_point(scene: TripletScenes) -> Array:
 
 
 def _into_prism(scan: Array, corner: Array, normal: Array, height: Array, eta: Array, ratio: Array) -> Array:
-    """Optical length of the ray from the scan point through the face to the corner, (m,).
+    """Optical length (m,) from the scan point through the face to the corner.
 
     It bends by the phase indices (the crossing of the face makes the phase path stationary: Newton's iterations on a
-    convex function) and is delayed by the group indices. The way back is the same ray.
+    convex function) and is delayed by the group indices. The return is the same ray.
     """
     to_scan = scan - corner
     out = np.sum(to_scan * normal, axis=-1) - height

@@ -1,1 +1,1 @@
-"""Whole synthetic nights with known truth, as campaign directories."""
+"""Synthetic nights with known truth, as campaign directories."""

@@ -1,4 +1,4 @@
-"""The air of a night: smooth profiles of height and time, its group index, and what the stations read of it."""
+"""True air of a night: profiles in height and time, and group index."""
 
 from dataclasses import dataclass, replace
 
@@ -14,7 +14,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)  # 12 nodes: below 1e-12 on
 
 @dataclass(frozen=True)
 class AirConditions:
-    """The air at z = 0 and at the start of the campaign, and how it changes.
+    """Air at z = 0 and at the start, and its changes.
 
     surface_layer_c   temperature gained on leaving the ground (positive at night), within `surface_layer_m`
     """
@@ -40,7 +40,10 @@ WINTER = replace(NIGHT, temperature_c=-12.0, humidity_percent=80.0, surface_laye
 
 
 def saturation_hpa(temperature_c):
-    """Saturation vapour pressure by Magnus' form, good to 0.5 %: only ratios are taken of it."""
+    """Saturation vapour pressure by Magnus' form, good to 0.5 %.
+
+    Only ratios of it are used.
+    """
     return 6.112 * np.exp(17.62 * temperature_c / (243.12 + temperature_c))
 
 
@@ -51,7 +54,8 @@ def group_refractivity_ppm(temperature_c, pressure_hpa, humidity_percent):
     pressure_hpa       500 to 1100
     humidity_percent   relative humidity over liquid water, 0 to 100
 
-    Source: [PARKER04] eqs. 1.3, 1.5, 1.23 to 1.25, coded here a second time on purpose: the twin checks the reduction.
+    Source: [PARKER04] eqs. 1.3, 1.5, 1.23 to 1.25, deliberately coded here a second time: the twin checks the
+    reduction.
 
     >>> round(float(group_refractivity_ppm(20.0, 933.0, 50.0)), 4)
     253.2468
@@ -72,14 +76,17 @@ def group_refractivity_ppm(temperature_c, pressure_hpa, humidity_percent):
 
 @dataclass(frozen=True)
 class TrueAir:
-    """True air, a function of height (m, ground frame) and of time (s since the start)."""
+    """True air as a function of height (m) and time (s).
+
+    In the ground frame, since the start.
+    """
 
     conditions: AirConditions
     stratification: float = 1.0  # factor on every change with height
 
     @property
     def neighbours(self) -> float:
-        """Share of the variance of a line's residual that it has in common with the lines beside it."""
+        """Share of a line's residual variance in common with neighbouring lines."""
         return 0.0
 
     def temperature_c(self, z, seconds):
@@ -104,7 +111,7 @@ class TrueAir:
         return 1.0 + PPM * group_refractivity_ppm(self.temperature_c(z, seconds), p, h)
 
     def weather_at(self, points, seconds):
-        """Temperature, °C, pressure, hPa, and relative humidity, %, at points (..., 3) and times (...)."""
+        """Temperature, °C, pressure, hPa, humidity, %, at points (..., 3), times (...)."""
         z = points[..., 2]
         return self.temperature_c(z, seconds), self.pressure_hpa(z, seconds), self.humidity_percent(seconds)
 
@@ -117,7 +124,7 @@ class TrueAir:
         return self.conditions.drift_c_per_h * np.asarray(seconds, dtype=float) / 3600.0
 
     def path_index(self, start, end, seconds):
-        """Group index averaged along straight lines from start to end, points (..., 3): Gauss-Legendre quadrature."""
+        """Mean group index along straight lines between points (..., 3), by quadrature."""
         share = 0.5 * (NODES + 1.0)
         z = start[..., 2, None] + (end - start)[..., 2, None] * share
         return 0.5 * self.index(z, np.asarray(seconds)[..., None]) @ WEIGHTS

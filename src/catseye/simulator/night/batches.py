@@ -1,4 +1,4 @@
-"""Errors that targets of one batch have in common."""
+"""Common errors of the targets of one batch."""
 
 from dataclasses import replace
 
@@ -10,7 +10,9 @@ BATCH = 100  # prisms that an optician grinds and measures together, by serial o
 
 
 def in_batches(telescope: Structure, strength: float, streams: Streams, planted: Planted) -> Structure:
-    """The telescope whose prisms have a common error of their glass heights in each batch, beside their own.
+    """Telescope with a common glass height error in each batch of prisms.
+
+    In addition to each prism's own error.
 
     strength   one sigma of it, in the u of the sheets; 0: none
     """
@@ -25,7 +27,7 @@ def in_batches(telescope: Structure, strength: float, streams: Streams, planted:
     dish = [ground(prism, "dish", i) for i, prism in enumerate(telescope.dish)]
     units = []
     for i, unit in enumerate(telescope.triplets):
-        left, right, ball = unit.targets
-        pair = ground(left, "triplet", 2 * i), ground(right, "triplet", 2 * i + 1)
+        left_prism, right_prism, ball = unit.targets
+        pair = ground(left_prism, "triplet", 2 * i), ground(right_prism, "triplet", 2 * i + 1)
         units.append(replace(unit, targets=(*pair, ball)))
     return replace(telescope, dish=dish, triplets=units)

@@ -1,4 +1,4 @@
-"""Expansion of the telescope with the temperature of its steel, while a night is measured."""
+"""Thermal expansion of the telescope's steel during a night."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,11 +17,11 @@ STEP_S = 10.0  # a thirtieth of the shortest wave
 class SteelExpansion:
     """Law of the telescope's expansion.
 
-    share        of steel's whole coefficient, about the pintle bearing
+    share        of steel's full coefficient, about the pintle bearing
     lag_s        time constant of the steel behind the air
-    dish_share   by which the dish expands about its own middle on top, as a share of the telescope's expansion
-    arm_share    by which the feed arm expands away from the dish's middle on top, likewise
-    alidade_share   by which the alidade, thicker than what it carries, expands on top: dish and arm move away from the
+    dish_share   by which the dish additionally expands about its own middle, as a share of the telescope's expansion
+    arm_share    by which the feed arm additionally expands away from the dish's middle, likewise
+    alidade_share   by which the alidade, thicker than its load, additionally expands: dish and arm move away from the
                  pintle bearing as the dish's middle does
     """
 
@@ -41,13 +41,13 @@ class SteelExpansion:
 
 @dataclass(frozen=True, eq=False)
 class MovingPoints:
-    """Points of a night at any time; without a law they stay where they are.
+    """Points of a night at any time; constant without a law.
 
     points        m, ground frame, at `reference_s`
-    own           by name how much more than itself a point expands about the dish's middle; 0 off dish and arm, and
-                  what is not in it stands on the ground
+    own           by name, the additional expansion of a point about the dish's middle; 0 off dish and arm; points
+                  not in it stand on the ground
     dish_middle   (3,) m
-    carried       names of what the alidade carries: dish and arm
+    carried       names of points carried by the alidade: dish and arm
     """
 
     points: Mapping[str, np.ndarray]
@@ -59,7 +59,10 @@ class MovingPoints:
     carried: frozenset[str] = frozenset()
 
     def scale(self, seconds):
-        """Expansion of the telescope since `reference_s`, at times (k,): 1e-6 is a micrometre a metre."""
+        """Expansion of the telescope since `reference_s`, at times (k,).
+
+        1e-6 is a micrometre a metre.
+        """
         if self.law is None:
             return np.zeros(np.shape(seconds))
         times = np.append(np.asarray(seconds, dtype=float), self.reference_s)
@@ -67,12 +70,12 @@ class MovingPoints:
         return self.law.share * STEEL_PER_K * (steel_c[:-1] - steel_c[-1])
 
     def at(self, names: list[str], seconds):
-        """Where points are (k, 3), each at its own time (k,)."""
-        rest = np.array([self.points[name] for name in names])
+        """Positions of points (k, 3), each at its own time (k,)."""
+        initial = np.array([self.points[name] for name in names])
         if self.law is None:
-            return rest
+            return initial
         scale = self.scale(seconds)[:, None]
         rides = np.array([name in self.own for name in names])[:, None]
-        own = np.array([self.own.get(name, 0.0) for name in names])[:, None]
+        extra = np.array([self.own.get(name, 0.0) for name in names])[:, None]
         lifted = self.law.alidade_share * np.array([name in self.carried for name in names])[:, None]
-        return rest + rides * scale * (rest + own * (rest - self.dish_middle) + lifted * self.dish_middle)
+        return initial + rides * scale * (initial + extra * (initial - self.dish_middle) + lifted * self.dish_middle)

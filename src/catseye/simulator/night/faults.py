@@ -1,4 +1,4 @@
-"""What goes wrong on purpose, and where each kind of randomness comes from."""
+"""Planted faults, and sources of randomness."""
 
 import zlib
 from collections.abc import Collection, Mapping, Sequence
@@ -33,12 +33,12 @@ EFFECTS = (
 
 @dataclass(frozen=True)
 class Faults:
-    """What the night suffers; the defaults are like night-01.
+    """Faults of the night; the defaults are like night-01.
 
-    fraction_blocked     shots of which nothing returns, 0 to 1 (reference shots are never touched)
-    fraction_reflected   shots with a return from elsewhere, 0 to 1
+    fraction_blocked     shots without return, 0 to 1 (never reference shots)
+    fraction_reflected   shots with a stray reflection, 0 to 1
     weak_ranger          a feed-arm ranger that receives `weak_amplitude` of the usual, or None
-    wrong_position_mm    one approximate position is typed wrong by this much
+    wrong_position_mm    error of one approximate position, as a typing error
     lying_thermometer_c  added to the readings of `lying_station` on top of its ordinary offset
     """
 
@@ -65,7 +65,7 @@ class Faults:
 
 @dataclass(frozen=True)
 class Planted:
-    """Changes of the truth that the files do not tell; every other random draw stays as it was.
+    """Changes of the truth unknown to the files; other draws are unchanged.
 
     shifts        name of a point -> (x, y, z), metres, ground frame, added to its true position
     signs         effect -> factor on it, such as -1
@@ -93,9 +93,9 @@ NIGHTLY = ("samples/", "returns/", "path/", "path noise/", "electronics", "weath
 
 @dataclass(frozen=True)
 class Streams:
-    """One independent random generator for each purpose, so that changing one draw moves no other.
+    """Independent random generators by purpose, so that draws do not interact.
 
-    night   another one at the same site: what a night draws anew differs, what stands there does not
+    night   another one at the same site: nightly draws differ, site draws do not
     """
 
     seed: int

@@ -1,6 +1,6 @@
-"""Fields of the air over a site: waves, fronts, turbulence, gradients, as functions of place and time.
+"""Fields of the air over a site: waves, fronts, turbulence, gradients.
 
-Points are (..., 3) m in the ground frame, times (...) s since the start; both broadcast.
+Functions of place and time. Points are (..., 3) m in the ground frame, times (...) s since the start; both broadcast.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ import numpy as np
 from catseye.constants import TWO_PI
 from catseye.simulator.night.limits import require
 
-MODES = 40  # one for each band of the spectrum, a sixth of an octave wide or so
+MODES = 40  # one for each band of the spectrum, about a sixth of an octave wide
 SMALLEST_EDDY_M = (
     5.0  # smaller ones, a tenth to a third of the variance, change a path of 100 m by 1 um at 0.1 degC rms
 )
@@ -20,12 +20,12 @@ LARGEST_EDDY = 10.0  # outer scales: 1 in 3000 of the variance lies in larger on
 
 @dataclass(frozen=True)
 class AirWave:
-    """A wave of air temperature, as gravity waves make it in a stable night.
+    """Wave of air temperature, as gravity waves in a stable night.
 
     amplitude_c        at z = 0
     period_s           above the buoyancy period, 4 min at a gradient of 0.008 degC/m
     phase_rad          at the origin at the start
-    slowness_s_per_m   by which the wave is later towards the east and the north; zero: the whole site at once
+    slowness_s_per_m   delay of the wave towards the east and the north; zero: simultaneous over the site
     growth_per_m       of the amplitude with height, as a share of that at z = 0
 
     Source: R. B. Stull, An Introduction to Boundary Layer Meteorology (1988), ch. 12.
@@ -51,7 +51,7 @@ class AirWave:
 
 @dataclass(frozen=True)
 class PressureWave:
-    """A wave of air pressure, the same from the ground to the dish.
+    """Wave of air pressure, the same from the ground to the dish.
 
     slowness_s_per_m   as of an `AirWave`
     """
@@ -72,7 +72,7 @@ class PressureWave:
 
 @dataclass(frozen=True)
 class Front:
-    """A step of air temperature that passes the site: half a cosine from the air before to the air behind.
+    """Step of air temperature that passes the site: half a cosine.
 
     at_s               when half of it has passed the origin
     rise_s             from its first to its last
@@ -96,7 +96,9 @@ class Front:
 
 @dataclass(frozen=True)
 class HorizontalGradient:
-    """A horizontal gradient of temperature, a constant part and one that turns: left about for a positive period.
+    """Horizontal temperature gradient with a constant and a turning part.
+
+    The turning is anticlockwise for a positive period.
 
     constant_c_per_m   towards the east and the north
     turning_c_per_m    length of the part that turns
@@ -125,10 +127,10 @@ class HorizontalGradient:
 
 @dataclass(frozen=True)
 class Turbulence:
-    """Eddies of temperature, frozen, that the wind carries across the site.
+    """Frozen temperature eddies carried across the site by the wind.
 
     rms_c           over place and time
-    outer_scale_m   of the von Karman spectrum; eddies of 10 of it to 5 m are there
+    outer_scale_m   of the von Karman spectrum; eddies from 10 of it down to 5 m are included
     wind_m_s        towards the east and the north
     seed            of the eddies
 
@@ -147,7 +149,10 @@ class Turbulence:
         require("wind_m_s of turbulence", float(np.hypot(*self.wind_m_s)), 0.0, 60.0)
 
     def temperature_c(self, points, seconds, lag_s: float = 0.0):
-        """Eddies at points (..., 3) and times (...), of what stands there and follows the air with a lag."""
+        """Eddy temperature at points (..., 3) and times (...), with a lag.
+
+        For a fixed sensor that follows the air with a lag.
+        """
         wave, amplitude, phase = _modes(self.seed, self.outer_scale_m)
         angle = self._angle(points, seconds, wave, phase)
         if lag_s:
@@ -156,7 +161,7 @@ class Turbulence:
         return self.rms_c * np.cos(angle) @ amplitude
 
     def mean_c(self, start, end, seconds):
-        """Mean along straight lines from start to end, in closed form: each mode is averaged by a sinc."""
+        """Mean along straight lines, in closed form: each mode by a sinc."""
         wave, amplitude, phase = _modes(self.seed, self.outer_scale_m)
         half = 0.5 * (end - start)
         turn = half @ wave.T
@@ -166,24 +171,27 @@ class Turbulence:
 
     def _angle(self, points, seconds, wave, phase):
         """Phases (..., modes), rad."""
-        carried = wave[:, :2] @ np.asarray(self.wind_m_s)
-        return points @ wave.T - np.asarray(seconds, dtype=float)[..., None] * carried + phase
+        advection = wave[:, :2] @ np.asarray(self.wind_m_s)
+        return points @ wave.T - np.asarray(seconds, dtype=float)[..., None] * advection + phase
 
 
 @lru_cache(maxsize=16)
 def _modes(seed: int, outer_scale_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Wave vectors (modes, 3), rad/m, amplitudes of a field of rms 1 and phases: a mode a band of the spectrum."""
+    """Wave vectors (modes, 3), rad/m, amplitudes for rms 1, and phases.
+
+    One mode for a band of the spectrum.
+    """
     rng = np.random.default_rng(seed)
     outer = TWO_PI / outer_scale_m
     edges = np.geomspace(outer / LARGEST_EDDY, TWO_PI / SMALLEST_EDDY_M, MODES + 1)
     length = edges[:-1] * (edges[1:] / edges[:-1]) ** rng.uniform(size=MODES)
-    way = rng.normal(size=(MODES, 3))
-    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    direction = rng.normal(size=(MODES, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     middle = np.sqrt(edges[:-1] * edges[1:])
     variance = middle**2 * (middle**2 + outer**2) ** (-11.0 / 6.0) * np.diff(edges)
-    return length[:, None] * way, np.sqrt(2.0 * variance / variance.sum()), rng.uniform(0.0, TWO_PI, MODES)
+    return length[:, None] * direction, np.sqrt(2.0 * variance / variance.sum()), rng.uniform(0.0, TWO_PI, MODES)
 
 
 def _local(points, seconds, slowness_s_per_m):
-    """Time since what passes the origin at zero has passed the points, s."""
+    """Time since the feature passing the origin at zero has passed the points, s."""
     return np.asarray(seconds, dtype=float) - points[..., :2] @ np.asarray(slowness_s_per_m)

@@ -1,12 +1,14 @@
-"""Delay of light in glass, by tracing rays."""
+"""Delay of light in glass, by ray tracing."""
 
 import numpy as np
 
-GLASS_TO_AIR = 1.527077  # group index of BK 7 against air, both as refraction and as delay, as the campaign says
+GLASS_TO_AIR = 1.527077  # group index of BK 7 against air, both as refraction and as delay, as in the campaign
 
 
 def prism_delay(height, normal, towards_ranger):
-    """Optical path that a corner-cube prism adds to its reference point, one way, in air metres; positive.
+    """Optical path that a prism adds to its reference point, air metres.
+
+    One way, positive.
 
     height           apex below the entry face, m, (...)
     normal           outward normal of the entry face, unit vectors (..., 3)
@@ -23,7 +25,7 @@ def prism_delay(height, normal, towards_ranger):
     h = np.asarray(height, dtype=float)[..., None]
     inward, ray = -normal, -towards_ranger
     cos_in = np.sum(ray * inward, axis=-1, keepdims=True)
-    tangential = (ray - cos_in * inward) / n  # what Snell keeps
+    tangential = (ray - cos_in * inward) / n  # conserved by Snell's law
     refracted = tangential + np.sqrt(1.0 - np.sum(tangential**2, axis=-1, keepdims=True)) * inward
     length = 2.0 * h / np.sum(refracted * inward, axis=-1, keepdims=True)
     exit_point = length * refracted  # from the entry point, taken as origin
@@ -33,7 +35,9 @@ def prism_delay(height, normal, towards_ranger):
 
 
 def ball_delay(r1, r2):
-    """Optical path that a ball of two radii (m) adds to its centre, one way, in air metres; positive.
+    """Optical path that a ball of two radii (m) adds to its centre, air metres.
+
+    One way, positive.
 
     The ray through the centre leaves the air at r1 before it, meets the mirrored shell at r2 beyond it.
     """

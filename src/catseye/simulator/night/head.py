@@ -1,4 +1,4 @@
-"""What a head records: the phase of each return, and the samples of its converter."""
+"""Head records: phase of each return, and converter samples."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ MODULATION_HZ = 1.5e9
 RADIANS_PER_METRE = 2.0 * TWO_PI * MODULATION_HZ / SPEED_OF_LIGHT  # of one-way optical path
 VOLT_PER_CODE = 10.0 / 32768.0
 SAMPLES_PER_CYCLE, CYCLES = 64, 128
-NEIGHBOUR_M = 5.0  # outer scale of eddies that stay: as far as a dish's backing structure and panels warm the air
+NEIGHBOUR_M = 5.0  # outer scale of stationary eddies: extent of air warmed by the dish's backing structure and panels
 DRIFT_RAD_PER_ROOT_HOUR = 0.010
 HARMONICS = np.array([0.0020, 0.0003])  # second and third, of the amplitude, their phases any from shot to shot
 REFERENCE_VOLT = 6.5
@@ -29,18 +29,21 @@ BENCHMARK_VOLT = (4.4, 5.4)
 
 @dataclass(frozen=True)
 class Return:
-    """The truth of one shot before sampling."""
+    """Truth of one shot before sampling."""
 
     shot: ScheduledShot
-    phasor: complex  # V, wanted, foreign and leaked together
+    phasor: complex  # V, target, stray and leakage together
     status: str  # 'good', 'blocked' or 'reflected'
     index: float  # group index averaged along the path, its fluctuation included; 1 for a reference shot
     range: float  # one-way optical path over index and glass: the straight distance, m
-    phase_error: float  # that a foreign return adds to the phase, rad
+    phase_error: float  # phase error from a stray reflection, rad
 
 
 def glass_delay(target: TrueTarget, towards_ranger, *, obliquity: float):
-    """Optical path that the glass of a target adds one way, air metres; `obliquity` scales what the angle changes."""
+    """Optical path that a target's glass adds one way, air metres.
+
+    `obliquity` scales the effect of the angle.
+    """
     if target.kind == "ball":
         return ball_delay(*target.sizes)
     if target.normal is None:
@@ -51,7 +54,10 @@ def glass_delay(target: TrueTarget, towards_ranger, *, obliquity: float):
 
 
 def electronic_phase(head: TrueHead, seconds, streams: Streams, *, planted: Planted):
-    """Phase of the electronics at the times of the shots (ascending): a random walk; every third head warms up."""
+    """Phase of the electronics at the ascending shot times.
+
+    A random walk; every third head warms up.
+    """
     rng = streams(f"electronics/{head.ranger}")
     start, warms, rise = rng.uniform(0.0, TWO_PI), rng.uniform() < 1.0 / 3.0, rng.uniform(0.010, 0.030)
     rise *= rng.choice((-1.0, 1.0))
@@ -62,7 +68,7 @@ def electronic_phase(head: TrueHead, seconds, streams: Streams, *, planted: Plan
 
 
 def usual_volt(name: str, draw: float) -> float:
-    """Amplitude of an ordinary return, for a draw of 0 to 1 that belongs to the path."""
+    """Usual amplitude of a return, V, for a path's draw of 0 to 1."""
     if name.startswith("ZBM"):
         low, high = BENCHMARK_VOLT
     else:
@@ -74,9 +80,9 @@ def usual_volt(name: str, draw: float) -> float:
 
 
 def foreign_return(amplitude: float, draws) -> tuple[complex, complex]:
-    """Factors on the wanted unit phasor: what is left of it, and what comes from elsewhere.
+    """Remaining target factor and stray reflection, on the unit phasor.
 
-    Half of the foreign returns replace the wanted one (path wrong by 1 mm up to nearly half a wavelength),
+    Half of the stray reflections replace the target's (path wrong by 1 mm up to nearly half a wavelength),
     half mix with it, at 15 to 60 %, such that the phase is wrong by at least 1 mm.
     """
     replaces, size, where, side = draws
@@ -89,17 +95,19 @@ def foreign_return(amplitude: float, draws) -> tuple[complex, complex]:
 
 
 def neighbouring_residuals(
-    own: Mapping[str, float], ends: np.ndarray, *, rng: np.random.Generator, share: float
+    independent: Mapping[str, float], ends: np.ndarray, *, rng: np.random.Generator, share: float
 ) -> dict[str, float]:
-    """Residuals of one ranger's lines, a share of their variance in common as exp(-r / 5 m) between their ends.
+    """Correlated residuals of one ranger's lines.
 
-    own    target: residual in its standard deviation, each by itself
-    ends   (n, 3) m, of the targets
+    A share of their variance is in common as exp(-r / 5 m) between their ends.
+
+    independent   target: independent residual, in its standard deviation
+    ends          (n, 3) m, of the targets
     """
     alike = np.exp(-np.linalg.norm(ends[:, None] - ends, axis=2) / NEIGHBOUR_M)
     common = np.linalg.cholesky(alike + 1e-9 * np.eye(len(ends))) @ rng.normal(size=len(ends))
-    alone = np.array(list(own.values()))
-    return dict(zip(own, (np.sqrt(1.0 - share) * alone + np.sqrt(share) * common).tolist(), strict=True))
+    alone = np.array(list(independent.values()))
+    return dict(zip(independent, (np.sqrt(1.0 - share) * alone + np.sqrt(share) * common).tolist(), strict=True))
 
 
 def returns_of_ranger(
@@ -113,22 +121,22 @@ def returns_of_ranger(
     planted: Planted,
     streams: Streams,
 ) -> list[Return]:
-    """What comes back to one ranger, shot by shot."""
+    """Returns of one ranger, shot by shot."""
     seconds = np.array([s.seconds for s in shots])
     phase_e = electronic_phase(head, seconds, streams, planted=planted)
     rng = streams(f"returns/{head.ranger}")
     paths = {name: streams(f"air/{head.ranger}/{name}").normal() for name in targets}
     if air.neighbours > 0.0:
-        own = {name: paths[name] for name in sorted({s.target for s in shots} & targets.keys())}
-        ends = np.array([points.points[name] for name in own])
+        independent = {name: paths[name] for name in sorted({s.target for s in shots} & targets.keys())}
+        ends = np.array([points.points[name] for name in independent])
         rng_of_lines = streams(f"air/{head.ranger}/neighbours")
-        paths |= neighbouring_residuals(own, ends, rng=rng_of_lines, share=air.neighbours)
+        paths |= neighbouring_residuals(independent, ends, rng=rng_of_lines, share=air.neighbours)
     fluctuation = np.array([paths.get(s.target, 0.0) for s in shots]) * air.conditions.index_fluctuation_ppm * PPM
     flicker = 1.0 + planted.gain("scintillation") * 0.022 * rng.normal(size=len(shots))
     fate, foreign = rng.uniform(size=len(shots)), rng.uniform(size=(len(shots), 4))
-    here = points.at([head.ranger] * len(shots), seconds)
+    scan = points.at([head.ranger] * len(shots), seconds)
     ends = points.at([head.ranger if s.target == REFERENCE else s.target for s in shots], seconds)
-    index = air.path_index(here, ends, seconds) + planted.gain("index_fluctuation") * fluctuation
+    index = air.path_index(scan, ends, seconds) + planted.gain("index_fluctuation") * fluctuation
     end_index = air.index_at(ends, seconds)
     volt = {name: usual_volt(name, streams(f"path/{head.ranger}/{name}").uniform()) for name in targets}
     weak = faults.weak_amplitude if head.ranger == faults.weak_ranger else 1.0
@@ -136,30 +144,33 @@ def returns_of_ranger(
     returns = []
     for i, shot in enumerate(shots):
         if shot.target == REFERENCE:
-            wanted = np.exp(1j * (phase_e[i] - RADIANS_PER_METRE * end_index[i] * head.true_d0))
-            phasor = REFERENCE_VOLT * wanted + head.true_leakage
+            unit_phasor = np.exp(1j * (phase_e[i] - RADIANS_PER_METRE * end_index[i] * head.true_d0))
+            phasor = REFERENCE_VOLT * unit_phasor + head.true_leakage
             returns.append(Return(shot, complex(phasor), "good", 1.0, head.true_d0, 0.0))
             continue
-        away = here[i] - ends[i]
+        away = scan[i] - ends[i]
         distance = float(np.linalg.norm(away))
         glass = glass_delay(targets[shot.target], unit(away), obliquity=planted.gain("obliquity"))
         path = index[i] * distance + end_index[i] * glass
-        wanted = np.exp(1j * (phase_e[i] - RADIANS_PER_METRE * path))
+        unit_phasor = np.exp(1j * (phase_e[i] - RADIANS_PER_METRE * path))
         amplitude = volt[shot.target] * weak * flicker[i]
-        status, left, strange = "good", complex(amplitude), 0j
+        status, remaining, strange = "good", complex(amplitude), 0j
         if fate[i] < faults.fraction_blocked:
-            status, left = "blocked", 0j
+            status, remaining = "blocked", 0j
         elif fate[i] > 1.0 - faults.fraction_reflected:
             status = "reflected"
-            left, strange = foreign_return(amplitude, foreign[i])
-        error = float(np.angle(left + strange)) if status == "reflected" else 0.0
-        phasor = wanted * (left + strange) + head.true_leakage
+            remaining, strange = foreign_return(amplitude, foreign[i])
+        error = float(np.angle(remaining + strange)) if status == "reflected" else 0.0
+        phasor = unit_phasor * (remaining + strange) + head.true_leakage
         returns.append(Return(shot, complex(phasor), status, float(index[i]), distance, error))
     return returns
 
 
 def sampled_frames(head: TrueHead, returns: list[Return], streams: Streams, *, planted: Planted) -> np.ndarray:
-    """Converter codes of every shot of one head, int16, (shots, samples): harmonics, offset, noise, rounding, ends."""
+    """Converter codes (shots, samples), int16, of one head's shots.
+
+    With harmonics, offset, noise, rounding and clipping.
+    """
     rng = streams(f"samples/{head.ranger}")
     offset, spread = rng.uniform(-0.25, 0.25), rng.uniform(0.165, 0.245)  # V
     phasor = np.array([r.phasor for r in returns])[:, None]

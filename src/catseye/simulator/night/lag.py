@@ -1,18 +1,18 @@
-"""First-order lag: what follows something else with a time constant."""
+"""First-order lag of a signal behind a history."""
 
 from collections.abc import Callable
 
 import numpy as np
 from scipy.signal import lfilter
 
-MEMORY = 16.0  # time constants before the first time: what was before counts 1e-7
+MEMORY = 16.0  # time constants before the first time: earlier values count 1e-7
 
 
 def lagged(history: Callable[[np.ndarray], np.ndarray], seconds, *, time_constant_s: float, step_s: float):
-    """Values at times (k,) of what follows a history as dy/dt = (x - y) / T.
+    """Values at times (k,) that follow a history as dy/dt = (x - y) / T.
 
     history   of times (n,), before the first of `seconds` too
-    step_s    between which the history is taken as straight
+    step_s    interval of the linear interpolation of the history
 
     Exact for straight pieces: over a step h, y goes to e y + (f - e) x0 + (1 - f) x1, e = exp(-h / T),
     f = (1 - e) T / h. It begins in the steady state of the first step.

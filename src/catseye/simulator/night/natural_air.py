@@ -1,4 +1,4 @@
-"""Air with all that nature does to it: smooth air, and waves, fronts, turbulence, gradients on top."""
+"""Smooth air with waves, fronts, turbulence and gradients added."""
 
 from dataclasses import dataclass
 
@@ -10,13 +10,16 @@ from catseye.simulator.night.nature import CALM, Nature
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(96)  # below 1e-12 of the index for eddies of 5 m along 380 m
 SHARES, WEIGHTS = 0.5 * (NODES + 1.0), 0.5 * WEIGHTS
-BLOCK = 256  # paths at once: what stays in a processor's cache
+BLOCK = 256  # paths at once: fits a processor's cache
 STEEL_AT = np.array([0.0, 0.0, 50.0])  # m: middle of the telescope
 
 
 @dataclass(frozen=True)
 class NaturalAir(TrueAir):
-    """Air as a function of place and time. Functions of a height alone hold over the pintle bearing."""
+    """Air as a function of place and time.
+
+    Functions of a height alone hold over the pintle bearing.
+    """
 
     nature: Nature = CALM
 
@@ -25,7 +28,10 @@ class NaturalAir(TrueAir):
         return self.nature.neighbours
 
     def weather_at(self, points, seconds):
-        """As of `TrueAir`. What warms the air does not wet it: the same vapour is a lower relative humidity."""
+        """Weather as of `TrueAir`, with the fields added.
+
+        Warming keeps the vapour: the same vapour is a lower relative humidity.
+        """
         smooth_c, pressure_hpa, humidity_percent = TrueAir(self.conditions, self.stratification).weather_at(
             points, seconds
         )
@@ -53,7 +59,7 @@ class NaturalAir(TrueAir):
         return super().common_c(seconds) + self.nature.common_c(STEEL_AT, seconds)
 
     def path_index(self, start, end, seconds):
-        """As of `TrueAir`, for points (k, 3) or (3,)."""
+        """Mean group index as of `TrueAir`, for points (k, 3) or (3,)."""
         start, end = (np.broadcast_to(p, (len(seconds), 3)) for p in (start, end))
         found = [
             self._block(start[i : i + BLOCK], end[i : i + BLOCK], seconds[i : i + BLOCK])

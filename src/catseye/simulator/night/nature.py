@@ -1,4 +1,4 @@
-"""Nature of a night: every effect that a smooth, linear model of air and telescope does not have, with its strength."""
+"""Natural effects of a night beyond a smooth, linear model, with strengths."""
 
 from dataclasses import dataclass, field
 
@@ -12,7 +12,7 @@ from catseye.simulator.night.limits import require
 from catseye.simulator.night.stations import STATIONS, USUAL_INTERVAL_S, ReadingGap, StationNature
 
 STRONGEST = 10.0  # of `Nature.drawn`: waves of 4 degC
-ABSENT = 0.2  # chance that a night does without an effect: chosen
+ABSENT = 0.2  # probability that a night lacks an effect: chosen
 # Largest at strength 1. Sources: Stull (1988) is R. B. Stull, An Introduction to Boundary Layer Meteorology; WMO-8 the
 # Guide to Instruments and Methods of Observation, part I ch. 2.
 WAVES, WAVE_C, WAVE_PERIOD_S = 3, 0.4, (300.0, 5400.0)  # Stull (1988) ch. 12: from the buoyancy period, 4 min, upwards
@@ -20,7 +20,7 @@ WAVE_SPEED_M_S, WAVE_GROWTH_PER_M = (2.0, 10.0), (-0.003, 0.008)  # the same: sl
 FRONT_C, FRONT_RISE_S = 1.5, (120.0, 900.0)  # drainage flows and outflows: Stull (1988) ch. 14
 FRONT_SLOTS, FRONT_SLOT_S, FRONT_CHANCE = 6, 7200.0, 0.5  # at most one in two hours: chosen
 EDDY_C, OUTER_SCALE_M = 0.15, (30.0, 200.0)  # Stull (1988) ch. 9: 1-2 times the surface layer's temperature scale
-WIND_M_S = (0.5, 6.0)  # what rangers work in; a stable night has little
+WIND_M_S = (0.5, 6.0)  # usual for rangers; a stable night has little
 GRADIENT_C_PER_M, GRADIENT_TURN_S = 0.008, (3600.0, 7200.0)  # a valley's slope flows: 0.8 degC across the dish
 PRESSURE_WAVES, PRESSURE_HPA, PRESSURE_PERIOD_S = 2, 0.5, (300.0, 3600.0)  # microbarograms: Stull (1988) ch. 12
 PRESSURE_SPEED_M_S = (10.0, 30.0)  # ducted waves: the same
@@ -34,11 +34,11 @@ DISH_SHARE, ARM_SHARE, ALIDADE_SHARE = 0.2, 0.1, 0.1  # dish and arm are thinner
 
 @dataclass(frozen=True)
 class Nature:
-    """Effects of a night beyond `AirConditions`, each with its strength; without arguments: none.
+    """Effects of a night beyond `AirConditions`; none by default.
 
     wind_m_s        towards the east and the north; airs the thermometers
-    batch_heights   error that the glass heights of a batch of prisms have in common, one sigma, in the sheet's u_height
-    neighbours      share of the variance of a line's residual that it has in common with the lines beside it, 0 to 1
+    batch_heights   common error of the glass heights of a batch of prisms, one sigma, in the sheet's u_height
+    neighbours      share of a line's residual variance in common with neighbouring lines, 0 to 1
 
     >>> Nature(waves=(AirWave(amplitude_c=0.3, period_s=2100.0),)).calm
     False
@@ -62,7 +62,9 @@ class Nature:
 
     @staticmethod
     def drawn(seed: int, strength: float = 1.0, *, night: int = 0) -> "Nature":
-        """All effects in random strengths, each up to `strength` of its natural largest; some are absent.
+        """All effects in random strengths up to `strength` of their natural maximum.
+
+        Some are absent.
 
         strength   0 to 10
         night      another one at the same site: its air is drawn anew, its stations, steel and glass are not
@@ -77,25 +79,25 @@ class Nature:
 
     @property
     def common(self) -> tuple[AirWave | Front, ...]:
-        """Fields of temperature that the whole site has."""
+        """Temperature fields common to the whole site."""
         return (*self.waves, *self.fronts)
 
     @property
     def fields(self) -> tuple[AirWave | Front | HorizontalGradient | Turbulence, ...]:
-        """Everything that changes the temperature of the air."""
+        """All fields that change the temperature of the air."""
         some = (self.horizontal, self.turbulence)
         return (*self.common, *(part for part in some if part is not None))
 
     def temperature_c(self, points, seconds):
-        """Change of the air's temperature at points (..., 3) and times (...)."""
+        """Change of the air's temperature at points (..., 3), times (...)."""
         return sum((part.temperature_c(points, seconds) for part in self.fields), np.zeros(()))
 
     def pressure_hpa(self, points, seconds):
-        """Change of the air's pressure at points (..., 3) and times (...)."""
+        """Change of the air's pressure at points (..., 3), times (...)."""
         return sum((wave.pressure_hpa(points, seconds) for wave in self.pressure_waves), np.zeros(()))
 
     def common_c(self, point, seconds):
-        """Change of temperature by waves and fronts at a point (3,) and times (...)."""
+        """Temperature change by waves and fronts at a point (3,), times (...)."""
         return sum((part.temperature_c(point, seconds) for part in self.common), np.zeros(()))
 
 
@@ -104,13 +106,19 @@ CALM = Nature()
 
 @dataclass(frozen=True)
 class _Draw:
-    """Draws of one nature. Purposes that begin with "nature/" are drawn anew each night, those with "site/" are not."""
+    """Draws of one nature.
+
+    Purposes that begin with "nature/" are drawn anew each night, those with "site/" are not.
+    """
 
     streams: Streams
     strength: float
 
     def level(self, purpose: str) -> float:
-        """Strength of an effect: none in some nights, else even between 0 and the strength of all."""
+        """Strength of an effect: zero in some nights, else uniform.
+
+        Between 0 and the strength of all.
+        """
         absent, level = self.streams(f"{purpose}/level").uniform(size=2)
         return 0.0 if absent < ABSENT else self.strength * float(level)
 
@@ -119,7 +127,7 @@ class _Draw:
 
 
 def _drawn(draw: _Draw) -> Nature:
-    """Every effect, without those that came out as nothing."""
+    """All effects, without those drawn as zero."""
     speed, towards = draw.rng("nature/wind").uniform((WIND_M_S[0], 0.0), (WIND_M_S[1], TWO_PI))
     wind = (float(speed * np.cos(towards)), float(speed * np.sin(towards)))
     named = (f"nature/wave {k}" for k in range(WAVES))
@@ -151,7 +159,7 @@ def _even_in_ratio(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def _slowness(velocity_m_s) -> tuple[float, float]:
-    """Slowness of what moves at (2,) m/s."""
+    """Slowness of a feature moving at (2,) m/s."""
     vx, vy = (float(v) for v in velocity_m_s)
     return vx / (vx * vx + vy * vy), vy / (vx * vx + vy * vy)
 
@@ -162,7 +170,7 @@ def _velocity(rng: np.random.Generator, speeds: tuple[float, float]) -> tuple[fl
 
 
 def air_wave(rng: np.random.Generator, k: int, amplitude_c: float) -> AirWave:
-    """The k-th of `WAVES` waves: each in its share of the periods, so that they differ."""
+    """The k-th of `WAVES` waves, with its own share of the periods."""
     edges = np.geomspace(*WAVE_PERIOD_S, WAVES + 1)
     return AirWave(
         amplitude_c,
@@ -174,7 +182,7 @@ def air_wave(rng: np.random.Generator, k: int, amplitude_c: float) -> AirWave:
 
 
 def pressure_wave(rng: np.random.Generator, amplitude_hpa: float) -> PressureWave:
-    """A wave of pressure of a period and a way that are drawn."""
+    """Pressure wave with random period and direction."""
     return PressureWave(
         amplitude_hpa,
         _even_in_ratio(rng, *PRESSURE_PERIOD_S),
@@ -184,7 +192,7 @@ def pressure_wave(rng: np.random.Generator, amplitude_hpa: float) -> PressureWav
 
 
 def _fronts(draw: _Draw, wind: tuple[float, float]) -> tuple[Front, ...]:
-    """Fronts that pass with the wind, at most one in each slot."""
+    """Fronts that pass with the wind, at most one a slot."""
     fronts = []
     for k in range(FRONT_SLOTS):
         purpose = f"nature/front {k}"
@@ -204,7 +212,10 @@ def _turbulence(draw: _Draw, wind: tuple[float, float]) -> Turbulence:
 
 
 def _horizontal(draw: _Draw) -> HorizontalGradient:
-    """One sigma of each component is shared equally by the part that stays and the part that turns."""
+    """Horizontal gradient; variance shared equally by constant and turning part.
+
+    One sigma of each component.
+    """
     rng, sigma = draw.rng("nature/horizontal"), GRADIENT_C_PER_M * draw.level("nature/horizontal")
     east, north = sigma / np.sqrt(2.0) * np.clip(rng.normal(size=2), -2.0, 2.0)
     period = _even(rng, *GRADIENT_TURN_S) * float(rng.choice((-1.0, 1.0)))
@@ -212,7 +223,7 @@ def _horizontal(draw: _Draw) -> HorizontalGradient:
 
 
 def _stations(draw: _Draw) -> StationNature:
-    """Time constants, radiation errors and rhythm belong to the site, gaps to the night."""
+    """Station time constants, radiation errors, interval (site) and gaps (night)."""
     mild = min(draw.strength, 1.0)
     rng = draw.rng("site/readings")
     usual, interval = rng.uniform() < ABSENT, _even_in_ratio(rng, *INTERVAL_S)

@@ -1,4 +1,4 @@
-"""A synthetic night: all that its files will hold, and the truth behind them."""
+"""Synthetic night: file contents and truth."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ from catseye.simulator.night.world import (
 
 @dataclass(frozen=True)
 class Night:
-    """A campaign: what its files hold (`write_night` makes them), and the `truth`."""
+    """Campaign: contents of its files (`write_night` makes them), and the `truth`."""
 
     name: str
     seed: int

@@ -1,4 +1,7 @@
-"""The paraboloid of the design focal length that fits the true dish best: the truth of the pose."""
+"""Best-fit paraboloid of the true dish, at design focal length.
+
+The truth of the pose.
+"""
 
 from dataclasses import dataclass
 
@@ -14,7 +17,10 @@ MINIMUM_PRISMS = 6
 
 @dataclass(frozen=True)
 class GroundParaboloid:
-    """A paraboloid in the ground frame; `deviations` are normal to it, positive towards the focus, m."""
+    """Paraboloid in the ground frame, with normal `deviations`, m.
+
+    Positive towards the focus.
+    """
 
     axis: np.ndarray  # unit vector, from the vertex to the focus
     vertex: np.ndarray
@@ -23,13 +29,16 @@ class GroundParaboloid:
 
 
 def normal_deviation(point):
-    """Distance of points (..., 3) to z = (x^2 + y^2)/(4 f), positive towards the focus; good to its square / 100 m."""
+    """Normal deviation of points (..., 3) from z = (x^2 + y^2)/(4 f).
+
+    Positive towards the focus; good to its square / 100 m.
+    """
     slope2 = np.sum(point[..., :2] ** 2, axis=-1) / (4.0 * FOCAL_LENGTH**2)
     return (point[..., 2] - FOCAL_LENGTH * slope2) / np.sqrt(1.0 + slope2)
 
 
 def best_paraboloid(points: dict[str, np.ndarray], pose: TruePosture) -> GroundParaboloid | None:
-    """Least squares of the normal deviations over two tilts and three shifts; None below six prisms."""
+    """Least squares fit over two tilts and three shifts; None below six prisms."""
     if len(points) < MINIMUM_PRISMS:
         return None
     prisms = pose.reflector_from_nominal(np.array(list(points.values())))

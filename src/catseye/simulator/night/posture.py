@@ -1,4 +1,4 @@
-"""How the telescope stands: the nominal posture, and the night's departure from it."""
+"""Posture of the telescope: nominal, and the night's departure."""
 
 from dataclasses import dataclass, field
 
@@ -15,7 +15,7 @@ FEED_ARM_FOOT = np.array([0.0, -8.0, 10.0])
 
 @dataclass(frozen=True)
 class TruePosture:
-    """Nominal rotation and shift of the reflector, and the night's departure from it (reflector frame)."""
+    """Nominal rotation and shift of the reflector, and departures from it."""
 
     azimuth_deg: float
     elevation_deg: float
@@ -36,7 +36,10 @@ class TruePosture:
         return direction @ (self._azimuth_rotation() @ self._elevation_rotation()).T
 
     def nominal(self, reflector):
-        """Nominal ground point of a point of the reflector frame. Source: [PARKER04] eq. 2.44."""
+        """Nominal ground point of a reflector point.
+
+        Source: [PARKER04] eq. 2.44.
+        """
         lifted = (reflector + REFLECTOR_TO_ELEVATION) @ self._elevation_rotation().T
         return self.alidade(lifted + np.array([0.0, 0.0, ELEVATION_AXIS_HEIGHT]))
 
@@ -44,12 +47,12 @@ class TruePosture:
         return point @ self._azimuth_rotation().T
 
     def reflector_from_nominal(self, ground):
-        """The inverse of `nominal`."""
+        """Inverse of `nominal`: reflector point of a ground point."""
         lifted = ground @ self._azimuth_rotation() - np.array([0.0, 0.0, ELEVATION_AXIS_HEIGHT])
         return lifted @ self._elevation_rotation() - REFLECTOR_TO_ELEVATION
 
     def dish(self, reflector):
-        """True ground point of a point of the dish."""
+        """True ground point of a dish point."""
         moved = Rotation.from_rotvec(self.turn).apply(reflector + REFLECTOR_TO_ELEVATION) - REFLECTOR_TO_ELEVATION
         return self.nominal(moved + self.shift)
 
@@ -57,13 +60,15 @@ class TruePosture:
         return self.nominal_direction(Rotation.from_rotvec(self.turn).apply(direction))
 
     def arm(self, reflector):
-        """True ground point of a point of the feed arm."""
+        """True ground point of a feed-arm point."""
         bent = Rotation.from_rotvec(self.arm_turn).apply(reflector - FEED_ARM_FOOT) + FEED_ARM_FOOT + self.arm_shift
         return self.dish(bent)
 
 
 def posture(azimuth_deg: float, elevation_deg: float, streams: Streams, *, planted: Planted) -> TruePosture:
-    """The posture of the night: some millimetres and arc seconds from nominal, the feed arm more.
+    """Posture of the night: millimetres and arc seconds from nominal.
+
+    More for the feed arm.
 
     The magnitudes are chosen; two sigma is the most.
     """

@@ -1,4 +1,4 @@
-"""Who shoots what and when, in the manner of night-01."""
+"""Shot schedule of a campaign, like night-01."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from catseye.simulator.night.structure import Structure, unit
 from catseye.simulator.night.world import FEED_ARM_RANGERS, GROUND_RANGERS, TrueBenchmark, TrueMonument
 
 REFERENCE = "ZRG"
-BUFFER_S = 0.128  # s that a shot takes: 128 cycles of 1 kHz
+BUFFER_S = 0.128  # s, duration of a shot: 128 cycles of 1 kHz
 
 
 @dataclass(frozen=True)
@@ -22,13 +22,13 @@ class Schedule:
     """Rhythm of the campaign.
 
     interval_s        between shots of a ranger
-    jitter_s          each shot comes early or late by up to this, and never before the last one's buffer is full
+    jitter_s          each shot is early or late by up to this, never before the last buffer is complete
     reference_every   shots between two reference shots
     span_s            the ground rangers start anywhere that lets them end within it
     ball_rangers      ground rangers that shoot one ball, at most
     ball_angle_deg    largest angle from the axis of a ball
     weak_share        share of the dish prisms that the weak ranger shoots
-    again             how often a ranger of the feed arm shoots each dish prism once more; a fraction is a share of them
+    again             repeats of each dish prism by a feed-arm ranger; a fraction is a share of the prisms
     """
 
     interval_s: float = 14.0
@@ -70,7 +70,10 @@ def ground_targets(
     pose: TruePosture,
     streams: Streams,
 ) -> dict[str, list[str]]:
-    """What each ground ranger shoots, repeats included; seen from the design, so that no plant changes it."""
+    """Targets of each ground ranger, repeats included.
+
+    Seen from the design, so that planted errors do not change it.
+    """
     lists: dict[str, list[str]] = {ranger: [] for ranger in GROUND_RANGERS}
     place = {r: m.fixed_point_mm / 1000.0 for r, m in monuments.items()}
     for unit_ in telescope.triplets:
@@ -99,27 +102,30 @@ def ground_targets(
 def feed_arm_targets(
     ranger: str, rule: Schedule, telescope: Structure, *, faults: Faults, streams: Streams
 ) -> list[str]:
-    """What a ranger of the feed arm shoots: its fellows and the triplets' prisms once, nearly all dish prisms."""
-    others = [r for r in FEED_ARM_RANGERS if r != ranger]
+    """Targets of a feed-arm ranger.
+
+    The other rangers and the triplets' prisms once, nearly all dish prisms.
+    """
+    rangers = [r for r in FEED_ARM_RANGERS if r != ranger]
     prisms = [t.name for unit_ in telescope.triplets for t in unit_.targets if t.kind == "prism"]
     share = rule.weak_share if ranger == faults.weak_ranger else 0.99
     drawn = streams(f"prisms/{ranger}").uniform(size=len(telescope.dish))
     dish = [t.name for t, u in zip(telescope.dish, drawn, strict=True) if u < share]
     more = streams(f"again/{ranger}").uniform(size=len(dish)) < rule.again % 1.0 if rule.again else np.zeros(len(dish))
-    repeats = [name for name, once in zip(dish, more, strict=True) for _ in range(int(rule.again) + int(once))]
-    return others + prisms + dish + repeats
+    repeats = [name for name, extra in zip(dish, more, strict=True) for _ in range(int(rule.again) + int(extra))]
+    return rangers + prisms + dish + repeats
 
 
-def with_references(targets: list[str], every: int) -> list[str]:
-    """A reference shot first, after every `every` shots, and last."""
-    blocks = [targets[i : i + every] for i in range(0, len(targets), every)]
+def with_references(targets: list[str], interval: int) -> list[str]:
+    """Targets with a reference shot first, last, and at an interval."""
+    blocks = [targets[i : i + interval] for i in range(0, len(targets), interval)]
     return [REFERENCE, *(name for block in blocks for name in (*block, REFERENCE))]
 
 
 def plan_shots(rule: Schedule, shot_lists: dict[str, list[str]], streams: Streams) -> dict[str, list[ScheduledShot]]:
-    """Shots of every ranger in its own time.
+    """Shots of every ranger at its times.
 
-    Raises ValidityError: more shots than a campaign's day has room for.
+    Raises ValidityError: more shots than fit a campaign's day.
     """
     plan = {}
     needs: list[tuple[float, int]] = []
@@ -139,7 +145,7 @@ def plan_shots(rule: Schedule, shot_lists: dict[str, list[str]], streams: Stream
 
 
 def _refuse_long(rule: Schedule, needs: Sequence[tuple[float, int]]) -> None:
-    """ValidityError where shots end later than a campaign may.
+    """Raise ValidityError where shots end after a campaign's limit.
 
     needs   start, s, and number of shots of each ranger
     """

@@ -1,4 +1,4 @@
-"""The files of a campaign, in the layout of night-01 to the last key and decimal."""
+"""Campaign files in the layout of night-01, to the last key and decimal."""
 
 import csv
 import shutil
@@ -77,7 +77,7 @@ def vector(values, decimals: int) -> str:
 
 
 def prism_constants(height_mm: float, u_height_mm: float = 0.002) -> str:
-    """The four lines that every prism sheet has, from the typed height."""
+    """Four lines common to all prism sheets, from the typed height."""
     hrp, pc = height_mm / GLASS_TO_AIR, -(GLASS_TO_AIR - 1.0 / GLASS_TO_AIR) * height_mm
     return f"height_mm = {height_mm:.3f}\nu_height_mm = {u_height_mm:.3f}\nhrp_mm = {hrp:.3f}\npc_mm = {pc:.4f}\n"
 
@@ -126,7 +126,7 @@ def target_entry(t: TrueTarget) -> str:
 
 
 def station_entry(night: Night, name: str) -> str:
-    """A weather station's table; where it stands is said where that matters."""
+    """Table of a weather station, with its place where needed."""
     entry = STATION.format(name=name, elevation=STATIONS[name])
     if night.truth.nature.calm:
         return entry
@@ -176,9 +176,9 @@ def write_table(path: Path, header: str, rows) -> None:
 
 
 def write_night(night: Night, directory: str | Path) -> Path:
-    """Write the campaign into a new or empty directory; either all of it or nothing.
+    """Write the campaign into a new or empty directory, whole or not at all.
 
-    Raises InputError: the directory holds something.
+    Raises InputError: the directory is not empty.
     """
     directory = Path(directory)
     if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
@@ -194,7 +194,7 @@ def write_night(night: Night, directory: str | Path) -> Path:
 
 
 def write_files(night: Night, directory: Path) -> None:
-    """Write every file of the campaign into an existing, empty directory.
+    """Write all files of the campaign into an existing, empty directory.
 
     Raises OSError with the file's name: no room, no permission.
     """
@@ -206,12 +206,12 @@ def write_files(night: Night, directory: Path) -> None:
     _write_tables(night, directory)
     with named(directory / "frames.npy") as path, path.open("wb") as file:
         np.lib.format.write_array_header_1_0(file, np.lib.format.header_data_from_array_1_0(night.frames))
-        file.write(np.ascontiguousarray(night.frames).data.cast("B"))  # numpy's own writing loses the system's reason
+        file.write(np.ascontiguousarray(night.frames).data.cast("B"))  # numpy's writing loses the system's reason
 
 
 @contextmanager
 def named(path: Path) -> Iterator[Path]:
-    """Let an OSError inside say which file it is of: one of a write knows no name."""
+    """Add the file name to an OSError raised inside."""
     try:
         yield path
     except OSError as problem:
@@ -220,7 +220,7 @@ def named(path: Path) -> Iterator[Path]:
 
 
 def _texts(night: Night) -> dict[str, str]:
-    """Read-me and sheets by relative path."""
+    """Readme and sheets by relative path."""
     texts = {
         "README.md": README.format(
             name=night.name,
@@ -247,7 +247,7 @@ def _texts(night: Night) -> dict[str, str]:
 
 
 def _write_tables(night: Night, directory: Path) -> None:
-    """Benchmarks, weather, path temperatures where sound was used, shots."""
+    """Write benchmarks, weather, shots, and path temperatures if sound was used."""
     start = night.start_mjd_utc
     write_table(
         directory / "benchmarks.csv",

@@ -1,4 +1,4 @@
-"""A whole synthetic night: the campaign as the files would tell it, and the truth that they do not."""
+"""Simulate a night: the campaign as in its files, and the truth."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ START_MJD_UTC = 52889.125
 
 @dataclass(frozen=True)
 class SimulatedTelescope:
-    """How the telescope stands and what is on it.
+    """Posture of the telescope and its equipment.
 
     azimuth_deg     clockwise from north
     elevation_deg   5 to 90
@@ -70,7 +70,10 @@ class SimulatedTelescope:
 
 @dataclass(frozen=True, eq=False)
 class NightSite:
-    """What stands on the site of a simulated night; `cubes` are the benchmarks as targets, `points` all, m, ground."""
+    """Objects on the site of a simulated night.
+
+    `cubes` are the benchmarks as targets, `points` all, m, ground.
+    """
 
     heads: dict[str, TrueHead]
     monuments: dict[str, TrueMonument]
@@ -99,14 +102,14 @@ def simulate_night(  # noqa: PLR0913 - what a night is made of, keyword-only
     nature: Nature | None = None,
     start_mjd_utc: float = START_MJD_UTC,
 ) -> Night:
-    """A night in the manner of night-01, from one seed.
+    """Simulate a night like night-01 from one seed.
 
     warmth          of lines; none if None
-    night           another one at the same site: noise, electronics, weather and air are drawn anew
+    night           another night at the same site, with new noise, electronics, weather and air
     nature          waves, fronts, turbulence, thermometers that lag, a telescope that expands; none of these if None
-    start_mjd_utc   decides with `nature` how the Sun stands, no more
+    start_mjd_utc   with `nature`, sets the Sun's position, no more
 
-    Raises InputError: something planted on what the night does not have.
+    Raises InputError: something planted on an object the night does not have.
     """
     stands, warmth, nature = telescope or SimulatedTelescope(), warmth or LineWarmth(), nature or CALM
     faults, rule, planted = faults or Faults(), schedule or Schedule(), planted or Planted()
@@ -170,7 +173,10 @@ def simulate_night(  # noqa: PLR0913 - what a night is made of, keyword-only
 def _site(
     stands: SimulatedTelescope, faults: Faults, planted: Planted, streams: Streams, *, batch_heights: float
 ) -> NightSite:
-    """Rangers, benchmarks and telescope, drawn. Raises InputError: an error planted on a stranger."""
+    """Draw rangers, benchmarks and telescope.
+
+    Raises InputError: an error planted on an unknown ranger.
+    """
     heads = {r: head(r, streams, planted) for r in (*GROUND_RANGERS, *FEED_ARM_RANGERS)}
     monuments = {r: monument(r, heads[r], streams, planted=planted) for r in GROUND_RANGERS}
     marks = benchmarks(monuments, streams, planted)
@@ -195,7 +201,7 @@ def _site(
 
 
 def _plan(site: NightSite, rule: Schedule, faults: Faults, streams: Streams) -> dict[str, list[ScheduledShot]]:
-    """Shots that every ranger is to fire, in its own time."""
+    """Planned shots of every ranger at its times."""
     telescope = site.telescope
     lists = ground_targets(
         rule, monuments=site.monuments, telescope=telescope, marks=site.marks, pose=site.pose, streams=streams
@@ -206,30 +212,33 @@ def _plan(site: NightSite, rule: Schedule, faults: Faults, streams: Streams) -> 
 def _moving(
     site: NightSite, air: TrueAir, law: SteelExpansion | None, plan: Mapping[str, list[ScheduledShot]]
 ) -> MovingPoints:
-    """The points while the telescope expands: what was drawn holds half-way from the first shot to the last."""
+    """Points of the expanding telescope.
+
+    The drawn positions hold half-way from the first shot to the last.
+    """
     seconds = [shot.seconds for shots in plan.values() for shot in shots]
-    own = dict.fromkeys(site.telescope.targets, 0.0)
+    expansion = dict.fromkeys(site.telescope.targets, 0.0)
     on_dish = [t.name for t in (*site.telescope.dish, *(t for unit in site.telescope.triplets for t in unit.targets))]
     on_arm = [*FEED_ARM_RANGERS, *(t.name for t in site.telescope.structural if t.frame == "reflector")]
     if law is not None:
-        own |= dict.fromkeys(on_dish, law.dish_share) | dict.fromkeys(on_arm, law.arm_share)
-    centre, carried = np.array([*APERTURE_CENTRE, height_above_vertex(APERTURE_CENTRE)]), frozenset(on_dish + on_arm)
-    half_way = 0.5 * (min(seconds) + max(seconds))
-    return MovingPoints(site.points, air, law, half_way, own, site.pose.dish(centre), carried)
+        expansion |= dict.fromkeys(on_dish, law.dish_share) | dict.fromkeys(on_arm, law.arm_share)
+    centre, on_alidade = np.array([*APERTURE_CENTRE, height_above_vertex(APERTURE_CENTRE)]), frozenset(on_dish + on_arm)
+    middle = 0.5 * (min(seconds) + max(seconds))
+    return MovingPoints(site.points, air, law, middle, expansion, site.pose.dish(centre), on_alidade)
 
 
 def benchmark_targets(marks: list[TrueBenchmark], streams: Streams, planted: Planted) -> list[TrueTarget]:
-    """The benchmarks as targets with approximate positions."""
+    """Benchmarks as targets with approximate positions."""
     rng = streams("benchmark positions")
     typed = [typed_mm(b.true_point + typing_error(planted, rng)) for b in marks]
     return [TrueTarget(b.name, "hollow", "ground", t, b.true_point) for b, t in zip(marks, typed, strict=True)]
 
 
 def shifted(points: dict[str, np.ndarray], planted: Planted) -> dict[str, np.ndarray]:
-    """The points with the planted shifts."""
+    """Points with the planted shifts."""
     for name in planted.shifts:
         if name not in points:
-            raise InputError(f"a shift planted on {name!r}: the night has no such point")
+            raise InputError(f"a shift planted on {name!r}: unknown point")
     return points | {name: points[name] + np.asarray(by, dtype=float) for name, by in planted.shifts.items()}
 
 
@@ -237,7 +246,7 @@ def in_time(
     heads: dict[str, TrueHead], returns: dict[str, list[Return]], streams: Streams, *, planted: Planted
 ) -> tuple[list[Return], np.ndarray]:
     """All returns in the order of their triggers, with their frames."""
-    every = [r for ranger in heads for r in returns[ranger]]
-    order = np.argsort([r.shot.seconds for r in every], kind="stable")
+    all_returns = [r for ranger in heads for r in returns[ranger]]
+    order = np.argsort([r.shot.seconds for r in all_returns], kind="stable")
     frames = np.concatenate([sampled_frames(heads[z], returns[z], streams, planted=planted) for z in heads])
-    return [every[i] for i in order], frames[order]
+    return [all_returns[i] for i in order], frames[order]

@@ -1,4 +1,4 @@
-"""Weather stations: where they stand, how they read, and what they read in a night."""
+"""Weather stations of a night: places, sensors and readings."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -22,7 +22,7 @@ STEP_S = 0.25  # an eddy of 5 m passes in 0.8 s at 6 m/s
 
 @dataclass(frozen=True)
 class ReadingGap:
-    """A time in which a weather station tells nothing, s since the start."""
+    """Interval without readings of a weather station, s since the start."""
 
     station: str
     start_s: float
@@ -34,10 +34,10 @@ class ReadingGap:
 
 @dataclass(frozen=True)
 class StationNature:
-    """How weather stations read. Stations without an entry read as the air is.
+    """Sensor properties of weather stations; stations without an entry are perfect.
 
     lags_s        station -> time constant of its thermometer, 0 to 1800
-    radiation_c   station -> what it reads too warm under a Sun in the zenith in still air
+    radiation_c   station -> excess reading under a Sun in the zenith in still air
     """
 
     lags_s: Mapping[str, float] = field(default_factory=dict)
@@ -69,7 +69,7 @@ class WeatherReading:
 
 @dataclass(frozen=True, eq=False)
 class WeatherStations:
-    """Stations of a night.
+    """Weather stations of a night.
 
     places   station -> (3,) m, ground frame
     wind     m/s
@@ -81,21 +81,26 @@ class WeatherStations:
     start_mjd_utc: float
 
     def temperature_c(self, air: TrueAir, station: str, seconds):
-        """What a perfect sensor behind this station's lag and in its screen reads at times (k,)."""
+        """Temperature at times (k,) of a perfect sensor with this station's lag.
+
+        In its screen.
+        """
         place, lag = self.places[station], self.nature.lags_s.get(station, 0.0)
         read = lagged(lambda t: air.weather_at(place, t)[0], seconds, time_constant_s=lag, step_s=STEP_S)
         return read + self.radiation_c(station, seconds)
 
     def radiation_c(self, station: str, seconds):
-        """What a station reads too warm at times (k,), as the Sun stands and the wind blows."""
+        """Radiation error at times (k,), °C, by Sun and wind."""
         sun = sine_of_sun(self.start_mjd_utc + np.asarray(seconds, dtype=float) / SECONDS_PER_DAY)
         return self.nature.radiation_c.get(station, 0.0) * sun / (1.0 + self.wind / AIRING_M_S)
 
     def readings(
         self, air: TrueAir, *, streams: Streams, faults: Faults, planted: Planted, until_s: float
     ) -> tuple[list[WeatherReading], dict[str, float]]:
-        """Readings of all stations from 180 s before the start to 570 s and more after the last shot, and the true
-        thermometer offsets."""
+        """Readings of all stations, and true thermometer offsets.
+
+        From 180 s before the start to 570 s and more after the last shot.
+        """
         interval = self.nature.interval_s
         until = max(4110.0, until_s + 600.0) + interval - USUAL_INTERVAL_S
         seconds = np.arange(-180.0, until, interval)
@@ -124,7 +129,7 @@ class WeatherStations:
         return readings, offsets
 
     def _silent(self, station: str, seconds):
-        """True (k,) for readings in a gap; the first and the last are always there."""
+        """True (k,) for readings in a gap; first and last are never in one."""
         silent = np.zeros(len(seconds), dtype=bool)
         for gap in self.nature.gaps:
             if gap.station == station:
@@ -134,7 +139,10 @@ class WeatherStations:
 
 
 def station_points(streams: Streams) -> dict[str, np.ndarray]:
-    """Where the stations stand (3,), m, ground frame: distances and bearings drawn, heights as site.toml says."""
+    """Places of the stations (3,), m, ground frame.
+
+    Distances and bearings are drawn, heights as in site.toml.
+    """
     places = {}
     for station, elevation in STATIONS.items():
         rng = streams(f"station place/{station}")

@@ -1,4 +1,4 @@
-"""The telescope of one night: where everything on it truly is, and what was typed about it."""
+"""Telescope of one night: true and typed places of its equipment."""
 
 from dataclasses import dataclass, replace
 
@@ -32,7 +32,10 @@ WEDGE_DEG = 10.0  # the dish prisms stand on wedges of multiples of this
 
 @dataclass(frozen=True)
 class TrueTarget:
-    """A target: what was typed about it, and its truth. `normal` looks at the rangers (a ball: its axis)."""
+    """Target with typed values and truth.
+
+    `normal` looks at the rangers (a ball: its axis).
+    """
 
     name: str
     kind: str  # 'hollow', 'prism' or 'ball'
@@ -47,7 +50,7 @@ class TrueTarget:
 
 @dataclass(frozen=True)
 class TrueTriplet:
-    """A triplet unit: its data sheet, and its three targets (left, right, ball)."""
+    """Triplet unit: data sheet and three targets (left, right, ball)."""
 
     name: str
     position_mm: np.ndarray
@@ -62,7 +65,7 @@ class TrueTriplet:
 
 @dataclass(frozen=True)
 class Structure:
-    """Everything on the telescope."""
+    """All targets on the telescope."""
 
     feed_arm: dict[str, TrueTarget]
     dish: list[TrueTarget]
@@ -83,12 +86,15 @@ def unit(vector):
 
 
 def tilted(direction, tilt_deg, rng):
-    """A direction turned by normal draws of `tilt_deg` (one sigma a component) about two axes across it."""
+    """Direction turned by normal draws of `tilt_deg` about two axes.
+
+    One sigma a component, the axes across it.
+    """
     return unit(direction + np.cross(direction, rng.normal(0.0, tilt_deg * DEGREE, np.shape(direction))))
 
 
 def typing_error(planted: Planted, rng, shape=3):
-    """Errors of approximate positions, m: 8 mm, never above 15 mm in a coordinate."""
+    """Errors of approximate positions, m: 8 mm, at most 15 mm a coordinate."""
     return planted.gain("typing") * np.clip(rng.normal(0.0, 8.0, shape), -15.0, 15.0) * MILLIMETRE
 
 
@@ -97,7 +103,10 @@ def typed_mm(point):
 
 
 def surface_deviations(xy, streams: Streams, planted: Planted, *, rms_mm: float = 0.3):
-    """Normal deviations of dish prisms (m, towards the focus): low orders of the aperture and a random part."""
+    """Normal deviations of dish prisms, m, positive towards the focus.
+
+    Low orders of the aperture and a random part.
+    """
     rng = streams("surface")
     x, y = ((xy - APERTURE_CENTRE) / APERTURE_RADIUS).T
     r2 = x**2 + y**2
@@ -113,7 +122,10 @@ def height_above_vertex(xy):
 
 
 def dish_prisms(count: int, pose: TruePosture, streams: Streams, *, planted: Planted) -> list[TrueTarget]:
-    """Prisms strewn over the aperture like sunflower seeds, on wedges that aim them roughly at the feed arm."""
+    """Dish prisms in a sunflower pattern, on wedges towards the feed arm.
+
+    The wedges aim them only roughly.
+    """
     if count == 0:
         return []
     rng = streams("dish")
@@ -154,7 +166,7 @@ def dish_prisms(count: int, pose: TruePosture, streams: Streams, *, planted: Pla
 
 
 def triplet(number: int, count: int, pose: TruePosture, *, streams: Streams, planted: Planted) -> TrueTriplet:
-    """One triplet at the rim, its plate looking at the aim point, its ball the other way."""
+    """Triplet at the rim, plate to the aim point, ball the other way."""
     rng = streams(f"triplet/{number}")
     calibration = planted.gain("calibration")
     name = f"TR{number:02d}"
@@ -214,7 +226,7 @@ def triplet(number: int, count: int, pose: TruePosture, *, streams: Streams, pla
 def structure(
     pose: TruePosture, *, dish_count: int, triplet_count: int, streams: Streams, faults: Faults, planted: Planted
 ) -> Structure:
-    """The telescope in one posture, with one approximate position typed wrong."""
+    """Telescope in one posture, with one mistyped approximate position."""
     rng = streams("feed_arm")
     place = FEED_ARM_DESIGN + rng.normal(0.0, 0.01, FEED_ARM_DESIGN.shape)
     arm_typed = typed_mm(place + typing_error(planted, rng, place.shape))
@@ -232,7 +244,7 @@ def structure(
 
 
 def structural_targets(pose: TruePosture, streams: Streams, planted: Planted):
-    """Hollow cubes on the feed arm and at the elevation bearing, and their design points in the ground frame."""
+    """Hollow cubes on feed arm and elevation bearing, with ground design points."""
     rng = streams("structural")
     targets, design = [], {}
     for name, at in STRUCTURAL_REFLECTOR.items():
@@ -248,7 +260,10 @@ def structural_targets(pose: TruePosture, streams: Streams, planted: Planted):
 
 
 def mistype(dish, fixed, units, *, wrong_mm: float, streams: Streams):
-    """Add one gross error to the typed position of one dish prism, structural target or triplet; say whose."""
+    """Add a gross error to one typed position; return its name.
+
+    Of a dish prism, structural target or triplet.
+    """
     rng = streams("wrong position")
     draw, direction = rng.uniform(), unit(rng.normal(size=3))
     sheets = [*dish, *fixed, *units]

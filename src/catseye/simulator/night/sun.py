@@ -10,7 +10,9 @@ J2000_MJD = 51_544.5
 
 
 def sine_of_sun(mjd_utc, *, latitude_deg: float = SITE_LATITUDE_DEG, longitude_deg: float = SITE_LONGITUDE_DEG):
-    """Sine of the Sun's elevation over a site at times (...), 0 at night; without refraction.
+    """Sine of the Sun's elevation at times (...), 0 at night.
+
+    Without refraction.
 
     Source: [MEEUS98] eqs. 12.4 (sidereal time), 13.6 (altitude) and ch. 25, low accuracy. Good to 0.01 degree.
 

@@ -1,4 +1,4 @@
-"""What really was, beside what the files say."""
+"""Truth of a night, beyond its files."""
 
 from dataclasses import dataclass
 
@@ -19,25 +19,27 @@ from catseye.simulator.night.world import TrueHead, TrueMonument
 
 @dataclass(frozen=True)
 class Truth:
-    """What really was. Metres, radians, ground frame; shots are keyed by their id as text, from '1'.
+    """Truth of a night, in metres, radians, ground frame.
+
+    Shots are keyed by their id as text, from '1'.
 
     points             every scan point, triplet target, dish prism, structural target, benchmark: name -> (3,), at
                        `reference_s` where the telescope expands: half-way from the first shot to the last
     shot_status        'good', 'blocked' or 'reflected' (reference shots are good)
     shot_ranges        straight distance scan point to reference point (a reference shot: D0)
-    shot_phase_errors  what a foreign return adds to the phase, rad (0 for the others)
+    shot_phase_errors  phase error from a stray reflection, rad (0 for other shots)
     path_refractivity_ppm   (n_path - 1) 1e6 of every shot on a target
-    refractivity_ppm   its mean over the good ones; None when there are none
+    refractivity_ppm   its mean over good shots; None without any
     d0, leakage, fixed_points, mirror_offsets   of the rangers (the last two: ground rangers)
-    thermometer_offsets_c   reading minus air, station -> value, the lie included
-    normals            of prisms (entry face) and balls (their axis, the way they look), unit vectors
+    thermometer_offsets_c   reading minus air, station -> value, planted bias included
+    normals            of prisms (entry face) and balls (their axis, outward), unit vectors
     paraboloid         best fit to the true dish prisms: axis, vertex, focus, normal deviations; None below six prisms
-    posture            the departure from the nominal posture that placed everything
+    posture            the departure from the nominal posture, for all points
     air                the air itself, a function of place and seconds since the start
     moving             the points at any time, `moving.at(names, seconds)`; `moving.scale(seconds)` is the expansion
     stations           places, time constants and radiation errors of the weather stations
-    nature             every effect beyond smooth air and a rigid telescope, as it was
-    wrongly_typed      whose approximate position carries the gross error (a triplet: TRnn)
+    nature             all effects beyond smooth air and a rigid telescope
+    wrongly_typed      name of the approximate position with the gross error (a triplet: TRnn)
     """
 
     points: dict[str, np.ndarray]
@@ -62,7 +64,7 @@ class Truth:
 
     @property
     def reference_s(self) -> float:
-        """When the points, the paraboloid and the posture hold, s since the start."""
+        """Time at which points, paraboloid and posture hold, s since the start."""
         return self.moving.reference_s
 
     @property
@@ -83,7 +85,7 @@ def truth_of(  # noqa: PLR0913 - keyword-only, from every part of the night
     pose: TruePosture,
     nature: Nature,
 ) -> Truth:
-    """Gather the truth; returns in the order of the shots."""
+    """Collect the truth; returns in the order of the shots."""
     points = dict(moving.points)
     shots = {str(i + 1): r for i, r in enumerate(returns)}
     ranged = {i: r for i, r in shots.items() if r.shot.target != REFERENCE}

@@ -1,4 +1,4 @@
-"""Lines of sight in warmer air than smooth, and what sound measures of them."""
+"""Lines of sight in warm air, and acoustic measurements of them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from catseye.simulator.night.faults import Streams
 
 SOUNDING_INTERVAL_S = 120.0
 AT_POINT = (
-    0.02  # m: within which a path ends at a plume's point; the telescope expands by less, points are further apart
+    0.02  # m: radius of a plume's point for path ends; above the telescope's expansion, below the spacing of points
 )
 
 
@@ -29,10 +29,10 @@ class Sounding:
 
 @dataclass(frozen=True)
 class LineWarmth:
-    """Lines in warmer air than smooth, and whether sound measures them.
+    """Lines in warmer air, and optional acoustic soundings.
 
-    warmer_c    (ranger, target) -> °C by which the mean of that line is warmer
-    u_sound_c   °C: these lines are sounded, each with an offset of its own drawn from it, and noise of a fifth;
+    warmer_c    (ranger, target) -> °C, excess of the mean of that line
+    u_sound_c   °C: these lines are sounded, each with a separate offset drawn from it, and noise of a fifth;
                 None: no sound
     """
 
@@ -42,9 +42,9 @@ class LineWarmth:
 
 @dataclass(frozen=True)
 class WarmLine:
-    """Air that is warmer by a plume on the way to some points than `air` there.
+    """Air with plumes on the lines to some points.
 
-    plumes   (point (3,) m, °C that the mean of the straight line is warmer: twice that half-way, none at the ends)
+    plumes   (point (3,) m, °C, excess of the straight line's mean: twice that half-way, none at the ends)
     """
 
     air: TrueAir
@@ -59,11 +59,14 @@ class WarmLine:
         return self.air.neighbours
 
     def index_at(self, points, seconds):
-        """Group index at the ends of lines, where no plume is."""
+        """Group index at the ends of lines, outside plumes."""
         return self.air.index_at(points, seconds)
 
     def path_index(self, start, end, seconds):
-        """As of `TrueAir`; towards a plume's point by the midpoint rule over 500 parts."""
+        """Mean group index as of `TrueAir`, through plumes by the midpoint rule.
+
+        With 500 parts.
+        """
         index = self.air.path_index(start, end, seconds)
         begins = np.broadcast_to(start, np.shape(end))
         for point, warmer in self.plumes:
@@ -73,7 +76,7 @@ class WarmLine:
                 on = begins[i] + (end[i] - begins[i]) * share[:, None]
                 smooth_c, pressure_hpa, humidity_percent = self.air.weather_at(on, seconds[i])
                 t = smooth_c + plume
-                # the plume warms, it does not wet: the same vapour is a lower relative humidity
+                # the plume adds no vapour: relative humidity falls
                 drier = saturation_hpa(smooth_c) / saturation_hpa(t)
                 index[i] = 1.0 + PPM * group_refractivity_ppm(t, pressure_hpa, humidity_percent * drier).mean()
         return index
@@ -82,10 +85,13 @@ class WarmLine:
 def air_of_rangers(
     rangers: Mapping[str, object], points: Mapping[str, np.ndarray], air: TrueAir, warmth: LineWarmth
 ) -> dict[str, TrueAir | WarmLine]:
-    """The air as each ranger looks through it. Raises InputError: a warm line with a strange end."""
+    """Air of each ranger's lines.
+
+    Raises InputError: a warm line with an unknown end.
+    """
     for ranger, target in warmth.warmer_c:
         if ranger not in rangers or target not in points:
-            raise InputError(f"a warm line {ranger} - {target}: the night has no such ends")
+            raise InputError(f"a warm line {ranger} - {target}: unknown ends")
     plumes = {r: tuple((points[t], w) for (a, t), w in warmth.warmer_c.items() if a == r) for r in rangers}
     return {r: WarmLine(air, p) if p else air for r, p in plumes.items()}
 
@@ -93,7 +99,7 @@ def air_of_rangers(
 def soundings(
     air: TrueAir, warmth: LineWarmth, points: Mapping[str, np.ndarray], *, streams: Streams, until_s: float
 ) -> tuple[Sounding, ...]:
-    """What sound measures of the warm lines: their true mean, an offset a line, and noise."""
+    """Acoustic readings of the warm lines: true mean, a line's offset, noise."""
     u_sound_c = warmth.u_sound_c
     if u_sound_c is None:
         return ()

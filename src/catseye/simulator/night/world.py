@@ -1,4 +1,4 @@
-"""What stands on the ground: monuments with their heads, benchmarks, and the heads of the feed arm."""
+"""Objects on the ground: monuments with heads, benchmarks; feed-arm heads."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ SITE_LATITUDE_DEG, METRES_PER_DEGREE = 38.433121, 110_950.0
 
 @dataclass(frozen=True)
 class TrueHead:
-    """A ranger head: what its sheet says, and what is true of it (`true_...`, SI)."""
+    """Ranger head: calibration sheet and true values (`true_...`, SI)."""
 
     ranger: str
     leakage_amplitude_volt: float
@@ -36,7 +36,10 @@ class TrueHead:
 
 @dataclass(frozen=True)
 class TrueMonument:
-    """A ground monument: its survey as printed, and its true fixed point and scan point (m, ground frame)."""
+    """Ground monument: printed survey, true fixed point and scan point.
+
+    m, ground frame.
+    """
 
     ranger: str
     fixed_point_mm: np.ndarray
@@ -49,7 +52,7 @@ class TrueMonument:
 
 @dataclass(frozen=True)
 class TrueBenchmark:
-    """A hollow cube on the ground with a certified distance to one ranger."""
+    """Hollow cube on the ground at a certified distance to one ranger."""
 
     name: str
     ranger: str
@@ -59,7 +62,10 @@ class TrueBenchmark:
 
 
 def kelvin_from_ground(alpha):
-    """The nine elements of the monument's rotation, from its three angles (rad). Source: [PARKER04] eq. 2.5."""
+    """Nine elements of the monument's rotation from its angles (rad).
+
+    Source: [PARKER04] eq. 2.5.
+    """
     (c1, c2, c3), (s1, s2, s3) = np.cos(alpha), np.sin(alpha)
     return np.array(
         [
@@ -71,7 +77,7 @@ def kelvin_from_ground(alpha):
 
 
 def head(ranger: str, streams: Streams, planted: Planted) -> TrueHead:
-    """A head with its calibration sheet, drawn for one ranger."""
+    """Head with its calibration sheet, drawn for one ranger."""
     rng = streams(f"head/{ranger}")
     amplitude, angle = round(rng.uniform(0.012, 0.040), 5), round(rng.uniform(0.0, 2 * np.pi), 4)
     d0_mm = round(rng.normal(180.3, 0.5), 3)
@@ -96,7 +102,10 @@ def head(ranger: str, streams: Streams, planted: Planted) -> TrueHead:
 
 
 def monument(ranger: str, head: TrueHead, streams: Streams, *, planted: Planted) -> TrueMonument:
-    """A monument some 120 m from the pintle bearing, pointing at it, with the true scan point of its head."""
+    """Monument some 120 m from the pintle bearing, pointing at it.
+
+    With the true scan point of its head.
+    """
     rng = streams(f"monument/{ranger}")
     bearing = (12.0 + 30.0 * GROUND_RANGERS.index(ranger) + rng.uniform(-5.0, 5.0)) * DEGREE
     radius, height = rng.normal(120.0, 1.1), rng.normal(0.0, 0.5)
@@ -119,7 +128,10 @@ def monument(ranger: str, head: TrueHead, streams: Streams, *, planted: Planted)
 
 
 def benchmarks(monuments: dict[str, TrueMonument], streams: Streams, planted: Planted) -> list[TrueBenchmark]:
-    """Six benchmarks, 60 to 140 m along chords of the ring, each certified from its own ranger."""
+    """Six benchmarks, 60 to 140 m along chords of the ring.
+
+    Each is certified from its own ranger.
+    """
     marks = []
     for k in range(6):
         rng = streams(f"benchmark/{k}")

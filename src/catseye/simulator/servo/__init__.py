@@ -1,1 +1,1 @@
-"""A mirror's motion chip, its motor and axis, step by step."""
+"""Servo simulation: motion chip, motor and axis, step by step."""

@@ -1,9 +1,10 @@
-"""One axis of a mirror: motion chip, converter, motor and encoder stepped together; and the ZY's commands for it.
+"""One mirror axis: motion chip, converter, motor, encoder; ZY commands.
 
-In each sample the chip reads the encoder and computes; what it computes drives the motor from the next sample on. That
-whole sample of delay is a choice: the data sheet does not say when within a sample the converter is written.
+The parts are stepped together. In each sample the chip reads the encoder and computes; its result drives the motor from
+the next sample on. That full sample of delay is a choice: the data sheet does not say when within a sample the
+converter is written.
 
-The methods named after ZY commands (`aba` to `cwt`) do what those commands mean, for one axis. Times are simulated:
+The methods named after ZY commands (`aba` to `cwt`) do the work of those commands for one axis. Times are simulated:
 nothing sleeps. Source: [CREAGER02], the pages of the commands; [TEXAS13] for the chip.
 """
 
@@ -27,13 +28,13 @@ Status = Literal["done", "motor off", "timeout"]
 
 @dataclass(frozen=True, eq=False)
 class AxisTrace:
-    """What an axis did, one row a sample.
+    """Trace of an axis, one row a sample.
 
     time       s, since power came on, when the encoder was read
     desired    counts, with its fraction
     velocity   counts/s, of the profile
     actual     counts, as the encoder reads
-    angle      rad, where the axis truly is, from where power came on
+    angle      rad, true angle of the axis from its place at power-on
     output     steps of the converter
     """
 
@@ -52,12 +53,12 @@ class AxisTrace:
 
 @dataclass(frozen=True)
 class Settling:
-    """How CWT decides that an axis has settled.
+    """Criteria of CWT for a settled axis.
 
     tolerance   counts (WTOL)
     reads       in a row within it (WCNT)
     timeout     s (WTMO; its unit is open, the manual's example is 18)
-    strict      whether a timeout fails (WMD other than 0)
+    strict      True if a timeout fails (WMD other than 0)
     every       s between two reads; the manual says continuously
     """
 
@@ -77,7 +78,7 @@ class Settling:
 
 @dataclass(frozen=True)
 class Wait:
-    """How a wait ended: `success` as the ZY reports it, `status`, how long it took, s."""
+    """Result of a wait: `success` as the ZY reports it, `status`, duration, s."""
 
     success: bool
     status: Status
@@ -86,7 +87,7 @@ class Wait:
 
 @dataclass(frozen=True)
 class Homing:
-    """How a search for the index ended; `text` says it to people."""
+    """Result of a search for the index; `text` describes it."""
 
     success: bool
     text: str
@@ -94,9 +95,9 @@ class Homing:
 
 
 class ServoAxis:
-    """A chip, a motor, and the time since power came on.
+    """Chip, motor, and the time since power-on.
 
-    chip    as it comes from its reset, or with its filter loaded
+    chip    after reset, or with its filter loaded
     motor   the axis; its encoder's count is zero wherever it stands when power comes on
 
     The amplifier is off at first (`axis`), as at the ZY's boot.
@@ -155,7 +156,7 @@ class ServoAxis:
     # The commands ---------------------------------------------------------------------------------------------------
 
     def axis(self, on: bool) -> None:
-        """AXIS: the amplifier on or off; off at boot."""
+        """AXIS: switch the amplifier on or off; off at boot."""
         self.enabled = on
 
     def acp(self) -> int:
@@ -167,9 +168,11 @@ class ServoAxis:
         return self.chip.desired_position
 
     def aba(self, value: int | None = None) -> int:
-        """ABA: acceleration of the next moves, 1/65536 count a sample squared; it must not exceed the velocity.
+        """ABA: acceleration of the next moves, 1/65536 count a sample squared.
 
-        value   0 to 2^30 - 1, None to ask
+        It must not exceed the velocity.
+
+        value   0 to 2^30 - 1, None to read
 
         Raises ValidityError: outside these limits, or above the velocity loaded.
         """
@@ -179,9 +182,11 @@ class ServoAxis:
         return self.chip.loaded_acceleration
 
     def abv(self, value: int | None = None) -> int:
-        """ABV: largest velocity of the next moves, 1/65536 count a sample; at least the acceleration.
+        """ABV: largest velocity of the next moves, 1/65536 count a sample.
 
-        value   0 to 2^30 - 1, None to ask
+        At least the acceleration.
+
+        value   0 to 2^30 - 1, None to read
 
         Raises ValidityError: outside these limits, or below the acceleration loaded.
         """
@@ -201,7 +206,10 @@ class ServoAxis:
         return self.chip.loaded_position
 
     def stt(self) -> bool:
-        """STT: start the move; False when the acceleration was changed during another, which goes on."""
+        """STT: start the move; False after an acceleration change in motion.
+
+        The current move then continues.
+        """
         return self.chip.start()
 
     def flt(
@@ -212,7 +220,7 @@ class ServoAxis:
         il: int | None = None,
         interval: int | None = None,
     ) -> tuple[int, int, int, int, int]:
-        """FLT, and FKP, FKI, FKD, FIL, FSI with one of the five: filter values, at work from the next sample on.
+        """FLT, FKP, FKI, FKD, FIL, FSI: filter values, from the next sample on.
 
         kp, ki, kd   gains, 0 to 32 767
         il           limit of the integral term, 0 to 32 767
@@ -225,15 +233,15 @@ class ServoAxis:
         return self.chip.loaded_filter
 
     def fkp(self, value: int | None = None) -> int:
-        """The proportional gain, FKP."""
+        """FKP: the proportional gain."""
         return self.flt(kp=value)[0]
 
     def fki(self, value: int | None = None) -> int:
-        """The gain of the integral, FKI."""
+        """FKI: the gain of the integral."""
         return self.flt(ki=value)[1]
 
     def fkd(self, value: int | None = None) -> int:
-        """The derivative gain, FKD."""
+        """FKD: the derivative gain."""
         return self.flt(kd=value)[2]
 
     def fil(self, value: int | None = None) -> int:
@@ -245,9 +253,9 @@ class ServoAxis:
         return self.flt(interval=value)[4]
 
     def erl(self, counts: int | None = None) -> int:
-        """ERL: position error beyond which the motor is off until the next move.
+        """ERL: position error that switches the motor off until the next move.
 
-        counts   0 to 25 000, None to ask
+        counts   0 to 25 000, None to read
 
         Raises ValidityError: outside these limits.
         """
@@ -256,7 +264,7 @@ class ServoAxis:
         return self.chip.error_limit
 
     def wai(self, timeout: float = 60.0) -> Wait:
-        """WAI: wait until the profile is complete. The motor off ends it too, as a failure.
+        """WAI: wait until the profile is complete; motor off is a failure.
 
         timeout   s
         """
@@ -265,12 +273,12 @@ class ServoAxis:
             if self.chip.trajectory_complete:
                 break
             self._step()
-        done = self.chip.on_target and not self.chip.motor_off
-        status: Status = "done" if done else "motor off" if self.chip.motor_off else "timeout"
-        return Wait(done, status, (self.samples - begin) * self.motor.sample)
+        complete = self.chip.on_target and not self.chip.motor_off
+        status: Status = "done" if complete else "motor off" if self.chip.motor_off else "timeout"
+        return Wait(complete, status, (self.samples - begin) * self.motor.sample)
 
     def cwt(self, target: int, settling: Settling = Settling()) -> Wait:
-        """CWT: wait until the encoder reads within the tolerance so many times in a row.
+        """CWT: wait until the encoder reads within tolerance repeatedly.
 
         target     counts where the cube is
         settling   WTOL, WCNT, WTMO, WMD
@@ -287,9 +295,11 @@ class ServoAxis:
         return Wait(not settling.strict, status, (self.samples - begin) * self.motor.sample)
 
     def fhm(self, direction: Literal[1, -1] = 1, timeout: float = HOMING_TIME) -> Homing:
-        """FHM: turn until the index pulse passes, one turn at most, go back to it, settle there, call it zero.
+        """FHM: find the index pulse, return to it, settle, set zero.
 
-        direction   in which to look first, 1 or -1
+        It turns at most once.
+
+        direction   of the first search, 1 or -1
         timeout     s, of all of it
 
         Where an end stop comes first (the motor is then off by its error limit) the search turns back; the manual does
@@ -298,7 +308,9 @@ class ServoAxis:
         """
         begin, chip, turn = self.samples, self.chip, self.motor.design.counts_per_turn
         if not chip.stops_on_error:
-            return Homing(False, "no position error limit is set: ERL first, or a stop would be pushed against", 0.0)
+            return Homing(
+                False, "no position error limit is set: send ERL first, or the axis may push against a stop", 0.0
+            )
         end = begin + self._samples_of(timeout)
         homed = False
         for sense in (direction, -direction):
@@ -306,12 +318,12 @@ class ServoAxis:
             self.abp(self.acp() + sense * turn)
             if not self.stt():
                 chip.seeking = False
-                text = "the acceleration (ABA) was changed during a move: home when it has ended"
+                text = "the acceleration (ABA) was changed during a move: home after it ends"
                 return Homing(False, text, (self.samples - begin) * self.motor.sample)
             while self.samples < end and not (chip.index_found or chip.trajectory_complete):
                 self._step()
             homed = chip.index_found
-            if homed or not chip.motor_off:  # a whole turn without a pulse, or no time left
+            if homed or not chip.motor_off:  # a full turn without a pulse, or no time left
                 break
         chip.seeking = False
         if homed:
@@ -320,9 +332,11 @@ class ServoAxis:
                 self.stt()
                 if self.wai((end - self.samples) * self.motor.sample).status != "motor off":
                     break
-            left = (end - self.samples) * self.motor.sample
-            homed = left > 0.0 and self.cwt(chip.index_position, Settling(tolerance=0, timeout=left)).success
-            text = "home" if homed else f"the index at {chip.index_position} counts was seen but not settled on"
+            time_left = (end - self.samples) * self.motor.sample
+            homed = time_left > 0.0 and self.cwt(chip.index_position, Settling(tolerance=0, timeout=time_left)).success
+            text = (
+                "home" if homed else f"the index at {chip.index_position} counts was found but the axis did not settle"
+            )
         else:
             text = f"no index pulse within a turn from {self.acp()} counts, or in {timeout:g} s"
         if homed:
@@ -331,15 +345,15 @@ class ServoAxis:
         return Homing(homed, text, (self.samples - begin) * self.motor.sample)
 
     def follow(self, counts: Sequence[float], samples: int = TRACKING_SAMPLES) -> AxisTrace:
-        """Track a moving target: the profile passes the given counts one after another, straight between them.
+        """Track a moving target through counts, linearly between them.
 
-        counts    where the target is after each interval, with fractions
+        counts    target positions after each interval, with fractions
         samples   of an interval: 375 are 128 ms
 
         Velocity mode, a new speed each interval: from where the profile is to where the target will be. Afterwards the
-        velocity loaded is what it was, for the next move. The profile
-        holds fractions of a count, so nothing adds up. A change of speed dv takes dv/a, and its dv^2/2a of way are made
-        good in the next interval.
+        loaded velocity is restored for the next move. The profile
+        holds fractions of a count, so errors do not accumulate. A change of speed dv takes dv/a, and its dv^2/2a of
+        travel is recovered in the next interval.
 
         Raises ValidityError: no counts, or not finite; a speed beyond the chip; the acceleration changed during a move.
         """
@@ -349,9 +363,9 @@ class ServoAxis:
             )
         rows, usual = [], self.chip.loaded_velocity
         for to in counts:
-            way = to - self.chip.position / FRACTION
-            speed = checked("ABV", round(abs(way) / samples * FRACTION))
-            self.chip.load_trajectory(velocity=speed, mode="velocity", direction=1 if way >= 0.0 else -1)
+            travel = to - self.chip.position / FRACTION
+            speed = checked("ABV", round(abs(travel) / samples * FRACTION))
+            self.chip.load_trajectory(velocity=speed, mode="velocity", direction=1 if travel >= 0.0 else -1)
             started = self.stt()
             self.chip.load_trajectory(velocity=usual)
             if not started:

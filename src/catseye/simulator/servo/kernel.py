@@ -1,11 +1,13 @@
-"""Many samples of servo axes in one compiled call, in the very numbers of `MotionChip`, `Motor` and `ServoAxis`.
+"""Compiled servo axes: many samples a call, bit-identical to the classes.
 
-Imported only when a living site needs it. Those classes stay the reference, and stay in charge of every command: the
-state lives in two arrays, is written into the Python objects before a command and read back after it. A test holds both
-to the same bits.
+They are `MotionChip`, `Motor` and `ServoAxis`.
+
+Imported only when a living site needs it. Those classes are the reference and execute every command: the
+state lives in two arrays, is written into the Python objects before a command and read back after it. A test compares
+both bit for bit.
 
 An axis at rest costs nothing, exactly: without disturbance the next state follows from this one alone, so a state that
-comes back to itself after one interval of the derivative does so for ever, and the rest of the time is skipped.
+repeats after one interval of the derivative repeats for ever, and the remaining time is skipped.
 """
 
 from collections.abc import Sequence
@@ -29,22 +31,22 @@ CHIP = (  # what a step of the chip reads or changes, by its names there
 FLAGS = frozenset(CHIP[-5:]) | {"seeking", "stops_on_error"}
 MODE, DIRECTION, TARGET, LIMIT, ACCELERATION, KP, KI, KD, IL, INTERVAL, ERROR_LIMIT, STOPS = range(12)
 WHERE, SPEED, HOME, RAW, ERROR, SUM, DIFFERENCE, OUTPUT, LAST, UNTIL, INDEX_AT, SEEKING = range(12, 24)
-OFF, ON_TARGET, EXCESSIVE, FOUND, WRAPAROUND = range(24, 29)
-START, ENABLED, TURN, INDEX, SHIFT, WRAPS, FULL, STUCK, BLIND, WATCH, REST, WIDTH = range(29, 41)  # beyond CHIP
+OFF, ON_TARGET, EXCESSIVE, INDEX_SEEN, WRAPAROUND = range(24, 29)
+START, ENABLED, TURN, INDEX, SHIFT, WRAPS, FULL, STUCK, BLIND, WATCH, AT_REST, WIDTH = range(29, 41)  # beyond CHIP
 ANGLE, RATE, DRIVE, REALS = range(4)
 INERTIA, TORQUE, DAMPING, STATIC, COULOMB, LOW, HIGH, PER_RADIAN, SAMPLE = range(9)
-WHOLE_SPEED, WHOLE_WAY, RIPPLE, RIPPLE_CYCLES, DISTURBANCE, CONSTANTS = range(9, 15)
-AT_INDEX, AT_END = 1, 2  # what an axis can be watched for: the index was seen, the profile is complete
+SPEED_LIMIT, TRAVEL_LIMIT, RIPPLE, RIPPLE_CYCLES, DISTURBANCE, CONSTANTS = range(9, 15)
+AT_INDEX, AT_END = 1, 2  # events to watch for: the index was seen, the profile is complete
 NO_NORMALS = np.empty((0, 0))
 
-_inlined = njit(error_model="numpy")  # kept with their caller
+_inlined = njit(error_model="numpy")  # cached with their caller
 
 
 class CompiledAxes:
     """Servo axes that share a clock, stepped together.
 
-    axes      in Python, as they stand; from here on they are brought up to date by `axis` alone
-    at_rest   whether the last `skip` found that no axis will change until something is done to it
+    axes      in Python; from here on only `axis` updates them
+    at_rest   True if the last `skip` found that no axis changes without a command
     """
 
     def __init__(self, axes: Sequence[ServoAxis]):
@@ -65,7 +67,7 @@ class CompiledAxes:
         self._disturbed = bool(self._fixed[:, DISTURBANCE].any())
 
     def axis(self, k: int) -> ServoAxis:
-        """Axis k in Python, up to date; what is done to it counts after `take`."""
+        """Axis k in Python, up to date; changes need `take`."""
         axis, ints, reals = self._axes[k], self._ints[k].tolist(), self._reals[k].tolist()
         chip = axis.chip
         for name, value in zip(CHIP, ints, strict=False):
@@ -75,7 +77,7 @@ class CompiledAxes:
         return axis
 
     def take(self, k: int) -> None:
-        """Read axis k as its Python form stands now."""
+        """Read the state of axis k from its Python form."""
         axis, ints = self._axes[k], self._ints[k]
         ints[: len(CHIP)] = [getattr(axis.chip, name) for name in CHIP]
         ints[RAW] = axis._raw
@@ -84,24 +86,27 @@ class CompiledAxes:
         self._reals[k] = axis.motor.angle, axis.motor.velocity, axis._drive
 
     def spoil(self, k: int, *, stuck: bool, blind: bool) -> None:
-        """What is wrong with an axis: it does not turn; its index pulse does not come."""
+        """Set the faults of an axis: stuck, or without index pulse."""
         if (self._ints[k, STUCK], self._ints[k, BLIND]) != (stuck, blind):
             self._ints[k, [STUCK, BLIND]] = stuck, blind
             self.at_rest = False
 
     def watch(self, k: int, what: int) -> None:
-        """`skip` ends early once axis k saw its index (AT_INDEX) or its profile is complete (AT_END); 0: neither."""
+        """Let `skip` end early at the index (AT_INDEX) or profile end (AT_END) of axis k.
+
+        0: neither.
+        """
         self._ints[k, WATCH] = what
 
     def skip(self, samples: int) -> int:
-        """Let time pass; how many samples did, fewer where something watched for is there.
+        """Let time pass; number of samples done, fewer at a watched event.
 
         samples   0 or above
         """
         if self._disturbed and samples > 1 and self._ints[:, WATCH].any():  # draw no number that is not used
-            for done in range(samples):
+            for completed in range(samples):
                 if not self.skip(1):
-                    return done
+                    return completed
             return samples
         normals = NO_NORMALS
         if self._disturbed:
@@ -109,15 +114,15 @@ class CompiledAxes:
             for k, axis in enumerate(self._axes):
                 if self._fixed[k, DISTURBANCE] and axis.motor.generator is not None:
                     normals[k] = axis.motor.generator.standard_normal(samples)
-        done = int(advance(self._ints, self._reals, self._fixed, normals, samples))
-        self.at_rest = bool(self._ints[:, REST].all())
+        completed = int(advance(self._ints, self._reals, self._fixed, normals, samples))
+        self.at_rest = bool(self._ints[:, AT_REST].all())
         for axis in self._axes:
-            axis.samples += done
-        return done
+            axis.samples += completed
+        return completed
 
     @property
     def counts(self) -> NDArray[np.float64]:
-        """(axes,) where they truly stand, counts with their fraction, from angle zero."""
+        """True positions (axes,), counts with fraction, from angle zero."""
         return self._reals[:, ANGLE] * self._fixed[:, PER_RADIAN]
 
     def actual(self, k: int) -> int:
@@ -134,29 +139,29 @@ class CompiledAxes:
         return int(self._ints[k, WHERE]) / 65_536, int(self._ints[k, SPEED]) / 65_536
 
     def enabled(self, k: int) -> bool:
-        """Whether the amplifier of axis k is on."""
+        """True if the amplifier of axis k is on."""
         return bool(self._ints[k, ENABLED])
 
     def motor_off(self, k: int) -> bool:
-        """Whether chip k drives nothing."""
+        """True if chip k drives nothing."""
         return bool(self._ints[k, OFF])
 
     def excessive(self, k: int) -> bool:
-        """Whether the position error of axis k passed its limit since the last move began."""
+        """True if the position error of axis k passed its limit in this move."""
         return bool(self._ints[k, EXCESSIVE])
 
     def complete(self, k: int) -> bool:
-        """Whether the profile of axis k is done, or its motor off."""
+        """True if the profile of axis k is complete, or its motor off."""
         return bool(self._ints[k, OFF] or self._ints[k, ON_TARGET])
 
     def index_found(self, k: int) -> bool:
-        """Whether the index asked for was seen."""
-        return bool(self._ints[k, FOUND])
+        """True if the requested index was seen."""
+        return bool(self._ints[k, INDEX_SEEN])
 
 
 @njit(cache=True, error_model="numpy")
 def advance(ints, reals, fixed, normals, samples):
-    """Step axes (a,) together by a number of samples; how many were done.
+    """Step axes (a,) together; number of samples done.
 
     ints      (a, WIDTH) int64, changed
     reals     (a, REALS), changed
@@ -168,37 +173,37 @@ def advance(ints, reals, fixed, normals, samples):
     awake = 0
     for k in range(axes):
         s, f, c = ints[k], reals[k], fixed[k]
-        s[REST] = 0
+        s[AT_REST] = 0
         period = s[INTERVAL] + 1
         still = s[WATCH] == 0 and s[SPEED] == 0 and f[RATE] == 0.0 and (s[OFF] or s[ON_TARGET])
         if still and c[DISTURBANCE] == 0.0 and samples > period:
             before[:], real_before[:] = s, f
             for _ in range(period):
                 _step(s, f, c, 0.0)
-            s[REST] = np.array_equal(before, s) and np.array_equal(real_before, f)
-            if not s[REST]:
+            s[AT_REST] = np.array_equal(before, s) and np.array_equal(real_before, f)
+            if not s[AT_REST]:
                 s[:], f[:] = before, real_before
-        awake += 1 - s[REST]
-    done = 0
+        awake += 1 - s[AT_REST]
+    completed = 0
     if awake == 0:
-        done = samples
-    while done < samples:
+        completed = samples
+    while completed < samples:
         for k in range(axes):
             s = ints[k]
-            if (s[WATCH] & AT_INDEX and s[FOUND]) or (s[WATCH] & AT_END and (s[OFF] or s[ON_TARGET])):
-                samples = done
-        if done == samples:
+            if (s[WATCH] & AT_INDEX and s[INDEX_SEEN]) or (s[WATCH] & AT_END and (s[OFF] or s[ON_TARGET])):
+                samples = completed
+        if completed == samples:
             break
         for k in range(axes):
-            if not ints[k, REST]:
-                normal = normals[k, done] if fixed[k, DISTURBANCE] != 0.0 else 0.0
+            if not ints[k, AT_REST]:
+                normal = normals[k, completed] if fixed[k, DISTURBANCE] != 0.0 else 0.0
                 _step(ints[k], reals[k], fixed[k], normal)
-        done += 1
+        completed += 1
     for k in range(axes):
-        if ints[k, REST]:
-            for _ in range(done % (ints[k, INTERVAL] + 1)):  # where in the derivative's interval it then is
+        if ints[k, AT_REST]:
+            for _ in range(completed % (ints[k, INTERVAL] + 1)):  # phase within the derivative's interval
                 _step(ints[k], reals[k], fixed[k], 0.0)
-    return done
+    return completed
 
 
 @_inlined
@@ -212,7 +217,7 @@ def _step(s, f, c, normal):
         if first <= high:
             passed = first if raw >= s[RAW] else high - (high - at) % turn
             s[INDEX_AT] = _wrapped(passed - s[HOME], 1)
-            s[SEEKING], s[FOUND] = 0, 1
+            s[SEEKING], s[INDEX_SEEN] = 0, 1
     s[RAW] = raw
     word = 0
     if not s[OFF]:
@@ -223,7 +228,7 @@ def _step(s, f, c, normal):
 
 @_inlined
 def _drive_word(s, raw):
-    """MotionChip.step with the motor on."""
+    """Drive word, as `MotionChip.step` with the motor on."""
     _move_on(s)
     error = _wrapped((s[WHERE] >> 16) - (raw - s[HOME]), 1)
     error = max(-ERROR_HIGH - 1, min(ERROR_HIGH, error))
@@ -248,7 +253,7 @@ def _drive_word(s, raw):
 
 @_inlined
 def _move_on(s):
-    """The profile's next sample, as `MotionChip._move_on`."""
+    """Next sample of the profile, as `MotionChip._move_on`."""
     if s[ON_TARGET]:
         return
     speed, rate = s[SPEED], s[ACCELERATION]
@@ -257,8 +262,8 @@ def _move_on(s):
         speed = _next_velocity(remaining, speed, s[LIMIT], rate)
         s[ON_TARGET] = remaining == 0 and speed == 0
     else:
-        wanted = s[DIRECTION] * s[LIMIT] if s[MODE] == VELOCITY else 0
-        speed = max(speed - rate, min(speed + rate, wanted))
+        target_speed = s[DIRECTION] * s[LIMIT] if s[MODE] == VELOCITY else 0
+        speed = max(speed - rate, min(speed + rate, target_speed))
         s[ON_TARGET] = s[MODE] != VELOCITY and speed == 0
     s[SPEED] = speed
     moved = s[WHERE] + speed
@@ -269,22 +274,22 @@ def _move_on(s):
 
 @_inlined
 def _next_velocity(remaining, velocity, limit, acceleration):
-    """`next_velocity`, with `stopping_distance` and `fastest_approach`."""
+    """Next velocity as `next_velocity`, with `stopping_distance` and `fastest_approach`."""
     if acceleration == 0:
         return velocity
     away, along = (remaining, velocity) if remaining >= 0 else (-remaining, -velocity)
-    wanted = min(along + acceleration, limit)
-    if wanted > 0:
-        k = wanted // acceleration
-        if wanted * (k + 1) - acceleration * (k * (k + 1) // 2) > away:
+    speed = min(along + acceleration, limit)
+    if speed > 0:
+        k = speed // acceleration
+        if speed * (k + 1) - acceleration * (k * (k + 1) // 2) > away:
             k = np.int64((sqrt(1.0 + 8.0 * away / acceleration) - 1.0) / 2.0)
             while acceleration * (k * (k + 1) // 2) > away:
                 k -= 1
             while acceleration * ((k + 1) * (k + 2) // 2) <= away:
                 k += 1
-            wanted = min(limit, (away + acceleration * (k * (k + 1) // 2)) // (k + 1))
-    wanted = max(wanted, along - acceleration)
-    return wanted if remaining >= 0 else -wanted
+            speed = min(limit, (away + acceleration * (k * (k + 1) // 2)) // (k + 1))
+    speed = max(speed, along - acceleration)
+    return speed if remaining >= 0 else -speed
 
 
 @_inlined
@@ -303,7 +308,7 @@ def _product(gain, signal, wraps):
 
 @_inlined
 def _advance_motor(s, f, c, normal):
-    """The motor over one sample, as `Motor.advance`."""
+    """Motor over one sample, as `Motor.advance`."""
     torque = f[DRIVE] * c[TORQUE]
     if c[RIPPLE] != 0.0:
         torque *= 1.0 + c[RIPPLE] * sin(c[RIPPLE_CYCLES] * f[ANGLE])
@@ -316,23 +321,23 @@ def _advance_motor(s, f, c, normal):
     if velocity != 0.0:
         friction = c[COULOMB] if velocity > 0.0 else -c[COULOMB]
         rate = (torque - friction - c[DAMPING] * velocity) / c[INERTIA]
-        after = velocity + rate * c[WHOLE_SPEED]
+        after = velocity + rate * c[SPEED_LIMIT]
         if after * velocity > 0.0:
             f[RATE] = after
-            f[ANGLE] += velocity * c[SAMPLE] + rate * c[WHOLE_WAY]
+            f[ANGLE] += velocity * c[SAMPLE] + rate * c[TRAVEL_LIMIT]
         else:
-            _through_rest(f, c, torque)
+            _through_standstill(f, c, torque)
     elif abs(torque) > c[STATIC]:
-        _through_rest(f, c, torque)
+        _through_standstill(f, c, torque)
     if f[ANGLE] < c[LOW] or f[ANGLE] > c[HIGH]:
         f[ANGLE] = min(max(f[ANGLE], c[LOW]), c[HIGH])
         f[RATE] = 0.0
 
 
 @_inlined
-def _through_rest(f, c, torque):
-    """Through a standstill, as `Motor._through_rest`."""
-    left, decay = c[SAMPLE], c[DAMPING] / c[INERTIA]
+def _through_standstill(f, c, torque):
+    """Pass through a standstill, as `Motor._through_standstill`."""
+    remaining, decay = c[SAMPLE], c[DAMPING] / c[INERTIA]
     for _ in range(MOST_EVENTS):
         velocity = f[RATE]
         if velocity == 0.0 and abs(torque) <= c[STATIC]:
@@ -340,19 +345,19 @@ def _through_rest(f, c, torque):
         sense = velocity if velocity != 0.0 else torque
         friction = c[COULOMB] if sense > 0.0 else -c[COULOMB]
         rate = (torque - friction - c[DAMPING] * velocity) / c[INERTIA]
-        rest = _time_to_rest(velocity, rate, decay)
-        duration = min(rest, left)
-        speed, way = _shares(duration, decay)
-        f[ANGLE] += velocity * duration + rate * way
-        if rest >= left:
+        stop_time = _stop_time(velocity, rate, decay)
+        duration = min(stop_time, remaining)
+        speed, travel = _shares(duration, decay)
+        f[ANGLE] += velocity * duration + rate * travel
+        if stop_time >= remaining:
             f[RATE] = velocity + rate * speed
             return
         f[RATE] = 0.0
-        left -= duration
+        remaining -= duration
 
 
 @_inlined
-def _time_to_rest(velocity, rate, decay):
+def _stop_time(velocity, rate, decay):
     if velocity * rate >= 0.0:
         return np.inf
     straight = -velocity / rate
@@ -365,8 +370,8 @@ def _time_to_rest(velocity, rate, decay):
 def _shares(duration, decay):
     x = duration * decay
     if x > 1e-2:
-        gone = -expm1(-x)
-        return gone / decay, (x - gone) / decay**2
+        decayed = -expm1(-x)
+        return decayed / decay, (x - decayed) / decay**2
     f1 = 1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0 * (1.0 - x / 6.0))))
     f2 = 0.5 - x / 6.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0 * (1.0 - x / 6.0 * (1.0 - x / 7.0))))
     return duration * f1, duration**2 * f2

@@ -1,14 +1,14 @@
-"""The LM628 motion chip: trapezoidal profile, PID filter, error limit and index register, in its own integers.
+"""LM628 motion chip: profile, PID filter, error limit, index, in integers.
 
-One `step` is one sample of the chip: it moves the desired position on, takes the position error and answers with the
-word for the converter that drives the motor. What the host loads waits in a second set of registers: STT takes the
+One `step` is one sample of the chip: it advances the desired position, takes the position error and returns the
+word for the converter that drives the motor. Values loaded by the host wait in a second set of registers: STT takes the
 trajectory over, UDF the filter. Source: [TEXAS13], pages 9 to 24.
 
-The data sheet leaves open, and here it is so:
+Choices where the data sheet is open:
 - The last fraction of a count of a move: the profile takes the largest speed from which it can still stop at the
-  target, so that it arrives exactly and never decelerates harder than told.
+  target, so that it arrives exactly and never decelerates harder than commanded.
 - The data sheet keeps only the bottom 16 bits of the filter's products. Taken literally (overflow = "wrap") the drive
-  turns round once a product passes 32 767, at kp = 200 from 164 counts. By default products stop at 16 bits, as the
+  reverses once a product passes 32 767, at kp = 200 from 164 counts. By default products stop at 16 bits, as the
   position error does ("saturate").
 - The integral is shifted right by 8 bits, once. The text can be read as twice; the user guide draws once.
 - The sum of errors stops at 24 bits. It is emptied when the motor is off.
@@ -22,14 +22,16 @@ from typing import Literal
 from catseye.errors import ValidityError
 from catseye.ranger.motion_units import FRACTION, LARGEST_GAIN, checked
 
-POSITION, VELOCITY, STOPPING = range(3)  # what the profile is doing
+POSITION, VELOCITY, STOPPING = range(3)  # states of the profile
 RANGE = 2**31  # counts until the position wraps round
 ERROR_HIGH = 2**15 - 1
 SUM_HIGH = 2**23 - 1
 
 
 def stopping_distance(velocity: int, acceleration: int) -> int:
-    """Way of a move from one sample at a speed until it stands, the speed falling by the acceleration every sample.
+    """Stopping distance from one sample at a speed, 1/65536 count.
+
+    The speed falls by the acceleration every sample.
 
     velocity       of the first sample, 1/65536 count a sample, 0 or above
     acceleration   1/65536 count a sample squared, above 0
@@ -42,12 +44,13 @@ def stopping_distance(velocity: int, acceleration: int) -> int:
 
 
 def fastest_approach(remaining: int, acceleration: int) -> int:
-    """Largest speed from which a move of this length can still stop in time.
+    """Largest speed from which a move of this length can stop in time.
 
     remaining      way to the target, 1/65536 count, 0 or above
     acceleration   1/65536 count a sample squared, above 0
 
-    The inverse of `stopping_distance`, rounded down. Every move thus ends in a sample that covers exactly what remains.
+    The inverse of `stopping_distance`, rounded down. Every move thus ends in a sample that covers exactly the
+    remainder.
 
     >>> fastest_approach(45, 10), fastest_approach(44, 10), fastest_approach(7, 10)
     (25, 24, 7)
@@ -61,7 +64,9 @@ def fastest_approach(remaining: int, acceleration: int) -> int:
 
 
 def next_velocity(remaining: int, velocity: int, *, limit: int, acceleration: int) -> int:
-    """Speed of the next sample on the way to a target; no sample changes it by more than the acceleration.
+    """Speed of the next sample on the way to a target.
+
+    No sample changes it by more than the acceleration.
 
     remaining      to the target, with its sign, 1/65536 count
     velocity       of the last sample, with its sign, 1/65536 count a sample
@@ -74,29 +79,35 @@ def next_velocity(remaining: int, velocity: int, *, limit: int, acceleration: in
     if acceleration == 0:
         return velocity
     away, along = (remaining, velocity) if remaining >= 0 else (-remaining, -velocity)
-    wanted = min(along + acceleration, limit)
-    if wanted > 0 and stopping_distance(wanted, acceleration) > away:
-        wanted = min(limit, fastest_approach(away, acceleration))
-    wanted = max(wanted, along - acceleration)
-    return wanted if remaining >= 0 else -wanted
+    speed = min(along + acceleration, limit)
+    if speed > 0 and stopping_distance(speed, acceleration) > away:
+        speed = min(limit, fastest_approach(away, acceleration))
+    speed = max(speed, along - acceleration)
+    return speed if remaining >= 0 else -speed
 
 
-def approached(velocity: int, wanted: int, acceleration: int) -> int:
-    """A speed brought nearer to another by at most the acceleration; all in 1/65536 count a sample."""
-    return max(velocity - acceleration, min(velocity + acceleration, wanted))
+def approached(velocity: int, goal: int, acceleration: int) -> int:
+    """Speed brought nearer to a goal by at most the acceleration.
+
+    All in 1/65536 count a sample.
+    """
+    return max(velocity - acceleration, min(velocity + acceleration, goal))
 
 
 def wrapped(position: int, unit: int = 1) -> int:
-    """A position within the chip's range, -2^30 to 2^30 - 1 counts; it wraps round. `unit` is what a count is."""
+    """Position wrapped into the chip's range, -2^30 to 2^30 - 1 counts.
+
+    `unit` is the size of a count.
+    """
     half = unit * (RANGE // 2)
     return (position + half) % (2 * half) - half
 
 
 class MotionChip:
-    """One LM628, as it is after a reset: motor off, all gains zero, every register zero.
+    """One LM628 after a reset: motor off, gains and registers zero.
 
     output_bits   8 or 12: width of the converter
-    overflow      "saturate" or "wrap": what a product of the filter does beyond 16 bits
+    overflow      "saturate" or "wrap": treatment of filter products beyond 16 bits
     """
 
     def __init__(self, *, output_bits: Literal[8, 12] = 8, overflow: Literal["saturate", "wrap"] = "saturate"):
@@ -117,7 +128,7 @@ class MotionChip:
         self.error_limit, self.stops_on_error = ERROR_HIGH, False
         # registers
         self.position = self.velocity = 0  # desired, in 1/65536 count and 1/65536 count a sample
-        self.home, self.raw = 0, 0  # the encoder's count at position zero, and the last one seen
+        self.home, self.raw = 0, 0  # the encoder's count at position zero, and the last one
         self.error = self.error_sum = self.difference = self.output = 0
         self._last_error, self._until_difference = 0, 0
         self.index_position, self.seeking = 0, False
@@ -127,12 +138,12 @@ class MotionChip:
 
     @property
     def actual_position(self) -> int:
-        """Where the encoder is, counts (RDRP)."""
+        """Position of the encoder, counts (RDRP)."""
         return wrapped(self.raw - self.home)
 
     @property
     def desired_position(self) -> int:
-        """Where the profile is, whole counts (RDDP)."""
+        """Position of the profile, whole counts (RDDP)."""
         return self.position // FRACTION
 
     @property
@@ -142,7 +153,10 @@ class MotionChip:
 
     @property
     def trajectory_complete(self) -> bool:
-        """Whether the profile is done or the motor off. The motor itself may not have arrived."""
+        """True if the profile is complete or the motor off.
+
+        The motor itself may not have arrived.
+        """
         return self.on_target or self.motor_off
 
     def load_trajectory(
@@ -154,7 +168,7 @@ class MotionChip:
         mode: Literal["position", "velocity"] | None = None,
         direction: Literal[1, -1] | None = None,
     ) -> None:
-        """Load what the next STT is to take over (LTRJ); what is not given stays as it was.
+        """Load values for the next STT (LTRJ); others are unchanged.
 
         position       target, counts
         velocity       largest speed, or in velocity mode the speed, 1/65536 count a sample, 0 or above
@@ -178,7 +192,10 @@ class MotionChip:
             self.loaded_direction = direction
 
     def start(self) -> bool:
-        """Take the loaded trajectory over (STT); False, and nothing done, if the acceleration changed during a move."""
+        """Start the loaded trajectory (STT).
+
+        False, without effect, if the acceleration changed during a move.
+        """
         if self.loaded_acceleration != self.acceleration and not self.trajectory_complete:
             self.command_error = True
             return False
@@ -191,9 +208,9 @@ class MotionChip:
         return True
 
     def stop(self, how: Literal["smooth", "abrupt", "off"]) -> None:
-        """Stop by hand (LTRJ bits 8 to 10 with STT).
+        """Stop manually (LTRJ bits 8 to 10 with STT).
 
-        how   "smooth" with the acceleration at work, "abrupt" at once where the motor is, "off" without drive
+        how   "smooth" with the present acceleration, "abrupt" at the motor's position, "off" without drive
 
         Raises ValidityError: another word.
         """
@@ -216,7 +233,7 @@ class MotionChip:
         il: int | None = None,
         interval: int | None = None,
     ) -> None:
-        """Load filter values for the next UDF (LFIL); what is not given stays as it was.
+        """Load filter values for the next UDF (LFIL); others are unchanged.
 
         kp, ki, kd   gains, 0 to 32 767
         il           limit of the integral term, 0 to 32 767
@@ -224,16 +241,18 @@ class MotionChip:
 
         Raises ValidityError: a value outside its register. Nothing is loaded then.
         """
-        asked = zip(("FKP", "FKI", "FKD", "FIL", "FSI"), (kp, ki, kd, il, interval), self.loaded_filter, strict=True)
-        five = [old if new is None else checked(command, new) for command, new, old in asked]
+        requested = zip(
+            ("FKP", "FKI", "FKD", "FIL", "FSI"), (kp, ki, kd, il, interval), self.loaded_filter, strict=True
+        )
+        five = [old if new is None else checked(command, new) for command, new, old in requested]
         self.loaded_filter = (five[0], five[1], five[2], five[3], five[4])
 
     def update_filter(self) -> None:
-        """Take the loaded filter values over (UDF)."""
+        """Apply the loaded filter values (UDF)."""
         self.kp, self.ki, self.kd, self.il, self.interval = self.loaded_filter
 
     def limit_error(self, counts: int, *, stop: bool) -> None:
-        """Largest position error, beyond which the flag is set (LPEI) and, with `stop`, the motor switched off (LPES).
+        """Set the position error limit (LPEI); with `stop` it switches the motor off (LPES).
 
         counts   0 to 32 767
 
@@ -244,19 +263,22 @@ class MotionChip:
         self.error_limit, self.stops_on_error = int(counts), stop
 
     def find_index(self) -> None:
-        """Keep the position of the next index pulse in the index register (SIP)."""
+        """Store the position of the next index pulse in the index register (SIP)."""
         self.seeking, self.index_found = True, False
 
     def define_home(self) -> None:
-        """Call the present position zero (DFH); the profile moves along, so that nothing jerks."""
-        here = self.actual_position
+        """Set the present position to zero (DFH) without a jerk.
+
+        The profile moves along.
+        """
+        present = self.actual_position
         self.home = self.raw
-        self.position = wrapped(self.position - here * FRACTION, FRACTION)
-        self.target -= here * FRACTION
-        self.index_position = wrapped(self.index_position - here)
+        self.position = wrapped(self.position - present * FRACTION, FRACTION)
+        self.target -= present * FRACTION
+        self.index_position = wrapped(self.index_position - present)
 
     def step(self, raw: int, index: int | None = None) -> int:
-        """One sample: the word for the converter, -128 to 127 or -2048 to 2047.
+        """One sample: converter word, -128 to 127 or -2048 to 2047.
 
         raw     the encoder's count since power came on
         index   the raw count at which an index pulse passed since the last sample, None without
@@ -279,7 +301,7 @@ class MotionChip:
         return self.output
 
     def _move_on(self) -> None:
-        """Desired position and velocity of this sample."""
+        """Advance desired position and velocity by one sample."""
         if self.on_target:
             return
         if self.mode == POSITION:
@@ -289,8 +311,8 @@ class MotionChip:
             )
             self.on_target = remaining == 0 and self.velocity == 0
         else:
-            wanted = self.direction * self.velocity_limit if self.mode == VELOCITY else 0
-            self.velocity = approached(self.velocity, wanted, self.acceleration)
+            target_speed = self.direction * self.velocity_limit if self.mode == VELOCITY else 0
+            self.velocity = approached(self.velocity, target_speed, self.acceleration)
             self.on_target = self.mode == STOPPING and self.velocity == 0
         moved = self.position + self.velocity
         self.position = wrapped(moved, FRACTION)
@@ -298,7 +320,9 @@ class MotionChip:
             self.wraparound = True
 
     def _filtered(self, error: int) -> int:
-        """The 16-bit sum u(n) = kp e(n) + ki sum e / 256 + kd (e(n') - e(n' - 1)), the second term held within il.
+        """16-bit sum u(n) = kp e(n) + ki sum e / 256 + kd (e(n') - e(n' - 1)).
+
+        The second term is held within il.
 
         Source: [TEXAS13] pages 11 and 12.
         """
@@ -320,7 +344,7 @@ class MotionChip:
         return max(-ERROR_HIGH - 1, min(ERROR_HIGH, product))
 
     def _switch_off(self) -> None:
-        """No drive, and the filter's memory emptied."""
+        """Switch the drive off and clear the filter's memory."""
         self.motor_off = True
         self.velocity = self.output = 0
         self.error = self.error_sum = self.difference = self._last_error = self._until_difference = 0

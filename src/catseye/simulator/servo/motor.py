@@ -1,8 +1,8 @@
-"""A mirror axis: motor and amplifier, inertia, friction, end stops, and the encoder on it.
+"""Mirror axis: motor and amplifier, inertia, friction, stops, encoder.
 
 Between two samples of the chip the drive is constant and the motion has a closed form; where the axis comes to rest
-within a sample the sample is cut there, and friction either holds the axis or the motion turns round. So nothing
-chatters, whatever the sample time. Source: [KARNOPP85] for friction that holds; the closed form is derived in `Motor`.
+within a sample the sample is split there, and friction either holds the axis or the motion reverses. So there is no
+chatter at any sample time. Source: [KARNOPP85] for friction that holds; the closed form is derived in `Motor`.
 """
 
 from dataclasses import dataclass
@@ -21,11 +21,13 @@ MOST_EVENTS = 4  # standstills within one sample: a constant drive allows one, r
 
 @dataclass(frozen=True)
 class AxisDesign:
-    """What an axis is made of. Nothing public says it of the ZY: these are a mirror of 150 mm and a small torque motor.
+    """Design of an axis: a 150 mm mirror and a small torque motor.
+
+    No public values of the ZY are known.
 
     inertia            kg m^2, motor and mirror
     torque_constant    N m/A, and V s/rad
-    amplifier          "current": `full_scale` is A; "voltage": V, behind `resistance`, the inductance left out
+    amplifier          "current": `full_scale` is A; "voltage": V, behind `resistance`, the inductance neglected
     full_scale         at the converter's end (128 of 128)
     resistance         ohm, of the winding and the amplifier; "voltage" only
     viscous            N m s/rad
@@ -33,7 +35,7 @@ class AxisDesign:
     static             N m, friction that holds it, at least `coulomb`
     ripple             of the torque, as a part of the drive's
     ripple_cycles      of the ripple, a turn
-    disturbance        N m rms, another one every sample; needs a generator
+    disturbance        N m rms, new every sample; needs a generator
     low_stop, high_stop   rad, of the axis; it stops there without a bounce
     counts_per_turn    of the encoder
     index_count        count of the index pulse, since power came on, modulo a turn
@@ -77,22 +79,25 @@ class AxisDesign:
 
     @property
     def damping(self) -> float:
-        """Torque lost with speed, N m s/rad: viscous friction, and with a voltage amplifier the motor's own voltage."""
-        own = self.torque_constant**2 / self.resistance if self.amplifier == "voltage" else 0.0
-        return self.viscous + own
+        """Speed-dependent torque loss, N m s/rad: viscous friction, and back-EMF.
+
+        The latter with a voltage amplifier.
+        """
+        back_emf = self.torque_constant**2 / self.resistance if self.amplifier == "voltage" else 0.0
+        return self.viscous + back_emf
 
 
 class Motor:
-    """An axis in motion; `advance` moves it over one sample of the chip.
+    """Axis in motion; `advance` moves it over one sample of the chip.
 
     With T the drive, B the damping and C the friction against the motion, J dw/dt = T - B w -+ C has, from angle a and
     speed w, over a time t,
         w(t) = w + q t f1(x),  a(t) = a + w t + q t^2 f2(x),  q = (T -+ C - B w)/J,  x = B t/J,
         f1 = (1 - e^-x)/x,  f2 = (x - 1 + e^-x)/x^2,
-    and stands still at t = -(J/B) log(1 + w B/(J q)), when q turns it back.
+    and stands still at t = -(J/B) log(1 + w B/(J q)), when q reverses it.
 
-    design      what it is made of
-    angle       rad, where it stands at first
+    design      its design
+    angle       rad, initial position
     generator   of the disturbance, None without
     sample      s, of the chip
 
@@ -122,7 +127,7 @@ class Motor:
 
     @property
     def count(self) -> int:
-        """What the encoder has counted since power came on, its steps half-way between whole counts."""
+        """Encoder count since power-on, with steps half-way between counts."""
         return floor(self.angle * self._per_radian + 0.5)
 
     def torque(self, drive: float) -> float:
@@ -147,33 +152,36 @@ class Motor:
                 self.velocity = after
                 self.angle += velocity * self.sample + rate * self._whole[1]
             else:
-                self._through_rest(torque)
+                self._through_standstill(torque)
         elif abs(torque) > design.static:
-            self._through_rest(torque)
+            self._through_standstill(torque)
         if self.angle < design.low_stop or self.angle > design.high_stop:
             self.angle = min(max(self.angle, design.low_stop), design.high_stop)
             self.velocity = 0.0
 
-    def _through_rest(self, torque: float) -> None:
+    def _through_standstill(self, torque: float) -> None:
         """One sample in which the axis comes to rest, or leaves it."""
-        design, left = self.design, self.sample
+        design, remaining = self.design, self.sample
         for _ in range(MOST_EVENTS):
             if self.velocity == 0.0 and abs(torque) <= design.static:
                 return
             sense = self.velocity if self.velocity != 0.0 else torque
             friction = design.coulomb if sense > 0.0 else -design.coulomb
             rate = (torque - friction - self._damping * self.velocity) / design.inertia
-            rest = self._time_to_rest(rate)
-            duration = min(rest, left)
-            speed, way = _shares(duration, self._damping / design.inertia)
-            self.angle += self.velocity * duration + rate * way
-            if rest >= left:
+            stop_time = self._stop_time(rate)
+            duration = min(stop_time, remaining)
+            speed, travel = _shares(duration, self._damping / design.inertia)
+            self.angle += self.velocity * duration + rate * travel
+            if stop_time >= remaining:
                 self.velocity += rate * speed
                 return
-            self.velocity, left = 0.0, left - duration
+            self.velocity, remaining = 0.0, remaining - duration
 
-    def _time_to_rest(self, rate: float) -> float:
-        """Time until the axis stands still, slowed down at first with `rate`, rad/s^2; infinite if it never does."""
+    def _stop_time(self, rate: float) -> float:
+        """Time until the axis stands still under `rate`, rad/s^2.
+
+        Infinite if it never does.
+        """
         if self.velocity * rate >= 0.0:
             return float("inf")
         straight = -self.velocity / rate
@@ -184,7 +192,9 @@ class Motor:
 
 
 def index_between(before: int, after: int, *, index: int, turn: int) -> int | None:
-    """Count at which the index pulse was passed between two readings, None when it was not.
+    """Count at which the index pulse was passed, None if it was not.
+
+    Between two readings.
 
     before, after   counts at two samples
     index           count of the pulse, modulo a turn
@@ -201,11 +211,14 @@ def index_between(before: int, after: int, *, index: int, turn: int) -> int | No
 
 
 def _shares(duration: float, decay: float) -> tuple[float, float]:
-    """t f1(x) and t^2 f2(x), s and s^2, by which an acceleration at the start changes speed and angle."""
+    """Terms t f1(x), s, and t^2 f2(x), s^2, for speed and angle.
+
+    Of an acceleration from the start.
+    """
     x = duration * decay
     if x > 1e-2:
-        gone = -expm1(-x)
-        return gone / decay, (x - gone) / decay**2
+        decayed = -expm1(-x)
+        return decayed / decay, (x - decayed) / decay**2
     f1 = 1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0 * (1.0 - x / 6.0))))
     f2 = 0.5 - x / 6.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0 * (1.0 - x / 6.0 * (1.0 - x / 7.0))))
     return duration * f1, duration**2 * f2

@@ -1,10 +1,10 @@
-"""Tuning an axis: its motor and load from recorded moves, filter integers for a phase margin, what comes out.
+"""Tuning an axis: identified plant, filter integers, margins, step response.
 
 Beyond friction the axis is gain/(s (s + decay)) from converter steps to counts. Sampled with the converter holding its
 word, and the word one sample late, this has an exact discrete form; so has the filter. The two zeros of the filter are
 set equal (a symmetrical choice: integral and derivative then share the phase) at the largest frequency that leaves the
-phase margin at the crossover asked, found on the discrete loop; the loop's gain there gives the rest. Margins are then
-computed again with the integers. Source: [FRANKLIN98], sampled plants, discrete PID, margins.
+phase margin at the required crossover, found on the discrete loop; the loop's gain there gives the size. Margins are
+then computed again with the integers. Source: [FRANKLIN98], sampled plants, discrete PID, margins.
 """
 
 from dataclasses import dataclass
@@ -20,18 +20,18 @@ from catseye.simulator.servo.axis import AxisTrace, ServoAxis
 from catseye.simulator.servo.motion_chip import MotionChip
 from catseye.simulator.servo.motor import AxisDesign, Motor
 
-STEPS = 128.0  # of the 8-bit converter, to its end; gains are told for it, a 12-bit converter is only finer
+STEPS = 128.0  # steps of the 8-bit converter; gains refer to it, a 12-bit converter is only finer
 SCALE = 256.0  # of the filter's 16-bit sum to a step; of the sum of errors to what ki multiplies
 BISECTIONS = 60
 
 
 @dataclass(frozen=True)
 class Plant:
-    """An axis as the filter sees it.
+    """Axis as seen by the filter.
 
     gain       counts/s^2 a converter step
     decay      1/s, of the speed without drive: damping over inertia
-    friction   converter steps that the moving axis's dry friction eats
+    friction   converter steps, dry friction of the moving axis
     sample     s
     """
 
@@ -50,7 +50,7 @@ class Plant:
 
 @dataclass(frozen=True)
 class Filter:
-    """The five integers of the filter, in the order of FLT."""
+    """Five integers of the filter, in the order of FLT."""
 
     kp: int
     ki: int
@@ -60,13 +60,13 @@ class Filter:
 
     @property
     def values(self) -> tuple[int, int, int, int, int]:
-        """kp, ki, kd, il, interval."""
+        """Values kp, ki, kd, il, interval."""
         return self.kp, self.ki, self.kd, self.il, self.interval
 
 
 @dataclass(frozen=True)
 class Margins:
-    """How far a loop is from instability.
+    """Stability margins of a loop.
 
     crossover      rad/s, the highest at which the loop's gain is one
     phase          rad, left at the crossover
@@ -82,7 +82,7 @@ class Margins:
 
 @dataclass(frozen=True)
 class StepMetrics:
-    """A step response.
+    """Metrics of a step response.
 
     rise        s, from 10 to 90 % of the step
     overshoot   part of the step, 0 or above
@@ -104,16 +104,16 @@ def ready_axis(
     angle: float = 0.0,
     chip: MotionChip | None = None,
 ) -> ServoAxis:
-    """An axis ready to move: amplifier on, filter at work, profile loaded.
+    """Axis ready to move: amplifier on, filter and profile loaded.
 
     filter_                  its integers
     velocity, acceleration   of its moves, as ABV and ABA take them
     design                   of the axis; the assumed one if None
     error_limit              counts, as ERL takes it
-    angle                    rad, where it stands
-    chip                     as it comes from its reset; one with an 8-bit converter if None
+    angle                    rad, initial position
+    chip                     after reset; one with an 8-bit converter if None
 
-    Raises ValidityError for what a command does not accept.
+    Raises ValidityError for values that a command does not accept.
     """
     axis = ServoAxis(chip or MotionChip(), Motor(design or AxisDesign(), angle))
     axis.axis(True)
@@ -125,7 +125,7 @@ def ready_axis(
 
 
 def plant_of(design: AxisDesign, sample: float = SAMPLE_TIME) -> Plant:
-    """What the filter sees of an axis whose parts are known.
+    """Plant of an axis of known design.
 
     design   of the axis
     sample   s
@@ -139,16 +139,18 @@ def plant_of(design: AxisDesign, sample: float = SAMPLE_TIME) -> Plant:
 
 
 def identify(*traces: AxisTrace, output_bits: int = 8) -> Plant:
-    """An axis's gain, decay and friction from recorded moves, by least squares over the samples in which it moved.
+    """Identify gain, decay and friction from recorded moves by least squares.
+
+    Over the samples in which the axis moved.
 
     traces        of moves that accelerate, cruise and brake; both directions for the friction's sake
     output_bits   8 or 12, of the converter
 
     output = (acceleration + decay speed)/gain + friction sign(speed). Speed and acceleration are those of the profile,
     smooth as the encoder's differences are not: the mean over a move is right while the following error is small. The
-    residuals are correlated; no standard uncertainty is claimed. Derived here; the regression is linear.
+    residuals are correlated; no standard uncertainty is given. Derived here; the regression is linear.
 
-    Raises EstimationError: the moves do not tell the three apart, or the drive's sign is wrong.
+    Raises EstimationError: the moves do not separate the three, or the drive's sign is wrong.
     """
     rows, words = [], []
     if not traces or min(len(trace.time) for trace in traces) < 2:
@@ -162,7 +164,7 @@ def identify(*traces: AxisTrace, output_bits: int = 8) -> Plant:
     design = np.concatenate(rows)
     scale = np.sqrt(np.mean(design**2, axis=0)) if len(design) else np.zeros(3)
     if not (scale > 0.0).all() or np.linalg.cond(design / scale) > 1e3:
-        raise EstimationError("the moves do not tell inertia, damping and friction apart: accelerate, cruise and brake")
+        raise EstimationError("the moves do not separate inertia, damping and friction: accelerate, cruise and brake")
     per_acceleration, per_speed, friction = (
         np.linalg.lstsq(design / scale, np.concatenate(words), rcond=None)[0] / scale
     )
@@ -176,7 +178,7 @@ def identify(*traces: AxisTrace, output_bits: int = 8) -> Plant:
 
 
 def plant_response(plant: Plant, frequency: ArrayLike) -> NDArray[np.complex128]:
-    """Counts a converter step at a frequency: the axis, the converter's hold and the sample of delay.
+    """Counts a converter step at a frequency: axis, hold and delay.
 
     plant       the axis
     frequency   rad/s, below pi over the sample time
@@ -184,18 +186,18 @@ def plant_response(plant: Plant, frequency: ArrayLike) -> NDArray[np.complex128]
     Source: [FRANKLIN98], zero-order hold equivalent of K/(s (s + d)), here times 1/z.
     """
     z = np.exp(1j * np.asarray(frequency, dtype=float) * plant.sample)
-    (b1, b0), pole = _held(plant)
+    (b1, b0), pole = _sampled_plant(plant)
     return (b1 * z + b0) / ((z - 1.0) * (z - pole)) / z
 
 
 def filter_response(filter_: Filter, frequency: ArrayLike, sample: float = SAMPLE_TIME) -> NDArray[np.complex128]:
-    """Converter steps a count of error at a frequency, rounding and limits left out.
+    """Converter steps a count of error at a frequency, unrounded, unlimited.
 
     filter_     its integers
     frequency   rad/s
     sample      s
 
-    With an interval of m samples the difference is taken every m-th sample and held: what it does below half that rate.
+    With an interval of m samples the difference is taken every m-th sample and held: valid below half that rate.
     """
     return _response((filter_.kp, filter_.ki, filter_.kd), filter_.interval, frequency, sample)
 
@@ -229,15 +231,15 @@ def margins(plant: Plant, filter_: Filter) -> Margins:
 def design_filter(
     plant: Plant, *, crossover_hz: float = 20.0, phase_margin: float = 55.0 * DEGREE, interval: int = 0
 ) -> Filter:
-    """Filter integers that give a loop its crossover and its phase margin.
+    """Filter integers for a crossover and a phase margin.
 
     plant          the axis
     crossover_hz   where the loop's gain is one
-    phase_margin   rad, left there; above 0, below pi/2
+    phase_margin   rad, at the crossover; above 0, below pi/2
     interval       of the derivative, samples less one, 0 to 255: a longer one is quieter and costs phase
 
-    The integral's limit is three times the friction and at least 16 steps: it must hold what friction eats, no more.
-    Raises ValidityError: the margin cannot be had there, or an integer would not fit its register.
+    The integral's limit is three times the friction and at least 16 steps: it must cover the friction, no more.
+    Raises ValidityError: the margin is not attainable there, or an integer would not fit its register.
     """
     checked("FSI", interval)
     if not 0.0 < phase_margin < 0.5 * pi:
@@ -251,19 +253,19 @@ def design_filter(
         """Response of axis and filter (s + zero)^2/s at the crossover."""
         return axis * _response(_gains(zero, 1.0, plant, interval), interval, frequency, plant.sample)
 
-    def left(zero: float) -> float:
+    def margin(zero: float) -> float:
         """Phase margin with both zeros at a frequency, between -pi and pi."""
         return float(np.angle(-loop(zero)))
 
     low, high = 1e-6 * frequency, frequency
-    if left(low) < phase_margin:
+    if margin(low) < phase_margin:
         raise ValidityError(
-            f"phase margin {phase_margin / DEGREE:.0f} degrees cannot be had at {crossover_hz:g} Hz: at most "
-            f"{left(low) / DEGREE:.0f}; lower the crossover or the derivative's interval"
+            f"phase margin {phase_margin / DEGREE:.0f} degrees is not attainable at {crossover_hz:g} Hz: at most "
+            f"{margin(low) / DEGREE:.0f}; lower the crossover or the derivative's interval"
         )
     for _ in range(BISECTIONS):
         middle = np.sqrt(low * high)
-        low, high = (middle, high) if left(middle) > phase_margin else (low, middle)
+        low, high = (middle, high) if margin(middle) > phase_margin else (low, middle)
     kp, ki, kd = _gains(low, float(1.0 / np.abs(loop(low))), plant, interval)
     rounded = {"FKP": round(kp), "FKI": round(ki), "FKD": round(kd)}
     for command, value in rounded.items():
@@ -277,16 +279,18 @@ def design_filter(
 
 
 def closed_loop(plant: Plant, filter_: Filter) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Numerator and denominator in falling powers of z, from desired to actual counts; for a derivative every sample.
+    """Closed loop from desired to actual counts: numerator, denominator in z.
+
+    Falling powers of z, for a derivative every sample.
 
     plant     the axis
     filter_   its integers
 
-    Raises ValidityError: a derivative less often, which is no such fraction.
+    Raises ValidityError: a derivative less often, which has no such form.
     """
     if filter_.interval:
         raise ValidityError(f"interval {filter_.interval}: the closed form holds for a derivative every sample (0)")
-    b, pole = _held(plant)
+    b, pole = _sampled_plant(plant)
     ki = filter_.ki / SCALE
     pid = np.array([filter_.kp + ki + filter_.kd, -filter_.kp - 2.0 * filter_.kd, filter_.kd]) / SCALE
     # Over z (z - 1) of the filter, z of the delay, (z - 1)(z - pole) of the axis.
@@ -296,7 +300,7 @@ def closed_loop(plant: Plant, filter_: Filter) -> tuple[NDArray[np.float64], NDA
 
 
 def step_metrics(time: ArrayLike, position: ArrayLike, *, target: float, tolerance: float = 1.0) -> StepMetrics:
-    """Rise, overshoot and settling of a response that starts at its first position.
+    """Rise, overshoot and settling of a step response.
 
     time        (n,) s, the step at the first
     position    (n,) counts
@@ -323,7 +327,7 @@ def step_metrics(time: ArrayLike, position: ArrayLike, *, target: float, toleran
 
 
 def _first(t: NDArray[np.float64], part: NDArray[np.float64], level: float) -> float:
-    """When a response first reaches a level, straight between samples; NaN when it does not."""
+    """Time of first reaching a level, interpolated; NaN if never."""
     at = np.flatnonzero(part >= level)
     if not len(at):
         return float("nan")
@@ -333,18 +337,18 @@ def _first(t: NDArray[np.float64], part: NDArray[np.float64], level: float) -> f
     return float(t[i - 1] + (level - part[i - 1]) / (part[i] - part[i - 1]) * (t[i] - t[i - 1]))
 
 
-def _held(plant: Plant) -> tuple[NDArray[np.float64], float]:
-    """(b1, b0) and the pole of (b1 z + b0)/((z - 1)(z - pole)), counts a step."""
+def _sampled_plant(plant: Plant) -> tuple[NDArray[np.float64], float]:
+    """Sampled plant: (b1, b0) and pole of (b1 z + b0)/((z - 1)(z - pole)), counts a step."""
     t, x = plant.sample, plant.decay * plant.sample
     if x < 1e-4:  # the closed forms cancel; the next terms of their series are below 1e-8 of these
         return plant.gain * t**2 * np.array([0.5 - x / 6.0, 0.5 - x / 3.0]), 1.0 - x + 0.5 * x**2
-    gone = -expm1(-x)
-    pole = 1.0 - gone
-    return plant.gain / plant.decay**2 * np.array([x - gone, gone - x * pole]), pole
+    decayed = -expm1(-x)
+    pole = 1.0 - decayed
+    return plant.gain / plant.decay**2 * np.array([x - decayed, decayed - x * pole]), pole
 
 
 def _gains(zero: float, size: float, plant: Plant, interval: int) -> tuple[float, float, float]:
-    """kp, ki and kd, not yet rounded, of size (s + zero)^2/s: steps a count."""
+    """Gains kp, ki and kd, unrounded, of size (s + zero)^2/s: steps a count."""
     t = plant.sample
     return SCALE * 2.0 * zero * size, SCALE**2 * zero**2 * size * t, SCALE * size / (t * (interval + 1))
 

@@ -1,1 +1,1 @@
-"""A site that lives: heads, beams, air, telescope, feed, in a world of its own."""
+"""Living simulated site: heads, beams, air, telescope, feed."""

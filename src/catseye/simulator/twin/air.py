@@ -1,4 +1,7 @@
-"""The air of a living site: a function of place and time; what it does to a path, to readings, to wet glass."""
+"""Air of a living site, a function of place and time.
+
+Its effects on paths, readings and wet glass.
+"""
 
 from dataclasses import dataclass
 
@@ -17,7 +20,7 @@ Array = NDArray[np.float64]
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)  # below 1e-10 of the index on a profile of 10 m scale height
 SHARES, WEIGHTS = 0.5 * (NODES + 1.0), 0.5 * WEIGHTS
 WARMEST_HOUR, BRIGHTEST_HOUR = 15.0, 12.5  # local mean time
-STEEL_LAG_HOURS, STEEL_SHARE = 1.0, 0.8  # steel follows the day's swing so much later and so much less
+STEEL_LAG_HOURS, STEEL_SHARE = 1.0, 0.8  # delay and attenuation of the steel against the day's swing
 STEEL_AT = np.array([0.0, 0.0, 50.0])  # m: middle of the telescope
 WET, WET_WIDTH_C = 0.03, 0.15  # amplitude left on wet glass; width of the change about the dew point
 
@@ -30,7 +33,9 @@ def saturation_hpa(temperature_c: ArrayLike, pressure_hpa: ArrayLike) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class LivingAir:
-    """True air at points (..., 3), m, ground frame, and times (...), s since the start.
+    """True air at points (..., 3), m, and times (...), s.
+
+    Ground frame; times since the start.
 
     start_hour        local mean solar time at the start
     slope             (2,) °C/m east and north
@@ -52,7 +57,7 @@ class LivingAir:
     def of(
         site: SiteFolder, conditions: LivingConditions, start_mjd: float, *, streams: Streams, planted: Planted
     ) -> "LivingAir":
-        """The air over a site, drawn."""
+        """Draw the air over a site."""
         c, rng = conditions, streams("living air")
         slope = planted.gain("horizontal_gradient") * c.horizontal_c_per_100m / 100.0 * rng.normal(size=2)
         wander = joined(
@@ -74,7 +79,10 @@ class LivingAir:
         )
 
     def sunshine(self, seconds: ArrayLike) -> Array:
-        """0 at midnight to 1 at noon; without the day's effects as at the start."""
+        """Sunshine from 0 at midnight to 1 at noon.
+
+        Without the day's effects as at the start.
+        """
         hours = self.start_hour + self.diurnal * np.asarray(seconds, dtype=float) / 3600.0
         return 0.5 * (1.0 + np.cos(TWO_PI * (hours - BRIGHTEST_HOUR) / 24.0))
 
@@ -93,11 +101,11 @@ class LivingAir:
         )
 
     def weather(self, points: Array, seconds: Array) -> tuple[Array, Array, Array]:
-        """Temperature, °C, pressure, hPa, and humidity over water, %, each (k, m), at points (k, m, 3), times (k,)."""
+        """Temperature, °C, pressure, hPa, humidity, %, (k, m), at points (k, m, 3), times (k,)."""
         return self._weather(points, seconds, self.passing.eddies_c(points, seconds[:, None]))
 
     def _weather(self, points: Array, seconds: Array, eddies_c: Array) -> tuple[Array, Array, Array]:
-        """As `weather`, with eddies (k, m)."""
+        """Weather as `weather`, with eddies (k, m)."""
         c, drift, z = self.conditions, self.wander(seconds), points[..., 2]
         temperature = self._temperature(points, seconds, drift[:, 0]) + eddies_c
         pressure = (c.pressure_hpa + drift[:, 1])[:, None] + self.passing.pressure_hpa(points, seconds[:, None])
@@ -108,7 +116,9 @@ class LivingAir:
         return temperature, pressure, humidity
 
     def _temperature(self, points: Array, seconds: Array, wander: Array, lag: float = 0.0) -> Array:
-        """Temperature (k, m), °C, of what follows the air with a lag, s, but for eddies; `wander` (k,) has it already.
+        """Temperature (k, m), °C, at a lag, s, without eddies.
+
+        `wander` (k,) already has the lag.
 
         Day and layers are slow: there a lag of a minute or two is a delay, to 0.1 mK.
         """
@@ -121,7 +131,7 @@ class LivingAir:
         return even + self.passing.common_c(points, seconds[:, None], lag)
 
     def felt_c(self, point: Array, seconds: Array, lag: float) -> Array:
-        """Temperature (k,), °C, of what stands at a point (3,) and follows the air with a lag, s."""
+        """Temperature (k,), °C, of a body at a point (3,) with a lag, s."""
         wander = self.wander.lagged(lag)(seconds)[:, 0]
         even = self._temperature(point[None, None], seconds, wander, lag)[:, 0]
         return even + self.passing.eddies_c(point, seconds, lag)
@@ -131,10 +141,11 @@ class LivingAir:
         return 1.0 + PPM * group_refractivity_ppm(*self.weather(points[:, None], seconds))[:, 0]
 
     def along(self, start: Array, end: Array, seconds: Array) -> tuple[Array, Array, Array]:
-        """Straight lines from start to end, points (k, 3): their mean group index, that at the end, and the share of
-        amplitude that a retroreflector outside at the end keeps, wet below the dew point; (k,) each.
+        """Mean and end index of straight lines (k, 3), and dry amplitude share, (k,) each.
 
-        By quadrature; eddies enter as their mean, which leaves out what they share with layers: 20 nm in 100 m. The ray
+        The share of amplitude is that of an outdoor retroreflector at the end, reduced when wet below the dew point.
+
+        By quadrature; eddies enter as their mean, which neglects their correlation with layers: 20 nm in 100 m. The ray
         itself is bent, by less than 0.1 um of path here.
         """
         on = start[:, None] + (end - start)[:, None] * np.append(SHARES, 1.0)[:, None]
@@ -143,11 +154,11 @@ class LivingAir:
         weather = self._weather(on, seconds, eddies)
         index = 1.0 + PPM * group_refractivity_ppm(*weather)
         temperature_c, pressure_hpa, humidity_percent = (v[:, -1] for v in weather)
-        kept = self._kept(temperature_c, pressure_hpa, humidity_percent, seconds)
-        return index[:, :-1] @ WEIGHTS, index[:, -1], kept
+        dry = self._dry_share(temperature_c, pressure_hpa, humidity_percent, seconds)
+        return index[:, :-1] @ WEIGHTS, index[:, -1], dry
 
-    def _kept(self, temperature_c: Array, pressure_hpa: Array, humidity_percent: Array, seconds: Array) -> Array:
-        """Share of amplitude (k,) that glass outside keeps: it is colder than the air by what it radiates at night."""
+    def _dry_share(self, temperature_c: Array, pressure_hpa: Array, humidity_percent: Array, seconds: Array) -> Array:
+        """Amplitude share (k,) of outdoor glass, colder than air by night radiation."""
         calm = 1.0 / (1.0 + self.conditions.wind_m_s / 4.0)
         cooling = self.conditions.sky_cooling_c * calm * (1.0 - self.sunshine(seconds))
         dew_point = _dew_point_c(saturation_hpa(temperature_c, pressure_hpa) * humidity_percent / 100.0, pressure_hpa)
@@ -156,13 +167,16 @@ class LivingAir:
 
 
 def _dew_point_c(vapour_hpa: ArrayLike, pressure_hpa: ArrayLike) -> Array:
-    """Temperature at which vapour is saturated, °C: the inverse of `saturation_hpa`."""
+    """Dew point, °C: the inverse of `saturation_hpa`."""
     ratio = np.log(np.asarray(vapour_hpa) / (6.1121 * (1.0007 + 3.46e-6 * np.asarray(pressure_hpa))))
     return 240.97 * ratio / (17.502 - ratio)
 
 
 def station_places(site: SiteFolder, streams: Streams) -> dict[str, Array]:
-    """Where the weather stations stand (3,), m, ground: at their elevation; 130 m out, bearings drawn (chosen)."""
+    """Places of the weather stations (3,), m, ground.
+
+    At their elevation; 130 m out, bearings drawn (chosen).
+    """
     places = {}
     for station in site.site.weather_station:
         bearing = streams(f"weather station/{station.name}").uniform(0.0, 360.0) * DEGREE

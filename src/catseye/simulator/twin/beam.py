@@ -1,7 +1,7 @@
-"""Where the beam of a dish and a feed that have moved truly goes: rays from the feed, reflected one by one.
+"""True beam of a displaced dish and feed, by ray tracing.
 
-By the law of reflection at the paraboloid, and nothing of the reduction's: which way the light goes in the end is the
-beam. All in the reflector frame at rest: x to the right of who looks along the beam, z along it, the vertex the origin.
+By the law of reflection at the paraboloid, and nothing of the reduction: the final direction of the light is the
+beam. All in the reflector frame at rest: x to the right when looking along the beam, z along it, the vertex the origin.
 """
 
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ RINGS, SPOKES = 20, 50
 
 @dataclass(frozen=True, eq=False)
 class TracedDish:
-    """A paraboloid with the points that light is followed to.
+    """Paraboloid with the points of its rays.
 
     focal_length   m
     xy             (n, 2) m, of the points
-    weight         (n,) with sum 1: the plane that fits ways over a disc, all parts alike, tilts by the mean of their
-                   slopes weighted with R^2 - r^2 (integrate x times the way by parts)
+    weight         (n,) with sum 1: the plane of best fit to paths over a disc, uniformly weighted, tilts by the mean of
+                   their slopes weighted with R^2 - r^2 (integrate x times the path by parts)
     """
 
     focal_length: float
@@ -44,17 +44,17 @@ class TracedDish:
 
     @property
     def focus(self) -> Array:
-        """Where the feed is at rest, (3,) m."""
+        """Position of the feed at rest, (3,) m."""
         return np.array([0.0, 0.0, self.focal_length])
 
     def beam(self, turn: Array, shift: Array, feed: Array) -> Array:
         """Direction (3,) of the beam, a unit vector.
 
         turn, shift   (3,) rad and m: the dish, turned about its vertex, then shifted
-        feed          (3,) m, where it is now
+        feed          (3,) m, present position
         """
         back = from_vector(np.asarray(turn, dtype=float))
-        feed_in_dish = back.T @ (np.asarray(feed, dtype=float) - shift)  # the feed as the dish sees it
+        feed_in_dish = back.T @ (np.asarray(feed, dtype=float) - shift)  # the feed in the dish's frame
         points = np.column_stack([self.xy, np.sum(self.xy**2, axis=1) / (4.0 * self.focal_length)])
         normals = np.column_stack([-self.xy, np.full(len(self.xy), 2.0 * self.focal_length)])
         normals /= np.linalg.norm(normals, axis=1)[:, None]
@@ -65,10 +65,12 @@ class TracedDish:
         return np.asarray(mean / np.linalg.norm(mean))
 
     def offset(self, dish: Array, arm: Array) -> Array:
-        """(3,) rad, rad, m: beam in azimuth times cos E and elevation, feed further from the dish along the beam.
+        """Beam offset (3,): azimuth times cos E, rad, elevation, rad, feed distance, m.
+
+        The feed further from the dish along the beam is positive.
 
         dish   (6,) shift and turn of the dish, m and rad, about the vertex
-        arm    (6,) of what carries the feed, about the focus
+        arm    (6,) of the feed's support, about the focus
 
         Azimuth rises towards x, elevation along -y, away from the dish.
         """

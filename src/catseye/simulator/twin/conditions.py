@@ -1,4 +1,4 @@
-"""What the weather of a living site is like, and which effects of its physics can be left out or turned round."""
+"""Weather conditions of a living site, and switches for its effects."""
 
 from dataclasses import dataclass, replace
 
@@ -10,10 +10,10 @@ SEA_LEVEL_K, LAPSE_K_PER_M, POLYTROPIC = 288.15, 0.0065, 5.25588  # K, K/m, g M 
 LIVING_EFFECTS = (
     "air_waves",  # of temperature, common to the site
     "bearing_tilt",  # of the azimuth bearing and track
-    "dew",  # amplitude lost where retroreflectors are wet
+    "dew",  # amplitude lost on wet retroreflectors
     "diurnal",  # temperature and layers through the day
     "eddies",  # of temperature, which the wind carries across the site
-    "encoder",  # what the telescope's encoders tell wrongly
+    "encoder",  # errors of the telescope's encoders
     "expansion",  # of the whole telescope with the temperature of its steel
     "fronts",  # steps of temperature that pass
     "gravity",  # bending with elevation
@@ -31,17 +31,19 @@ LIVING_EFFECTS = (
 
 @dataclass(frozen=True)
 class LivingPlanted(Planted):
-    """`Planted`, which knows the living site's effects too: `signs` and `ignore` take both lists.
+    """Planted changes, with the living site's effects too.
+
+    `signs` and `ignore` take both lists.
 
     >>> LivingPlanted(ignore=["vibration", "drift"]).gain("vibration")
     0.0
     """
 
     def __post_init__(self) -> None:
-        known = (*EFFECTS, *LIVING_EFFECTS)
+        effects = (*EFFECTS, *LIVING_EFFECTS)
         for effect in (*self.signs, *self.ignore):
-            if effect not in known:
-                raise InputError(f"unknown effect {effect!r}: expected one of {', '.join(sorted(known))}")
+            if effect not in effects:
+                raise InputError(f"unknown effect {effect!r}: expected one of {', '.join(sorted(effects))}")
 
 
 STILL = LivingPlanted(ignore=(*EFFECTS, *LIVING_EFFECTS))  # nothing but geometry, air without layers, glass
@@ -49,21 +51,23 @@ STILL = LivingPlanted(ignore=(*EFFECTS, *LIVING_EFFECTS))  # nothing but geometr
 
 @dataclass(frozen=True)
 class LivingConditions:
-    """The air at z = 0 over the pintle at the start, and how it lives. Magnitudes are chosen; nights are quiet.
+    """Air at z = 0 over the pintle at the start, and its changes.
 
-    elevation_m             above the sea, where `pressure_hpa` is meant; a site elsewhere has the standard air's there
+    Magnitudes are chosen; nights are quiet.
+
+    elevation_m             above the sea, for `pressure_hpa`; a site elsewhere has the standard air's pressure
     diurnal_c               half of the day's swing; warmest at 15 h local mean time
     gradient_c_per_m        at night and at noon; above the surface layer
     surface_layer_c         temperature gained on leaving the ground, at night and at noon
     surface_layer_m         its depth
     horizontal_c_per_100m   one sigma of each of the two components, drawn once
     wander_c                one sigma, correlated over 20 minutes
-    pressure_walk_hpa       that passes in an hour, one sigma of a random walk
+    pressure_walk_hpa       in an hour, one sigma of a random walk
     dew_point_wander_c      one sigma, correlated over 3 hours
     thermometer_offset_c    one sigma, each station
     turbulence              factor on the site's path_index_fluctuation_ppm
     wind_m_s                mean; moves the feed arm with its square
-    sky_cooling_c           how far below the air a retroreflector cools under a clear night sky in still air
+    sky_cooling_c           cooling of a retroreflector below the air under a clear night sky in still air
 
     Sources of those below and of the periods: `simulator.night.nature`, where a night's largest are twice these.
 
@@ -75,7 +79,7 @@ class LivingConditions:
     thermometer_lag         s, largest time constant of a station's thermometer
     radiation_c             largest error of a thermometer under a Sun in the zenith in still air
     expansion_per_k         of the whole telescope about the pintle bearing: structural steel's
-    dish_expansion          largest share of it by which the dish expands more or less, about its own middle
+    dish_expansion          largest share of it by which the dish expands more or less, about its middle
     """
 
     temperature_c: float = 11.3
@@ -105,7 +109,9 @@ class LivingConditions:
     dish_expansion: float = 0.2
 
     def at(self, elevation_m: float) -> "LivingConditions":
-        """The same weather at another elevation above the sea, m: pressure as in the standard atmosphere.
+        """Weather at another elevation above the sea, m.
+
+        Pressure as in the standard atmosphere.
 
         Source: [ICAO93], the layer with a lapse of 6.5 K/km: p / p0 = (T / T0)^(g M / R L).
 

@@ -1,4 +1,4 @@
-"""What a twin's A/D converter makes of a return that changes while it samples: codes of a whole buffer."""
+"""Simulated A/D converter of a return that changes while sampled."""
 
 from dataclasses import dataclass
 
@@ -10,13 +10,13 @@ from catseye.ranger.head import SamplingSettings
 from catseye.simulator.night.faults import Streams
 from catseye.simulator.night.head import HARMONICS, VOLT_PER_CODE
 
-SLOW_HZ = 100  # below this intermediate frequency a return may turn far within one cycle
+SLOW_HZ = 100  # below this intermediate frequency a return may turn considerably within one cycle
 Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
 class Converter:
-    """The electronics between detector and codes.
+    """Electronics between detector and codes.
 
     offset   V, of the mean
     noise    V rms, of one sample
@@ -27,7 +27,10 @@ class Converter:
 
     @staticmethod
     def of(ranger: str, seed: int) -> "Converter":
-        """A ranger's: an offset of -0.25 to 0.25 V, a noise of 0.165 to 0.245 V, as the night's heads have."""
+        """Converter of a ranger, drawn as the night's heads.
+
+        An offset of -0.25 to 0.25 V, a noise of 0.165 to 0.245 V.
+        """
         rng = Streams(seed)(f"samples/{ranger}")
         return Converter(float(rng.uniform(-0.25, 0.25)), float(rng.uniform(0.165, 0.245)))
 
@@ -40,10 +43,12 @@ class Converter:
         generator: np.random.Generator,
         gain: float = 1.0,
     ) -> NDArray[np.int16]:
-        """Codes (m n,): offset + Re(z e^-ij) with harmonics, noise, rounding and the converter's ends at 10 V.
+        """Codes (m n,) of a buffer.
+
+        offset + Re(z e^-ij) with harmonics, noise, rounding and the converter's ends at 10 V.
 
         at          (k,) s since the first sample, ascending
-        phasors     (k,) V: the return at these times; straight between but for its mean turn
+        phasors     (k,) V: the return at these times; linear between but for its mean rotation
         sampling    m cycles of n samples
         generator   of the noise and of the harmonics' phases
         gain        on the return, before the converter's ends
@@ -64,7 +69,10 @@ class Converter:
 
 
 def _cycle_by_cycle(edges: Complex, n: int, harmonics: Complex) -> NDArray[np.float64]:
-    """(m, n) codes of a return (m + 1,) V at the edges of the cycles, straight between; harmonics as at the middle."""
+    """Codes (m, n) of a return (m + 1,) V at cycle edges, interpolated linearly.
+
+    Harmonics as at the middle.
+    """
     share = np.arange(n) / n
     turn = np.exp(-1j * TWO_PI * share)
     first, change = edges[:-1], np.diff(edges)
@@ -78,7 +86,7 @@ def _cycle_by_cycle(edges: Complex, n: int, harmonics: Complex) -> NDArray[np.fl
 def _sample_by_sample(
     at: NDArray[np.float64], phasors: Complex, sampling: SamplingSettings, harmonics: Complex
 ) -> NDArray[np.float64]:
-    """The same for a slow intermediate frequency: the return at every sample."""
+    """Codes for a slow intermediate frequency: the return at every sample."""
     j = np.arange(sampling.cycles * sampling.samples)
     z = _between(at, phasors, j / (sampling.samples * sampling.frequency_hz))
     turn = np.exp(-1j * TWO_PI / sampling.samples * j)
@@ -87,9 +95,9 @@ def _sample_by_sample(
 
 
 def _between(at: NDArray[np.float64], phasors: Complex, times: NDArray[np.float64]) -> Complex:
-    """The return at other times: its mean turn taken out, straight between the points, the turn put back.
+    """Return at other times, interpolated with its mean rotation removed.
 
-    So a steady range rate is exact, and a return that goes out and comes back has no phase to lose.
+    So a steady range rate is exact, and a return that fades and recovers keeps its phase.
     """
     steps = np.diff(at)
     rate = float(np.angle(np.vdot(phasors[:-1], phasors[1:]))) / float(steps.mean())

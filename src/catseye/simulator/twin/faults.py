@@ -1,19 +1,19 @@
-"""Faults on command: what goes wrong on the twin, where, and when. Read by the world, the heads and the servers.
+"""Faults on command: kind, place and time. Used by world, heads and servers.
 
 kind             whom                what it does                                            size
 blocked-beam     ranger[:target]     nothing returns
 dead-ranger      ranger              its ports close, its connections break
-hung-ranger      ranger              it takes lines and answers nothing
+hung-ranger      ranger              it takes lines and does not answer
 drifting-clock   ranger              its clock runs away, no time signal                     s a second
 stuck-axis       ranger:axis         the mirror does not turn (0 azimuth, 1 elevation)
 lost-index       ranger:axis         the search for the index finds none
-wrong-target     ranger[:target]     the light comes back from another retroreflector        m, nearer or farther
+wrong-target     ranger[:target]     a stray reflection from another retroreflector         m, nearer or farther
 saturated-adc    ranger              the return is beyond the converter's ends               factor
 network-cut      ranger              its connections break, new ones are refused
 network-slow     ranger              every line is late                                      s
 lying-station    station             its thermometer reads too high                          deg C
-silent-station   station             it says nothing
-silent-telescope telescope           no posture is told
+silent-station   station             it sends nothing
+silent-telescope telescope           no posture is sent
 open-interlock   ranger              hardware forbids light and moves
 dew              target or *         the return is weak                                      factor of amplitude
 """
@@ -72,9 +72,9 @@ class Fault:
 
     @staticmethod
     def parse(text: str) -> "Fault":
-        """A fault as people type it: KIND WHOM [START [END [SIZE]]].
+        """Fault from text: KIND WHOM [START [END [SIZE]]].
 
-        Raises InputError with what was wrong and what was expected.
+        Raises InputError with the invalid value and the expectation.
         """
         words = text.split()
         if not 2 <= len(words) <= 5 or words[0] not in get_args(Kind):
@@ -84,7 +84,7 @@ class Fault:
         try:
             start, end, size = (float(w) for w in (words[2:] + ["0", "inf", "nan"][len(words) - 2 :]))
         except ValueError:
-            raise InputError(f"fault {text!r}: start, end or size is no number") from None
+            raise InputError(f"fault {text!r}: start, end or size is not a number") from None
         if size != size:
             size = SIZES.get(words[0], 0.0)
         if not 0.0 <= start < end:
@@ -93,7 +93,7 @@ class Fault:
 
 
 class FaultBoard:
-    """The faults of a twin; more can be added and taken off while it runs."""
+    """Faults of a twin; they can be added and removed while it runs."""
 
     def __init__(self, faults: Iterable[Fault] = ()):
         self.faults: list[Fault] = list(faults)
@@ -103,13 +103,15 @@ class FaultBoard:
         self.faults.append(fault)
 
     def clear(self, kind: str = "*", whom: str = "*") -> int:
-        """Take off those of a kind and of whom; how many they were."""
-        gone = [f for f in self.faults if kind in ("*", f.kind) and whom in ("*", f.whom)]
-        self.faults = [f for f in self.faults if f not in gone]
-        return len(gone)
+        """Remove the faults of a kind and object; returns their number."""
+        removed = [f for f in self.faults if kind in ("*", f.kind) and whom in ("*", f.whom)]
+        self.faults = [f for f in self.faults if f not in removed]
+        return len(removed)
 
     def active(self, kind: Kind, whom: str, part: str | int | None = None, *, at: float) -> Fault | None:
-        """The first fault of a kind that touches someone at a time, s since the twin's start; None where none does.
+        """First active fault of a kind on an object, or None.
+
+        at   s since the twin's start
 
         whom   a ranger, station or target
         part   its target or axis: a fault on whom alone, or on *, touches every part

@@ -1,4 +1,4 @@
-"""Faults of one ranger's connections: lines that are late or lost on their way to its server and from it."""
+"""Faulty connections of one ranger: lines late or lost in both directions."""
 
 import asyncio
 from collections import deque
@@ -11,11 +11,11 @@ from catseye.ranger.network import ConnectionMaker, Listener, P
 
 @dataclass
 class Gate:
-    """What is wrong now with a ranger's connections.
+    """Present faults of a ranger's connections.
 
-    hung      what comes is taken and dropped, what goes is dropped
-    delay     s that every write is late
-    open      the connections that stand
+    hung      incoming data are taken and dropped, outgoing dropped
+    delay     s, delay of every write
+    open      the open connections
     """
 
     hung: bool = False
@@ -29,10 +29,10 @@ class Gate:
 
 
 class FaultyNetwork:
-    """A network whose connections to a server pass a gate.
+    """Network whose connections to a server pass a gate.
 
-    network   to pass on to
-    gate      what is wrong
+    network   the underlying network
+    gate      the present faults
     """
 
     def __init__(self, network: ConnectionMaker, gate: Gate):
@@ -46,7 +46,7 @@ class FaultyNetwork:
 
 
 class _Gated(asyncio.Protocol):
-    """Stands before a server's protocol."""
+    """Filter in front of a server's protocol."""
 
     def __init__(self, inner: asyncio.Protocol, gate: Gate):
         self._inner, self._gate = inner, gate
@@ -69,7 +69,7 @@ class _Gated(asyncio.Protocol):
 
 
 class _LateTransport(asyncio.Transport):
-    """Passes writes on after the gate's delay, in their order."""
+    """Transport that passes writes on after the gate's delay, in order."""
 
     def __init__(self, transport: asyncio.Transport, gate: Gate):
         super().__init__()

@@ -1,10 +1,10 @@
-"""The site's feed: what its weather stations read and where the telescope says it is, in lines of the ZY language.
+"""Site feed: weather readings and telescope posture in ZY lines.
 
     HELLO This is SITE gbt ver. 1 · CONNECT 1, port          the greeting, and then, unasked, TID 0, TS of the reading:
     WX 1, station, temperature_c, pressure_hpa, humidity_percent          `none` where the sensor is silent
     TEL 1, azimuth_deg, elevation_deg, azimuth_rate_deg_s, elevation_rate_deg_s
 
-A station that says nothing at all has no line. `bye` ends a connection, all else that a client says is not read.
+A silent station has no line. `bye` ends a connection, all other input is ignored.
 """
 
 import asyncio
@@ -30,38 +30,38 @@ from catseye.simulator.twin.faults import FaultBoard
 WEATHER_EVERY = 10.0  # s
 POSTURES_A_SECOND = 10
 MOST_CLIENTS = 32
-MOST_UNSENT = 2**20  # bytes that a client does not take: an hour and a half of lines
-MOST_LINES = 64  # of what a client says at once: the others are not looked at
+MOST_UNSENT = 2**20  # bytes not taken by a client: an hour and a half of lines
+MOST_LINES = 64  # lines of a client at once: the others are ignored
 VERSION = "1"
-WORDS = frozenset(["HLP", "HELP", "BYE", "KEY"])  # that a client's first line may begin with
+WORDS = frozenset(["HLP", "HELP", "BYE", "KEY"])  # allowed beginnings of a client's first line
 HELP = "WX and TEL lines come unasked; HLP or HELP says this; BYE closes the connection"
 LOG = logging.getLogger(__name__)
 
 
 class FeedWorld(Protocol):
-    """What the feed tells of; `Twin` is one."""
+    """Source of the feed's values; `Twin` is one."""
 
     faults: FaultBoard
 
     def seconds(self, ns: int, /) -> float:
-        """s since the start, of nanoseconds since MJD 0."""
+        """Seconds since the start, of nanoseconds since MJD 0."""
         ...
 
     def posture(self, seconds: float, /) -> Sequence[NDArray[np.float64]]:
-        """Azimuth, elevation, rad, and their rates, rad/s, each (1,) or a number: what the encoders tell."""
+        """Azimuth, elevation, rad, and rates, rad/s, (1,) or numbers, from the encoders."""
         ...
 
     def weather(self, station: str, seconds: float, /) -> LiveWeather:
-        """What a station reads at an instant."""
+        """Reading of a station at an instant."""
         ...
 
 
 class SiteFeed:
-    """A server of the feed language, for many clients.
+    """Server of the feed language, for many clients.
 
     name       of the site
     stations   of weather
-    world      what it tells of
+    world      source of the values
     clock      UTC, the stamps of the readings
     """
 
@@ -88,18 +88,21 @@ class SiteFeed:
         self.port = 0
 
     async def start(self, host: str, port: int) -> None:
-        """Listen. Raises InputError where the port cannot be had, or would be open to others without a key."""
+        """Listen. Raises InputError where the port is unavailable or unsafe.
+
+        Unsafe: open to other hosts without a key.
+        """
         refuse_open("feed", host, self.door)
         try:
             self._listener = await self._network.serve(self._joining, host, port)
         except OSError as problem:
             raise InputError(
-                f"feed: {host} port {port} cannot be had: {problem.strerror or problem} (expected a free one)"
+                f"feed: {host} port {port} is not available: {problem.strerror or problem} (expected a free one)"
             ) from problem
         self.port = self._listener.port
 
     async def stop(self) -> None:
-        """Close the connections and listen no more."""
+        """Close the connections and stop listening."""
         for client in tuple(self.clients):
             client.close()
         if self._listener is not None:
@@ -107,30 +110,36 @@ class SiteFeed:
             await listener.close()
 
     async def serve(self) -> None:
-        """Tell every reading at its time, until cancelled; `start` first. What is late is left out, not caught up."""
+        """Send every reading at its time, until cancelled; `start` first.
+
+        Late readings are skipped.
+        """
         step = PER_SECOND // POSTURES_A_SECOND
         next_weather = 0
         while True:
-            now = self.clock.now_ns()
-            ticks = nanoseconds_to_ticks(now)
-            if now >= next_weather:
-                next_weather = now - now % self._weather_ns + self._weather_ns
+            instant = self.clock.now_ns()
+            ticks = nanoseconds_to_ticks(instant)
+            if instant >= next_weather:
+                next_weather = instant - instant % self._weather_ns + self._weather_ns
                 self._send(b"".join(self._weather(ticks)))
             self._send(self._posture(ticks))
             self.gate.check()
             self._close_idle()
-            now = self.clock.now_ns()
-            await asyncio.sleep((step - now % step) / PER_SECOND)
+            instant = self.clock.now_ns()
+            await asyncio.sleep((step - instant % step) / PER_SECOND)
 
     def greeting(self) -> bytes:
-        """What a new client hears: who this is, and the weather, read now: what is older than 5 s nobody would use."""
+        """Greeting of a new client: site name and present weather.
+
+        The weather is read now, as clients ignore readings older than 5 s.
+        """
         ticks = nanoseconds_to_ticks(self.clock.now_ns())
         hello = Reply("HELLO", None, (f"This is SITE {self.name} ver. {VERSION}",), 0, ticks)
         connected = Reply("CONNECT", True, (str(self.port),), 0, ticks)
         return b"".join([_line(hello), _line(connected), *self._weather(ticks)])
 
     def help_line(self, command: str) -> bytes:
-        """What HLP and HELP answer: the lines that come unasked, and the commands."""
+        """Reply to HLP and HELP: unsolicited lines and commands."""
         ticks = nanoseconds_to_ticks(self.clock.now_ns())
         return _line(Reply(command, True, (HELP,), 0, ticks))
 
@@ -142,10 +151,10 @@ class SiteFeed:
             client.write(data)
 
     def _close_idle(self) -> None:
-        """Close who has not sent a byte for long: a client sends an empty line each minute."""
-        now = _loop_time()
+        """Close clients without a byte for long; they send an empty line each minute."""
+        instant = _loop_time()
         for client in tuple(self.clients):
-            if now - client.heard > self.door.idle:
+            if instant - client.heard > self.door.idle:
                 client.say(Reply("LINE", False, (f"nothing was said for {self.door.idle:g} s",)))
                 client.close()
 
@@ -162,7 +171,7 @@ class SiteFeed:
         return lines
 
     def _posture(self, ticks: int) -> bytes:
-        """The place at exactly the stamp's time."""
+        """Posture at exactly the stamp's time."""
         seconds = self.world.seconds(ticks * TICK_NS)
         if self.world.faults.active("silent-telescope", "telescope", at=seconds) is not None:
             return b""
@@ -171,7 +180,7 @@ class SiteFeed:
 
 
 class FeedConnection(asyncio.Protocol):
-    """A connection of one client of the feed."""
+    """Connection of one client of the feed."""
 
     def __init__(self, feed: SiteFeed):
         self._feed = feed
@@ -190,9 +199,9 @@ class FeedConnection(asyncio.Protocol):
             self._join()
 
     def _join(self) -> None:
-        """Take a place among the clients, where one is free."""
+        """Take a place among the clients, if one is free."""
         if len(self._feed.clients) >= MOST_CLIENTS:
-            self.say(Reply("CONNECT", False, (f"{MOST_CLIENTS} clients listen already (expected fewer)",)))
+            self.say(Reply("CONNECT", False, (f"{MOST_CLIENTS} clients are connected already (expected fewer)",)))
             self.close()
             return
         self._feed.clients.add(self)
@@ -212,26 +221,26 @@ class FeedConnection(asyncio.Protocol):
             return
         if not was_in:
             self._join()
-        *lines, rest = (self._unread + more).split(b"\n")
+        *lines, remainder = (self._unread + more).split(b"\n")
         words = [line.strip().upper().decode("ascii", "replace") for line in lines[:MOST_LINES]]
         for word in words:
             if word in ("HLP", "HELP"):
                 self.write(self._feed.help_line(word))
         if "BYE" in words:
             self.close()
-        self._unread = rest[-LONGEST_REQUEST:]
+        self._unread = remainder[-LONGEST_REQUEST:]
 
     def say(self, reply: Reply) -> None:
         """Send a reply, stamped with this instant."""
         self.write(_line(replace(reply, ticks=nanoseconds_to_ticks(self._feed.clock.now_ns()))))
 
     def write(self, data: bytes) -> None:
-        """Send; who does not take it is cut off."""
+        """Send; a client that does not take it is disconnected."""
         if self._transport is None or self._transport.is_closing() or not data:
             return
         self._transport.write(data)
         if self._transport.get_write_buffer_size() > MOST_UNSENT:
-            LOG.warning("feed: a client is cut off: more than %d bytes not taken", MOST_UNSENT)
+            LOG.warning("feed: a client is disconnected: more than %d bytes not taken", MOST_UNSENT)
             self._transport.abort()
 
     def close(self) -> None:

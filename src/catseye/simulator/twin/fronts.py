@@ -1,4 +1,4 @@
-"""Fronts of a living site, without end: in each slot of time the air goes from one level of temperature to the next."""
+"""Endless fronts of a living site: one temperature step a time slot."""
 
 from dataclasses import dataclass
 
@@ -7,14 +7,14 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 SLOT = 7200.0  # s: a front in two hours, as `simulator.night.nature` has at most
-SLOTS = 480  # 40 days; then they come again
+SLOTS = 480  # 40 days; then they repeat
 RISE = (120.0, 900.0)  # s, as `simulator.night.nature` has it
-MEMORY = 16.0  # lags after which 1e-7 of a step is left
+MEMORY = 16.0  # lags after which 1e-7 of a step remains
 
 
 @dataclass(frozen=True, eq=False)
 class LivingFronts:
-    """Levels (n,), °C, when each begins (n,), s into its slot, and how long it takes (n,), s; slowness (2,), s/m."""
+    """Temperature levels, °C, begin and duration (n,), s, slowness (2,), s/m."""
 
     level: Array
     begin: Array
@@ -29,21 +29,24 @@ class LivingFronts:
         return LivingFronts(0.5 * step_c * rng.uniform(-1.0, 1.0, SLOTS), begin, rise, velocity / (velocity @ velocity))
 
     def __call__(self, points: Array, seconds: Array, lag: float = 0.0) -> Array:
-        """Change of temperature at points (..., 3) and times (...), °C, of what follows the air with a lag, s."""
+        """Temperature change at points (..., 3), times (...), °C, with a lag, s."""
         local = np.asarray(seconds, dtype=float) - points[..., :2] @ self.slowness
         slot = np.floor(local / SLOT).astype(int)
         back = 1 + int(np.ceil(MEMORY * lag / SLOT))
         first = slot.min()
-        at = (first if first == slot.max() else slot[..., None]) - np.arange(back)  # mostly all are in one slot
+        at = (first if first == slot.max() else slot[..., None]) - np.arange(back)  # usually all are in one slot
         row = at % SLOTS
-        now, before = self.level[row], self.level[row - 1]
-        share = risen(local[..., None] - (at * SLOT + self.begin[row]), self.rise[row], lag)
-        found: Array = before[..., -1] + np.sum((now - before) * share, axis=-1)
-        return found
+        present, previous = self.level[row], self.level[row - 1]
+        share = step_share(local[..., None] - (at * SLOT + self.begin[row]), self.rise[row], lag)
+        change: Array = previous[..., -1] + np.sum((present - previous) * share, axis=-1)
+        return change
 
 
-def risen(since: ArrayLike, rise: ArrayLike, lag: float) -> Array:
-    """Share of a step that is reached at times since it began: half a cosine, followed by y' = (x - y) / lag."""
+def step_share(since: ArrayLike, rise: ArrayLike, lag: float) -> Array:
+    """Share of a step reached at times since its begin, with a lag.
+
+    Half a cosine, followed by y' = (x - y) / lag.
+    """
     t, a = np.asarray(since, dtype=float), np.asarray(rise, dtype=float)
     w = np.pi / a
     u = np.clip(t, 0.0, a)

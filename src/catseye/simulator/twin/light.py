@@ -1,4 +1,4 @@
-"""What comes back to a living ranger: the way of the light, its strength, and the phase of the electronics."""
+"""Return of a living ranger: optical path, amplitude, electronics phase."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,20 +10,22 @@ from catseye.simulator.twin.targets import BodyRetroreflector
 from catseye.simulator.twin.waves import Waves, correlated, joined, walk
 
 Array = NDArray[np.float64]
-SPOT = 0.014  # m: amplitude exp(-d^2 / 2 SPOT^2) where the beam passes the middle at d: 10 mm of beam and the receiver
-CUBE_RADIUS = 0.005  # m, of what the internal cube takes: some hundred counts
-PRISM_END = 45.0 * DEGREE  # incidence at which a prism's aperture is gone
+SPOT = 0.014  # m: amplitude exp(-d^2 / 2 SPOT^2) for a beam at d from the middle: 10 mm of beam and the receiver
+CUBE_RADIUS = 0.005  # m, acceptance of the internal cube: some hundred counts
+PRISM_END = 45.0 * DEGREE  # incidence at which a prism's aperture vanishes
 BALL_FULL, BALL_END = 60.0 * DEGREE, 79.0 * DEGREE  # off a ball's axis
 SCINTILLATION, FLICKER = 0.022, 0.3  # of amplitude, one sigma; s of correlation
-GUST, SPELL = 4.0, 1800.0  # s of correlation of a path's index: turbulence, and what is local to the path
+GUST, SPELL = 4.0, 1800.0  # s of correlation of a path's index: turbulence, and effects local to the path
 GUST_SHARE = 0.7  # of its standard deviation that is turbulence; the squares of both shares make one
 
 
 def prism_way(height: float, cosine: Array, *, group: float, phase: float) -> Array:
-    """Way that a prism adds to its reference point, one way, air metres (k,), at cosines of incidence (k,).
+    """Path that a prism adds to its reference point, air metres (k,).
+
+    One way, at cosines of incidence (k,).
 
     height         apex below the entry face, m; the reference point lies height / group below the face
-    group, phase   indices of the glass over air's: how long it takes, and how it bends
+    group, phase   indices of the glass over air's: for delay, and for refraction
 
     By a ray through the prism unfolded about its apex, a slab of twice the height, between the plane wavefronts through
     the reference point and through its image.
@@ -37,9 +39,11 @@ def prism_way(height: float, cosine: Array, *, group: float, phase: float) -> Ar
 
 
 def glass_way(retro: BodyRetroreflector, cosine: Array, *, group: float, phase: float, obliquity: float) -> Array:
-    """Way (k,), air metres, that a retroreflector's glass adds one way, light coming in at cosines of incidence (k,).
+    """Path (k,), air metres, of a retroreflector's glass, one way.
 
-    obliquity   factor on what the angle changes
+    At cosines of incidence (k,).
+
+    obliquity   factor on the effect of the angle
     """
     if retro.kind == "ball":
         r1, r2 = retro.sizes
@@ -51,7 +55,7 @@ def glass_way(retro: BodyRetroreflector, cosine: Array, *, group: float, phase: 
 
 
 def acceptance(retro: BodyRetroreflector, cosine: Array) -> Array:
-    """Share of amplitude (k,) that comes back at cosines (k,) of the angle off where the retroreflector looks."""
+    """Returned amplitude share (k,) at cosines (k,) of the angle off axis."""
     if retro.facing is None:
         return np.ones_like(cosine)
     angle = np.arccos(np.clip(cosine, -1.0, 1.0))
@@ -62,19 +66,21 @@ def acceptance(retro: BodyRetroreflector, cosine: Array) -> Array:
 
 
 def path_waves(ranger: str, target: str, *, index_ppm: float, streams: Streams, planted: Planted) -> Waves:
-    """Noise of one path: its index, ppm, and its amplitude's relative change; 2 channels."""
+    """Noise of one path: index, ppm, relative amplitude; 2 channels."""
     rng = streams(f"path noise/{ranger}/{target}")
     ppm = planted.gain("index_fluctuation") * index_ppm
     gust = correlated(rng, GUST_SHARE * ppm, GUST)
     spell = correlated(rng, np.sqrt(1.0 - GUST_SHARE**2) * ppm, SPELL)
     flicker = correlated(rng, planted.gain("scintillation") * SCINTILLATION, FLICKER)
-    whole = joined(gust, spell, flicker)
+    combined = joined(gust, spell, flicker)
     mixing = np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    return Waves(whole.omega, whole.cosine @ mixing, whole.sine @ mixing, np.zeros(2))
+    return Waves(combined.omega, combined.cosine @ mixing, combined.sine @ mixing, np.zeros(2))
 
 
 class ElectronicsWalk:
-    """Phase of a head's electronics: a random walk of 10 mrad in the root of an hour; every third warms up.
+    """Phase of a head's electronics: 10 mrad random walk in root hour.
+
+    Every third warms up.
 
     It is a sum of waves with a 1/f^2 spectrum (`waves.walk`): smooth below 5 s, a walk up to some days.
     """
@@ -87,5 +93,5 @@ class ElectronicsWalk:
         self._walk = walk(rng, step, shortest=5.0)
 
     def __call__(self, seconds: Array) -> Array:
-        """rad (k,), at times (k,) since the start."""
+        """Phase, rad (k,), at times (k,) since the start."""
         return self._start + self._walk(seconds)[:, 0] + self._rise * np.exp(-np.maximum(seconds, 0.0) / 300.0)

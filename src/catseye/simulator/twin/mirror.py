@@ -1,7 +1,7 @@
-"""The two axes of a twin's mirror as time passes: moves, the search for the index, following a target, what jams them.
+"""Simulated mirror axes in time: moves, index search, tracking, faults.
 
 Time is the number of samples of the motion chips since the head was built. `pass_to` brings the axes there in one
-stride or in many with the same result: searches and tracks act at samples of their own, whenever they are looked at.
+step or in many with the same result: searches and tracks act at fixed samples.
 """
 
 from collections.abc import Generator, Iterable, Iterator
@@ -25,31 +25,37 @@ from catseye.simulator.servo.tuning import design_filter, plant_of
 from catseye.simulator.twin.faults import FaultBoard
 
 TRAVEL = ((-29_000, 77_000), (-32_000, 32_000))  # counts: wide enough for every mirror of the site
-BEYOND = 500  # counts from an allowed one to the stop
-INTERVAL = 30  # samples from one look of a track to the next, 10 ms
-ENOUGH = 0.02  # counts that a track may miss by before it is told a new speed
+STOP_DISTANCE = 500  # counts from an allowed one to the stop
+INTERVAL = 30  # samples between updates of a track, 10 ms
+ENOUGH = 0.02  # counts of error of a track before a new speed
 FARTHEST = 1e8  # counts of a track; the chip's end is at 2^30
-NEAR_STOP = 2_000  # counts from a stop where no mirror is left when power goes off
-READS, BETWEEN = 5, 3  # of the index position in a row, and samples from one to the next
-Job = Generator[tuple[int, int], None, None]  # gives the sample to go on at, and what to watch for before it
+NEAR_STOP = 2_000  # counts from a stop: no mirror is nearer at power-off
+READS, BETWEEN = 5, 3  # successive readings of the index position, and samples between them
+Job = Generator[tuple[int, int], None, None]  # yields the sample to continue at, and events to watch before it
 
 
 def mirror_filter() -> tuple[int, int, int, int, int]:
-    """A filter that makes the assumed axis settle to the count: docs/studies/servo.md, 30 Hz, interval 3."""
+    """Filter that settles the assumed axis to the count.
+
+    docs/studies/servo.md, 30 Hz, interval 3.
+    """
     return design_filter(plant_of(AxisDesign()), crossover_hz=30.0, interval=3).values
 
 
 def travel_of(mirror: MirrorGeometry) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Counts between which the stops let a mirror move: its limits of azimuth, and all beams above or prime."""
+    """Counts between which the stops allow motion.
+
+    Limits of azimuth, and all beams above or prime.
+    """
     return (
-        (mirror.az_low_limit - BEYOND, mirror.az_high_limit + BEYOND),
-        (mirror.ne0 - 25_000 - BEYOND, mirror.ne0 + 25_000 + BEYOND),
+        (mirror.az_low_limit - STOP_DISTANCE, mirror.az_high_limit + STOP_DISTANCE),
+        (mirror.ne0 - 25_000 - STOP_DISTANCE, mirror.ne0 + 25_000 + STOP_DISTANCE),
     )
 
 
 @dataclass(frozen=True)
 class MirrorTuning:
-    """How a mirror is driven where no command says it.
+    """Drive settings without a command.
 
     filter         kp, ki, kd, integration limit, derivative interval
     velocity       of searches and tracks, counts/s
@@ -65,7 +71,7 @@ class MirrorTuning:
 
 @dataclass(frozen=True, eq=False)
 class CountSegment:
-    """Counts (2,) at two samples, which may be fractions; linear between, held at the ends."""
+    """Counts (2,) at two samples, possibly fractions; linear between, held at ends."""
 
     samples: tuple[float, float]
     counts: tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -85,14 +91,14 @@ class CountSegment:
 class TwinMirror:
     """Both axes of a mirror behind their motion chips.
 
-    ranger      whose it is, for its faults
-    stands      (2,) counts from the index, where power comes on
+    ranger      its name, for its faults
+    stands      (2,) counts from the index at power-on
     travel      lowest and highest counts of each axis that its stops allow
-    tuning      how it is driven where no command says it
+    tuning      drive settings without a command
     faults      of the twin
     origin      s since the twin's start at sample 0
 
-    Raises InputError: the index is not between the stops, or more than once, or it stands beyond one.
+    Raises InputError: the index is not between the stops, or twice, or the mirror is beyond one.
     """
 
     def __init__(
@@ -112,7 +118,7 @@ class TwinMirror:
         self._power_on()
 
     def reset(self) -> None:
-        """Power off and on: chips as after a reset, amplifiers off; the mirror is where it was."""
+        """Switch power off and on: chips reset, amplifiers off, mirror in place."""
         for k in (0, 1):
             self.axes.axis(k)  # the motors keep their motion
         self._power_on()
@@ -131,13 +137,13 @@ class TwinMirror:
 
     @property
     def idle(self) -> bool:
-        """Whether nothing will change until a command, so that time need not be followed."""
+        """True if nothing changes until a command."""
         return not self._jobs and not self._marks and self.axes.at_rest
 
     def pass_to(self, sample: int) -> None:
         """Bring both axes to a sample."""
         while self.samples < sample:
-            if self.axes.at_rest and not self._jobs:  # all marks on the way see the mirror where it is
+            if self.axes.at_rest and not self._jobs:  # all marks before the end have the present position
                 marks = [n for n in self._marks if n <= sample]
                 counts, self._marks = self.axes.counts, self._marks[len(marks) :]
                 self.marked += [(n, counts) for n in marks]
@@ -149,33 +155,36 @@ class TwinMirror:
             while self._marks and self._marks[0] <= self.samples:
                 self.marked.append((self._marks.pop(0), self.axes.counts))
             for name, (_, wake, axis, watch) in list(self._jobs.items()):
-                if name in self._jobs and (wake <= self.samples or self._seen(axis, watch)):
+                if name in self._jobs and (wake <= self.samples or self._event(axis, watch)):
                     self._go_on(name)
 
     def mark(self, samples: Iterable[int]) -> None:
-        """Note in `marked` where the axes truly stand at these samples, ascending and not yet past."""
+        """Record in `marked` the true positions at these samples.
+
+        Ascending and not yet past.
+        """
         self._marks, self.marked = [int(n) for n in samples], []
         while self._marks and self._marks[0] <= self.samples:
             self.marked.append((self._marks.pop(0), self.axes.counts))
 
     def _spoil(self, stop: int) -> int:
-        """Faults as they are now; the sample before `stop` where one of them changes."""
+        """Apply the present faults; sample before `stop` where one changes."""
         if not self.faults.faults:
             for k in (0, 1):
                 self.axes.spoil(k, stuck=False, blind=False)
             return stop
-        now = self.origin + self.samples * SAMPLE_TIME
+        instant = self.origin + self.samples * SAMPLE_TIME
         for k in (0, 1):
-            stuck = self.faults.active("stuck-axis", self.ranger, k, at=now) is not None
-            blind = self.faults.active("lost-index", self.ranger, k, at=now) is not None
+            stuck = self.faults.active("stuck-axis", self.ranger, k, at=instant) is not None
+            blind = self.faults.active("lost-index", self.ranger, k, at=instant) is not None
             self.axes.spoil(k, stuck=stuck, blind=blind)
         for fault in self.faults.faults:
             for edge in (fault.start, fault.end):
-                if now < edge < self.origin + stop * SAMPLE_TIME:
+                if instant < edge < self.origin + stop * SAMPLE_TIME:
                     stop = min(stop, max(self.samples + 1, ceil((edge - self.origin) / SAMPLE_TIME)))
         return stop
 
-    def _seen(self, axis: int, watch: int) -> bool:
+    def _event(self, axis: int, watch: int) -> bool:
         return bool((watch & AT_INDEX and self.axes.index_found(axis)) or (watch & AT_END and self.axes.complete(axis)))
 
     def _begin(self, name: str, job: Job, axis: int) -> None:
@@ -203,38 +212,41 @@ class TwinMirror:
     # Commands: of the sample reached ---------------------------------------------------------------------------------
 
     def enable(self, k: int, on: bool) -> None:
-        """The amplifier of an axis."""
+        """Switch the amplifier of an axis."""
         with self._axis(k) as axis:
             axis.axis(on)
 
     def enabled(self, k: int) -> bool:
-        """Whether an axis is switched on."""
+        """True if an axis is switched on."""
         return self.axes.enabled(k)
 
     def set_filter(self, k: int, values: tuple[int, int, int, int, int]) -> None:
-        """Filter values, at work from the next sample on; five zeros mean the tuning's own."""
+        """Set filter values from the next sample on; five zeros: own tuning."""
         with self._axis(k) as axis:
             axis.flt(*(values if any(values) else self.tuning.filter))
 
     def set_error_limit(self, k: int, counts: int) -> None:
-        """Position error past which the motor goes off."""
+        """Set the position error that switches the motor off."""
         with self._axis(k) as axis:
             axis.chip.limit_error(counts, stop=True)
 
     def start(self, k: int, position: int, *, velocity: int, acceleration: int) -> bool:
-        """Begin a move; a track is given up for it. False: amplifier off, a search, another acceleration in a move."""
+        """Begin a move; a track ends. False if not possible.
+
+        Amplifier off, a search, or another acceleration in a move.
+        """
         if not self.enabled(k) or self.homing[k] == "searching":
             return False
         if self.following:
             self._give_up("track")
-            for each in (0, 1):
-                self._stop_abruptly(each)
+            for axis_number in (0, 1):
+                self._stop_abruptly(axis_number)
         with self._axis(k) as axis:
             axis.chip.load_trajectory(position=position, velocity=velocity, acceleration=acceleration, mode="position")
             return axis.chip.start()
 
     def stop(self) -> None:
-        """Searches and tracks are given up, moves slowed down."""
+        """End searches and tracks, slow moves down."""
         for name in list(self._jobs):
             self._give_up(name)
         for k in (0, 1):
@@ -263,7 +275,10 @@ class TwinMirror:
     # The search for the index ----------------------------------------------------------------------------------------
 
     def find_home(self, k: int) -> None:
-        """Begin to look for the index of an axis: as `ServoAxis.fhm` does, a turn at most, back at a stop."""
+        """Begin the index search of an axis, as `ServoAxis.fhm`.
+
+        A turn at most, back at a stop.
+        """
         self._give_up("track")
         self._give_up(f"home {k}")
         self._stop_abruptly(k)
@@ -281,13 +296,13 @@ class TwinMirror:
                 axis.chip.find_index()
             self._go(k, self.axes.actual(k) + sense * turn)
             yield end, AT_INDEX | AT_END
-            if self.axes.index_found(k) or not self.axes.motor_off(k):  # a whole turn without a pulse, or too late
+            if self.axes.index_found(k) or not self.axes.motor_off(k):  # a full turn without a pulse, or too late
                 break
         with self._axis(k) as axis:
             axis.chip.seeking = False
         if not self.axes.index_found(k):
             with self._axis(k) as axis:
-                axis.chip.stop("off")  # it may lean on a stop: a filter that winds up would miss the next home
+                axis.chip.stop("off")  # it may press on a stop: a filter that winds up would miss the next home
             self.homing[k] = "failed"
             return
         at = self.axes.axis(k).chip.index_position
@@ -309,18 +324,20 @@ class TwinMirror:
 
     @property
     def following(self) -> bool:
-        """Whether a track is under way."""
+        """True while a track is active."""
         return "track" in self._jobs
 
     def follow(self, track: CountSegment) -> bool:
-        """Follow a track with both axes; another track before is taken over from. False: amplifier off, or a move.
+        """Follow a track with both axes. False: amplifier off, or a move.
 
-        Far from the line the chip makes a trapezoidal move at it, aimed ahead by the way that its speed brakes in; near
-        to it, in velocity mode, a new speed every 10 ms leads the profile to where the line then is, half a count on,
-        because the chip takes the whole part of its profile. A profile holds fractions of a count: nothing adds up.
-        From the end on, a move holds the nearest whole count.
+        It takes over from an earlier track.
 
-        Raises InputError: counts that are no numbers, or beyond the chip.
+        Far from the line the chip makes a trapezoidal move at it, aimed ahead by its braking distance; near
+        to it, in velocity mode, a new speed every 10 ms leads the profile to the line, half a count ahead,
+        because the chip takes the whole part of its profile. A profile holds fractions of a count: errors do not
+        accumulate. From the end on, a move holds the nearest whole count.
+
+        Raises InputError: counts that are not numbers, or beyond the chip.
         """
         if not np.all(np.abs(track.counts) < FARTHEST):
             raise InputError(f"{self.ranger}: a track of counts {track.counts} (expected within {FARTHEST:g})")
@@ -347,17 +364,19 @@ class TwinMirror:
                 self._go(k, round(track.at(self.samples, k)))
 
     def _lead(self, k: int, track: CountSegment, stop: int) -> None:
-        """Bring the profile of an axis to the track at a sample to come."""
+        """Bring the profile of an axis to the track at a later sample."""
         span, rate = stop - self.samples, track.rate(self.samples, k)
         goal = track.at(stop, k) + 0.5
         (at, speed), top = self.axes.profile(k), self.tuning.velocity * SAMPLE_TIME
         if abs(goal - at - speed * span) < ENOUGH and not self.axes.complete(k):
             return
-        wanted, room = (goal - at) / span, 0.5 * self.tuning.acceleration * SAMPLE_TIME**2 * span
-        if abs(wanted - speed) <= room and abs(wanted - rate) <= room and abs(wanted) <= top:
+        rate_needed, room = (goal - at) / span, 0.5 * self.tuning.acceleration * SAMPLE_TIME**2 * span
+        if abs(rate_needed - speed) <= room and abs(rate_needed - rate) <= room and abs(rate_needed) <= top:
             with self._axis(k) as axis:
                 axis.chip.load_trajectory(
-                    velocity=round(abs(wanted) * FRACTION), mode="velocity", direction=1 if wanted >= 0.0 else -1
+                    velocity=round(abs(rate_needed) * FRACTION),
+                    mode="velocity",
+                    direction=1 if rate_needed >= 0.0 else -1,
                 )
                 axis.chip.start()
         else:
@@ -367,7 +386,7 @@ class TwinMirror:
 
 
 def _motor(ranger: str, axis: int, stands: float, travel: tuple[float, float]) -> Motor:
-    """An axis whose angle is zero at the index."""
+    """Axis whose angle is zero at the index."""
     turn = AxisDesign().counts_per_turn
     low, high = travel
     if not -turn < low <= stands <= high < turn or not low < 0.0 < high:

@@ -1,10 +1,11 @@
-"""How the telescope's axes turn in time: where they truly are and how fast, from a line that people type.
+"""Motion of the telescope's axes: true angles and rates from a text.
 
     fixed AZ EL                        stands, degrees
-    track AZ EL                        follows the object of the sky that stands there at the start
+    track AZ EL                        follows the object of the sky that is there at the start
     slew AZ0 EL0 AZ1 EL1               at 35.2 and 17.6 degrees a minute, 0.2 degrees a second a second, then stands
-    scan AZ EL WIDTH RATE              azimuth to and fro about AZ over WIDTH degrees at RATE degrees a minute
-    table FILE                         CSV with the header mjd,azimuth_deg,elevation_deg; smooth between, still outside
+    scan AZ EL WIDTH RATE              azimuth back and forth about AZ over WIDTH degrees at RATE degrees a minute
+    table FILE                         CSV with the header mjd,azimuth_deg,elevation_deg; smooth between, constant
+                                       outside
 
 Azimuths are clockwise from north and count on past a turn; elevations are 5 to 95 degrees (a track: to 89).
 """
@@ -32,7 +33,7 @@ COLUMNS = ["mjd", "azimuth_deg", "elevation_deg"]
 
 
 class AxisAngles(NamedTuple):
-    """Azimuth and elevation (k,), rad, and their rates (k,), rad/s."""
+    """Azimuth and elevation (k,), rad, and rates (k,), rad/s."""
 
     azimuth: Array
     elevation: Array
@@ -41,15 +42,15 @@ class AxisAngles(NamedTuple):
 
 
 class AxisMotion(ABC):
-    """Where the axes are at times."""
+    """Motion of the axes as a function of time."""
 
     @abstractmethod
     def angles(self, seconds: Array, *, latitude: float, start_mjd: float) -> AxisAngles:
-        """Angles at times (k,), s since the start at `start_mjd`, UTC; of a site at a latitude, rad."""
+        """Angles at times (k,), s since `start_mjd`, UTC, at a latitude, rad."""
 
     @staticmethod
     def parse(text: str) -> "AxisMotion":
-        """A motion as people type it, above. Raises InputError with what was expected.
+        """Motion from text, as above. Raises InputError with the expectation.
 
         >>> AxisMotion.parse("slew 10 30 40 50")
         TelescopeSlew(start_deg=(10.0, 30.0), end_deg=(40.0, 50.0))
@@ -57,12 +58,12 @@ class AxisMotion(ABC):
         kind, *words = (text.split(maxsplit=1) if text.startswith("table ") else text.split()) or [""]
         if kind == "table" and words:
             return read_table(Path(words[0].strip()))
-        wanted = {"fixed": 2, "track": 2, "slew": 4, "scan": 4}
+        arguments = {"fixed": 2, "track": 2, "slew": 4, "scan": 4}
         try:
             n = [float(word) for word in words]
         except ValueError:
             n = []
-        if kind not in wanted or len(n) != wanted[kind] or not np.all(np.isfinite(n)):
+        if kind not in arguments or len(n) != arguments[kind] or not np.all(np.isfinite(n)):
             raise InputError(
                 f"motion {text!r}: expected fixed AZ EL, track AZ EL, slew AZ0 EL0 AZ1 EL1, scan AZ EL WIDTH RATE "
                 "(degrees, degrees a minute) or table FILE"
@@ -85,7 +86,9 @@ def _refuse_elevation(elevation_deg: float, where: str, highest: float = HIGHEST
 
 @dataclass(frozen=True)
 class TelescopeSlew(AxisMotion):
-    """From one posture to another, each axis by itself with a trapezoid of speed; standing is a slew to where it is.
+    """Slew between postures, a trapezoid of speed on each axis.
+
+    A fixed posture is a slew to itself.
 
     start_deg, end_deg   azimuth, elevation
     """
@@ -101,31 +104,34 @@ class TelescopeSlew(AxisMotion):
         axes = []
         for axis in (0, 1):
             begin = self.start_deg[axis] * DEGREE
-            way = self.end_deg[axis] * DEGREE - begin
-            if way == 0.0:
+            travel = self.end_deg[axis] * DEGREE - begin
+            if travel == 0.0:
                 axes.append((np.full_like(seconds, begin), np.zeros_like(seconds)))
                 continue
-            speed = min(FASTEST[axis], np.sqrt(ACCELERATION * abs(way)))
+            speed = min(FASTEST[axis], np.sqrt(ACCELERATION * abs(travel)))
             rise = speed / ACCELERATION
-            whole = abs(way) / speed + rise
-            t = np.clip(seconds, 0.0, whole)
-            end = whole - t
+            full = abs(travel) / speed + rise
+            t = np.clip(seconds, 0.0, full)
+            end = full - t
             passed = np.where(t < rise, 0.5 * ACCELERATION * t**2, speed * (t - 0.5 * rise))
-            passed = np.where(end < rise, abs(way) - 0.5 * ACCELERATION * end**2, passed)
-            axes.append((begin + np.sign(way) * passed, np.sign(way) * ACCELERATION * _least(t, end, rise)))
+            passed = np.where(end < rise, abs(travel) - 0.5 * ACCELERATION * end**2, passed)
+            axes.append((begin + np.sign(travel) * passed, np.sign(travel) * ACCELERATION * _least(t, end, rise)))
         return AxisAngles(axes[0][0], axes[1][0], axes[0][1], axes[1][1])
 
 
 def _least(since: Array, until: Array, rise: float) -> Array:
-    """Time of acceleration that makes the speed: since the start, until the end, at most the whole rise."""
+    """Effective acceleration time, limited to the full rise.
+
+    Since the start, until the end.
+    """
     return np.minimum(np.minimum(since, until), rise)
 
 
 @dataclass(frozen=True)
 class SkyTrack(AxisMotion):
-    """After an object of the sky: its direction turns about the pole once a sidereal day, without refraction.
+    """Track of a sky object at sidereal rate, without refraction.
 
-    start_deg   azimuth, elevation at the start; where the object is below 5 degrees the telescope waits there
+    start_deg   azimuth, elevation at the start; while the object is below 5 degrees the telescope waits there
     """
 
     start_deg: tuple[float, float]
@@ -135,17 +141,19 @@ class SkyTrack(AxisMotion):
 
     def angles(self, seconds: Array, *, latitude: float, start_mjd: float) -> AxisAngles:
         a, e = np.array(self.start_deg) * DEGREE
-        here = np.array([np.sin(a) * np.cos(e), np.cos(a) * np.cos(e), np.sin(e)])  # east, north, up
+        direction = np.array([np.sin(a) * np.cos(e), np.cos(a) * np.cos(e), np.sin(e)])  # east, north, up
         pole = np.array([0.0, np.cos(latitude), np.sin(latitude)])
         meridian = np.array([0.0, -np.sin(latitude), np.cos(latitude)])
-        declination = np.arcsin(here @ pole)
+        declination = np.arcsin(direction @ pole)
         if abs(latitude - declination) < TRACK_CLEARANCE_DEG * DEGREE:
             raise InputError(
                 f"track {self.start_deg[0]:g} {self.start_deg[1]:g}: the object passes "
                 f"{abs(latitude - declination) / DEGREE:.2f} degrees from the zenith (expected {TRACK_CLEARANCE_DEG:g} "
                 "or more, where azimuth can follow): name another"
             )
-        south = declination < latitude  # passes the meridian south of the zenith, and then goes round; else it swings
+        south = (
+            declination < latitude
+        )  # passes the meridian south of the zenith, then azimuth goes round; else it oscillates
         round_trip = TWO_PI if south else 0.0
         lowest = (np.sin(LOWEST_DEG * DEGREE) - np.sin(latitude) * np.sin(declination)) / (
             np.cos(latitude) * np.cos(declination)
@@ -153,7 +161,7 @@ class SkyTrack(AxisMotion):
         sets = np.arccos(np.clip(lowest, -1.0, 1.0))  # hour angle; pi where it never does
 
         def sky_angles(hour: Array) -> tuple[Array, Array, Array, Array]:
-            """Azimuth off the meridian, elevation, and their derivatives by the hour angle."""
+            """Azimuth off the meridian, elevation, and derivatives by hour angle."""
             cosine, sine = np.cos(hour)[:, None] * np.cos(declination), np.sin(hour)[:, None] * np.cos(declination)
             v = np.sin(declination) * pole + cosine * meridian - sine * EAST
             slope = -sine * meridian - cosine * EAST
@@ -163,19 +171,19 @@ class SkyTrack(AxisMotion):
             return off, np.arctan2(v[:, 2], across), turn, slope[:, 2] / across
 
         speed = TWO_PI / SIDEREAL_DAY
-        first = np.arctan2(-here[0], here @ meridian)
+        first = np.arctan2(-direction[0], direction @ meridian)
         hours = first + speed * seconds
         transit = np.round(hours / TWO_PI)
         hour = hours - TWO_PI * transit
         off, elevation, turn, climb = sky_angles(hour)
         up = np.abs(hour) <= sets
-        # below it waits: low, and azimuth goes evenly to where the object will rise
+        # below the limit it waits: low, and azimuth moves evenly to the rising point
         begin = float(sky_angles(np.array([sets]))[0][0])
         even = (round_trip - 2.0 * begin) / max(TWO_PI - 2.0 * sets, 1e-9)
         waits = begin + even * (np.where(hour > 0.0, hour, hour + TWO_PI) - sets)
-        whole = round_trip * np.where(up | (hour > 0.0), transit, transit - 1.0)
+        azimuth = round_trip * np.where(up | (hour > 0.0), transit, transit - 1.0)
         return AxisAngles(
-            a - float(sky_angles(np.array([first]))[0][0]) + whole + np.where(up, off, waits),
+            a - float(sky_angles(np.array([first]))[0][0]) + azimuth + np.where(up, off, waits),
             np.where(up, elevation, LOWEST_DEG * DEGREE),
             speed * np.where(up, turn, even),
             speed * np.where(up, climb, 0.0),
@@ -184,7 +192,9 @@ class SkyTrack(AxisMotion):
 
 @dataclass(frozen=True)
 class Scan(AxisMotion):
-    """To and fro in azimuth at one elevation; it turns round outside the width, at the drives' acceleration.
+    """Scan in azimuth at one elevation, turning outside the width.
+
+    At the drives' acceleration.
 
     middle_deg      azimuth, elevation
     width_deg       of what is scanned at the full rate, above 0
@@ -220,7 +230,9 @@ class Scan(AxisMotion):
 
 @dataclass(frozen=True, eq=False)
 class PostureTable(AxisMotion):
-    """Through given postures, by cubics with the mean slopes of their neighbours; before and after it stands.
+    """Posture table interpolated by cubics; constant before and after.
+
+    The slopes are means of the neighbours.
 
     mjd, azimuth, elevation   (n,) UTC ascending, rad
     """
@@ -240,14 +252,19 @@ class PostureTable(AxisMotion):
         for y in (self.azimuth, self.elevation):
             slope = np.gradient(y, at)
             slope[0] = slope[-1] = 0.0
-            left, right, rise = slope[k] * span, slope[k + 1] * span, y[k + 1] - y[k]
-            c2, c3 = 3.0 * rise - 2.0 * left - right, left + right - 2.0 * rise
-            axes.append((y[k] + s * (left + s * (c2 + s * c3)), (left + s * (2.0 * c2 + 3.0 * s * c3)) / span * moving))
+            slope_before, slope_after, rise = slope[k] * span, slope[k + 1] * span, y[k + 1] - y[k]
+            c2, c3 = 3.0 * rise - 2.0 * slope_before - slope_after, slope_before + slope_after - 2.0 * rise
+            axes.append(
+                (
+                    y[k] + s * (slope_before + s * (c2 + s * c3)),
+                    (slope_before + s * (2.0 * c2 + 3.0 * s * c3)) / span * moving,
+                )
+            )
         return AxisAngles(axes[0][0], axes[1][0], axes[0][1], axes[1][1])
 
 
 def read_table(path: Path) -> PostureTable:
-    """A table of postures. Raises InputError with file, row and what was expected."""
+    """Read a table of postures. Raises InputError with file and row."""
     try:
         with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.reader(file))

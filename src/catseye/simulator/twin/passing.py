@@ -1,4 +1,4 @@
-"""What passes through the air of a living site: waves, fronts, and eddies that the wind carries."""
+"""Passing disturbances of a living site's air: waves, fronts, eddies."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +19,10 @@ STILLEST = 0.5  # m/s: still air moves too
 
 @dataclass(frozen=True, eq=False)
 class TravellingWaves:
-    """A few waves (n,) that travel over the site: amplitudes at z = 0, their growth a metre, rad/s, rad, (2, n) s/m."""
+    """Waves (n,) travelling over the site.
+
+    Amplitudes at z = 0, their growth a metre, rad/s, rad, (2, n) s/m.
+    """
 
     amplitude: Array
     growth: Array
@@ -29,7 +32,7 @@ class TravellingWaves:
 
     @staticmethod
     def of(waves: Sequence[AirWave | PressureWave]) -> "TravellingWaves":
-        """The same waves, side by side."""
+        """The same waves as arrays."""
         return TravellingWaves(
             np.array([w.amplitude_c if isinstance(w, AirWave) else w.amplitude_hpa for w in waves]),
             np.array([w.growth_per_m if isinstance(w, AirWave) else 0.0 for w in waves]),
@@ -39,18 +42,21 @@ class TravellingWaves:
         )
 
     def __call__(self, points: Array, seconds: Array, lag: float = 0.0) -> Array:
-        """Their sum at points (..., 3) and times (...), of what follows them with a first-order lag, s."""
+        """Sum at points (..., 3) and times (...), with a first-order lag, s."""
         turn = self.omega * lag
         local = np.asarray(seconds, dtype=float)[..., None] - points[..., :2] @ self.slowness
         wave = np.sin(self.omega * local + (self.phase - np.arctan(turn)))
         size = self.amplitude / np.hypot(1.0, turn)
-        found: Array = wave @ size
-        return found + points[..., 2] * (wave @ (size * self.growth)) if self.growth.any() else found
+        total: Array = wave @ size
+        return total + points[..., 2] * (wave @ (size * self.growth)) if self.growth.any() else total
 
 
 @dataclass(frozen=True, eq=False)
 class PassingAir:
-    """Waves of temperature and of pressure, fronts, eddies; `eddy_gain` is a factor on the eddies."""
+    """Waves of temperature and pressure, fronts, eddies.
+
+    `eddy_gain` is a factor on the eddies.
+    """
 
     waves: TravellingWaves
     pressure_hpa: TravellingWaves
@@ -60,7 +66,10 @@ class PassingAir:
 
     @staticmethod
     def of(conditions: LivingConditions, *, streams: Streams, planted: Planted) -> "PassingAir":
-        """All of it, drawn. Waves have any amplitude up to the largest; fronts and eddies go with the wind."""
+        """Draw all disturbances.
+
+        Waves have any amplitude up to the largest; fronts and eddies go with the wind.
+        """
         c, rng = conditions, streams("passing air")
         sizes, towards, seed = rng.uniform(size=WAVES + PRESSURE_WAVES), rng.uniform(0.0, TWO_PI), rng.integers(2**31)
         wave_c = planted.gain("air_waves") * c.wave_c * sizes[:WAVES]
@@ -75,19 +84,22 @@ class PassingAir:
         )
 
     def common_c(self, points: Array, seconds: Array, lag: float = 0.0) -> Array:
-        """Waves and fronts at points (..., 3) and times (...), °C, of what follows the air with a lag, s."""
+        """Waves and fronts at points (..., 3), times (...), °C, with a lag, s."""
         return self.waves(points, seconds, lag) + self.fronts(points, seconds, lag)
 
     def eddies_c(self, points: Array, seconds: Array, lag: float = 0.0) -> Array:
-        """Eddies at points (..., 3) and times (...), °C, of what stands there and follows the air with a lag, s."""
+        """Eddies at points (..., 3), times (...), °C, with a lag, s.
+
+        For a fixed sensor that follows the air.
+        """
         if self.eddy_gain == 0.0:
             return np.zeros(np.broadcast_shapes(points.shape[:-1], np.shape(seconds)))
-        found: Array = self.eddy_gain * self.eddies.temperature_c(points, seconds, lag)
-        return found
+        eddies: Array = self.eddy_gain * self.eddies.temperature_c(points, seconds, lag)
+        return eddies
 
     def mean_eddies_c(self, start: Array, end: Array, seconds: Array) -> Array:
         """Means of the eddies along straight lines, points (k, 3), °C."""
         if self.eddy_gain == 0.0:
             return np.zeros(len(seconds))
-        found: Array = self.eddy_gain * self.eddies.mean_c(start, end, seconds)
-        return found
+        mean: Array = self.eddy_gain * self.eddies.mean_c(start, end, seconds)
+        return mean

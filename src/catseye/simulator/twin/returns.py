@@ -1,4 +1,4 @@
-"""What a beam falls on, and what comes back of it: the phasors of a living site's rangers."""
+"""Returned phasors of a living site's rangers, from beam to retroreflector."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -16,21 +16,21 @@ from catseye.simulator.twin.faults import FaultBoard
 from catseye.simulator.twin.light import CUBE_RADIUS, SPOT, ElectronicsWalk, acceptance, glass_way, path_waves
 from catseye.simulator.twin.scene import Beam, TwinPlaces
 from catseye.simulator.twin.stations import TrueStation, reference_cube
-from catseye.simulator.twin.telescope import TelescopeStanding
+from catseye.simulator.twin.telescope import TelescopeState
 from catseye.simulator.twin.waves import Waves
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-FARTHEST = 200.0  # m: a beam that sweeps by more than `SWEEP` there is looked at three times
+FARTHEST = 200.0  # m: a beam that sweeps by more than `SWEEP` there is checked three times
 SWEEP = 0.1  # m
-MOST_PATHS = 1024  # whose noise is kept: a whole dish has 40 000, of 12 kB each
+MOST_PATHS = 1024  # paths with cached noise: a full dish has 40 000, of 12 kB each
 
 
 class Meeting(NamedTuple):
-    """A beam and one retroreflector at k times.
+    """Beam and one retroreflector at k times.
 
-    along, off   (k,) m: how far along the beam its point lies, and how far off it
-    cosine       (k,) of the angle off where it looks
+    along, off   (k,) m: distance of its point along the beam, and off the beam
+    cosine       (k,) of the angle off its axis
     """
 
     along: Array
@@ -39,9 +39,9 @@ class Meeting(NamedTuple):
 
 
 class Returns:
-    """The light of a living site.
+    """Light of a living site.
 
-    scene, air   where things are, and what is between them
+    scene, air   places, and the air between them
     faults       blocked-beam, wrong-target, dew
     """
 
@@ -64,60 +64,60 @@ class Returns:
         self._cubes = {name: reference_cube(station) for name, station in scene.stations.items()}
         self._path = lru_cache(MOST_PATHS)(self._drawn_path)
 
-    def lit(self, ranger: str, counts: Array, t: Array, standing: TelescopeStanding) -> str | None:
-        """The retroreflector on which a beam falls at counts (1, 2) and one time (1,), the nearest; None: on none."""
+    def lit(self, ranger: str, counts: Array, t: Array, state: TelescopeState) -> str | None:
+        """Nearest retroreflector in a beam at counts (1, 2), one time (1,); None: none."""
         if self._off_cube(self._scene.station(ranger), counts)[0][0] < CUBE_RADIUS:
             return REFERENCE
-        beam = self.beam(ranger, counts, t, standing)
-        taken: dict[str, float] = {}
-        for name in self._scene.near(beam, standing, 0):
-            retro, meeting = self._scene.retros[name], self._meeting(name, beam, t, standing)
+        beam = self.beam(ranger, counts, t, state)
+        distance: dict[str, float] = {}
+        for name in self._scene.near(beam, state, 0):
+            retro, meeting = self._scene.retros[name], self._meeting(name, beam, t, state)
             if meeting.off[0] < retro.radius and acceptance(retro, meeting.cosine)[0] > 0.0:
-                taken[name] = float(meeting.off[0])
-        return min(taken, key=lambda name: taken[name], default=None)
+                distance[name] = float(meeting.off[0])
+        return min(distance, key=lambda name: distance[name], default=None)
 
-    def beam(self, ranger: str, counts: Array, t: Array, standing: TelescopeStanding) -> Beam:
-        """Where the light goes at what the encoders read (k, 2)."""
-        return self._scene.beam(self._scene.frame(ranger, t, standing), self._scene.station(ranger).ray(counts))
+    def beam(self, ranger: str, counts: Array, t: Array, state: TelescopeState) -> Beam:
+        """Beam at encoder readings (k, 2)."""
+        return self._scene.beam(self._scene.frame(ranger, t, state), self._scene.station(ranger).ray(counts))
 
     def phasors(
-        self, ranger: str, counts: Array, t: Array, standing: TelescopeStanding, *, among: tuple[str, ...] | None = None
+        self, ranger: str, counts: Array, t: Array, state: TelescopeState, *, among: tuple[str, ...] | None = None
     ) -> Complex:
-        """What returns (k,), V, at counts (k, 2) and times (k,), and what leaks.
+        """Return (k,), V, at counts (k, 2), times (k,), leakage included.
 
-        among   names that the beam may fall on, where they are known; None: they are looked for
+        among   names that the beam may fall on, if known; None: search
         """
         station = self._scene.station(ranger)
         turned = np.exp(1j * self.electronics[ranger](t))
         if among is None or REFERENCE in among:
-            off, way = self._off_cube(station, counts)
+            off, path = self._off_cube(station, counts)
             if np.any(off < CUBE_RADIUS):
-                return station.leakage + turned * self._reference(ranger, off, way, t, standing)
-        beam = self.beam(ranger, counts, t, standing)
+                return station.leakage + turned * self._reference(ranger, off, path, t, state)
+        beam = self.beam(ranger, counts, t, state)
         returned = np.zeros(len(t), dtype=complex)
-        for name in self._near(beam, standing) if among is None else among:
-            returned = returned + self._return(ranger, name, beam, t, standing)
+        for name in self._near(beam, state) if among is None else among:
+            returned = returned + self._return(ranger, name, beam, t, state)
         return station.leakage + turned * returned
 
-    def _near(self, beam: Beam, standing: TelescopeStanding) -> list[str]:
-        """Names of what the beam may fall on at any of its times."""
-        last = len(beam.way) - 1
+    def _near(self, beam: Beam, state: TelescopeState) -> list[str]:
+        """Names of retroreflectors possibly in the beam at any of its times."""
+        last = len(beam.path) - 1
         sweep = FARTHEST * float(np.max(np.abs(beam.direction[-1] - beam.direction[0])))
         at = (last // 2,) if sweep < SWEEP else (0, last // 2, last)
-        return list(dict.fromkeys(name for k in at for name in self._scene.near(beam, standing, k)))
+        return list(dict.fromkeys(name for k in at for name in self._scene.near(beam, state, k)))
 
-    def _meeting(self, name: str, beam: Beam, t: Array, standing: TelescopeStanding) -> Meeting:
-        sight = self._scene.point(name, t, standing) - beam.origin
+    def _meeting(self, name: str, beam: Beam, t: Array, state: TelescopeState) -> Meeting:
+        sight = self._scene.point(name, t, state) - beam.origin
         along = np.einsum("ij,ij->i", sight, beam.direction)
         aside = sight - along[:, None] * beam.direction
-        facing = self._scene.facing(name, standing)
+        facing = self._scene.facing(name, state)
         cosine = np.ones(len(t)) if facing is None else -np.einsum("ij,ij->i", facing, beam.direction)
         return Meeting(along, np.sqrt(np.einsum("ij,ij->i", aside, aside)), cosine)
 
-    def _return(self, ranger: str, name: str, beam: Beam, t: Array, standing: TelescopeStanding) -> Complex:
-        """What one retroreflector returns (k,), V, but for the electronics' phase."""
+    def _return(self, ranger: str, name: str, beam: Beam, t: Array, state: TelescopeState) -> Complex:
+        """Return of one retroreflector (k,), V, without the electronics' phase."""
         retro, at = self._scene.retros[name], float(t[len(t) // 2])
-        met = self._meeting(name, beam, t, standing)
+        met = self._meeting(name, beam, t, state)
         accepted = np.where(met.off < retro.radius, acceptance(retro, met.cosine), 0.0)
         if not accepted.any() or self._faults.active("blocked-beam", ranger, name, at=at) is not None:
             return np.zeros(len(t), dtype=complex)
@@ -132,12 +132,15 @@ class Returns:
         obliquity = self._planted.gain("obliquity")
         glass = glass_way(retro, met.cosine, group=self._group, phase=self._bending, obliquity=obliquity)
         wrong = self._faults.active("wrong-target", ranger, name, at=at)
-        length = beam.way + met.along + (0.0 if wrong is None else wrong.size)
+        length = beam.path + met.along + (0.0 if wrong is None else wrong.size)
         phase = -self.radians_per_metre * ((index + 1e-6 * ppm) * length + end_index * glass)
         return volts * np.exp(1j * (phase + self._coupled(self._scene.stations[ranger], volts, phase)))
 
     def _coupled(self, station: TrueStation, volts: Array, phase: Array) -> Array | float:
-        """Phase that a head adds by amplitude and by phase (k,), rad; to the reference it adds none."""
+        """Phase coupling of a head by amplitude and phase (k,), rad.
+
+        None for the reference.
+        """
         added: Array | float = 0.0
         if station.amplitude_to_phase:
             added = station.amplitude_to_phase * np.log(np.maximum(volts, 1e-6) / REFERENCE_VOLT)
@@ -148,21 +151,24 @@ class Returns:
         return added
 
     def _off_cube(self, station: TrueStation, counts: Array) -> tuple[Array, Array]:
-        """How far the beam passes the internal cube (k,), m, and the way of the light to it (k,), m."""
+        """Beam offset from the internal cube (k,), m, and path to it (k,), m."""
         ray, (cube, _) = station.ray(counts), self._cubes[station.name]
         sight = cube - ray.leaves
         along = np.einsum("ij,ij->i", sight, ray.direction)
         aside = sight - along[:, None] * ray.direction
         off = np.sqrt(np.einsum("ij,ij->i", aside, aside))
-        return np.where(along > 0.0, off, np.inf), ray.way + along
+        return np.where(along > 0.0, off, np.inf), ray.path + along
 
-    def _reference(self, ranger: str, off: Array, way: Array, t: Array, standing: TelescopeStanding) -> Complex:
-        """What the internal cube returns (k,), V, but for the electronics' phase: nothing blocks or wets it."""
+    def _reference(self, ranger: str, off: Array, path: Array, t: Array, state: TelescopeState) -> Complex:
+        """Return of the internal cube (k,), V, without electronics' phase.
+
+        Nothing blocks or wets it.
+        """
         volts = np.where(off < CUBE_RADIUS, REFERENCE_VOLT * np.exp(-0.5 * (off / SPOT) ** 2), 0.0)
-        index = self._air.index(self._scene.point(ranger, t, standing), t)
-        return volts * np.exp(-1j * self.radians_per_metre * index * way)
+        index = self._air.index(self._scene.point(ranger, t, state), t)
+        return volts * np.exp(-1j * self.radians_per_metre * index * path)
 
     def _drawn_path(self, ranger: str, name: str) -> tuple[Waves, float]:
-        """Noise of a path, and where between least and most its usual amplitude is: the same whenever it is drawn."""
+        """Noise of a path and its usual amplitude between limits, reproducibly."""
         noise = path_waves(ranger, name, index_ppm=self._index_ppm, streams=self._streams, planted=self._planted)
         return noise, float(self._streams(f"path/{ranger}/{name}").uniform())

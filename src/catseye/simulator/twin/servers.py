@@ -1,7 +1,7 @@
-"""The rangers of a site in one process: a server for each, their initialisation files, and the faults of their network.
+"""Servers of a site's rangers in one process, with files and network faults.
 
-A ranger that was dead comes back as after a power cut: cold, not initialised, not homed. One that was hung goes on
-where it stood, without the lines that came meanwhile. One that was cut off goes on, and forgets its clients.
+A dead ranger comes back as after a power cut: cold, not initialised, not homed. A hung one continues in its state,
+without the lines received meanwhile. A disconnected one continues without its clients.
 """
 
 import asyncio
@@ -27,12 +27,12 @@ from catseye.simulator.twin.faults import FaultBoard
 from catseye.simulator.twin.faulty_network import FaultyNetwork, Gate
 
 LOG = logging.getLogger(__name__)
-SUPERVISED = 0.05  # s between two looks at the faults
+SUPERVISED = 0.05  # s between two checks of the faults
 
 
 @dataclass
 class Served:
-    """One ranger: its server, what is wrong with it now, the task that turns it."""
+    """One ranger: its server, present network faults, and task."""
 
     server: ZyServer
     head: RangerHead
@@ -48,12 +48,12 @@ class TwinSite:
     site           its records
     heads          by ranger; only these are served
     world_faults   whose network faults are applied: dead-ranger, hung-ranger, network-cut, network-slow
-    seconds        s since the twin's start, now
+    seconds        present time, s since the twin's start
     addresses      "loopback" or a port base; 0: any free ports, which `addresses` says after `start`
-    files          folder in which each ranger has a folder of initialisation files; those that are there are kept.
+    files          folder in which each ranger has a folder of initialisation files; existing files are kept.
                    None: a temporary one
-    network        sockets unless told otherwise
-    door           what the rangers' ports ask of those who come
+    network        sockets by default
+    door           access policy of the rangers' ports
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class TwinSite:
     ):
         unknown = sorted(set(heads) - set(site.rangers))
         if unknown:
-            raise InputError(f"{unknown[0]} is no ranger of the site (expected one of {', '.join(site.rangers)})")
+            raise InputError(f"{unknown[0]} is not a ranger of the site (expected one of {', '.join(site.rangers)})")
         self.site, self.faults, self.seconds = site, world_faults, seconds
         self._heads, self._network = dict(heads), network or Sockets(door.tls)
         self.addresses: dict[str, Address] = (
@@ -85,11 +85,14 @@ class TwinSite:
 
     @property
     def rangers(self) -> dict[str, Ranger]:
-        """The rangers by name, once started."""
+        """Rangers by name, once started."""
         return {name: one.server.ranger for name, one in self.served.items()}
 
     async def start(self) -> None:
-        """Write the files and listen. Raises InputError: a port that cannot be had, a folder that cannot be written."""
+        """Write the files and listen. Raises InputError on failure.
+
+        A port that is not available, or a folder that cannot be written.
+        """
         if self._folder is None:
             self._temporary = tempfile.TemporaryDirectory(prefix="catseye-twin-")
             self._folder = Path(self._temporary.name)
@@ -111,12 +114,12 @@ class TwinSite:
             raise
 
     def rearm(self) -> None:
-        """Count every dead man's time from now on: the rangers are ready to be commanded."""
+        """Restart every dead-man timer: the rangers are ready for commands."""
         for one in self.served.values():
             one.server.rearm()
 
     async def serve(self) -> None:
-        """Turn the rangers and apply the faults, until cancelled; `start` first."""
+        """Run the rangers and apply the faults until cancelled; `start` first."""
         for one in self.served.values():
             one.task = asyncio.create_task(one.server.serve())
         try:
@@ -128,7 +131,7 @@ class TwinSite:
                 await _halt(one)
 
     async def stop(self) -> None:
-        """Close all connections, listen no more, take the temporary files away."""
+        """Close all connections, stop listening, remove temporary files."""
         for one in self.served.values():
             await _halt(one)
             one.gate.cut()
@@ -160,7 +163,7 @@ class TwinSite:
             ranger.files.mkdir(parents=True, exist_ok=True)
         except OSError as problem:
             raise InputError(
-                f"{ranger.files} cannot be made: {problem.strerror} (expected a folder of one's own)"
+                f"{ranger.files} cannot be made: {problem.strerror} (expected a writable folder)"
             ) from problem
         if all((ranger.files / name).exists() for name in file_names(ranger)):
             return
@@ -169,10 +172,10 @@ class TwinSite:
                 replace_file(ranger.files, name, text)
 
     async def _supervise(self) -> None:
-        now = self.seconds()
+        instant = self.seconds()
         for name, one in self.served.items():
             dead, hung, cut, slow = (
-                self.faults.active(kind, name, at=now) if self.faults.faults else None
+                self.faults.active(kind, name, at=instant) if self.faults.faults else None
                 for kind in ("dead-ranger", "hung-ranger", "network-cut", "network-slow")
             )
             if one.dead and dead is None:
@@ -187,7 +190,7 @@ class TwinSite:
             elif one.task is None:
                 one.task = asyncio.create_task(one.server.serve())
             elif one.task.done():
-                one.task.result()  # it ends only by what is wrong with this program: say it
+                one.task.result()  # it ends only by a program error: report it
 
     async def _shut(self, one: Served, shut: bool) -> None:
         if shut and not one.shut:
@@ -197,13 +200,13 @@ class TwinSite:
             try:
                 await one.server.start()
             except InputError as problem:
-                LOG.warning("%s: tried again each %g s", problem, SUPERVISED)
+                LOG.warning("%s: retrying every %g s", problem, SUPERVISED)
                 return
         one.shut = shut
 
 
 async def _halt(one: Served) -> None:
-    """End the turns of all rangers."""
+    """End the tasks of all rangers."""
     task, one.task = one.task, None
     if task is not None:
         task.cancel()

@@ -1,16 +1,16 @@
-"""The truth of a living site: what stands where, what light comes back, what instruments read, at any time.
+"""Truth of a living site at any time: places, returns, readings.
 
 A twin is a pure function of its arguments and of time: nothing is stepped or stored, so that processes which make the
-same twin agree without talking. Only faults come and go, by the board that is handed in. Times are s since the start,
+same twin agree without talking. Only faults change, through the given board. Times are s since the start,
 arrays (k,); places m, ground frame. Where its parts are:
 
     motion      where the telescope's axes turn          air        weather, index, dew
-    telescope   how it stands and bends                  stations   rangers and their mirrors
+    telescope   its posture and bending                    stations   rangers and their mirrors
     targets     where everything truly rests             light      glass, acceptance, noise
     scene       all of these at a time                   returns    what comes back
 
-Left out, as below 1 um here: the time of flight (0.3 um at the rim in a slew), the bending of rays. What is not here at
-all: things that stand in a beam's way.
+Neglected, as below 1 um here: the time of flight (0.3 um at the rim in a slew), the bending of rays. Not included:
+obstructions of a beam.
 """
 
 from typing import TypedDict
@@ -32,35 +32,35 @@ from catseye.simulator.twin.faults import FaultBoard
 from catseye.simulator.twin.motion import AxisAngles, AxisMotion
 from catseye.simulator.twin.returns import Returns
 from catseye.simulator.twin.scene import Beam, StationFrame, TwinPlaces
-from catseye.simulator.twin.telescope import TelescopeStanding, telescope
+from catseye.simulator.twin.telescope import TelescopeState, telescope
 from catseye.simulator.twin.thermometers import thermometers
 
 Array = NDArray[np.float64]
 NS_PER_TICK = PER_DAY // TICKS_PER_DAY
 READ_SCATTER = (0.05, 0.05, 0.5)  # °C, hPa, %: one sigma of a reading, as the night's stations have
-POINTS, POINTS_A_SECOND = 17, 125.0  # of a buffer at which a shot's return is looked at: 8 ms apart
+POINTS, POINTS_A_SECOND = 17, 125.0  # points in a buffer for a shot's return: 8 ms apart
 RATE_STEP = 1e-3  # s
 
 
 class TwinDraws(TypedDict):
-    """What every part of a twin is drawn with."""
+    """Random draws of all parts of a twin."""
 
     streams: Streams
     planted: Planted
 
 
 class Twin:
-    """A living site.
+    """Living site.
 
-    site         its records: what the truth is drawn around
+    site         its records, about which the truth is drawn
     seed         of every draw
     start_mjd    UTC, where its seconds begin
     motion       of the telescope
     conditions   of the weather
-    faults       what goes wrong, and when; may change while it runs
-    planted      changes of the truth: shifts, D0, effects left out (`LivingPlanted` knows all of them)
+    faults       faults with times; may change while it runs
+    planted      changes of the truth: shifts, D0, effects omitted (`LivingPlanted` has all of them)
 
-    Raises InputError: a motion that this latitude cannot have, a planted name that the site does not have.
+    Raises InputError: a motion impossible at this latitude, an unknown planted name.
     """
 
     def __init__(
@@ -79,10 +79,10 @@ class Twin:
         drawn: TwinDraws = {"streams": Streams(seed), "planted": Planted() if planted is None else planted}
         self._streams, self._planted = drawn["streams"], drawn["planted"]
         self._start_ns = round(start_mjd * PER_DAY)
-        here = conditions.at(site.site.site.elevation_of_z0_m)
-        self.air = LivingAir.of(site, here, start_mjd, **drawn)
+        local_conditions = conditions.at(site.site.site.elevation_of_z0_m)
+        self.air = LivingAir.of(site, local_conditions, start_mjd, **drawn)
         self.telescope = telescope(site, motion, start_mjd, air=self.air, **drawn)
-        self.telescope.angles(np.zeros(1))  # a motion that cannot be is refused here
+        self.telescope.angles(np.zeros(1))  # refuses an impossible motion
         self.scene = TwinPlaces(site, **drawn)
         self.returns = Returns(self.scene, self.air, site.site.ranging, faults=self.faults, **drawn)
         self._converters = {name: Converter.of(name, seed) for name in self.scene.stations}
@@ -92,93 +92,104 @@ class Twin:
     # Time -----------------------------------------------------------------------------------------------------------
 
     def seconds(self, ns: int, /) -> float:
-        """s since the start, of nanoseconds since MJD 0."""
+        """Seconds since the start, of nanoseconds since MJD 0."""
         return (ns - self._start_ns) / PER_SECOND
 
     def seconds_of_ticks(self, ticks: int) -> float:
-        """s since the start, of ticks since MJD 0."""
+        """Seconds since the start, of ticks since MJD 0."""
         return self.seconds(ticks * NS_PER_TICK)
 
     def ticks(self, seconds: float) -> int:
-        """The tick nearest to a time, since MJD 0."""
+        """Nearest tick to a time, since MJD 0."""
         ns = self._start_ns + round(seconds * PER_SECOND)
         return (2 * ns + NS_PER_TICK) // (2 * NS_PER_TICK)
 
     # Places ---------------------------------------------------------------------------------------------------------
 
     def posture(self, seconds: ArrayLike) -> AxisAngles:
-        """What the telescope's encoders tell: angles (k,), rad, and rates (k,), rad/s."""
+        """Encoder angles (k,), rad, and rates (k,), rad/s, of the telescope."""
         return self.telescope.encoder_angles(_times(seconds))
 
     def live_posture(self, ticks: int) -> LivePosture:
-        """The same at one instant, as the site's feed says it."""
+        """Posture at one instant, as sent by the site's feed."""
         return LivePosture(ticks, *(float(values[0]) for values in self.posture(self.seconds_of_ticks(ticks))))
 
-    def standing(self, seconds: ArrayLike) -> TelescopeStanding:
-        """Where the telescope's bodies stand."""
+    def standing(self, seconds: ArrayLike) -> TelescopeState:
+        """State of the telescope's bodies."""
         return self.telescope.standing(_times(seconds))
 
     def point(self, name: str, seconds: ArrayLike) -> Array:
-        """True place (k, 3) of a target, a triplet's part, a ranger's scan point, or its Kelvin point ("ZY105-F")."""
+        """True place (k, 3) of a target, triplet part, scan point or Kelvin point.
+
+        A Kelvin point is named as "ZY105-F".
+        """
         t = _times(seconds)
         return self.scene.point(name, t, self.telescope.standing(t))
 
     def points(self, names: list[str] | tuple[str, ...], seconds: ArrayLike) -> Array:
-        """True places (k, n, 3) of many."""
+        """True places (k, n, 3) of many points."""
         t = _times(seconds)
         return self.scene.points(names, t, self.telescope.standing(t))
 
     def truth(self, names: list[str] | tuple[str, ...], seconds: float) -> dict[str, Array]:
-        """True places (3,) of points at one time, by name: to hold an answer against."""
+        """True places (3,) of points at one time, by name, for comparison."""
         return dict(zip(names, self.points(names, seconds)[0], strict=True))
 
     def rate(self, name: str, seconds: ArrayLike) -> Array:
-        """True velocity (k, 3), m/s, of a point, by a difference over 2 ms: good to 0.1 um/s."""
+        """True velocity (k, 3), m/s, of a point, good to 0.1 um/s.
+
+        By a difference over 2 ms.
+        """
         t = _times(seconds)
         return (self.point(name, t + RATE_STEP) - self.point(name, t - RATE_STEP)) / (2.0 * RATE_STEP)
 
     # Mirrors and light ----------------------------------------------------------------------------------------------
 
     def station_frame(self, ranger: str, seconds: ArrayLike) -> StationFrame:
-        """Scan point and axes of a ranger's mirror, as they truly are."""
+        """True scan point and axes of a ranger's mirror."""
         t = _times(seconds)
         return self.scene.frame(ranger, t, self.telescope.standing(t))
 
     def counts(self, ranger: str, name: str, seconds: ArrayLike) -> Array:
-        """What the encoders read (k, 2), not rounded, when a ranger's beam truly meets a point, ZRG too: direct."""
+        """Encoder readings (k, 2), not rounded, when a beam truly meets a point.
+
+        ZRG too; direct pointing.
+        """
         t = _times(seconds)
         return self._counts(ranger, name, t, self.telescope.standing(t))
 
-    def _counts(self, ranger: str, name: str, t: Array, standing: TelescopeStanding) -> Array:
+    def _counts(self, ranger: str, name: str, t: Array, state: TelescopeState) -> Array:
         station = self.scene.station(ranger)
         if name == REFERENCE:
             return np.broadcast_to(station.zrg, (len(t), 2))
         if name == ranger:
             raise InputError(f"ranger {ranger} as its own target (expected another point of the site)")
-        scan, turn = self.scene.frame(ranger, t, standing)
-        away = self.scene.point(name, t, standing) - scan
+        scan, turn = self.scene.frame(ranger, t, state)
+        away = self.scene.point(name, t, state) - scan
         return station.counts((turn @ away[..., None])[..., 0])
 
     def beam(self, ranger: str, counts: ArrayLike, seconds: ArrayLike) -> Beam:
-        """Where the light really goes at what the encoders read (k, 2)."""
+        """True beam at encoder readings (k, 2)."""
         t = _times(seconds)
         return self.returns.beam(ranger, _pairs(counts, t), t, self.telescope.standing(t))
 
     def lit(self, ranger: str, counts: ArrayLike, seconds: float) -> str | None:
-        """The retroreflector on which a beam falls at counts (2,), ZRG among them; None where it falls on none."""
+        """Retroreflector (ZRG included) in a beam at counts (2,); None if none."""
         t = _times(seconds)
         return self.returns.lit(ranger, _pairs(counts, t), t, self.telescope.standing(t))
 
     def phasors(self, ranger: str, counts: ArrayLike, seconds: ArrayLike, /) -> NDArray[np.complex128]:
-        """What returns (k,), V, with a ranger's mirror at counts (k, 2) at times (k,): all that the beam falls on, and
-        what leaks."""
+        """Return (k,), V, at counts (k, 2), times (k,), of all objects in the beam.
+
+        With leakage.
+        """
         t = _times(seconds)
         return self.returns.phasors(ranger, _pairs(counts, t), t, self.telescope.standing(t))
 
     # Readings -------------------------------------------------------------------------------------------------------
 
     def weather(self, station: str, seconds: float) -> LiveWeather:
-        """What a weather station reads: the air there with its lag, its errors and scatter; NaN while silent."""
+        """Reading of a weather station with lag, errors and scatter; NaN while silent."""
         if station not in self._weather_at:
             raise InputError(
                 f"weather station {station!r} is not at this site (expected {', '.join(self._weather_at)})"
@@ -205,19 +216,19 @@ class Twin:
     def shot(
         self, ranger: str, target: str, seconds: float, *, cycles: int = 128, samples: int = 64, if_hz: int = 1000
     ) -> LiveShot:
-        """A whole buffer of one ranger whose beam follows a target's middle perfectly, from a time on.
+        """Full buffer of a ranger whose beam follows a target perfectly.
 
         Without servers and servos, for tests and scatter. The stamp is rounded to the nearest tick.
         """
         sampling = SamplingSettings(samples, cycles, if_hz)
         t = seconds + np.linspace(0.0, sampling.duration, max(POINTS, round(sampling.duration * POINTS_A_SECOND)))
-        standing = self.telescope.standing(t)
-        aimed = self._counts(ranger, target, t, standing)
+        state = self.telescope.standing(t)
+        aimed = self._counts(ranger, target, t, state)
         hot = self.faults.active("saturated-adc", ranger, at=seconds)
         ticks = self.ticks(seconds)
         codes = self._converters[ranger].codes(
             t - seconds,
-            self.returns.phasors(ranger, aimed, t, standing, among=(target,)),
+            self.returns.phasors(ranger, aimed, t, state, among=(target,)),
             sampling=sampling,
             generator=self._streams(f"shot/{ranger}/{target}/{ticks}"),
             gain=1.0 if hot is None else hot.size,

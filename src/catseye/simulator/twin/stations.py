@@ -1,6 +1,6 @@
-"""The rangers of a living site as they truly are: mounts, mirrors, heads; and where a mirror sends the light.
+"""True rangers of a living site: mounts, mirrors, heads; beam directions.
 
-The laser comes down the azimuth axis and is reflected by a mirror whose two axes the encoders tell: here the beam is
+The laser comes down the azimuth axis and is reflected by a mirror with encoders on both axes: here the beam is
 found by reflecting a ray in the mirror's face, not by the notes' angles.
 """
 
@@ -23,24 +23,27 @@ from catseye.simulator.twin.telescope import turning
 
 Array = NDArray[np.float64]
 COUNTS_PER_TURN = 100_000.0
-U_MOUNT, U_ZERO = 30e-6, 0.3  # rad, counts: of orientation and encoder zeros where the sheets say nothing; chosen
+U_MOUNT, U_ZERO = 30e-6, 0.3  # rad, counts: of orientation and encoder zeros without a sheet value; chosen
 SINK, SWAY, LEAN = 2e-6 / 3600.0, 15e-6, 5e-6  # m/s, one sigma; m and rad through a day: how monuments settle, chosen
 
 
 class BeamAtMirror(NamedTuple):
-    """A beam in mirror axes at k settings: where it leaves the face (k, 3), m; its direction (k, 3); the way (k,), m,
-    from the plane across the azimuth axis through the scan point to the face, below zero where it is met before."""
+    """Beam in mirror axes at k settings.
+
+    Its origin on the face (k, 3), m; its direction (k, 3); the path (k,), m, from the plane across the azimuth axis
+    through the scan point to the face, below zero where the face comes first.
+    """
 
     leaves: Array
     direction: Array
-    way: Array
+    path: Array
 
 
 @dataclass(frozen=True, eq=False)
 class TrueStation:
-    """A ranger: what is true of it.
+    """True values of a ranger.
 
-    body            that carries it: "ground" or "arm"
+    body            of its mount: "ground" or "arm"
     place           (3,) m: Kelvin fixed point on the ground, scan point on the arm, in the body's frame
     gamma, lambda_  (3, 3) body to mount axes, mount to mirror axes
     offset          (3,) m, mount axes: fixed point to scan point (ground)
@@ -48,9 +51,9 @@ class TrueStation:
     axes            (4,) m: axis, face, beam x, beam y offsets; tilts (3,) rad: of the face, of the beam (x, y)
     waves           (2, 2, n) counts: azimuth and elevation encoder, cosines and sines by order
     d0, leakage     m, V
-    zrg             (2,) counts that look at the internal cube
+    zrg             (2,) counts towards the internal cube
     amplitude_to_phase   rad a factor e above the reference's amplitude
-    cyclic          (2, n) m too long: cosines and sines, orders of the phase after the electronics'
+    cyclic          (2, n) m of range error: cosines and sines, orders of the phase after the electronics'
     sinks, sways, leans   (3,) m/s; (3,) m; (3,) rad: how the monument settles
     """
 
@@ -74,15 +77,18 @@ class TrueStation:
     leans: Array
 
     def settled(self, seconds: Array) -> tuple[Array, Array]:
-        """Where its `place` is (k, 3), m, and how far its monument has turned (k, 3), rad, at times (k,)."""
+        """Place (k, 3), m, and rotation (k, 3), rad, of the settled monument.
+
+        At times (k,).
+        """
         day = seconds[:, None] * (TWO_PI / 86_400.0)
         return self.place + self.sinks * seconds[:, None] + self.sways * np.sin(day), self.leans * np.sin(day)
 
     def ray(self, counts: ArrayLike) -> BeamAtMirror:
-        """The beam at what the encoders read (k, 2)."""
+        """Beam at encoder readings (k, 2)."""
         turns = (np.asarray(counts, dtype=float) - self.zeros) * (TWO_PI / COUNTS_PER_TURN)
         read = turns
-        for _ in range(8 if self.waves.any() else 0):  # an encoder's error moves by 1e-3 of itself each time
+        for _ in range(8 if self.waves.any() else 0):  # an encoder's error changes by 1e-3 of itself each time
             turns = read - self._high(turns) * (TWO_PI / COUNTS_PER_TURN)
         # Rest: the face looks up the azimuth axis z, the elevation axis lies along y. It tips about y, all about z.
         (about_z, about_y), (lean, beam_x, beam_y) = turns.T, self.tilts
@@ -95,23 +101,25 @@ class TrueStation:
         laser = -np.array([beam_x, beam_y, np.sqrt(1.0 - beam_x**2 - beam_y**2)])
         start, against = np.array([start_x, start_y, 0.0]), face @ laser
         with np.errstate(divide="ignore", invalid="ignore"):
-            way = (out + face_offset - face @ start) / against
-            leaves = start + way[:, None] * laser
-            return BeamAtMirror(leaves, laser - 2.0 * against[:, None] * face, way)
+            path = (out + face_offset - face @ start) / against
+            leaves = start + path[:, None] * laser
+            return BeamAtMirror(leaves, laser - 2.0 * against[:, None] * face, path)
 
     def _high(self, turns: Array) -> Array:
-        """What the encoders read too high (k, 2), counts, with the axes turned by (k, 2), rad."""
+        """Encoder errors (k, 2), counts, positive too high, at axis angles (k, 2), rad."""
         angle = turns[:, :, None] * np.arange(1, self.waves.shape[2] + 1)
         return np.sum(np.cos(angle) * self.waves[:, 0] + np.sin(angle) * self.waves[:, 1], axis=-1)
 
     def counts(self, target: Array) -> Array:
-        """What the encoders read (k, 2), not rounded, when the middle of the beam meets points (k, 3), m, mirror axes.
+        """Encoder readings (k, 2), not rounded, with the beam on points (k, 3).
 
-        The direct pointing, azimuths -pi/2 to 3 pi/2. With offsets or tilts it aims beside the point by what it missed.
+        Points in m, mirror axes.
+
+        The direct pointing, azimuths -pi/2 to 3 pi/2. With offsets or tilts it aims off the point by its miss.
         """
-        wanted = unit(target)
-        toward, perfect = wanted, not (self.axes.any() or self.tilts.any())
-        for left in range(1 if perfect else 12, 0, -1):
+        unit_target = unit(target)
+        toward, perfect = unit_target, not (self.axes.any() or self.tilts.any())
+        for rounds in range(1 if perfect else 12, 0, -1):
             azimuth = np.arctan2(toward[:, 1], toward[:, 0])
             azimuth = np.where(azimuth < -0.5 * np.pi, azimuth + TWO_PI, azimuth)
             half = 0.5 * np.arctan2(np.hypot(toward[:, 0], toward[:, 1]), toward[:, 2])
@@ -119,24 +127,26 @@ class TrueStation:
             read = turns * (COUNTS_PER_TURN / TWO_PI) + self.zeros
             if self.waves.any():
                 read = read + self._high(turns)
-            if left > 1:
+            if rounds > 1:
                 ray = self.ray(read)
                 toward = unit(toward + unit(target - ray.leaves) - ray.direction)
         return read
 
 
 def reference_cube(station: TrueStation) -> tuple[Array, float]:
-    """Where the internal cube stands (3,), m, mirror axes, in the middle of its beam, D0 from the scan point; and the
-    way of the light to it, m."""
+    """Place of the internal cube (3,), m, mirror axes, and path to it, m.
+
+    In the middle of its beam, D0 from the scan point.
+    """
     ray = station.ray(station.zrg[None])
-    leaves, direction, way = ray.leaves[0], ray.direction[0], float(ray.way[0])
+    leaves, direction, path = ray.leaves[0], ray.direction[0], float(ray.path[0])
     along = leaves @ direction
     length = -along + np.sqrt(along**2 - leaves @ leaves + station.d0**2)
-    return leaves + length * direction, way + float(length)
+    return leaves + length * direction, path + float(length)
 
 
 def stations(site: SiteFolder, draw: Drawing) -> dict[str, TrueStation]:
-    """Every ranger of a site, by name, sorted."""
+    """All rangers of a site, by name, sorted."""
     drawn = {}
     arm = {ranger.name: ranger for ranger in site.feedarm.ranger}
     for name in draw.planted.d0_error_mm:
@@ -184,7 +194,7 @@ def _station(
     gamma: Array,
     settle: Array,
 ) -> TrueStation:
-    """The head and mirror of a ranger, by their sheet and its uncertainties."""
+    """Head and mirror of a ranger, by its sheet and uncertainties."""
     gain = planted.gain("calibration")
 
     def true(values: ArrayLike, u: float | None, factor: float = 1.0) -> Array:
@@ -219,20 +229,20 @@ def _station(
 
 
 def _waves(mirror: Mirror) -> Array:
-    """(2, 2, n) counts, of both encoders: cosines and sines by order."""
+    """Encoder waves (2, 2, n), counts: cosines and sines by order."""
     parts = (
         (mirror.azimuth_encoder_cosine_counts, mirror.azimuth_encoder_sine_counts),
         (mirror.elevation_encoder_cosine_counts, mirror.elevation_encoder_sine_counts),
     )
     waves = np.zeros((2, 2, max(len(parts[0][0]), len(parts[1][0]))))
-    for axis, both in enumerate(parts):
-        for k, values in enumerate(both):
+    for axis, pair in enumerate(parts):
+        for k, values in enumerate(pair):
             waves[axis, k, : len(values)] = values
     return waves
 
 
 def _cyclic(mirror: Mirror) -> Array:
-    """(2, n) mm; a sheet that says an uncertainty alone means orders 1 and 2."""
+    """Cyclic terms (2, n), mm; an uncertainty alone means orders 1 and 2."""
     orders = len(mirror.cyclic_cosine_mm) or (2 if mirror.u_cyclic_mm is not None else 0)
     waves = np.zeros((2, orders))
     if mirror.cyclic_cosine_mm:
@@ -241,9 +251,9 @@ def _cyclic(mirror: Mirror) -> Array:
 
 
 def arm_mount(ranger: FeedArmRanger, site: SiteFolder) -> Array:
-    """Reflector to mount axes (3, 3) of a ranger on the feed arm.
+    """Reflector to mount axes (3, 3) of a feed-arm ranger.
 
-    Where feedarm.toml does not say it, as `ranger.initialisation` chooses: y^ from the scan point to the middle of the
+    Without a value in feedarm.toml, as `ranger.initialisation` chooses: y^ from the scan point to the middle of the
     dish's surface, z^ along the reflector's x as far as it can.
     """
     if ranger.mount_z is not None and ranger.mount_y is not None:

@@ -1,4 +1,7 @@
-"""Where everything on a living site truly rests, against what the files say, and what each retroreflector is."""
+"""True rest places of all targets of a living site, and retroreflectors.
+
+The files have the typed places.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,40 +20,40 @@ from catseye.simulator.night.structure import tilted, unit
 from catseye.simulator.twin.telescope import low_orders
 
 Array = NDArray[np.float64]
-TYPING_MM, MOST_TYPING = 8.0, 2.0  # of each coordinate where its record says nothing; clipped at so many sigma
+TYPING_MM, MOST_TYPING = 8.0, 2.0  # of each coordinate without a record; clipped at so many sigma
 SURFACE_MM, ROUGH_MM = 0.25, 0.15  # normal deviations of the dish: low orders, and from prism to prism
-NEAR_SURFACE, BEYOND_RIM = 2.0, 3.0  # m: what is so near to the paraboloid rides on the dish, else on the feed arm
-PRISM_RADIUS, BALL_RADIUS = 0.045, 0.050  # m: how far off its middle a beam still comes back
+NEAR_SURFACE, BEYOND_RIM = 2.0, 3.0  # m: points nearer to the paraboloid belong to the dish, others to the feed arm
+PRISM_RADIUS, BALL_RADIUS = 0.045, 0.050  # m: largest offset of a returned beam
 
 
 @dataclass(frozen=True, eq=False)
 class BodyRetroreflector:
-    """A retroreflector in the frame of its body.
+    """Retroreflector in the frame of its body.
 
-    kind     "prism", "ball" or "hollow"
-    body     "ground", "alidade", "dish" or "arm"
-    rest     (3,) m, true
-    facing   (3,) unit vector: outward normal of the entry face, a ball's axis; None: any way
-    sizes    m, true: height of the prism; both radii of the ball
-    volts    the least and the most of its usual amplitude
+    kind         "prism", "ball" or "hollow"
+    body         "ground", "alidade", "dish" or "arm"
+    rest_place   (3,) m, true
+    facing       (3,) unit vector: outward normal of the entry face, a ball's axis; None: any direction
+    sizes        m, true: height of the prism; both radii of the ball
+    volts        limits of its usual amplitude
     """
 
     kind: str
     body: str
-    rest: Array
+    rest_place: Array
     facing: Array | None
     sizes: tuple[float, ...]
     volts: tuple[float, float]
 
     @property
     def radius(self) -> float:
-        """m: a beam that passes farther off does not come back."""
+        """Largest offset of a returned beam, m."""
         return BALL_RADIUS if self.kind == "ball" else PRISM_RADIUS
 
 
 @dataclass(frozen=True, eq=False)
 class TrueSurface:
-    """The design paraboloid, and the true dish's normal deviations from it.
+    """Design paraboloid, and the true dish's normal deviations from it.
 
     focal_length, centre (2,), radius   m
     orders   (6,) m of `low_orders`
@@ -70,22 +73,22 @@ class TrueSurface:
         return TrueSurface(p.focal_length_mm * MILLIMETRE, centre, p.aperture_radius_mm * MILLIMETRE, orders)
 
     def height(self, xy: Array) -> Array:
-        """z of the design (...) at (..., 2), m."""
+        """Height z of the design (...) at (..., 2), m."""
         return np.sum(xy**2, axis=-1) / (4.0 * self.focal_length)
 
     def up(self, xy: Array) -> Array:
         """Unit normals (n, 3) towards the focus at (n, 2), m."""
         return unit(np.column_stack([-xy / (2.0 * self.focal_length), np.ones(len(xy))]))
 
-    def body(self, rest: Array) -> str:
-        """Whether a point of the reflector frame rides on the dish or on the arm."""
-        near = abs(rest[2] - self.height(rest[:2])) < NEAR_SURFACE
-        return "dish" if near and np.hypot(*(rest[:2] - self.centre)) < self.radius + BEYOND_RIM else "arm"
+    def body(self, rest_place: Array) -> str:
+        """Body of a reflector-frame point: dish or arm."""
+        near = abs(rest_place[2] - self.height(rest_place[:2])) < NEAR_SURFACE
+        return "dish" if near and np.hypot(*(rest_place[:2] - self.centre)) < self.radius + BEYOND_RIM else "arm"
 
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """What the truth of a site is drawn from."""
+    """Random source of a site's truth."""
 
     streams: Streams
     planted: Planted
@@ -96,18 +99,18 @@ class Drawing:
         draw = np.clip(rng.normal(size=shape), -MOST_TYPING, MOST_TYPING)
         return self.planted.gain("typing") * (TYPING_MM if u_mm is None else u_mm) * MILLIMETRE * draw
 
-    def body(self, frame: FrameName, rest: Array) -> str:
-        """What carries a point that rests at (3,), m, in a file's frame."""
-        return self.surface.body(rest) if frame == "reflector" else frame
+    def body(self, frame: FrameName, rest_place: Array) -> str:
+        """Body of a point at rest at (3,), m, in a file's frame."""
+        return self.surface.body(rest_place) if frame == "reflector" else frame
 
 
 def drawing(site: SiteFolder, streams: Streams, planted: Planted) -> Drawing:
-    """What a site's targets are drawn with: streams of chance, planted effects, the true surface."""
+    """Drawing of a site's targets: random streams, planted effects, true surface."""
     return Drawing(streams, planted, TrueSurface.of(site, streams, planted))
 
 
 def retroreflectors(site: SiteFolder, scan_points: Mapping[str, Array], draw: Drawing) -> dict[str, BodyRetroreflector]:
-    """Every single target and triplet part of a site.
+    """All single targets and triplet parts of a site.
 
     scan_points   true, ground frame, of the rangers from which benchmarks are certified
     """
@@ -119,25 +122,30 @@ def retroreflectors(site: SiteFolder, scan_points: Mapping[str, Array], draw: Dr
         if row.target in drawn and drawn[row.target].body == "ground" and row.ranger in scan_points:
             station, old = scan_points[row.ranger], drawn[row.target]
             miss = gain * row.u_mm * draw.streams(f"benchmark/{row.target}").normal()
-            rest = station + unit(old.rest - station) * (row.certified_distance_mm + miss) * MILLIMETRE
-            drawn[row.target] = BodyRetroreflector(old.kind, old.body, rest, old.facing, old.sizes, BENCHMARK_VOLT)
+            rest_place = station + unit(old.rest_place - station) * (row.certified_distance_mm + miss) * MILLIMETRE
+            drawn[row.target] = BodyRetroreflector(
+                old.kind, old.body, rest_place, old.facing, old.sizes, BENCHMARK_VOLT
+            )
     return drawn
 
 
 def single(record: TargetRecord, draw: Drawing) -> BodyRetroreflector:
-    """The truth of one target: on the dish it slides along the surface by typing, and off it by the deviations."""
+    """True single target; on the dish displaced along and off the surface.
+
+    Along it by typing, off it by the deviations.
+    """
     rng = draw.streams(f"place/{record.name}")
     miss, rough, lean = draw.typed(rng, record.u_position_mm), rng.normal(), rng.normal(size=3)
-    rest = np.array(record.position_mm) * MILLIMETRE
-    if record.frame == "reflector" and draw.surface.body(rest) == "dish":
+    rest_place = np.array(record.position_mm) * MILLIMETRE
+    if record.frame == "reflector" and draw.surface.body(rest_place) == "dish":
         surface = draw.surface
-        above = rest[2] - surface.height(rest[:2])
-        xy = (rest + miss)[None, :2]
+        above = rest_place[2] - surface.height(rest_place[:2])
+        xy = (rest_place + miss)[None, :2]
         off = low_orders(xy, surface.centre, surface.radius) @ surface.orders
         off = off + draw.planted.gain("surface") * ROUGH_MM * MILLIMETRE * rough
-        rest = np.array([*xy[0], surface.height(xy[0]) + above]) + off * surface.up(xy)[0]
+        rest_place = np.array([*xy[0], surface.height(xy[0]) + above]) + off * surface.up(xy)[0]
     else:
-        rest = rest + miss
+        rest_place = rest_place + miss
     facing: Array | None = None
     sizes: tuple[float, ...] = ()
     if record.normal is not None and record.height_mm is not None:
@@ -145,13 +153,16 @@ def single(record: TargetRecord, draw: Drawing) -> BodyRetroreflector:
         facing = unit(normal + np.cross(normal, draw.planted.gain("normals") * 0.1 * DEGREE * lean))
         u = draw.planted.gain("calibration") * (record.u_height_mm or 0.0)
         sizes = ((record.height_mm + u * rng.normal()) * MILLIMETRE,)
-    body = draw.body(record.frame, rest)
+    body = draw.body(record.frame, rest_place)
     volts = USUAL_VOLT["hollow" if facing is None else "dish" if body == "dish" else "prism"]
-    return BodyRetroreflector(record.type, body, rest, facing, sizes, volts)
+    return BodyRetroreflector(record.type, body, rest_place, facing, sizes, volts)
 
 
 def triplet(record: TripletRecord, draw: Drawing) -> dict[str, BodyRetroreflector]:
-    """Prisms and ball as they truly are, by the data sheet and its u (as `simulator.night.structure.triplet`)."""
+    """True prisms and ball of a triplet, by data sheet and u.
+
+    As `simulator.night.structure.triplet`.
+    """
     rng, gain = draw.streams(f"place/{record.triplet}"), draw.planted.gain
     ball = np.array(record.nominal_position_mm) * MILLIMETRE + draw.typed(rng, record.u_position_mm)
     normal = tilted(unit(np.array(record.normal)), gain("normals") * 0.3, rng)

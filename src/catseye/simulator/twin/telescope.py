@@ -1,10 +1,11 @@
-"""The telescope in motion: where its bodies stand at times, and how they bend.
+"""Telescope in motion: places and bending of its bodies in time.
 
     ground <- (bearing tilt) <- alidade <- (elevation) <- dish <- feed arm
 
 Points rest in the frame of their body: "ground", "alidade", "dish" and "arm", both in the reflector frame. The nominal
-posture is [PARKER04] eq. 2.44, written here a second time; departures from it are drawn, their sizes chosen:
-millimetres and arc seconds as the generator of nights has them, a centimetre of sag at the arm's tip over the sky.
+posture is [PARKER04] eq. 2.44, deliberately written here a second time; departures from it are drawn, their sizes
+chosen: millimetres and arc seconds as the generator of nights has them, a centimetre of sag at the arm's tip over the
+sky.
 """
 
 from dataclasses import dataclass
@@ -24,7 +25,7 @@ Array = NDArray[np.float64]
 ARM_FOOT, ARM_LENGTH = np.array([0.0, -8.0, 10.0]), 55.0  # m, reflector frame; chosen, as `simulator.night.posture`
 GRAVITY_DISH = 0.6 * MILLIMETRE  # rms of the surface's low orders for a unit of sine or cosine of elevation
 GRAVITY_SHIFT = 2.0 * MILLIMETRE
-GRAVITY_SAG = 12.0 * MILLIMETRE  # of the arm's tip for a unit of cosine of elevation, the way gravity pulls
+GRAVITY_SAG = 12.0 * MILLIMETRE  # of the arm's tip for a unit of cosine of elevation, along gravity
 STEEL_RISE, STEEL_SHIFT, STEEL_DISH = 0.3e-3, 0.3e-3, 0.05e-3  # m/°C: elevation axis, arm's tip, low orders
 WIND_TIP = 0.3 * MILLIMETRE  # rms of the arm's tip in each direction at 5 m/s; grows with the square
 MODES_HZ, MODE_TIP = (0.8, 1.2, 2.4), 50e-6  # of the arm; m, mean amplitude at the tip, drawn between 0.4 and 2 of it
@@ -33,7 +34,7 @@ ENCODER_ORDERS = np.array([1.0, 2.0, 16.0])
 
 
 def turning(vector: Array) -> Array:
-    """Matrices (..., 3, 3) that turn points about vectors (..., 3) by their length, rad: Rodrigues' formula."""
+    """Matrices (..., 3, 3) of rotation vectors (..., 3), rad: Rodrigues' formula."""
     x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
     angle = np.sqrt(x * x + y * y + z * z)
     safe = np.where(angle > 0.0, angle, 1.0)
@@ -48,7 +49,7 @@ def turning(vector: Array) -> Array:
 
 
 def low_orders(xy: Array, centre: Array, radius: float) -> Array:
-    """Six smooth shapes (n, 6) of the aperture, each of rms 1 over it, at (n, 2), m."""
+    """Six smooth shapes (n, 6) of the aperture, rms 1, at (n, 2), m."""
     x, y = ((xy - centre) / radius).T
     r2 = x**2 + y**2
     shapes = (x**2 - y**2, 2 * x * y, (3 * r2 - 2) * x, (3 * r2 - 2) * y, x**3 - 3 * x * y**2, 6 * r2**2 - 6 * r2 + 1)
@@ -56,18 +57,21 @@ def low_orders(xy: Array, centre: Array, radius: float) -> Array:
 
 
 class Body(NamedTuple):
-    """ground = turn @ (rest + bending) + shift at k times: turn (k, 3, 3), shift (k, 3), m."""
+    """Body at k times: ground = turn @ (rest + bending) + shift.
+
+    Turn (k, 3, 3), shift (k, 3), m.
+    """
 
     turn: Array
     shift: Array
 
 
-class TelescopeStanding(NamedTuple):
-    """The telescope at k times.
+class TelescopeState(NamedTuple):
+    """State of the telescope at k times.
 
     orders       (k, 6) m along the normals: its surface's low orders
-    scale        (k,) by which all that rides on it expands about the pintle bearing, after all else
-    dish_scale   (k,) by which the dish expands about its own middle, before all else
+    scale        (k,) expansion of the telescope about the pintle bearing, applied last
+    dish_scale   (k,) expansion of the dish about its middle, applied first
     """
 
     bodies: dict[str, Body]
@@ -78,19 +82,19 @@ class TelescopeStanding(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Telescope:
-    """A telescope that moves and bends; every draw is made once.
+    """Telescope that moves and bends; every draw is made once.
 
     reflector_to_elevation, axis_height   m, from site.toml
-    rest_elevation   rad: where positions on the dish and on the arm are what the files mean
-    rigid_shift, rigid_turn   (3,) m, (3, 3): departure of the dish that stays; turned about the elevation axis
-    arm              (6,) shift of the tip, m, and turn about the foot, rad, that stay
+    rest_elevation   rad: elevation at which positions on dish and arm agree with the files
+    rigid_shift, rigid_turn   (3,) m, (3, 3): constant departure of the dish; turned about the elevation axis
+    arm              (6,) constant shift of the tip, m, and turn about the foot, rad
     gravity          (2, 9) for sine and cosine of elevation: shift of the dish, orders
     sag              m
     steel            (10,) a °C: rise of the elevation axis, shift of the arm, orders
     sway             waves (6): shift of the arm's tip by wind and by vibration, m
     tilt             (2, 3) rad: lean of the bearing to east and north, constant, cosine and sine of twice the azimuth
     encoder          (2, 2, 3) rad: cosines and sines of both encoders' errors by `ENCODER_ORDERS`
-    expansion        (2,) a °C of the steel: the whole telescope, and what the dish expands beyond it
+    expansion        (2,) a °C of the steel: the full telescope, and the additional expansion of the dish
     """
 
     motion: AxisMotion
@@ -112,11 +116,11 @@ class Telescope:
     expansion: Array
 
     def angles(self, seconds: Array) -> AxisAngles:
-        """Where the axes truly are, at times (k,)."""
+        """True angles of the axes at times (k,)."""
         return self.motion.angles(seconds, latitude=self.latitude, start_mjd=self.start_mjd)
 
     def encoder_angles(self, seconds: Array) -> AxisAngles:
-        """What the encoders tell, at times (k,)."""
+        """Encoder angles at times (k,)."""
         true, encoders = self.angles(seconds), []
         for axis in (0, 1):
             wave = ENCODER_ORDERS * true[axis][:, None]
@@ -126,8 +130,8 @@ class Telescope:
             encoders.append((true[axis] + error, true[axis + 2] * (1.0 + slope)))
         return AxisAngles(encoders[0][0], encoders[1][0], encoders[0][1], encoders[1][1])
 
-    def standing(self, seconds: Array) -> TelescopeStanding:
-        """Where all stands at times (k,), s since the start."""
+    def standing(self, seconds: Array) -> TelescopeState:
+        """State of all bodies at times (k,), s since the start."""
         a, e, _, _ = self.angles(seconds)
         steel = self.air.steel_c(seconds)[:, None]
         pull = np.column_stack([np.sin(e) - np.sin(self.rest_elevation), np.cos(e) - np.cos(self.rest_elevation)])
@@ -155,7 +159,7 @@ class Telescope:
             "arm": Body(dish @ bend, arm_shift),
         }
         scale = steel * self.expansion
-        return TelescopeStanding(bodies, bent[:, 3:] + warm[:, 4:], scale[:, 0], scale[:, 1])
+        return TelescopeState(bodies, bent[:, 3:] + warm[:, 4:], scale[:, 0], scale[:, 1])
 
     def _leaning(self, azimuth: Array) -> Array:
         """Turn of the alidade (k, 3, 3) by the bearing's lean."""
@@ -168,10 +172,10 @@ class Telescope:
 def telescope(
     site: SiteFolder, motion: AxisMotion, start_mjd: float, *, air: LivingAir, streams: Streams, planted: Planted
 ) -> Telescope:
-    """The telescope of a site, drawn."""
-    rest = np.clip(streams("living posture").normal(size=(4, 3)), -2.0, 2.0)
+    """Draw the telescope of a site."""
+    residual = np.clip(streams("living posture").normal(size=(4, 3)), -2.0, 2.0)
     rigid, arm = planted.gain("posture"), planted.gain("feed_arm")
-    turn = rest[1] * np.array([18.0, 8.0, 8.0]) * ARCSECOND
+    turn = residual[1] * np.array([18.0, 8.0, 8.0]) * ARCSECOND
     bending, steel = streams("gravity").normal(size=(2, 9)), streams("steel").normal(size=10)
     bending[:, :3] *= GRAVITY_SHIFT
     bending[:, 3:] *= GRAVITY_DISH / np.sqrt(6.0)
@@ -187,9 +191,9 @@ def telescope(
         np.array(nominal.reflector_to_elevation_mm) * MILLIMETRE,
         nominal.elevation_axis_height_mm * MILLIMETRE,
         site.site.campaign.elevation_deg * DEGREE,
-        rigid_shift=rigid * rest[0] * 3.0 * MILLIMETRE,
+        rigid_shift=rigid * residual[0] * 3.0 * MILLIMETRE,
         rigid_turn=turning(rigid * turn),
-        arm=arm * np.concatenate([rest[2] * 4.0 * MILLIMETRE, rest[3] * 12.0 * ARCSECOND]),
+        arm=arm * np.concatenate([residual[2] * 4.0 * MILLIMETRE, residual[3] * 12.0 * ARCSECOND]),
         gravity=planted.gain("gravity") * bending,
         sag=planted.gain("gravity") * GRAVITY_SAG,
         steel=planted.gain("thermal") * steel,
@@ -203,16 +207,19 @@ def telescope(
 
 
 def _sway(wind_m_s: float, streams: Streams, planted: Planted) -> Waves:
-    """Shift of the arm's tip (6 channels): wind along x, y, z, then vibration; along the arm a tenth."""
+    """Shift of the arm's tip (6 channels): wind, then vibration.
+
+    Wind along x, y, z; vibration along the arm a tenth.
+    """
     stiff = np.array([1.0, 1.0, 0.1])
     wind = band(streams("wind"), WIND_TIP * (wind_m_s / 5.0) ** 2, 0.1, high=0.3, channels=3).scaled(stiff)
     rng = streams("vibration")
     parts = []
     for hertz in MODES_HZ:
-        size, way = MODE_TIP * rng.uniform(0.4, 2.0), rng.normal(size=3) * stiff
+        size, direction = MODE_TIP * rng.uniform(0.4, 2.0), rng.normal(size=3) * stiff
         mode = band(rng, size / np.sqrt(2.0), 0.985 * hertz, high=1.015 * hertz)  # amplitude sqrt(2) times the rms
-        way /= np.linalg.norm(way)
-        parts.append(Waves(mode.omega, mode.cosine * way, mode.sine * way, np.zeros(3)))
+        direction /= np.linalg.norm(direction)
+        parts.append(Waves(mode.omega, mode.cosine * direction, mode.sine * direction, np.zeros(3)))
     shaken = Waves(
         np.concatenate([p.omega for p in parts]),
         np.concatenate([p.cosine for p in parts]),
@@ -228,7 +235,10 @@ def _moved(turn: Array, vector: Array) -> Array:
 
 
 def _azimuth(angle: Array) -> Array:
-    """Alidade to ground (k, 3, 3), clockwise from north. Source: [PARKER04] eq. 2.40."""
+    """Alidade to ground (k, 3, 3), clockwise from north.
+
+    Source: [PARKER04] eq. 2.40.
+    """
     matrices = np.zeros((len(angle), 3, 3))
     c, s = np.cos(angle), np.sin(angle)
     matrices[:, 0, 0], matrices[:, 0, 1], matrices[:, 1, 0], matrices[:, 1, 1], matrices[:, 2, 2] = c, s, -s, c, 1.0
@@ -236,7 +246,10 @@ def _azimuth(angle: Array) -> Array:
 
 
 def _elevation(angle: Array) -> Array:
-    """Elevation structure to alidade (k, 3, 3), parallel at the zenith. Source: [PARKER04] eq. 2.41."""
+    """Elevation structure to alidade (k, 3, 3), parallel at the zenith.
+
+    Source: [PARKER04] eq. 2.41.
+    """
     matrices = np.zeros((len(angle), 3, 3))
     s, c = np.sin(angle), np.cos(angle)
     matrices[:, 0, 0], matrices[:, 1, 1], matrices[:, 1, 2], matrices[:, 2, 1], matrices[:, 2, 2] = 1.0, s, c, -c, s

@@ -1,4 +1,4 @@
-"""Thermometers of a living site's weather stations: offsets, lags, and what the Sun adds."""
+"""Thermometers of a living site: offsets, lags, solar radiation errors."""
 
 from dataclasses import dataclass
 
@@ -17,12 +17,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Thermometer:
-    """One station's.
+    """Thermometer of one station.
 
     place         (3,) m, ground
     offset_c      reading less air
     lag           s, time constant
-    radiation_c   °C that it reads too warm under a Sun in the zenith in still air
+    radiation_c   °C, excess reading under a Sun in the zenith in still air
     """
 
     place: Array
@@ -34,13 +34,13 @@ class Thermometer:
     longitude_deg: float
 
     def temperature_c(self, air: LivingAir, seconds: ArrayLike) -> Array:
-        """What it reads at times (k,), but for scatter."""
+        """Reading at times (k,), without scatter."""
         times = np.asarray(seconds, dtype=float)
         warmed = self.warmed_c(times, air.conditions.wind_m_s)
         return air.felt_c(self.place, times, self.lag) + self.offset_c + warmed
 
     def warmed_c(self, seconds: ArrayLike, wind_m_s: float) -> Array:
-        """What the Sun adds at times (k,), °C."""
+        """Radiation error at times (k,), °C."""
         mjd = self.start_mjd + np.asarray(seconds, dtype=float) / SECONDS_PER_DAY
         sun = sine_of_sun(mjd, latitude_deg=self.latitude_deg, longitude_deg=self.longitude_deg)
         return self.radiation_c * sun / (1.0 + wind_m_s / AIRING_M_S)
@@ -49,7 +49,7 @@ class Thermometer:
 def thermometers(
     site: SiteFolder, air: LivingAir, start_mjd: float, *, places: dict[str, Array], streams: Streams, planted: Planted
 ) -> dict[str, Thermometer]:
-    """A thermometer at each place, drawn."""
+    """Draw a thermometer at each place."""
     c, drawn = air.conditions, {}
     for name, place in places.items():
         offset = planted.gain("thermometer_offsets") * streams(f"thermometer/{name}").normal(

@@ -1,9 +1,9 @@
-"""Noise that is a function of time: sums of waves with seeded frequencies and amplitudes, any instant at any cost.
+"""Noise as a function of time: sums of seeded waves.
 
 A process of given spectrum is cut into bands; each band is one wave, its frequency drawn inside the band, its cosine
 and sine amplitudes drawn normal with the band's variance. At every instant the sum is then exactly normal over seeds,
 with the variance of all bands; its structure function is the spectrum's for lags between shortest and longest period.
-Nothing is stepped or stored: two processes that draw alike agree, and rates of change exist.
+Nothing is stepped or stored: two processes with equal draws agree, and rates of change exist.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ WALK_BANDS, CORRELATED_BANDS, MODE_WAVES = 36, 18, 8
 
 @dataclass(frozen=True, eq=False)
 class Waves:
-    """A sum of waves in one or more channels.
+    """Sum of waves in one or more channels.
 
     omega          (n,) rad/s
     cosine, sine   (n, channels) amplitudes
@@ -38,12 +38,15 @@ class Waves:
         return np.cos(angle) @ self.cosine + np.sin(angle) @ self.sine - self.origin
 
     def scaled(self, factor: ArrayLike) -> "Waves":
-        """The same times a factor, of one number or (channels,)."""
+        """Waves times a factor, of one number or (channels,)."""
         by = np.asarray(factor, dtype=float)
         return Waves(self.omega, self.cosine * by, self.sine * by, self.origin * by)
 
     def lagged(self, lag: float) -> "Waves":
-        """What follows them with a first-order lag, s: each wave times 1 / (1 + i w T)."""
+        """Waves followed with a first-order lag, s.
+
+        Each is multiplied by 1 / (1 + i w T).
+        """
         turn = (self.omega * lag)[:, None]
         less = 1.0 + turn**2
         return Waves(
@@ -52,7 +55,7 @@ class Waves:
 
 
 def joined(*parts: Waves) -> Waves:
-    """Several as one, their channels side by side: one call evaluates all."""
+    """Combine several with their channels side by side, for one call."""
     omega = np.concatenate([p.omega for p in parts])
     shape = (len(omega), sum(p.cosine.shape[1] for p in parts))
     cosine, sine = np.zeros(shape), np.zeros(shape)
@@ -66,14 +69,14 @@ def joined(*parts: Waves) -> Waves:
 
 
 def _drawn(edges: Array, variance: Array, channels: int, rng: np.random.Generator) -> Waves:
-    """One wave a band: edges (n + 1,) Hz ascending, variance (n,) of each band."""
+    """One wave a band: edges (n + 1,) Hz ascending, variance (n,)."""
     hertz = edges[:-1] * (edges[1:] / edges[:-1]) ** rng.uniform(size=len(edges) - 1)
     amplitudes = rng.normal(size=(2, len(hertz), channels)) * np.sqrt(variance)[:, None]
     return Waves(TWO_PI * hertz, amplitudes[0], amplitudes[1], np.zeros(channels))
 
 
 def walk(rng: np.random.Generator, per_root_second: float, *, shortest: float, channels: int = 1) -> Waves:
-    """A random walk from zero at zero: the variance of what passes in tau is per_root_second^2 tau.
+    """Random walk from zero: variance per_root_second^2 tau in tau.
 
     shortest   s: below it the walk is smooth
 
@@ -86,7 +89,9 @@ def walk(rng: np.random.Generator, per_root_second: float, *, shortest: float, c
 
 
 def correlated(rng: np.random.Generator, sigma: float, correlation: float, *, channels: int = 1) -> Waves:
-    """Stationary noise of standard deviation sigma whose correlation falls as exp(-tau / correlation), s.
+    """Stationary noise with exponential correlation exp(-tau / correlation), s.
+
+    Its standard deviation is sigma.
 
     One-sided spectrum 4 sigma^2 T / (1 + (2 pi f T)^2), cut where 0.5 % of the variance lies beyond either end.
     """
@@ -97,6 +102,9 @@ def correlated(rng: np.random.Generator, sigma: float, correlation: float, *, ch
 
 
 def band(rng: np.random.Generator, sigma: float, low: float, *, high: float, channels: int = 1) -> Waves:
-    """Noise of standard deviation sigma, even between two frequencies, Hz; it breathes in 1 / (high - low)."""
+    """Noise of standard deviation sigma, white between two frequencies, Hz.
+
+    Its envelope varies in 1 / (high - low).
+    """
     edges = np.linspace(low, high, MODE_WAVES + 1)
     return _drawn(edges, np.full(MODE_WAVES, sigma**2 / MODE_WAVES), channels, rng)
