@@ -31,8 +31,8 @@ def test_what_cannot_be_meant_is_wrong_usage(catseye, words, said):
     ("words", "said"),
     [
         (["--addresses", "none.toml"], "none.toml"),
-        (["--motion-script", "walk"], "is no file that can be read"),
-        (["--drop", "ZY999"], "--drop ZY999: no such ranger here"),
+        (["--motion-script", "walk"], "is not a readable file"),
+        (["--drop", "ZY999"], "--drop ZY999: unknown ranger"),
         (["--keep-out", "none.toml"], "none.toml"),
         (["--journal", "mysql://there/db"], "cannot be used"),
     ],
