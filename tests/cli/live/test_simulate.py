@@ -58,8 +58,8 @@ def test_unless_told_otherwise_it_begins_at_night_at_green_bank():
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--fault", "dead-ranger ZY999"], "ZY999 is no ranger of the site"),
-        (["--drop", "ZY999"], "--drop ZY999: no such ranger here"),
+        (["--fault", "dead-ranger ZY999"], "unknown ranger ZY999"),
+        (["--drop", "ZY999"], "--drop ZY999: unknown ranger"),
         (["--journal", "/nowhere/x.db"], "directory /nowhere is missing"),
         (["--journal", __file__], "no journal"),
     ],
