@@ -107,9 +107,9 @@ class Ranger(RangerState):
             return self._stop(client, request)
         if request.command == "LEASE" and self._leases_at_once(client, request):
             return self._leased(client, request)
-        stranger = self._stranger(client, request)
-        if stranger is not None:
-            return [self._refused(request, stranger, client)]
+        refusal = self._lease_refusal(client, request)
+        if refusal is not None:
+            return [self._refused(request, refusal, client)]
         if self._holds(client) and acts(request):
             self.orders += 1
         lane.waiting.append(request)
@@ -118,7 +118,7 @@ class Ranger(RangerState):
     def _holds(self, client: int) -> bool:
         return self.lease is not None and self.lease.client == client
 
-    def _stranger(self, client: int, request: Request) -> str | None:
+    def _lease_refusal(self, client: int, request: Request) -> str | None:
         """Reason why a connection without the lease may not command; else None."""
         if not self.guarded or not acts(request) or self._holds(client):
             return None
@@ -336,9 +336,9 @@ class Ranger(RangerState):
     def _begin(self, lane: Lane, client: int, request: Request) -> list[Outgoing]:
         if stops(request) and (request.ticks is None or request.ticks * TICK_NS <= self.now_ns()):
             return self._stop(client, request)  # scheduled before
-        stranger = self._stranger(client, request)
-        if stranger is not None:  # the lease was taken meanwhile
-            return [self._refused(request, stranger, client)]
+        refusal = self._lease_refusal(client, request)
+        if refusal is not None:  # the lease was taken meanwhile
+            return [self._refused(request, refusal, client)]
         if request.command != "AT" and request.command not in COMMANDS:
             unknown = Reply("UNKNOWN", None, (f"command {request.command}",), request.tid, self.now_ticks())
             return [Outgoing(unknown, client)]

@@ -304,9 +304,7 @@ class Journal:
             if not self._queue:
                 return []
             full_at = self._queue[0].since + self._settings.group
-            while (
-                not self._closing and self._waiting < MOST_ROWS and (timeout_s := full_at - time.monotonic()) > 0.0
-            ):
+            while not self._closing and self._waiting < MOST_ROWS and (timeout_s := full_at - time.monotonic()) > 0.0:
                 self._wake.wait(timeout_s)
             batches: list[Batch] = []
             rows = 0
