@@ -92,7 +92,7 @@ def test_a_journal_that_was_changed_is_found_out(catseye, tmp_path):
     ("words", "said"),
     [
         (["none.db"], "none.db"),
-        ([__file__], "no journal"),
+        ([__file__], "is not a journal"),
         (["JOURNAL", "--run", "7"], "run 7 names 0 runs"),
         (["JOURNAL", "--calibrations", "nowhere"], "nowhere"),
     ],

@@ -264,7 +264,7 @@ def test_who_says_nothing_for_an_hour_is_closed_and_an_empty_line_is_enough():
             await asyncio.sleep(25.0)
             alive.transport.write(b"\n")
         assert mute.lost
-        assert b"LINE 0, no line received for 60 s" in mute.heard
+        assert b"LINE 0, nothing was said for 60 s" in mute.heard
         assert not alive.lost
 
     run(story, door=Door(idle=60.0))
