@@ -12,7 +12,7 @@ SOURCE = ROOT / "src" / "catseye"
 TREES = {path: ast.parse(path.read_text(encoding="utf-8")) for path in sorted(SOURCE.rglob("*.py"))}
 SHORTEST = 24  # characters of a docstring
 READERS = {"partition", "rpartition", "split", "rsplit", "startswith", "endswith", "removeprefix", "removesuffix"}
-VALUES = re.compile(r"\b(reasons?|parameters?|rejected|unresolved|layout\.names|carried\.names)\b")
+VALUES = re.compile(r"\b(reasons?|parameters?|rejected|unresolved|layout\.names|state\.names)\b")
 
 
 def test_public_class_names_stand_once():

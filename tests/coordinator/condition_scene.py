@@ -1,4 +1,4 @@
-"""Parts of a site whose condition is judged and shown: links, firing, intake, clock, without a network."""
+"""Parts of a site for tests of its condition, without a network."""
 
 import math
 from types import SimpleNamespace

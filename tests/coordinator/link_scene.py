@@ -1,4 +1,4 @@
-"""Rangers on scripted heads behind their servers, in virtual time and without sockets."""
+"""Rangers on scripted heads behind their servers, in virtual time without sockets."""
 
 import asyncio
 from concurrent.futures import Future

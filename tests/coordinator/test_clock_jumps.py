@@ -1,4 +1,4 @@
-"""A coordinator on a machine whose UTC is set while it measures: no restart, and no shot across a jump."""
+"""A coordinator whose machine's UTC is set while it measures."""
 
 import asyncio
 
@@ -71,7 +71,7 @@ def fired(site):
 
 
 @pytest.mark.parametrize("seconds", [3600.0, -3600.0, 0.4, -1.0])
-def test_a_wrong_jump_stops_firing_and_then_measuring_goes_on_by_the_count(seconds):
+def test_wrong_jump_suspends_measuring_until_the_count_is_confirmed(seconds):
     async def story():
         async with SetSite() as site:
             await until(lambda: len(site.shots) >= 9)
@@ -96,7 +96,7 @@ def test_a_wrong_jump_stops_firing_and_then_measuring_goes_on_by_the_count(secon
 
 
 @pytest.mark.parametrize("ahead", [3600.0, -3600.0, 0.4])
-def test_a_machine_that_was_wrong_and_is_set_right_measures_without_a_restart(ahead):
+def test_corrected_machine_measures_without_a_restart(ahead):
     async def story():
         async with SetSite(ahead) as site:
             await until(lambda: site.events("host-clock-off"), 30.0)
@@ -127,7 +127,7 @@ def test_a_machine_that_was_wrong_and_is_set_right_measures_without_a_restart(ah
     run(story)
 
 
-def test_a_shot_under_way_at_a_jump_is_not_used():
+def test_shot_during_a_jump_is_rejected():
     async def story():
         async with SetSite() as site:
             await until(lambda: len(site.shots) >= 9)

@@ -1,4 +1,4 @@
-"""A site's condition in one look: what is wrong, alarms first, and who measures."""
+"""Condition of a site: problems, alarms first, and rangers."""
 
 import pytest
 
@@ -20,7 +20,7 @@ def told(site):
     return [problem.text for problem in site.condition.now().problems]
 
 
-def test_a_site_that_measures_is_well():
+def test_measuring_site_is_well():
     now = measuring().condition.now()
     assert (now.word, now.problems, now.measuring) == ("well", (), 18)
     assert (now.epoch, now.verdict.word, now.clock, now.disk, now.journal, now.holder) == (
@@ -28,7 +28,7 @@ def test_a_site_that_measures_is_well():
     )  # fmt: skip
 
 
-def test_a_coordinator_that_fires_nothing_is_stopped_though_every_ranger_is_ready():
+def test_coordinator_without_shots_is_stopped_with_all_rangers_ready():
     site = measuring()
     site.clock.advance(46.0)
     now = site.condition.now()
@@ -38,11 +38,11 @@ def test_a_coordinator_that_fires_nothing_is_stopped_though_every_ranger_is_read
 
 
 @pytest.mark.parametrize("mode", ["hold", "passive"])
-def test_a_site_that_was_told_to_fire_nothing_is_not_well(mode):
+def test_site_not_in_active_mode_is_not_well(mode):
     site = measuring()
     site.mode = mode
     assert site.condition.now().word == "stopped"
-    assert f"mode {mode}: nothing is fired" in told(site)
+    assert f"mode {mode}: no shots are taken" in told(site)
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_a_site_that_was_told_to_fire_nothing_is_not_well(mode):
         ({"troubles": ("slow",)}, "trouble"),
     ],
 )
-def test_a_ranger_that_does_not_measure_is_named(changed, word):
+def test_ranger_that_does_not_measure_is_named(changed, word):
     site = measuring()
     site.links["ZY105"] = link(**changed)
     now = site.condition.now()
@@ -66,7 +66,7 @@ def test_a_ranger_that_does_not_measure_is_named(changed, word):
     assert told(site) == [f"1 {word}: ZY105"]
 
 
-def test_rangers_that_are_left_out_suspended_or_idle_are_not_well():
+def test_excluded_suspended_or_idle_rangers_are_not_well():
     site = measuring()
     site.firing.dropped.add("ZY101")
     for _ in range(3):
@@ -78,37 +78,37 @@ def test_rangers_that_are_left_out_suspended_or_idle_are_not_well():
     assert "idle: " in " ".join(told(site))
 
 
-def test_of_many_the_first_are_named_and_the_others_counted():
+def test_first_of_many_are_named_and_the_others_counted():
     site = measuring()
     for name in ("ZY101", "ZY102", "ZY103", "ZY104", "ZY110"):
         site.links[name] = link(connected=False)
     assert told(site) == ["5 not connected: ZY101, ZY102, ZY103 and 2 more"]
 
 
-def test_alarms_stand_before_warnings():
+def test_alarms_come_before_warnings():
     site = measuring()
     site.links["ZY105"] = link(troubles=("slow",))
     site.condition.disk = DiskState(3 * 10**8, 1e5, 1200.0)
     site.believed, site.telescope = False, False
     site.intake.trouble = "the disk is full"
-    site.epoch(2, doubts=["WX2's thermometer is biased by some +2.5 °C"])
+    site.epoch(2, doubts=["WX2's thermometer is biased by about +2.5 °C"])
     now = site.condition.now()
     severities = [problem.severity for problem in now.problems]
     assert severities == ["alarm"] * 4 + ["warning"] * 2
     assert told(site)[:4] == [
-        "journal: the disk is full: nothing is measured",
-        "clock: this machine's is in doubt: nothing is fired",
+        "journal: the disk is full: measuring suspended",
+        "clock: this machine's clock is in doubt: no shots are taken",
         "disk: full in 20.0 min",
-        "telescope: no posture: targets on it are not measured",
+        "telescope: no posture, targets on it are not measured",
     ]
-    assert "epoch 2 doubtful: WX2's thermometer is biased by some +2.5 °C" in told(site)
+    assert "epoch 2 doubtful: WX2's thermometer is biased by about +2.5 °C" in told(site)
     assert (now.word, now.clock, now.journal, now.disk) == ("alarm", "in doubt", "the disk is full", "0.3 GB free")
 
 
-def test_an_epoch_that_cannot_be_solved_is_an_alarm_and_so_is_none_for_long():
+def test_failed_or_missing_epochs_are_an_alarm():
     site = measuring()
     site.entry(EpochSolution(ticks_now(site.clock), {}))
-    assert told(site) == ["epoch 1 failed: nothing could be solved"]
+    assert told(site) == ["epoch 1 failed: no solution"]
     site.epoch(2)
     for _ in range(10):
         site.clock.advance(10.0)
@@ -117,7 +117,7 @@ def test_an_epoch_that_cannot_be_solved_is_an_alarm_and_so_is_none_for_long():
     assert told(site) == ["no epoch for 100 s"]
 
 
-def test_while_it_starts_nothing_that_is_still_to_come_is_wrong():
+def test_pending_steps_are_no_problem_during_start():
     site = ScenedSite()
     for name in site.links:
         site.links[name] = link(connected=False, state="down", status=StatusWord.LASER_OFF)
@@ -133,13 +133,13 @@ def test_while_it_starts_nothing_that_is_still_to_come_is_wrong():
     assert any("18 not connected" in problem.text for problem in now.problems)
 
 
-def test_each_word_of_a_ranger_has_its_own_character():
+def test_each_state_of_a_ranger_has_its_own_character():
     assert len(set(SIGNS.values())) == len(SIGNS)
     assert all(len(sign) == 1 for sign in SIGNS.values())
     assert set(WRONG) < set(SIGNS)
 
 
-def test_an_epochs_own_doubts_make_its_verdict():
+def test_doubts_of_an_epoch_make_its_verdict():
     assert verdict_of(EpochSolution(0, {})).word == "failed"
     assert verdict_of(EpochSolution(0, {"number": 1, "names": ["A"]})).word == "good"
     doubtful = verdict_of(EpochSolution(0, {"number": 1, "doubts": ["WX1 lies."]}))

@@ -1,4 +1,4 @@
-"""The feed's lines, its silences, and motions from a script."""
+"""Lines of the feed, its silences, and motion scripts."""
 
 import asyncio
 import math
@@ -72,7 +72,7 @@ class Fed:
         return [h.kind for h in self.happenings]
 
 
-def test_weather_and_posture_come_as_they_are_said():
+def test_weather_and_posture_are_received():
     async def story():
         async with Fed() as fed:
             say("WX 1, WX1, 10.25, 930.1, none")
@@ -105,7 +105,7 @@ def test_weather_and_posture_come_as_they_are_said():
         "TEL 1, 10, 20, x, 0",
     ],
 )
-def test_a_reading_that_is_none_is_refused_in_one_line(body):
+def test_invalid_reading_is_refused_in_one_line(body):
     reply = parse_reply(f"0\t52889.0\t{body}")
     with pytest.raises(InputError) as refused:
         (weather_of if body.startswith("WX") else posture_of)(reply)
@@ -113,7 +113,7 @@ def test_a_reading_that_is_none_is_refused_in_one_line(body):
 
 
 @given(st.text(max_size=30), st.lists(st.text(max_size=12), max_size=6))
-def test_no_values_at_all_raise_anything_but_a_refusal(command, values):
+def test_any_values_are_read_or_refused(command, values):
     reply = Reply(command, True, tuple(values), 0, 5288900000000)
     for read in (weather_of, posture_of):
         try:
@@ -123,7 +123,7 @@ def test_no_values_at_all_raise_anything_but_a_refusal(command, values):
         assert found.ticks == 5288900000000
 
 
-def test_bad_lines_are_told_and_good_ones_go_on():
+def test_invalid_lines_are_reported_and_valid_ones_used():
     async def story():
         async with Fed() as fed:
             Site.transport.write(b"\xff\xfe\n\n???\n")
@@ -136,7 +136,7 @@ def test_bad_lines_are_told_and_good_ones_go_on():
     run(story)
 
 
-def test_stamps_that_are_old_or_not_of_now_are_not_used():
+def test_old_or_wrong_stamps_are_rejected():
     async def story():
         async with Fed() as fed:
             for seconds in (0.0, -1.0, 0.0, 0.5, 60.0, -60.0):
@@ -148,7 +148,7 @@ def test_stamps_that_are_old_or_not_of_now_are_not_used():
     run(story)
 
 
-def test_a_telescope_whose_feed_is_still_to_come_is_no_alarm_in_the_first_half_minute():
+def test_missing_telescope_is_no_alarm_in_the_first_half_minute():
     async def story():
         async with Fed() as fed:
             await asyncio.sleep(29.0)
@@ -159,7 +159,7 @@ def test_a_telescope_whose_feed_is_still_to_come_is_no_alarm_in_the_first_half_m
     run(story)
 
 
-def test_a_loop_that_was_held_up_reads_first_what_came_meanwhile():
+def test_delayed_loop_reads_pending_input_first():
     async def story():
         async with Fed() as fed:
             say("TEL 1, 10, 20, 0, 0")
@@ -178,7 +178,7 @@ def test_a_loop_that_was_held_up_reads_first_what_came_meanwhile():
     run(story)
 
 
-def test_silence_is_told_after_its_time_and_not_before_and_its_end_too():
+def test_silence_is_reported_after_its_limit_and_at_its_end():
     async def story():
         async with Fed() as fed:
             loop = asyncio.get_running_loop()
@@ -208,7 +208,7 @@ def test_silence_is_told_after_its_time_and_not_before_and_its_end_too():
     run(story)
 
 
-def test_a_feed_that_is_gone_is_found_again():
+def test_lost_feed_is_reconnected():
     async def story():
         async with Fed() as fed:
             await fed.close()
@@ -223,12 +223,12 @@ def test_a_feed_that_is_gone_is_found_again():
     run(story)
 
 
-def test_a_feed_that_is_connected_and_says_nothing_is_given_up():
+def test_silent_feed_is_given_up():
     async def story():
         quick = FeedSettings(weather_silent=6.0, telescope_silent=2.0)
         async with Fed(settings=quick) as fed:
             await until(lambda: "feed-lost" in fed.kinds(), 30.0)
-            assert any("nothing was read" in h.text for h in fed.happenings)
+            assert any("no reading received" in h.text for h in fed.happenings)
 
     run(story)
 
@@ -248,7 +248,7 @@ def test_random_bytes_from_a_feed_do_no_harm():
     run(story)
 
 
-def test_a_fixed_motion_stands_still_and_a_table_is_linear_between_its_lines():
+def test_fixed_motion_is_constant_and_a_table_is_interpolated_linearly():
     still = MotionScript.parse("fixed 145.3 30").at(123)
     assert (still.azimuth, still.azimuth_rate) == (math.radians(145.3), 0.0)
     table = MotionScript.of_table("mjd,azimuth_deg,elevation_deg\n52889,10,20\n52889.01,12,19\n52889.02,12,19\n", "t")
@@ -263,7 +263,7 @@ def test_a_fixed_motion_stands_still_and_a_table_is_linear_between_its_lines():
 
 
 @given(st.floats(0.0, 1.0), st.floats(-3.0, 3.0), st.floats(0.001, 0.1))
-def test_a_scripts_rate_is_the_slope_of_its_angle(share, change, span):
+def test_rate_of_a_script_is_the_slope_of_its_angle(share, change, span):
     script = MotionScript(np.array([52889.0, 52889.0 + span]), np.array([1.0, 1.0 + change]), np.zeros(2))
     ticks = round((52889.0 + span * (0.05 + 0.9 * share)) * 1e8)
     step = 1000
@@ -276,24 +276,24 @@ def test_a_scripts_rate_is_the_slope_of_its_angle(share, change, span):
     [
         ("", "line 1"),
         ("mjd,az,el\n", "line 1"),
-        ("mjd,azimuth_deg,elevation_deg\n", "no line"),
+        ("mjd,azimuth_deg,elevation_deg\n", "contains no motion"),
         ("mjd,azimuth_deg,elevation_deg\n1,2\n", "line 2"),
         ("mjd,azimuth_deg,elevation_deg\n1,2,x\n", "line 2"),
         ("mjd,azimuth_deg,elevation_deg\n1,2,3\n1,2,3\n", "line 3"),
     ],
 )
-def test_a_bad_table_is_refused_with_its_line(text, word):
+def test_invalid_table_is_refused_with_its_line(text, word):
     with pytest.raises(InputError, match=word):
         MotionScript.of_table(text, "motion.csv")
 
 
-def test_a_motion_that_is_neither_is_refused():
+def test_other_motion_texts_are_refused():
     for text in ("fixed 1", "fixed a b", "no such file.csv"):
         with pytest.raises(InputError, match="motion"):
             MotionScript.parse(text)
 
 
-def test_a_script_is_played_ten_times_a_second():
+def test_script_is_played_ten_times_a_second():
     async def story():
         got = []
         task = asyncio.ensure_future(play(MotionScript.parse("fixed 10 20"), LoopClock(), got.append))

@@ -1,4 +1,4 @@
-"""Each ranger at its own list: what of a round is shot, and what is left."""
+"""Execution of a round by each ranger."""
 
 import asyncio
 from types import SimpleNamespace
@@ -36,7 +36,7 @@ class Link:
         ([0.5, 1.0, 1.9, 2.1], ["T0", "T1", "T2"]),
     ],
 )
-def test_the_first_shot_of_a_list_is_fired_however_long_its_way(begins, shot):
+def test_first_shot_of_a_list_is_taken_after_any_move(begins, shot):
     """Or a ranger whose reference is farther than a round would never do anything, and nobody would know."""
 
     async def story():

@@ -1,4 +1,4 @@
-"""The one way in: what the journal says late is acknowledged all the same."""
+"""Ordered intake: late entries, wrong stamps, clock corrections."""
 
 import asyncio
 from concurrent.futures import Future
@@ -46,13 +46,13 @@ async def settled():
     await asyncio.sleep(0.0)
 
 
-def test_what_was_not_durable_in_time_is_made_known_once_it_is():
+def test_late_entries_are_published_once_durable():
     async def story():
         journal, published = SlowJournal(), []
         intake = intake_of(journal, published)
         intake.take(NOTE)
         intake.flush()
-        journal.futures[0].set_exception(NotDurable("kept, and written when that is possible"))
+        journal.futures[0].set_exception(NotDurable("not durable yet; queued for retry"))
         await settled()
         assert published == []
         assert intake.trouble is not None  # nothing is fired while what was fired is not safe
@@ -65,14 +65,14 @@ def test_what_was_not_durable_in_time_is_made_known_once_it_is():
     asyncio.run(story())
 
 
-def test_what_is_durable_late_is_made_known_in_the_journals_order():
+def test_late_entries_are_published_in_journal_order():
     async def story():
         journal, published = SlowJournal(), []
         intake = intake_of(journal, published)
         for note in (NOTE, NEXT):
             intake.take(note)
             intake.flush()
-        journal.futures[0].set_exception(NotDurable("kept, and written when that is possible"))
+        journal.futures[0].set_exception(NotDurable("not durable yet; queued for retry"))
         await settled()
         journal.futures[1].set_result(2)  # the journal is back, and has written both
         await settled()
@@ -81,7 +81,7 @@ def test_what_is_durable_late_is_made_known_in_the_journals_order():
     asyncio.run(story())
 
 
-def test_a_mistake_while_what_came_is_handled_ends_the_coordinator_and_is_not_just_a_line_in_a_log():
+def test_bug_during_processing_ends_the_coordinator():
     class Mistaken:
         def weather(self, read):
             raise ZeroDivisionError("a mistake in the reduction")
@@ -103,7 +103,7 @@ def test_a_mistake_while_what_came_is_handled_ends_the_coordinator_and_is_not_ju
 
 
 @pytest.mark.parametrize("off", [-3600.0, -130.0, 1.0, 10.0, 3600.0])
-def test_a_shot_stamped_long_ago_or_of_the_future_is_not_used_and_told_and_spoils_none_after_it(off):
+def test_shot_with_a_wrong_stamp_is_rejected_without_effect_on_later_ones(off):
     """A stamp an hour ahead must not make all that come after it stamps before the last one's."""
 
     class Refusing:
@@ -150,7 +150,7 @@ class Forgetful:
     def begin(self, ticks):
         return ticks
 
-    def take_in(self, job, epoch):
+    def accept(self, job, epoch):
         self.taken.append(job)
         return {"number": 1}
 
@@ -172,7 +172,7 @@ def jumping(told, journal=None, solver=None):
 @pytest.mark.parametrize(
     ("seconds", "used"), [(-10.2, True), (-10.1, False), (-9.0, False), (-5.1, False), (-4.9, True)]
 )
-def test_a_shot_any_part_of_which_lies_across_a_jump_is_not_used(seconds, used):
+def test_shot_overlapping_a_jump_is_rejected(seconds, used):
     async def story():
         told = []
         intake, _, judged = jumping(told)
@@ -186,7 +186,7 @@ def test_a_shot_any_part_of_which_lies_across_a_jump_is_not_used(seconds, used):
     asyncio.run(story())
 
 
-def test_while_a_jump_is_not_judged_no_later_shot_is_used():
+def test_shots_are_rejected_until_a_jump_is_judged():
     async def story():
         told = []
         intake, _, judged = jumping(told)
@@ -200,7 +200,7 @@ def test_while_a_jump_is_not_judged_no_later_shot_is_used():
     asyncio.run(story())
 
 
-def test_a_clock_set_back_by_an_hour_refuses_no_shot_of_the_hour_and_the_journal_says_when():
+def test_clock_set_back_by_an_hour_rejects_no_later_shot_and_is_journalled():
     clock = ManualClock(60_635.125)
 
     async def story():
@@ -223,7 +223,7 @@ def test_a_clock_set_back_by_an_hour_refuses_no_shot_of_the_hour_and_the_journal
     asyncio.run(story())
 
 
-def test_an_epoch_that_was_being_solved_when_the_clock_was_corrected_is_not_taken_in():
+def test_epoch_under_way_at_a_clock_correction_is_discarded():
     async def story():
         told, journal, going = [], SlowJournal(), asyncio.Event()
 

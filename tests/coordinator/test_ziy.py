@@ -1,4 +1,4 @@
-"""The coordinator's loop on real servers with scripted heads; its reduction, planner and journal write down."""
+"""The coordinator's loop on real servers with scripted heads and stub parts."""
 
 import asyncio
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ def of(rows, kind):
     return [row for row in rows if isinstance(row, kind)]
 
 
-def test_rounds_are_shot_reduced_journalled_and_acknowledged():
+def test_rounds_are_measured_reduced_journalled_and_acknowledged():
     async def story():
         async with Site() as site:
             await until(lambda: site.live.epochs >= 3)
@@ -39,7 +39,7 @@ def test_rounds_are_shot_reduced_journalled_and_acknowledged():
     run(story)
 
 
-def test_the_journals_order_is_that_in_which_the_reduction_was_fed():
+def test_journal_order_is_the_order_of_the_reductions_input():
     async def story():
         async with Site() as site:
             for _ in range(40):
@@ -55,7 +55,7 @@ def test_the_journals_order_is_that_in_which_the_reduction_was_fed():
     run(story)
 
 
-def test_what_was_commanded_is_journalled_with_what_came_of_it():
+def test_commands_are_journalled_with_their_replies():
     async def story():
         async with Site() as site:
             await until(lambda: site.live.epochs >= 2)
@@ -78,7 +78,7 @@ def test_what_was_commanded_is_journalled_with_what_came_of_it():
     run(story)
 
 
-def test_cancelled_it_switches_lasers_off_and_closes_the_journal_within_five_seconds():
+def test_cancellation_switches_lasers_off_and_closes_the_journal_within_five_seconds():
     async def story():
         async with Site(ready=False) as site:
             for served in site.served.values():
@@ -102,7 +102,7 @@ def test_cancelled_it_switches_lasers_off_and_closes_the_journal_within_five_sec
     run(story)
 
 
-def test_a_new_coordinator_measures_again_within_five_seconds():
+def test_new_coordinator_measures_within_five_seconds():
     async def story():
         async with Site() as site:
             await until(lambda: site.live.epochs)
@@ -118,7 +118,7 @@ def test_a_new_coordinator_measures_again_within_five_seconds():
     run(story)
 
 
-def test_a_ranger_that_dies_holds_nobody_up_and_comes_back():
+def test_dead_ranger_delays_no_other_and_comes_back():
     async def story():
         async with Site() as site:
             await until(lambda: site.live.epochs)
@@ -135,7 +135,7 @@ def test_a_ranger_that_dies_holds_nobody_up_and_comes_back():
     run(story)
 
 
-def test_while_the_journal_is_away_nothing_is_fired_fed_or_acknowledged_and_all_goes_on_by_itself():
+def test_failing_journal_suspends_measuring_until_it_recovers():
     async def story():
         async with Site() as site:
             await until(lambda: site.live.epochs)
@@ -161,7 +161,7 @@ def test_while_the_journal_is_away_nothing_is_fired_fed_or_acknowledged_and_all_
     run(story)
 
 
-def test_a_full_journal_that_refuses_an_append_loses_nothing_either():
+def test_full_journal_loses_nothing():
     async def story():
         async with Site() as site:
             await until(lambda: site.live.epochs)
@@ -183,7 +183,7 @@ def test_a_full_journal_that_refuses_an_append_loses_nothing_either():
     run(story)
 
 
-def test_without_a_posture_tracking_stops_and_fixed_targets_go_on(monkeypatch):
+def test_without_a_posture_tracking_stops_and_fixed_targets_continue(monkeypatch):
     async def story():
         async with Site(planner=ListPlanner(fixed=False)) as site:
             await until(lambda: {s.target for s in site.live.shots} == {"ZRG", "ZG11", "ZG12"})
@@ -196,7 +196,7 @@ def test_without_a_posture_tracking_stops_and_fixed_targets_go_on(monkeypatch):
     run(story)
 
 
-def test_nothing_is_planned_before_the_posture_is_known():
+def test_no_round_is_planned_before_the_posture_is_known():
     async def story():
         async with Site(feed=None) as site:
             await asyncio.sleep(5.0)
@@ -218,7 +218,7 @@ def test_postures_are_thinned_to_ten_a_second():
     run(story)
 
 
-def test_hold_fires_nothing_and_active_goes_on():
+def test_hold_suspends_shots_and_active_resumes():
     async def story():
         async with Site() as site:
             await until(lambda: site.live.shots)
@@ -234,7 +234,7 @@ def test_hold_fires_nothing_and_active_goes_on():
     run(story)
 
 
-def test_a_passive_coordinator_takes_what_another_client_measures_and_changes_nothing():
+def test_passive_coordinator_uses_other_clients_shots_and_changes_nothing():
     async def story():
         async with Site() as site:
             passive = Site(mode="passive", ready=False)
@@ -252,7 +252,7 @@ def test_a_passive_coordinator_takes_what_another_client_measures_and_changes_no
     run(story)
 
 
-def test_a_dropped_ranger_is_left_out_until_it_is_taken():
+def test_dropped_ranger_is_excluded_until_taken():
     async def story():
         async with Site() as site:
             await until(lambda: site.live.epochs)
@@ -273,7 +273,7 @@ def test_a_dropped_ranger_is_left_out_until_it_is_taken():
     run(story)
 
 
-def test_streams_measure_one_target_again_and_again():
+def test_streams_measure_one_target_repeatedly():
     async def story():
         async with Site() as site:
             for name in site.names:
@@ -294,7 +294,7 @@ def test_streams_measure_one_target_again_and_again():
     run(story)
 
 
-def test_a_line_that_is_blocked_again_and_again_rests_and_is_tried_again():
+def test_repeatedly_blocked_line_is_suspended_and_retried():
     async def story():
         async with Site(("ZY101",), live=ListLive(ZG12="blocked")) as site:
             line = ("ZY101", "ZG12")
@@ -309,7 +309,7 @@ def test_a_line_that_is_blocked_again_and_again_rests_and_is_tried_again():
     run(story)
 
 
-def test_a_ranger_that_fails_again_and_again_rests_and_comes_back_by_itself():
+def test_repeatedly_failing_ranger_is_suspended_and_retried():
     async def story():
         async with Site() as site:
             bad = site.ziy.links["ZY101"]
@@ -328,7 +328,7 @@ def test_a_ranger_that_fails_again_and_again_rests_and_comes_back_by_itself():
     run(story)
 
 
-def test_a_shot_whose_stamp_is_not_later_is_not_used():
+def test_shot_with_an_earlier_stamp_is_rejected():
     async def story():
         async with Site(("ZY101",)) as site:
             await until(lambda: site.live.epochs)
@@ -343,27 +343,27 @@ def test_a_shot_whose_stamp_is_not_later_is_not_used():
     run(story)
 
 
-def test_what_planner_or_reduction_cannot_do_is_told_and_the_coordinator_goes_on():
+def test_errors_of_planner_or_reduction_are_logged_and_the_coordinator_continues():
     async def story():
         async with Site() as site:
             await until(lambda: site.live.epochs)
-            right = site.planner.round, site.live.take_in
+            right = site.planner.round, site.live.accept
 
             def cannot(*_):
                 raise EstimationError("singular")
 
-            site.live.take_in, site.live.failed = lambda job, found: None, "singular"
+            site.live.accept, site.live.failed = lambda job, found: None, "singular"
             await until(lambda: "not-solved" in site.kinds())
             site.planner.round = cannot
             await until(lambda: "not-planned" in site.kinds())
-            site.planner.round, site.live.take_in = right
+            site.planner.round, site.live.accept = right
             epochs = site.live.epochs
             await until(lambda: site.live.epochs > epochs)
 
     run(story)
 
 
-def test_a_part_that_breaks_ends_the_coordinator_cleanly_with_its_own_error():
+def test_bug_in_a_part_ends_the_coordinator_cleanly():
     async def story():
         async with Site(ready=False) as site:
 
@@ -379,7 +379,7 @@ def test_a_part_that_breaks_ends_the_coordinator_cleanly_with_its_own_error():
     run(story)
 
 
-def test_a_mistake_in_a_rangers_own_task_ends_the_coordinator_too():
+def test_bug_in_a_rangers_task_ends_the_coordinator():
     async def story():
         async with Site() as site:
             site.live.place = lambda name, mjd: {}[name]
@@ -391,7 +391,7 @@ def test_a_mistake_in_a_rangers_own_task_ends_the_coordinator_too():
     run(story)
 
 
-def test_rounds_in_which_nothing_can_be_fired_are_not_planned_without_a_pause():
+def test_rounds_without_possible_shots_are_paced():
     async def story():
         for targets, known in (((), True), (("ZG11",), False)):
             async with Site(("ZY101",), planner=ListPlanner(targets=targets, fixed=False)) as site:
@@ -404,7 +404,7 @@ def test_rounds_in_which_nothing_can_be_fired_are_not_planned_without_a_pause():
     run(story)
 
 
-def test_rangers_are_told_the_sun_every_few_seconds():
+def test_sun_vector_is_sent_every_few_seconds():
     async def story():
         async with Site(("ZY101",)) as site:
             await asyncio.sleep(12.0)
@@ -414,7 +414,7 @@ def test_rangers_are_told_the_sun_every_few_seconds():
     run(story)
 
 
-def test_a_beam_that_the_sun_comes_to_is_parked_and_where_that_is_refused_the_laser_goes_off():
+def test_beam_approached_by_the_sun_is_parked_or_its_laser_switched_off():
     @dataclass(frozen=True)
     class Alarm:
         ranger: str
@@ -446,7 +446,7 @@ def test_a_beam_that_the_sun_comes_to_is_parked_and_where_that_is_refused_the_la
     run(story)
 
 
-def test_streams_alone_go_on_without_a_pause_and_an_epoch_each_ten_seconds():
+def test_streams_without_rounds_continue_with_an_epoch_each_ten_seconds():
     """Buffers of 0.128 s, twenty a pointing, and less than half a buffer lost with each: 2 %."""
 
     async def story():
@@ -461,7 +461,7 @@ def test_streams_alone_go_on_without_a_pause_and_an_epoch_each_ten_seconds():
     run(story)
 
 
-def test_the_guard_hears_what_rangers_answer_and_how_the_telescope_stands():
+def test_guard_receives_replies_and_postures():
     async def story():
         async with Site(("ZY101",)) as site:
             await until(lambda: site.live.epochs)
@@ -472,7 +472,7 @@ def test_the_guard_hears_what_rangers_answer_and_how_the_telescope_stands():
     run(story)
 
 
-def test_another_targets_failures_do_not_forgive_a_line():
+def test_failures_of_another_target_do_not_reset_a_line():
     async def story():
         async with Site(("ZY101",), live=ListLive(ZG11="blocked", ZG12="used")) as site:
             states = site.planner.states

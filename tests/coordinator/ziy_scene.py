@@ -1,4 +1,4 @@
-"""A coordinator on served rangers, with a planner, a reduction and a journal that only write down."""
+"""A coordinator on served rangers, with recording planner, reduction and journal."""
 
 import asyncio
 from dataclasses import dataclass, field
@@ -73,7 +73,7 @@ class ListLive:
     def begin(self, ticks):
         return SimpleNamespace(solve=partial(self.solve, ticks))
 
-    def take_in(self, job, found):
+    def accept(self, job, found):
         return found
 
     def place(self, name, mjd):

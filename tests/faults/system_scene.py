@@ -1,4 +1,4 @@
-"""A living site in processes of their own, each of which may be killed at any moment, and a client that notes all."""
+"""A living site in processes that may be killed at any time, and a client that records all."""
 
 import os
 import queue

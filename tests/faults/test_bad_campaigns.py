@@ -1,4 +1,4 @@
-"""A bad campaign is refused in one line: the file, the place in it, the value, what was expected."""
+"""Invalid campaigns are refused in one line: file, place, value, expectation."""
 
 import io
 import re
@@ -491,12 +491,12 @@ DAMAGES: dict[str, tuple[Damage, str]] = {
 }
 
 
-def test_the_small_campaign_itself_loads(small):
+def test_small_campaign_loads(small):
     assert len(read_campaign(small).shots) == SHOTS
 
 
 @pytest.mark.parametrize("name", DAMAGES)
-def test_a_bad_campaign_is_refused_in_one_line_that_names_file_place_and_value(small, name):
+def test_invalid_campaign_is_refused_in_one_line_with_file_place_and_value(small, name):
     damage, expected = DAMAGES[name]
     damage(small)
     with pytest.raises(InputError) as refusal:
@@ -508,14 +508,14 @@ def test_a_bad_campaign_is_refused_in_one_line_that_names_file_place_and_value(s
     assert re.match(r"[A-Za-z0-9/.]+: ", text)
 
 
-def test_a_directory_that_is_not_there_is_refused(tmp_path):
+def test_missing_directory_is_refused(tmp_path):
     for directory in (tmp_path / "nowhere", Path(__file__), tmp_path / "two\nlines", tmp_path / "nul\0l"):
         with pytest.raises(InputError, match="expected a campaign directory") as refusal:
             read_campaign(directory)
         assert str(refusal.value).isprintable()
 
 
-def test_a_file_that_leads_to_itself_is_refused(small):
+def test_circular_link_is_refused(small):
     (small / "weather.csv").unlink()
     (small / "weather.csv").symlink_to("weather.csv")
     with pytest.raises(InputError, match=r"^weather\.csv: "):
@@ -523,7 +523,7 @@ def test_a_file_that_leads_to_itself_is_refused(small):
 
 
 @pytest.mark.parametrize("file", ["weather.csv", "frames.npy", "monuments"])
-def test_a_file_that_may_not_be_read_is_refused(small, monkeypatch, file):
+def test_unreadable_file_is_refused(small, monkeypatch, file):
     """Permissions do not bind the superuser, so the system's answer is put in its place."""
 
     def denied(path, *_, **__):
@@ -555,7 +555,7 @@ def test_harmless_differences_are_accepted(small):
     edits=st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 2), st.binary(max_size=3)), max_size=4),
 )
 @settings(max_examples=150, deadline=None)
-def test_any_damage_to_a_text_file_is_refused_or_harmless(pristine, file, edits):
+def test_random_damage_to_a_text_file_is_refused_or_harmless(pristine, file, edits):
     original = (pristine / file).read_bytes()
     raw = original
     for where, width, patch in edits:

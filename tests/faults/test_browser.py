@@ -1,4 +1,4 @@
-"""A page in a real browser tries every port: nothing changes, and each try is in the log."""
+"""Pages in a real browser try every port: no effect, and each attempt is logged."""
 
 import asyncio
 import json
@@ -88,7 +88,7 @@ async def browse(url, profile, done):
 
 
 @pytest.mark.skipif(BROWSER is None, reason="browser tests: no chromium (expected Debian's package chromium)")
-def test_no_page_in_a_browser_changes_anything_at_any_port_and_each_try_is_in_the_log(tmp_path, caplog):
+def test_browser_pages_change_nothing_and_each_attempt_is_logged(tmp_path, caplog):
     caplog.set_level(logging.WARNING)
     ranger = ready().ranger
 

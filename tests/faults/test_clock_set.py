@@ -51,7 +51,7 @@ class SettableSite(LivingSite):
 
 
 @pytest.mark.slow
-def test_a_site_measures_on_when_its_machine_is_set_wrong_and_when_it_is_set_right(faketime, tmp_path):
+def test_site_continues_when_its_clock_is_set_wrong_and_right(faketime, tmp_path):
     place = tmp_path / "j.db"
     site = SettableSite(place, tmp_path, faketime)
     try:

@@ -163,7 +163,7 @@ def one_line(action):
 
 
 @draws(200, quick=20, name="count")
-def test_no_damage_is_passed_over_and_what_is_left_is_what_was_written(night, tmp_path, count):
+def test_damage_is_detected_and_exported_rows_are_genuine(night, tmp_path, count):
     folder, heads, wanted = night
     before, rng = stored(folder / "j.db"), np.random.default_rng(40)
     kinds = (*OF_BYTES, *OF_ROWS)
@@ -202,7 +202,7 @@ def test_no_damage_is_passed_over_and_what_is_left_is_what_was_written(night, tm
 
 
 @pytest.mark.parametrize("tenth", range(1, 11))
-def test_a_journal_that_was_cut_at_ten_places_gives_what_is_left(night, tmp_path, tenth):
+def test_truncated_journal_is_exported_as_far_as_readable(night, tmp_path, tenth):
     folder, heads, wanted = night
     raw = (folder / "j.db").read_bytes()
     cut = tmp_path / "cut.db"

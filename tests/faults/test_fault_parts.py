@@ -1,4 +1,4 @@
-"""What names a fault in the coordinator, part by part: misfits, weak returns, doubted weather, busy rangers' clocks."""
+"""Detection of faults in parts: misfits, weak returns, rejected weather, busy rangers."""
 
 import asyncio
 
@@ -27,7 +27,7 @@ def told(site, kind):
     return [row for row in site.journal.rows if getattr(row, "kind", "") == kind]
 
 
-def test_a_line_whose_ranges_fit_nothing_is_named_and_rests():
+def test_line_with_wrong_ranges_is_reported_and_suspended():
     async def story():
         async with Site(live=Misfit()) as scene:
             await until(lambda: told(scene, "line-suspended"))
@@ -42,7 +42,7 @@ def test_a_line_whose_ranges_fit_nothing_is_named_and_rests():
     run(story)
 
 
-def test_a_return_far_below_the_usual_is_told_though_it_is_used():
+def test_weak_return_is_logged_though_used():
     async def story():
         async with Site() as scene:
             await until(lambda: len(scene.live.shots) > 20)
@@ -58,7 +58,7 @@ def test_a_return_far_below_the_usual_is_told_though_it_is_used():
     run(story)
 
 
-def test_a_station_that_is_not_believed_is_named_until_it_is_believed_again():
+def test_rejected_station_is_logged_until_accepted_again():
     class Doubting(ListLive):
         doubt = ""
 
@@ -79,7 +79,7 @@ def test_a_station_that_is_not_believed_is_named_until_it_is_believed_again():
     run(story)
 
 
-def test_a_ranger_without_a_pause_is_asked_for_its_clock_all_the_same():
+def test_busy_ranger_is_probed_for_its_clock():
     async def story():
         async with Linked(head={"name": "ZY101"}) as (served, link):
             served.head.rate = 1e-3
@@ -92,7 +92,7 @@ def test_a_ranger_without_a_pause_is_asked_for_its_clock_all_the_same():
     run(story)
 
 
-def test_the_first_epoch_does_without_a_ranger_that_never_spoke():
+def test_first_epoch_works_without_a_silent_ranger():
     night, live = begun(seed=5)
     night.round(0, rangers=FEW, without=("ZY103",)).into(live)
     answer = live.solve(night.ticks(0))
@@ -100,10 +100,10 @@ def test_the_first_epoch_does_without_a_ranger_that_never_spoke():
     assert "ZY103" in answer.names
 
 
-def test_a_station_that_first_speaks_later_takes_part_then():
+def test_late_station_is_used_once_received():
     night, _ = begun(seed=5, faults=("silent-station WX1 0 15",))
     live = Live(night.world.site)
     for k in range(3):
         night.round(k, rangers=FEW).into(live)
         assert live.solve(night.ticks(k)) is not None, live.failed
-    assert {"the air WX1", "the air WX2"} <= set(live.carried.names)
+    assert {"the air WX1", "the air WX2"} <= set(live.state.names)

@@ -96,7 +96,7 @@ def told(name: str, seed: int = 1) -> Told:
 
 
 @pytest.mark.parametrize(("name", "row"), ROWS)
-def test_a_fault_is_named_soon_and_not_before(name, row):
+def test_fault_is_detected_soon_and_not_before(name, row):
     said, fault = told(name), row.read
     usual = fault.start if row.who else 0.0  # a target may return little to one or another at any time
     at = said.first(row.kinds, row.named, after=usual)
@@ -105,7 +105,7 @@ def test_a_fault_is_named_soon_and_not_before(name, row):
 
 
 @pytest.mark.parametrize(("name", "row"), ROWS)
-def test_a_fault_ends_by_itself(name, row):
+def test_fault_ends_by_itself(name, row):
     said, fault = told(name), row.read
     if row.over:
         at = said.first((row.over,), row.named, after=fault.end)
@@ -118,7 +118,7 @@ def test_a_fault_ends_by_itself(name, row):
 
 
 @pytest.mark.parametrize(("name", "row"), ROWS)
-def test_the_others_go_on_measuring(name, row):
+def test_other_rangers_continue(name, row):
     said, fault = told(name), row.read
     faulty = {each.named for each in NIGHTS[name]}
     stopped = fault.kind == "silent-telescope"  # benchmarks only, and nothing from the feed arm
@@ -131,7 +131,7 @@ def test_the_others_go_on_measuring(name, row):
 
 
 @pytest.mark.parametrize(("name", "row"), ROWS)
-def test_a_faulty_ranger_gives_what_it_can(name, row):
+def test_faulty_ranger_measures_what_it_can(name, row):
     said, fault = told(name), row.read
     if row.named in (*GROUND, *ARM):
         begin = fault.start + (row.within if row.most < 0.5 else 0.0)
@@ -140,7 +140,7 @@ def test_a_faulty_ranger_gives_what_it_can(name, row):
 
 
 @pytest.mark.slow
-def test_a_line_that_gives_nothing_or_something_wrong_rests():
+def test_failing_line_is_suspended():
     said = told("light")
     for ranger, target in (("ZY105", "ZBM05"), ("ZY109", "ZBM03")):
         rests = [
@@ -159,7 +159,7 @@ def honest(said: Told) -> list[float]:
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in NIGHTS])
-def test_no_epoch_claims_more_than_it_has(name):
+def test_claims_of_epochs_hold_during_faults(name):
     said = told(name)
     chi2 = honest(said)
     assert len(chi2) >= 0.8 * SECONDS[name] / ROUND - 1, "an epoch a round, whatever happens"
@@ -169,7 +169,7 @@ def test_no_epoch_claims_more_than_it_has(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3])
-def test_in_other_nights_too_all_is_named_and_honest(seed):
+def test_faults_are_detected_and_claims_hold_in_other_nights(seed):
     for name in ("light", "no answer", "mirror"):
         said = told(name, seed)
         assert max(honest(said)) < HONEST

@@ -1,4 +1,4 @@
-"""Ctrl-C and termination at any moment: the right status, soon, no traceback, nothing left behind."""
+"""Ctrl-C and termination at any time: status, promptness, no traceback, no leftovers."""
 
 import json
 import os
@@ -73,7 +73,7 @@ def assert_clean(out, status, number):
         (0.5, signal.SIGTERM),
     ],
 )
-def test_at_some_moment_after_the_start(tmp_path, moment, number):
+def test_interrupt_at_a_random_time(tmp_path, moment, number):
     out = tmp_path / "out"
     process = start(out)
     wait_until_in_charge(process)
@@ -85,7 +85,7 @@ def test_at_some_moment_after_the_start(tmp_path, moment, number):
 
 
 @pytest.mark.parametrize("step", ["samples to phases", "adjustment", "writing ranges.csv"])
-def test_at_every_step_of_the_work(tmp_path, step):
+def test_interrupt_at_every_step(tmp_path, step):
     """The progress line on a terminal tells the step."""
     out = tmp_path / "out"
     ours, theirs = pty.openpty()
@@ -109,7 +109,7 @@ def read_until(stream, wanted):
     return seen
 
 
-def test_an_earlier_output_survives(tmp_path):
+def test_earlier_output_survives_an_interrupt(tmp_path):
     """In a fresh home, where matplotlib writes its font cache under a lock while the report is made."""
     out, mplconfig = tmp_path / "work" / "out", tmp_path / "mpl"
     out.mkdir(parents=True)
@@ -129,7 +129,7 @@ def test_an_earlier_output_survives(tmp_path):
     assert not list(mplconfig.rglob("*lock*"))
 
 
-def test_steps_that_belong_together_are_not_cut_in_two(tmp_path):
+def test_atomic_steps_are_not_interrupted(tmp_path):
     """The signal arrives inside; the second step is still done, then what was unfinished is undone."""
     code = (
         "import os, signal, sys\n"
@@ -147,7 +147,7 @@ def test_steps_that_belong_together_are_not_cut_in_two(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["second", "undone"]
 
 
-def test_they_cannot_hold_it_up_for_ever():
+def test_atomic_steps_cannot_delay_an_interrupt_forever():
     code = (
         "import os, signal\n"
         "from catseye.gateways.writers import interruption\n"
@@ -209,7 +209,7 @@ def test_within_a_call_that_runs_no_handler(tmp_path, number):
     assert (out / "ranges.csv").read_text() == "shot\n1\n"
 
 
-def test_a_run_that_the_system_kills_says_so_in_one_line(tmp_path):
+def test_killed_run_is_reported_in_one_line(tmp_path):
     """As it does where memory is out: what is killed cannot say or remove anything itself."""
     process = held(tmp_path / "out", "import os, threading; threading.Timer(0.2, os.kill, (os.getpid(), 9)).start()\n")
     _, said = process.communicate(timeout=4 * SOON)
@@ -220,7 +220,7 @@ def test_a_run_that_the_system_kills_says_so_in_one_line(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_nobody_works_on_when_the_supervisor_is_killed(tmp_path):
+def test_workers_end_with_a_killed_supervisor(tmp_path):
     process = held(tmp_path / "out", "import os; os.write(2, b'%d\\n' % os.getpid())\n")
     worker = int(process.stderr.readline())
     process.kill()
@@ -232,7 +232,7 @@ def test_nobody_works_on_when_the_supervisor_is_killed(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_directory_between_its_two_renames_is_taken_back(tmp_path):
+def test_interrupted_rename_of_a_directory_is_undone(tmp_path):
     """What the supervisor heard: begun, and ended where it is done; said in pieces as a pipe may cut them."""
     from catseye.gateways.writers.interruption import Unfinished, UnfinishedWork
 

@@ -1,4 +1,4 @@
-"""No room on the disk, a file that went away, a server that hangs: an alarm, no lie, nothing half-written, and back."""
+"""Full disk, removed file, hung server: an alarm, nothing half-written, recovery."""
 
 import asyncio
 import os
@@ -80,7 +80,7 @@ def assert_full_and_back(place, told, journal, make_room):
     failed = [k for k, future in enumerate(futures) if future.exception(MOST_WAIT) is not None]
     assert all(future.result() == 2 * k + 2 for k, future in enumerate(futures) if k not in failed)
     assert {type(futures[k].exception()) for k in failed} == {NotDurable}
-    assert "kept, and written when that is possible" in str(futures[-1].exception())
+    assert "not durable yet; queued for retry" in str(futures[-1].exception())
     assert len(futures) - len(failed) <= pairs_stored(place) < len(futures)
     assert journal.trouble is not None
     make_room()
@@ -93,7 +93,7 @@ def assert_full_and_back(place, told, journal, make_room):
     return len(futures)
 
 
-def test_a_full_disk_is_told_and_recovered_from(tmp_path):
+def test_full_disk_is_reported_and_recovered_from(tmp_path):
     told = Told()
     journal = opened(tmp_path / "j.db", told)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -110,7 +110,7 @@ def test_a_full_disk_is_told_and_recovered_from(tmp_path):
 
 
 @pytest.mark.skipif(os.getuid() != 0 or shutil.which("mount") is None, reason="needs root to mount a small disk")
-def test_a_small_disk_that_is_full_is_told_and_recovered_from(tmp_path):
+def test_full_small_disk_is_reported_and_recovered_from(tmp_path):
     disk = tmp_path / "disk"
     disk.mkdir()
     mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", disk], check=False, capture_output=True)
@@ -127,7 +127,7 @@ def test_a_small_disk_that_is_full_is_told_and_recovered_from(tmp_path):
         subprocess.run(["umount", disk], check=True)
 
 
-def test_a_journal_closed_while_there_is_no_room_says_what_is_lost(tmp_path):
+def test_journal_closed_on_a_full_disk_reports_its_loss(tmp_path):
     journal = opened(tmp_path / "j.db", Told())
     with no_file_larger_than(1_000_000):
         futures = fill(journal)
@@ -139,7 +139,7 @@ def test_a_journal_closed_while_there_is_no_room_says_what_is_lost(tmp_path):
         assert journal.append(scene_answer(1)).result(MOST_WAIT) == 1
 
 
-def test_nothing_is_acknowledged_into_a_file_that_was_removed(tmp_path):
+def test_removed_file_stops_acknowledgements(tmp_path):
     """The system would let us write into it for ever."""
     told = Told()
     journal = opened(tmp_path / "j.db", told)
@@ -158,7 +158,7 @@ def test_nothing_is_acknowledged_into_a_file_that_was_removed(tmp_path):
         assert [shot.shot.number for _, shot in reader.shots(1)] == [0, 1]
 
 
-def test_a_file_that_another_process_holds_is_waited_for(tmp_path, monkeypatch):
+def test_writer_waits_for_a_locked_file(tmp_path, monkeypatch):
     """A person with a database tool: the writer says so after its patience, `durable` gives up, and all goes on."""
     monkeypatch.setattr(journal_module, "LONGEST_DURABLE", 0.2)
     told = Told()

@@ -208,7 +208,7 @@ def killed(place, folder, kinds, seed, server=None, longest=1.5):
     return killer.times, counts
 
 
-def test_coordinator_and_rangers_killed_at_any_moment_lose_and_double_nothing(tmp_path):
+def test_killed_coordinator_and_rangers_lose_and_duplicate_nothing(tmp_path):
     times, (acknowledged, stored, runs, _) = killed(
         tmp_path / "j.db", tmp_path, ["coordinator", "ranger", "backup", "starting_coordinator"], seed=1
     )
@@ -217,7 +217,7 @@ def test_coordinator_and_rangers_killed_at_any_moment_lose_and_double_nothing(tm
     assert max(times["processor until ready"]) < UP  # by the clock on the wall it counts what others do meanwhile
 
 
-def test_a_database_killed_at_any_moment_loses_and_doubles_nothing(server, tmp_path):
+def test_killed_database_loses_and_duplicates_nothing(server, tmp_path):
     _, (acknowledged, stored, runs, _) = killed(
         server.database("system"), tmp_path, ["outage", "coordinator", "backend", "database"], seed=2, server=server
     )
@@ -226,7 +226,7 @@ def test_a_database_killed_at_any_moment_loses_and_doubles_nothing(server, tmp_p
 
 
 @pytest.mark.slow
-def test_a_coordinator_that_is_told_to_end_leaves_one_whole_file(tmp_path):
+def test_terminated_coordinator_leaves_one_complete_file(tmp_path):
     """SIGTERM, as a service's, status 0, and Ctrl-C, 130, while it measures: within the contract's five seconds."""
     (tmp_path / "out").mkdir()
     place = tmp_path / "out" / "j.db"
@@ -248,7 +248,7 @@ def test_a_coordinator_that_is_told_to_end_leaves_one_whole_file(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_site_that_is_killed_leaves_no_twin(tmp_path):
+def test_killed_site_leaves_no_twin(tmp_path):
     words = ["serve", small_site(), "--twin", "--port-base", free_base(), "--port", "0", "--log-json"]
     with started(*words, home=tmp_path) as process:
         while "rangers and the feed listen" not in (line := process.stderr.readline()):
@@ -280,14 +280,14 @@ def assert_quick(times):
 
 
 @pytest.mark.slow
-def test_killed_at_a_hundred_moments_a_file_loses_and_doubles_nothing(tmp_path):
+def test_file_journal_survives_a_hundred_kills(tmp_path):
     times, counts = killed(tmp_path / "j.db", tmp_path, mixed(OF_A_FILE, 3), seed=3)
     assert_quick(times)
     assert counts[0] > 1000
 
 
 @pytest.mark.slow
-def test_killed_at_a_hundred_moments_a_server_loses_and_doubles_nothing(server, tmp_path):
+def test_server_journal_survives_a_hundred_kills(server, tmp_path):
     kinds = mixed(OF_A_SERVER, 4)
     # A database that is down holds up what a file would have taken: longer between two kills.
     times, counts = killed(server.database("hundred"), tmp_path, kinds, seed=4, server=server, longest=6.0)

@@ -1,4 +1,4 @@
-"""A test run that is killed with -9, when no test can clean up: what it had started goes with it."""
+"""A test run killed with -9: the processes it started end with it."""
 
 import os
 import select
@@ -41,7 +41,7 @@ def test_it_waits():
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="asks Linux to end children with their parent")
-def test_what_a_killed_test_run_had_started_is_gone_soon(tmp_path):
+def test_processes_of_a_killed_test_run_end_soon(tmp_path):
     test = tmp_path / "test_it.py"
     test.write_text(RUN)
     command = [

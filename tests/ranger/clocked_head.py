@@ -1,4 +1,4 @@
-"""A scripted head whose time passes by itself, as a clock says."""
+"""A scripted head whose time follows a clock."""
 
 from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND, TimeTag
 from ranger.scripted_head import ScriptedHead

@@ -1,4 +1,4 @@
-"""What every Head must do. Derive, give `head()` and `pass_time()`, and pytest runs it for that head."""
+"""Conformance tests of heads: derive, provide `head()` and `pass_time()`."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ class HeadConformance:
             head.enable(axis, True)
         return head
 
-    def test_at_boot_amplifiers_are_off_and_nothing_is_homed_or_taken(self):
+    def test_amplifiers_homing_and_buffer_are_off_at_boot(self):
         head = self.head()
         for axis in (0, 1):
             assert not head.enabled(axis)
@@ -41,7 +41,7 @@ class HeadConformance:
             assert not head.motor_off(axis)
         assert head.buffer() is None
 
-    def test_the_clock_runs_and_can_be_set(self):
+    def test_clock_runs_and_can_be_set(self):
         head = self.head()
         before = head.now()
         self.pass_time(head, 0.5)

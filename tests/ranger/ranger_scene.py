@@ -1,4 +1,4 @@
-"""A ranger on a scripted head, told things in lines, with time passing by whole strides."""
+"""A ranger on a scripted head, driven by lines, with stepped time."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""A head without physics: axes run at constant speed, buffers are what the script says. Time passes when told."""
+"""A head without physics: constant speeds, scripted buffers, manual time."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The table of commands: complete, and each parameter's count, number and range is checked."""
+"""Table of commands: complete; counts, numbers and ranges of parameters are checked."""
 
 import pytest
 from hypothesis import given
@@ -76,7 +76,7 @@ def read(line):
     return COMMANDS[request.command].read(request)
 
 
-def test_the_table_holds_every_command_that_survives_and_marks_those_that_are_ours():
+def test_table_has_every_surviving_command_and_marks_chosen_ones():
     assert len(ROWS) == len(COMMANDS)
     assert {row.name for row in ROWS if not row.chosen} == KNOWN
     for row in ROWS:
@@ -86,7 +86,7 @@ def test_the_table_holds_every_command_that_survives_and_marks_those_that_are_ou
         assert row.usage.isascii()
 
 
-def test_every_command_has_its_handler_and_no_handler_is_without_a_row():
+def test_commands_and_handlers_correspond():
     assert set(HANDLERS) == set(COMMANDS)
 
 
@@ -104,7 +104,7 @@ def test_every_command_has_its_handler_and_no_handler_is_without_a_row():
         ("STI 52889.12500000", (5288912500000,)),
     ],
 )
-def test_good_parameters_are_read(line, values):
+def test_valid_parameters_are_read(line, values):
     assert read(line) == values
 
 
@@ -124,8 +124,8 @@ def test_good_parameters_are_read(line, values):
         ("IFF 10001", "outside 1 to 10000 Hz"),
         ("SFQ 2", "outside 3"),
         ("COO 1, 2, 3", "3 parameters do not fit"),
-        ("DST 1.5", "no name"),
-        ("COO 1, 0, 0, 0, 7ZG", "no name"),
+        ("DST 1.5", "not a name"),
+        ("COO 1, 0, 0, 0, 7ZG", "not a name"),
         ("TRG 1", "1 parameters do not fit"),
         ("STI now", "not an MJD"),
         ("NG 0.9", "outside 1 to 1.001"),
@@ -149,7 +149,7 @@ def test_any_parameters_are_read_or_refused_by_name(row, parameters):
         assert len(values) == len(parameters)
 
 
-def test_a_schedule_holds_a_whole_command_and_checks_it_at_once():
+def test_schedule_checks_its_command_at_once():
     assert schedule_of(("52889.5", "3", "0.25", "stt 0")) == (5288950000000, 3, 0.25, Request("STT", ("0",)))
     for parameters, said in (
         (("0", "1", "1", "STT 2"), "axis 2"),

@@ -1,4 +1,4 @@
-"""Laser off at once: what makes dark passes every queue, holds from outside the lease, and nothing undoes it."""
+"""Stops: immediate, latched from outside the lease, not undone."""
 
 import asyncio
 import logging
@@ -34,7 +34,7 @@ def said(told, client, line):
     return {out.reply.command: out.reply for out in told.ranger.receive(client, line)}
 
 
-def test_a_wait_of_the_holder_keeps_nobodys_dark_order():
+def test_holders_wait_does_not_delay_a_stop():
     """Attack: WTMO 3600 and CWT on an axis that is off kept PS 0 waiting for an hour."""
     told = leased()
     told.say("AXIS 0, 0", "WTMO 3600", client=HOLDER)
@@ -49,7 +49,7 @@ def test_a_wait_of_the_holder_keeps_nobodys_dark_order():
 
 
 @pytest.mark.parametrize("order", ["PS 0", "STOP", "1000\tps +00", "  STOP", "AXIS 0, 0"])
-def test_a_dark_order_from_outside_the_lease_holds_until_a_person_clears_it(order):
+def test_stop_from_outside_the_lease_is_latched_until_cleared(order):
     told = leased()
     command = order.split("\t")[-1].split()[0].upper()
     lights, moves = command != "AXIS", command != "PS"
@@ -66,7 +66,7 @@ def test_a_dark_order_from_outside_the_lease_holds_until_a_person_clears_it(orde
     refused = said_later(told, HOLDER, "UNLATCH anna")
     assert (refused.ok, refused.text) == (
         False,
-        "who has the lease cannot clear it (expected another connection, or LEASE none first)",
+        "the holder of the lease cannot clear it (expected another connection, or LEASE none first)",
     )
     told.heard.clear()
     assert said_later(told, OTHER, "UNLATCH ben").values == ("none",)
@@ -83,7 +83,7 @@ def said_later(told, client, line):
 
 
 @pytest.mark.parametrize("order", ["PS 0", "STOP", "AXIS 0, 0"])
-def test_the_holders_own_order_holds_for_nobody(order):
+def test_holders_own_stop_is_not_latched(order):
     told = leased()
     told.say(order, client=HOLDER)
     assert told.ranger.latch is None
@@ -91,7 +91,7 @@ def test_the_holders_own_order_holds_for_nobody(order):
     assert told.head.laser_on()
 
 
-def test_what_another_stops_of_scan_and_stream_may_be_begun_again():
+def test_scan_and_stream_stopped_by_another_client_may_restart():
     told = leased()
     told.say("CIL 1", client=HOLDER)
     told.say("STM 1, 1000", client=HOLDER)
@@ -103,7 +103,7 @@ def test_what_another_stops_of_scan_and_stream_may_be_begun_again():
     assert told.ranger.latch is None
 
 
-def test_what_waits_before_a_dark_order_does_not_light_behind_it():
+def test_queued_commands_do_not_light_after_a_stop():
     """Attack: PS 1 waits behind a move, PS 0 passes it, and then the laser is lit for good."""
     told = leased()
     for line in ("CIL 2", "PS 1", "AT 0, 1, 0, PS 1", "AT 60000, 1, 0, PS 1", "D0", "PS 0"):
@@ -118,7 +118,7 @@ def test_what_waits_before_a_dark_order_does_not_light_behind_it():
     assert told.say("PS 1", client=HOLDER)[-1].ok  # what comes behind it counts
 
 
-def test_what_was_overtaken_is_answered():
+def test_overtaken_commands_are_answered():
     told = leased()
     for line in ("1001\tCIL 2", "1002\tPS 1", "1003\tAXIS 1, 1", "1004\tAXIS 0, 1"):
         told.ranger.receive(HOLDER, line)
@@ -129,7 +129,7 @@ def test_what_was_overtaken_is_answered():
     assert [(r.tid, r.ok) for r in replies] == [(1006, True), (1004, False)]
 
 
-def test_stop_drops_what_is_under_way_and_waits_and_answers_it():
+def test_stop_drops_and_answers_running_and_queued_commands():
     told = leased()
     told.say("AT 60000, 5, 1, TRG", client=HOLDER)
     for line in ("1001\tWTMO 3600", "1002\tCWT 2", "1003\tCIL 2", "1004\tD0"):
@@ -146,7 +146,7 @@ def test_stop_drops_what_is_under_way_and_waits_and_answers_it():
     assert told.ranger.scheduler.entries == []
 
 
-def test_a_stop_of_a_ranger_that_is_dark_already_drops_what_waits_too():
+def test_stop_of_a_dark_ranger_drops_queued_commands():
     told = leased()
     told.say("PS 0", "AXIS 0, 0", "AXIS 1, 0", "WTMO 3600", client=HOLDER)
     for line in ("CWT 2", "AXIS 0, 1", "FHM 0"):
@@ -158,7 +158,7 @@ def test_a_stop_of_a_ranger_that_is_dark_already_drops_what_waits_too():
     assert dark(told.head)
 
 
-def test_the_order_outlives_a_reset_the_lease_and_the_program(tmp_path):
+def test_latch_survives_reset_lease_and_restart(tmp_path):
     told = leased(files=tmp_path)
     told.ranger.receive(OTHER, "PS 0")
     told.say("RST", "LEASE none", client=HOLDER)
@@ -176,7 +176,7 @@ def test_the_order_outlives_a_reset_the_lease_and_the_program(tmp_path):
     assert (broken.light, broken.moves) == (True, True)
 
 
-def test_a_reader_cannot_clear_with_what_is_no_name_and_a_second_order_keeps_the_first_ones_words():
+def test_invalid_name_does_not_clear_and_a_second_stop_keeps_the_first_text():
     told = leased()
     told.ranger.receive(OTHER, "PS 0")
     assert not said_later(told, OTHER, "UNLATCH 1").ok
@@ -190,12 +190,12 @@ def test_a_reader_cannot_clear_with_what_is_no_name_and_a_second_order_keeps_the
 @pytest.mark.parametrize(
     "line", ["PS 1", "PS", "AXIS 0", "AXIS 0, 1", "SCN 1", "STM 1, 5", "STOP 0", "CMEAS 1, 0", "RST"]
 )
-def test_what_does_not_stop_is_not_urgent(line):
+def test_other_commands_are_not_urgent(line):
     word, _, rest = line.partition(" ")
     assert not stops(Request(word, tuple(part.strip() for part in rest.split(",")) if rest else ()))
 
 
-def test_a_stamped_dark_order_waits_for_its_time_and_needs_the_lease():
+def test_scheduled_stop_waits_and_needs_the_lease():
     told = leased()
     at = stamp_text(told.ranger.now_ticks() + 1000)
     assert "needs the lease" in said(told, OTHER, f"2000\t{at}\tPS 0")["PS"].text
@@ -233,7 +233,7 @@ def test_a_lease_is_taken_or_given_back_now_and_not_by_a_stamp_to_come(words):
 # What lights, and what does not -------------------------------------------------------------------------------------
 
 
-def test_a_ranger_that_is_not_homed_stays_dark():
+def test_unhomed_ranger_stays_dark():
     told = Told()
     assert "not homed" in told.one("PS 1").text
     assert not told.head.laser_on()
@@ -245,7 +245,7 @@ def test_a_ranger_that_is_not_homed_stays_dark():
 
 
 @pytest.mark.parametrize("how", ["lost home", "came on by itself"])
-def test_light_that_nobody_switched_on_or_whose_way_is_not_known_goes_off_in_the_next_pass(how):
+def test_light_without_command_or_known_direction_goes_off_in_the_next_turn(how):
     told = ready()
     if how == "lost home":
         told.head.homes[0] = "never"
@@ -257,7 +257,7 @@ def test_light_that_nobody_switched_on_or_whose_way_is_not_known_goes_off_in_the
     assert [("laser off" in reply.text, reply.ok) for reply in safe] == [(True, False)]
 
 
-def test_a_power_cut_of_the_head_leaves_no_light():
+def test_no_light_after_a_power_cut_of_the_head():
     told = ready()
     told.head.reset()
     told.head.laser = True  # as hardware whose laser comes on with its power
@@ -265,7 +265,7 @@ def test_a_power_cut_of_the_head_leaves_no_light():
     assert not told.head.laser_on()
 
 
-def test_the_notes_rangers_light_as_their_hardware_does_where_that_is_asked_for():
+def test_laser_at_boot_follows_the_hardware_if_configured():
     told = Told(laser_at_boot=True)
     told.turns(3)
     assert told.head.laser_on()
@@ -276,19 +276,19 @@ def test_the_notes_rangers_light_as_their_hardware_does_where_that_is_asked_for(
     assert not told.head.laser_on()
 
 
-def test_no_initialisation_file_lights(tmp_path):
+def test_initialisation_files_cannot_light(tmp_path):
     (tmp_path / "CUBES.INI").write_text("INI 4\nPS 1\n")
     (tmp_path / "ZY101.INI").write_text("")
     (tmp_path / "zp.INI").write_text("")
     told = ready(files=tmp_path)
     told.say("PS 0")
-    assert "PS is no command of an initialisation file" in told.say("INITZY")[-1].text
+    assert "PS is not allowed in an initialisation file" in told.say("INITZY")[-1].text
     assert not told.head.laser_on()
 
 
 @pytest.mark.parametrize("order", ["CMEAS 2, 1", "STM 1, 50"])
 @pytest.mark.parametrize("again", [False, True])
-def test_a_buffer_in_which_the_laser_went_off_is_no_measurement(order, again):
+def test_buffer_during_which_the_laser_went_off_is_rejected(order, again):
     told = leased()
     told.say("CIL 1", client=HOLDER)
     told.ranger.receive(HOLDER, order)
@@ -304,7 +304,7 @@ def test_a_buffer_in_which_the_laser_went_off_is_no_measurement(order, again):
 # Over the wire ------------------------------------------------------------------------------------------------------
 
 
-def test_a_dark_order_behind_a_thousand_lines_of_the_same_peer_is_carried_out_at_once():
+def test_stop_behind_a_thousand_lines_is_executed_at_once():
     async def story():
         async with Site(door=OPEN) as site:
             _, writer = await site.typed(0)
@@ -318,7 +318,7 @@ def test_a_dark_order_behind_a_thousand_lines_of_the_same_peer_is_carried_out_at
     run(story)
 
 
-def test_a_flood_of_dark_orders_is_bounded_and_none_is_lost():
+def test_flood_of_stops_is_rate_limited_and_none_is_lost():
     async def story():
         async with Site(door=OPEN) as site:
             reader, writer = await site.typed(0)
@@ -339,7 +339,7 @@ def test_a_flood_of_dark_orders_is_bounded_and_none_is_lost():
     run(story)
 
 
-def test_a_dark_order_from_outside_is_logged_with_its_peer(caplog):
+def test_stop_from_outside_is_logged_with_its_peer(caplog):
     caplog.set_level(logging.WARNING)
 
     async def story():
@@ -359,7 +359,7 @@ def test_a_dark_order_from_outside_is_logged_with_its_peer(caplog):
     run(story)
 
 
-def test_dark_orders_are_answered_within_a_few_turns_whatever_the_others_ask():
+def test_stops_are_answered_within_a_few_turns_under_load():
     """No clock: each is answered by the `receive` that brings it, so by the next read of the loop."""
 
     async def story():
@@ -381,7 +381,7 @@ def test_dark_orders_are_answered_within_a_few_turns_whatever_the_others_ask():
     run(story)
 
 
-def test_power_up_is_dark_before_the_first_turn():
+def test_ranger_is_dark_at_power_up():
     head = ScriptedHead()
     assert head.laser_on()
     Ranger("ZY101", head, limits=(-30_000, 80_000))

@@ -1,4 +1,4 @@
-"""The site's key: where it comes from, and what it may be."""
+"""The site's key: sources and requirements."""
 
 import os
 import random
@@ -14,7 +14,7 @@ from catseye.ranger.network import is_here
 KEY = "a-key-of-the-site"
 
 
-def test_the_key_is_of_the_environment_or_of_a_file_that_it_names(tmp_path):
+def test_key_comes_from_environment_or_file(tmp_path):
     (tmp_path / "key").write_text(f"{KEY}\n")
     (tmp_path / "key").chmod(0o600)
     assert key_of({}) is None
@@ -25,23 +25,23 @@ def test_the_key_is_of_the_environment_or_of_a_file_that_it_names(tmp_path):
 @pytest.mark.parametrize(
     "key", ["", "short", "with a blank in it, all", "semi;colon-in-the-middle", "ümlaut-ümlaut-ümlaut"]
 )
-def test_a_key_that_no_line_holds_is_refused(key):
+def test_key_with_invalid_characters_is_refused(key):
     with pytest.raises(InputError, match="expected 16 or more"):
         key_of({"CATSEYE_KEY": key})
 
 
-def test_a_file_that_is_not_there_is_refused(tmp_path):
+def test_missing_key_file_is_refused(tmp_path):
     with pytest.raises(InputError, match="cannot be read"):
         key_of({"CATSEYE_KEY_FILE": str(tmp_path / "none")})
 
 
 @pytest.mark.parametrize("mode", [0o640, 0o604, 0o660, 0o602])
-def test_a_file_that_others_can_use_is_refused(tmp_path, mode):
+def test_key_file_accessible_by_others_is_refused(tmp_path, mode):
     (tmp_path / "key").write_text(f"{KEY}\n")
     if os.geteuid() == 0:
         os.chown(tmp_path / "key", 1000, 1000)
     (tmp_path / "key").chmod(mode)
-    with pytest.raises(InputError, match=r"others can use it, -rw.* \(expected -rw-------"):
+    with pytest.raises(InputError, match=r"accessible by others, -rw.* \(expected -rw-------"):
         key_of({"CATSEYE_KEY_FILE": str(tmp_path / "key")})
 
 
@@ -50,31 +50,31 @@ def test_a_file_that_others_can_use_is_refused(tmp_path, mode):
     [
         ("aaaaaaaaaaaaaaaaaaaa", "1 different characters"),
         ("abababababababababab", "2 different characters"),
-        ("0123456789abcdef0123", "in a row"),
-        ("xq2-jihgfedcb-7kQpZ-w", "in a row"),
-        ("kQ7-zx1pkQ7-zx1pkQ7-zx1p", "again and again"),
-        ("our-Password-of-2026", "holds 'password'"),
-        ("GBT-changeme-x2-key1", "holds 'changeme'"),
+        ("0123456789abcdef0123", "consecutive"),
+        ("xq2-jihgfedcb-7kQpZ-w", "consecutive"),
+        ("kQ7-zx1pkQ7-zx1pkQ7-zx1p", "repeated"),
+        ("our-Password-of-2026", "contains 'password'"),
+        ("GBT-changeme-x2-key1", "contains 'changeme'"),
     ],
 )
-def test_a_trivial_key_is_refused(key, why):
+def test_trivial_key_is_refused(key, why):
     with pytest.raises(InputError, match=f"trivial: .*{why}"):
         key_of({"CATSEYE_KEY": key})
 
 
-def test_no_random_key_is_trivial():
+def test_random_keys_are_not_trivial():
     rng = random.Random(40)
     assert all(triviality(f"{rng.getrandbits(128):032x}") is None for _ in range(2000))
 
 
-def test_the_answer_to_a_nonce_is_what_openssl_says():
+def test_answer_to_a_nonce_agrees_with_openssl():
     asked = ["openssl", "dgst", "-sha256", "-hmac", KEY]
     said = subprocess.run(asked, input=b"00ff", capture_output=True, check=True).stdout.split()[-1]
     assert answer_to("00ff", KEY) == said.decode()
     assert answer_to("00fe", KEY) != said.decode()
 
 
-def test_what_is_here():
+def test_addresses_of_this_machine():
     assert all(map(is_here, ("127.0.0.1", "127.9.9.9", "::1", "localhost", "unix:/run/catseye")))
     assert not any(map(is_here, ("0.0.0.0", "::", "10.0.0.1", "example.org", "")))
 

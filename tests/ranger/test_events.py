@@ -1,4 +1,4 @@
-"""Laser, motors, mirror and lease at every event, as the table of docs/formats/zy.md says."""
+"""Laser, motors, mirror and lease after each event, as docs/formats/zy.md states."""
 
 import asyncio
 
@@ -205,12 +205,12 @@ LEASE = {
 }
 
 
-def test_the_table_and_the_events_are_the_same():
+def test_table_and_events_correspond():
     assert list(table()) == list(EVENTS)
 
 
 @pytest.mark.parametrize("event", EVENTS)
-def test_what_is_on_after_an_event_is_what_the_table_says(event):
+def test_state_after_an_event_agrees_with_the_table(event):
     laser, motors, mirror, lease = table()[event]
 
     async def story():

@@ -1,4 +1,4 @@
-"""What a connection begins with: read, answered and closed, or closed at once."""
+"""First line of a connection: read, answered and closed, or closed at once."""
 
 import pytest
 
@@ -23,7 +23,7 @@ from catseye.ranger.first_line import opening_of
         b"\x7f",
     ],
 )
-def test_a_browsers_first_bytes_are_known(data):
+def test_first_bytes_of_browsers_are_recognised(data):
     assert opening_of(data)[0] == "foreign"
 
 
@@ -42,10 +42,10 @@ def test_a_browsers_first_bytes_are_known(data):
         (b"A" * 3000, "unreadable"),
     ],
 )
-def test_all_else_is_read_waited_for_or_answered(data, expected):
+def test_other_input_is_read_awaited_or_answered(data, expected):
     assert opening_of(data)[0] == expected
 
 
 @pytest.mark.parametrize(("line", "expected"), [(b"EHLO a\n", "unreadable"), (b"7\tver\n", "read"), (b"\n", "waiting")])
-def test_a_first_line_in_the_languages_shape_needs_a_known_word(line, expected):
+def test_first_line_needs_a_known_command(line, expected):
     assert opening_of(line, {"VER"})[0] == expected

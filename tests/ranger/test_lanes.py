@@ -1,4 +1,4 @@
-"""A reader cannot stall the holder: queues a connection, long answers in slices, by pages, and to who asked."""
+"""Command queues per connection: a reader cannot stall the holder."""
 
 import asyncio
 
@@ -9,7 +9,7 @@ from catseye.ranger.commands import LONGEST_PAGE
 from catseye.ranger.door import Door
 from catseye.ranger.line import LONGEST_REQUEST, format_reply
 from catseye.ranger.ranger import MOST_QUEUED, REPLIES_A_TURN
-from catseye.ranger.server import MOST_HELD, MOST_REPLIES, REPLIES_A_SECOND, ClientConnection
+from catseye.ranger.server import MOST_PENDING_BYTES, MOST_REPLIES, REPLIES_A_SECOND, ClientConnection
 from ranger.ranger_scene import ready
 from ranger.test_server import FullTransport, Site, run
 
@@ -36,7 +36,7 @@ def outgoing(told, turns=1):
     return [out for out in told.turns(turns) if out.reply.command not in ("STW", "LEASE")]
 
 
-def test_64_listings_of_a_reader_keep_the_holder_waiting_for_one_turn():
+def test_64_listings_of_a_reader_delay_the_holder_by_one_turn():
     """Attack: one packet of 64 COO made the holder's next command wait 23 s and sent him 10 MB."""
     told = with_cubes(leased())
     for k in range(64):
@@ -50,7 +50,7 @@ def test_64_listings_of_a_reader_keep_the_holder_waiting_for_one_turn():
         assert (first.reply.tid, first.client) == (tid, HOLDER)  # before the reader's slice
 
 
-def test_the_holders_long_wait_keeps_no_reader_waiting_and_his_order_stays():
+def test_holders_long_wait_delays_no_reader_and_keeps_its_order():
     told = leased()
     told.say("AXIS 0, 0", "WTMO 3600", client=HOLDER)
     for line in ("1\tCWT 1", "2\tD0", "3\tACP 0"):
@@ -63,7 +63,7 @@ def test_the_holders_long_wait_keeps_no_reader_waiting_and_his_order_stays():
 
 
 @pytest.mark.parametrize("line", ["COO", "SEQ"])
-def test_an_answer_is_a_page_and_the_next_one_begins_where_it_says(line):
+def test_answer_is_a_page_that_names_the_next(line):
     told = with_cubes(ready(), 300)
     told.say("CYC 300", "CMEAS 1, 0", client=HOLDER)
     seen, asked = [], line
@@ -87,13 +87,13 @@ def ask(told, line):
 @pytest.mark.parametrize(
     ("line", "bad"), [("COO 0, 129", "1 to 128"), ("SEQ 0, 5", "outside 1"), ("SEQ 999, 5", "999")]
 )
-def test_a_page_that_is_none_is_refused(line, bad):
+def test_invalid_page_is_refused(line, bad):
     told = ready()
     told.say("CMEAS 1, 0", client=HOLDER)
     assert bad in ask(told, line)[0].reply.text
 
 
-def test_who_hears_what():
+def test_receivers_of_each_reply():
     told = leased()
 
     def to(client, line):
@@ -108,7 +108,7 @@ def test_who_hears_what():
     assert to(HOLDER, "BUF") == {HOLDER}
 
 
-def test_a_queue_is_a_connections_own_and_bounded():
+def test_queues_are_per_connection_and_bounded():
     told = leased()
     told.ranger.receive(HOLDER, "WTMO 3600")
     told.ranger.receive(HOLDER, "CWT 2")
@@ -117,12 +117,12 @@ def test_a_queue_is_a_connections_own_and_bounded():
     for _ in range(MOST_QUEUED):
         assert told.ranger.receive(HOLDER, "D0") == []
     (refused,) = told.ranger.receive(HOLDER, "D0")
-    assert f"{MOST_QUEUED} commands wait already" in refused.reply.text
+    assert f"{MOST_QUEUED} commands are queued already" in refused.reply.text
     assert told.ranger.receive(READER, "D0") == []
     assert told.ranger.waiting(READER) == 1
 
 
-def test_who_takes_the_lease_does_not_wait_for_what_was_ordered_before():
+def test_new_lease_drops_earlier_commands():
     told = leased()
     told.say("AXIS 0, 0", "WTMO 3600", client=HOLDER)
     for line in ("1001\tCWT 2", "1002\tCYC 32", "1003\tD0"):
@@ -137,7 +137,7 @@ def test_who_takes_the_lease_does_not_wait_for_what_was_ordered_before():
 
 
 @pytest.mark.parametrize("token", ["0" * 32, "anna", "none"])
-def test_a_name_without_its_token_renews_nothing(token):
+def test_name_without_its_token_renews_nothing(token):
     told = leased()
     orders, lease = told.ranger.orders, told.ranger.lease
     (reply,) = told.ranger.receive(READER, f"LEASE anna, {token}")
@@ -149,7 +149,7 @@ def test_a_name_without_its_token_renews_nothing(token):
     assert told.ranger.orders == orders + 1
 
 
-def test_a_token_is_told_to_its_taker_alone_and_is_new_each_time():
+def test_token_is_sent_only_to_the_holder_and_always_new():
     told = leased()
     heard = told.ranger.receive(READER, "LEASE ben") + told.turns(2)
     token = told.ranger.lease.token
@@ -163,7 +163,7 @@ def test_a_token_is_told_to_its_taker_alone_and_is_new_each_time():
 # Over the wire --------------------------------------------------------------------------------------------------------
 
 
-def test_a_readers_listings_come_at_his_rate_and_the_holders_commands_at_once():
+def test_readers_listings_are_rate_limited_and_holders_commands_are_not():
     async def story():
         async with Site(door=Door()) as site:
             holder = await site.client(0)
@@ -189,7 +189,7 @@ def test_a_readers_listings_come_at_his_rate_and_the_holders_commands_at_once():
     run(story)
 
 
-def test_a_reader_that_takes_nothing_stops_its_own_listing_and_is_not_cut():
+def test_slow_reader_pauses_its_listing_and_stays_connected():
     async def story():
         async with Site() as site:
             with_cubes(site.told, 1000)
@@ -201,13 +201,13 @@ def test_a_reader_that_takes_nothing_stops_its_own_listing_and_is_not_cut():
                 await site.turns(1, 0.0)
             assert not full.cut
             line = LONGEST_REQUEST  # more than a line of COO has
-            assert MOST_HELD < full.kept < MOST_HELD + (REPLIES_A_TURN + 2) * line
+            assert MOST_PENDING_BYTES < full.kept < MOST_PENDING_BYTES + (REPLIES_A_TURN + 2) * line
             slow.connection_lost(None)
 
     run(story)
 
 
-def test_the_whole_list_comes_page_by_page():
+def test_full_list_is_sent_page_by_page():
     async def story():
         async with Site() as site:
             with_cubes(site.told, 700)
@@ -227,7 +227,7 @@ def test_the_whole_list_comes_page_by_page():
     run(story)
 
 
-def test_a_page_is_of_a_size_that_is_known():
+def test_page_size_is_fixed():
     told = with_cubes(ready(), 4095)
     size = sum(len(format_reply(out.reply)) + 1 for out in ask(told, "COO") if out.client is not None)
     assert size < 2**14

@@ -1,4 +1,4 @@
-"""Lines of the ZY language: what the sources quote, laws of round trips, and what is refused."""
+"""Lines of the ZY language: quoted examples, round trips, refusals."""
 
 import pytest
 from hypothesis import given
@@ -64,21 +64,21 @@ QUOTED_REPLIES = {
 
 
 @pytest.mark.parametrize("line", QUOTED_REQUESTS)
-def test_every_quoted_request_is_read(line):
+def test_quoted_requests_are_read(line):
     assert parse_request(line) == QUOTED_REQUESTS[line]
     assert parse_request(line.lower()).command == QUOTED_REQUESTS[line].command
     assert parse_request(f"1000\t52889.12500000\t{line}").ticks == TS
 
 
 @pytest.mark.parametrize("line", QUOTED_REPLIES)
-def test_every_quoted_reply_is_read_and_written_letter_for_letter(line):
+def test_quoted_replies_survive_the_round_trip(line):
     reply = Reply(*QUOTED_REPLIES[line], 1000, TS)
     whole = f"1000\t52889.12500000\t{line}"
     assert parse_reply(whole) == reply
     assert format_reply(reply) == whole
 
 
-def test_a_greeting_without_tid_and_stamp_is_read_but_no_other_line():
+def test_only_a_greeting_may_lack_tid_and_stamp():
     assert parse_reply("HELLO This is ZY11 ver. 2.20").ticks is None
     assert parse_reply("CONNECT 1, 5240").values == ("5240",)
     with pytest.raises(InputError, match="0 tabs"):
@@ -86,31 +86,31 @@ def test_a_greeting_without_tid_and_stamp_is_read_but_no_other_line():
 
 
 @given(COMMANDS, st.lists(WORDS, max_size=8), TIDS, st.none() | TICKS)
-def test_any_request_comes_back_from_its_line(command, values, tid, ticks):
+def test_requests_survive_the_round_trip(command, values, tid, ticks):
     request = Request(command, tuple(values), tid, ticks)
     assert parse_request(format_request(request)) == request
 
 
 @given(COMMANDS.filter(lambda c: c not in ("HELLO", "UNKNOWN")), st.lists(WORDS, max_size=8), TIDS, TICKS)
-def test_any_reply_comes_back_from_its_line(command, values, tid, ticks):
+def test_replies_survive_the_round_trip(command, values, tid, ticks):
     for reply in (Reply(command, True, tuple(values), tid, ticks), Reply(command, False, ("a, b; c",), tid, ticks)):
         assert parse_reply(format_reply(reply)) == reply
 
 
 @given(TICKS)
-def test_a_stamp_is_exact_there_and_back_and_agrees_with_the_time_tag_s_own_text(ticks):
+def test_stamp_is_exact_and_agrees_with_the_time_tag(ticks):
     assert parse_stamp(stamp_text(ticks)) == ticks == ticks_of(tag_of(ticks))
     assert tag_of(ticks).text(8) == stamp_text(ticks)
 
 
 @given(st.integers(0, 105_999), st.integers(0, 86_400_000_000_000 - 1))
-def test_a_stamp_is_within_half_a_tick_of_its_instant(day, nanoseconds):
+def test_stamp_is_within_half_a_tick_of_its_instant(day, nanoseconds):
     tag = TimeTag(day, nanoseconds)
     assert abs(int(tag_of(ticks_of(tag)) - tag)) <= 432_000
 
 
 @given(st.text(max_size=60))
-def test_any_line_is_read_or_refused_in_one_clear_line(line):
+def test_any_line_is_read_or_refused_in_one_line(line):
     for parse in (parse_request, parse_reply):
         said = ""
         try:
@@ -134,16 +134,16 @@ def test_any_line_is_read_or_refused_in_one_clear_line(line):
         ("STT 0; STT 1", "comment"),
         ("COO 1, 2, 3, 4, n\xe9", "ASCII"),
         ("ABP 0\r", "ASCII"),
-        ("9ABC", "no command"),
+        ("9ABC", "not a command"),
         ("ABP " + ",".join("1" * 33), "33 parameters"),
     ],
 )
-def test_bad_requests_are_refused(line, said):
+def test_invalid_requests_are_refused(line, said):
     with pytest.raises(InputError, match=said):
         parse_request(line)
 
 
-def test_an_empty_line_asks_nothing_and_the_longest_line_is_read():
+def test_empty_line_is_ignored_and_longest_line_is_read():
     assert parse_request("") is None
     assert parse_request(" \t ") is None
     assert parse_reply("") is None
@@ -151,7 +151,7 @@ def test_an_empty_line_asks_nothing_and_the_longest_line_is_read():
 
 
 @pytest.mark.parametrize("value", ["a,b", "a\tb", " a", "", "a;b", "a\n"])
-def test_a_value_that_would_be_read_otherwise_is_not_sent(value):
+def test_value_with_separators_is_not_sent(value):
     with pytest.raises(InputError):
         format_request(Request("COO", ("1", value)))
 
@@ -163,7 +163,7 @@ def test_comments_and_places_in_a_file():
         commands_of_file("STT 0\nABP ,1\n", "ZY101.INI")
 
 
-def test_tids_wrap_to_a_thousand():
+def test_tids_wrap_to_1000():
     assert [next_tid(0), next_tid(999), next_tid(1000), next_tid(LAST_TID - 1), next_tid(LAST_TID)] == [
         1000,
         1000,
@@ -175,7 +175,7 @@ def test_tids_wrap_to_a_thousand():
 
 @pytest.mark.parametrize("letter", ["\x00", "\x1f", "\x7f", "\n", "é"])
 @pytest.mark.parametrize("length", [40, 511, 512, 513, 22_000])
-def test_what_is_not_printable_is_refused_in_long_lines_as_in_short_ones(letter, length):
+def test_unprintable_characters_are_refused_in_any_line(letter, length):
     line = "1000\t52889.12500000\tBUF 1, " + "A" * length
     assert parse_reply(line).values == ("A" * length,)
     assert parse_reply(line[:-1] + "~").values[0].endswith("~")

@@ -1,4 +1,4 @@
-"""People's units and the motion chip's integers."""
+"""Units and the motion chip's integers."""
 
 import pytest
 from hypothesis import given
@@ -9,7 +9,7 @@ from catseye.ranger import motion_units as units
 from catseye.records.site.mirror import MirrorGeometry
 
 
-def test_the_data_sheet_s_worked_example():
+def test_data_sheet_example():
     """[TEXAS13] page 11: 500 lines, 600 rpm, 1 turn/s^2, 100 turns; it takes 341 us for the sample time."""
     sample = 341e-6
     assert units.velocity_integer(units.counts_from_turns(10, 2000), sample) == 446_956 == 0x0006D1EC
@@ -17,7 +17,7 @@ def test_the_data_sheet_s_worked_example():
     assert units.counts_from_turns(100, 2000) == 200_000 == 0x00030D40
 
 
-def test_with_the_exact_sample_time_600_rpm_is_another_integer():
+def test_exact_sample_time_changes_the_integer_of_600_rpm():
     assert units.velocity_integer(units.counts_from_turns(10, 2000)) == 447_392  # 2e4 * 2048/6e6 * 65536 = 447 392.4
     assert units.acceleration_integer(units.counts_from_turns(1, 2000)) == 15  # 15.27
     assert pytest.approx(341.3333e-6, abs=1e-10) == units.SAMPLE_TIME
@@ -32,7 +32,7 @@ def test_sample_times_and_intervals_of_the_data_sheet():
 
 
 @given(st.floats(1.0, 4e7), st.floats(256e-6, 1e-3))
-def test_any_speed_comes_back_within_half_a_unit(speed, sample):
+def test_speeds_survive_the_round_trip_within_half_a_unit(speed, sample):
     if speed * sample * units.FRACTION > units.LARGEST_RATE:
         with pytest.raises(ValidityError, match="ABV: velocity"):
             units.velocity_integer(speed, sample)
@@ -42,20 +42,20 @@ def test_any_speed_comes_back_within_half_a_unit(speed, sample):
 
 
 @given(st.floats(200.0, 1e9), st.floats(256e-6, 1e-3))
-def test_any_acceleration_comes_back_within_half_a_unit(rate, sample):
+def test_accelerations_survive_the_round_trip_within_half_a_unit(rate, sample):
     back = units.acceleration_counts(units.acceleration_integer(rate, sample), sample)
     assert abs(back - rate) <= 0.5 / units.FRACTION / sample**2 * (1 + 1e-9)
 
 
 @given(st.floats(-1e6, 1e6))
-def test_turns_and_radians_there_and_back(value):
+def test_turns_and_radians_survive_the_round_trip(value):
     assert units.turns_from_counts(units.counts_from_turns(value)) == pytest.approx(value, rel=1e-12)
     assert units.radians_from_counts(units.counts_from_radians(value)) == pytest.approx(value, rel=1e-12)
     assert units.counts_from_radians(6.283185307179586) == pytest.approx(100_000)
 
 
 @pytest.mark.parametrize("command", units.LIMITS)
-def test_every_command_takes_its_limits_and_refuses_the_next(command):
+def test_limits_are_accepted_and_the_next_value_refused(command):
     limits = units.LIMITS[command]
     assert units.checked(command, limits.low) == limits.low
     assert units.checked(command, limits.high) == limits.high
@@ -68,12 +68,12 @@ def test_every_command_takes_its_limits_and_refuses_the_next(command):
 
 
 @pytest.mark.parametrize("value", [1.5, "7", None, True])
-def test_what_is_no_integer_is_refused(value):
-    with pytest.raises(ValidityError, match="is no integer"):
+def test_non_integers_are_refused(value):
+    with pytest.raises(ValidityError, match="is not an integer"):
         units.checked("FKP", value)
 
 
-def test_a_velocity_below_the_acceleration_is_refused_and_says_what_to_set_first():
+def test_velocity_below_the_acceleration_is_refused_with_a_remedy():
     with pytest.raises(ValidityError, match=r"ABA: velocity 9 is below acceleration 10 .*ABV"):
         units.checked_rates("ABA", 9, 10)
     with pytest.raises(ValidityError, match=r"ABV: velocity 9 is below acceleration 10 .*ABA"):
@@ -81,24 +81,24 @@ def test_a_velocity_below_the_acceleration_is_refused_and_says_what_to_set_first
 
 
 @pytest.mark.parametrize("bad", [-1.0, float("nan"), float("inf"), 1e12])
-def test_speeds_that_no_register_holds_are_refused(bad):
+def test_speeds_beyond_the_register_are_refused(bad):
     with pytest.raises(ValidityError, match="ABV: velocity"):
         units.velocity_integer(bad)
 
 
-def test_a_speed_too_small_to_move_is_refused_and_zero_is_not():
+def test_speed_too_small_to_move_is_refused_and_zero_is_not():
     with pytest.raises(ValidityError, match="nothing would move"):
         units.velocity_integer(0.01)
     assert units.velocity_integer(0.0) == 0
 
 
 @pytest.mark.parametrize("clock", [0.0, -6e6, 9e6, float("nan")])
-def test_a_clock_the_chip_has_not_is_refused(clock):
+def test_invalid_clock_frequency_is_refused(clock):
     with pytest.raises(ValidityError, match="clock"):
         units.sample_time(clock)
 
 
-def test_a_record_tells_how_fast_the_axes_go():
+def test_record_gives_the_speeds_of_the_axes():
     sheet = {"zp": "ZP1", "dx_mm": 0.0, "dy_mm": 250.0, "dz_mm": 0.0, "beta1_rad": 0.0, "beta2_rad": 0.0}
     limits = {"na0": 0, "ne0": 0, "az_low_limit": -20_000, "az_high_limit": 70_000}
     rates = {"abv_0": units.velocity_integer(12_000.0), "aba_0": units.acceleration_integer(40_000.0), "abv_1": 44_739}

@@ -1,4 +1,4 @@
-"""TLS beyond this machine, and Unix sockets that only their owner may use, over real sockets."""
+"""TLS beyond this machine, and owner-only Unix sockets, over real sockets."""
 
 import asyncio
 import contextlib
@@ -60,7 +60,7 @@ async def ask_over(site, tls):
         client.close()
 
 
-def test_lines_beyond_this_machine_go_by_tls(made, far):
+def test_connections_beyond_this_machine_use_tls(made, far):
     async def story():
         certificate, key = made["ranger"]
         async with TlsSite(TlsFiles(certificate, key)) as site:
@@ -73,7 +73,7 @@ def test_lines_beyond_this_machine_go_by_tls(made, far):
     run(story)
 
 
-def test_a_certificate_of_another_address_is_not_believed(made, far):
+def test_certificate_of_another_address_is_rejected(made, far):
     async def story():
         certificate, key = made["elsewhere"]
         async with TlsSite(TlsFiles(certificate, key)) as site:
@@ -83,7 +83,7 @@ def test_a_certificate_of_another_address_is_not_believed(made, far):
     run(story)
 
 
-def test_lines_in_clear_reach_nothing_at_a_port_with_tls(made, far):
+def test_clear_text_is_ignored_at_a_port_with_tls(made, far):
     async def story():
         certificate, key = made["ranger"]
         async with TlsSite(TlsFiles(certificate, key)) as site:
@@ -100,7 +100,7 @@ def test_lines_in_clear_reach_nothing_at_a_port_with_tls(made, far):
     run(story)
 
 
-def test_old_protocols_are_not_spoken(made):
+def test_old_protocols_are_refused(made):
     certificate, key = made["ranger"]
     for context in (TlsFiles(certificate, key).of_server("192.0.2.7"), NO_TLS.of_client("192.0.2.7")):
         assert context.minimum_version == ssl.TLSVersion.TLSv1_2
@@ -108,7 +108,7 @@ def test_old_protocols_are_not_spoken(made):
     assert NO_TLS.of_client("192.0.2.7").check_hostname
 
 
-def test_in_clear_is_asked_for_by_name_and_told_once(far, caplog):
+def test_clear_text_must_be_configured_and_is_logged_once(far, caplog):
     async def story():
         async with TlsSite(TlsFiles(clear=True)) as site:
             network = Sockets(TlsFiles(clear=True))
@@ -119,10 +119,12 @@ def test_in_clear_is_asked_for_by_name_and_told_once(far, caplog):
                 await site.until(lambda: not site.server.connections)
 
     run(story)
-    assert sum("lines go in clear" in record.getMessage() for record in caplog.records) == 2  # the server, the client
+    assert (
+        sum("connection without TLS" in record.getMessage() for record in caplog.records) == 2
+    )  # the server, the client
 
 
-def test_files_of_tls_are_of_the_environment(made):
+def test_tls_files_come_from_the_environment(made):
     certificate, key = made["ranger"]
     names = {"CATSEYE_TLS_CERTIFICATE": str(certificate), "CATSEYE_TLS_KEY": str(key)}
     assert TlsFiles.of({}) == NO_TLS
@@ -139,7 +141,7 @@ def test_files_of_tls_are_of_the_environment(made):
             TlsFiles.of(bad)
 
 
-def test_files_that_do_not_fit_are_refused_before_anything_listens(made):
+def test_invalid_tls_files_are_refused_before_listening(made):
     door = Door(key=KEY, tls=TlsFiles(made["ranger"][0], made["other"][1]))
     with pytest.raises(InputError, match=r"feed: CATSEYE_TLS_CERTIFICATE=.* cannot be used"):
         refuse_open("feed", "192.0.2.7", door)
@@ -166,7 +168,7 @@ class UnixSite(Site):
         )
 
 
-def test_a_unix_socket_is_its_owners_and_its_peers_are_known(tmp_path):
+def test_unix_socket_is_for_its_owner_and_identifies_peers(tmp_path):
     folder = tmp_path / "run"
 
     async def story():
@@ -189,7 +191,7 @@ def test_a_unix_socket_is_its_owners_and_its_peers_are_known(tmp_path):
     run(story)
 
 
-def test_a_socket_of_a_server_that_is_gone_is_replaced_and_of_one_that_lives_is_not(tmp_path):
+def test_socket_of_a_dead_server_is_replaced_and_of_a_live_one_is_not(tmp_path):
     bound, port = bound_socket(tmp_path / "run", 24_110)
     assert port == 24_110
     bound.close()  # killed: the file stays
@@ -201,7 +203,7 @@ def test_a_socket_of_a_server_that_is_gone_is_replaced_and_of_one_that_lives_is_
     bound.close()
 
 
-def test_a_folder_that_others_can_write_in_is_refused(tmp_path):
+def test_folder_writable_by_others_is_refused(tmp_path):
     async def story():
         folder = tmp_path / "open"
         folder.mkdir()
@@ -212,7 +214,7 @@ def test_a_folder_that_others_can_write_in_is_refused(tmp_path):
     run(story)
 
 
-def test_no_other_file_is_taken_for_a_socket(tmp_path):
+def test_other_files_are_not_taken_for_sockets(tmp_path):
     socket_path(tmp_path, 7).write_text("a file")
     tmp_path.chmod(0o700)
     with pytest.raises(OSError, match="in use"):
@@ -220,7 +222,7 @@ def test_no_other_file_is_taken_for_a_socket(tmp_path):
     assert socket_path(tmp_path, 7).read_text() == "a file"
 
 
-def test_a_unix_socket_never_is_open_to_others_not_even_for_a_moment(tmp_path, monkeypatch):
+def test_unix_socket_is_never_open_to_others(tmp_path, monkeypatch):
     bind, modes = socket.socket.bind, []
 
     def watched(self, at):
@@ -236,5 +238,5 @@ def test_a_unix_socket_never_is_open_to_others_not_even_for_a_moment(tmp_path, m
     assert modes == [0o600]
 
 
-def test_unix_is_here():
+def test_unix_address_is_of_this_machine():
     assert is_here("unix:/run/catseye")

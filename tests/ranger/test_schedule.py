@@ -1,4 +1,4 @@
-"""Commands that wait for their time."""
+"""Scheduled commands."""
 
 import pytest
 
@@ -9,7 +9,7 @@ from catseye.ranger.schedule import MOST_ENTRIES, Scheduler
 SECOND = 10**9
 
 
-def test_a_repeated_command_keeps_its_times_however_late_each_comes():
+def test_repeated_command_keeps_its_times_when_late():
     waiting = Scheduler()
     waiting.add(1, Request("CMEAS"), 10 * SECOND, repeats=4, interval=2.0)
     assert waiting.take(10 * SECOND - 1) is None  # never early
@@ -21,18 +21,18 @@ def test_a_repeated_command_keeps_its_times_however_late_each_comes():
     assert waiting.due_ns is None
 
 
-def test_who_was_served_goes_to_the_back_of_the_row():
+def test_served_client_moves_to_end_of_queue():
     waiting = Scheduler()
     for client in (1, 2):
         waiting.add(client, Request("CMEAS"), SECOND, repeats=2, interval=0.0)
     assert [waiting.take(SECOND).client for _ in range(4)] == [1, 2, 1, 2]
 
 
-def test_each_connection_has_its_own_room_and_is_cleared_alone():
+def test_each_connection_has_its_own_limit_and_is_cleared_separately():
     waiting = Scheduler()
     for k in range(MOST_ENTRIES):
         waiting.add(1, Request("CMEAS"), k)
-    with pytest.raises(InputError, match=f"^{MOST_ENTRIES} commands wait already"):
+    with pytest.raises(InputError, match=f"^{MOST_ENTRIES} commands are scheduled already"):
         waiting.add(1, Request("CMEAS"), 0)
     waiting.add(2, Request("BUF"), 5)
     assert waiting.clear(1) == MOST_ENTRIES

@@ -17,8 +17,8 @@ from catseye.ranger.line import LAST_TID, LONGEST_REPLY, LONGEST_REQUEST, parse_
 from catseye.ranger.network import TlsFiles
 from catseye.ranger.ranger import Ranger
 from catseye.ranger.server import (
+    LINE_BURST,
     LOOPBACK,
-    MOST_AT_ONCE,
     MOST_UNSENT,
     MOST_WAITING,
     MUTE,
@@ -81,7 +81,7 @@ def run(story):
     asyncio.run(story())
 
 
-def test_a_person_on_nc_can_drive_a_ranger():
+def test_ranger_can_be_driven_from_nc():
     async def story():
         async with Site() as site:
             site.ranger.name = "ZY11"
@@ -106,7 +106,7 @@ def test_a_person_on_nc_can_drive_a_ranger():
     run(story)
 
 
-def test_two_clients_hear_everything_but_a_buffer_goes_to_who_asked_and_a_third_is_turned_away():
+def test_two_clients_share_state_changes_and_a_third_is_refused():
     async def story():
         async with Site() as site:
             heard = []
@@ -132,7 +132,7 @@ def test_two_clients_hear_everything_but_a_buffer_goes_to_who_asked_and_a_third_
     run(story)
 
 
-def test_keep_alives_come_each_60_s_and_not_before():
+def test_keep_alives_are_sent_every_60_s():
     async def story():
         async with Site() as site:
             reader, writer = await site.typed()
@@ -152,7 +152,7 @@ def test_keep_alives_come_each_60_s_and_not_before():
     run(story)
 
 
-def test_a_client_keeps_alive_and_gives_up_a_silent_ranger():
+def test_client_sends_keep_alives_and_gives_up_a_silent_ranger():
     async def story():
         async with Site() as site:
             client = await site.client()
@@ -170,7 +170,7 @@ def test_a_client_keeps_alive_and_gives_up_a_silent_ranger():
     run(story)
 
 
-def test_many_requests_are_outstanding_and_each_gets_its_own_answer():
+def test_each_of_many_outstanding_requests_gets_its_answer():
     async def story():
         async with Site() as site:
             client = await site.client(first_tid=LAST_TID - 1)
@@ -192,7 +192,7 @@ def test_many_requests_are_outstanding_and_each_gets_its_own_answer():
     run(story)
 
 
-def test_a_lost_connection_answers_what_is_outstanding_and_frees_port_and_schedule():
+def test_lost_connection_fails_outstanding_requests_and_frees_port_and_schedule():
     async def story():
         async with Site() as site:
             client = await site.client()
@@ -210,7 +210,7 @@ def test_a_lost_connection_answers_what_is_outstanding_and_frees_port_and_schedu
     run(story)
 
 
-def test_a_flood_is_slowed_not_lost_and_memory_stays_bounded():
+def test_flood_is_rate_limited_without_loss_and_memory_is_bounded():
     async def story():
         async with Site() as site:
             flood = socket.create_connection((LOOPBACK, site.server.ports[0]))
@@ -219,10 +219,10 @@ def test_a_flood_is_slowed_not_lost_and_memory_stays_bounded():
             await site.until(lambda: 0 in site.server.connections)
             sent = flood.send(b"D0\n" * 2000)
             assert sent == 6000
-            await site.turns(int(MOST_AT_ONCE) + 50)
+            await site.turns(int(LINE_BURST) + 50)
             connection = site.server.connections[0]
             assert not connection.paused  # what came is looked through for what makes dark
-            assert len(connection.unread) == 3 * (2000 - int(MOST_AT_ONCE))
+            assert len(connection.unread) == 3 * (2000 - int(LINE_BURST))
             assert site.ranger.waiting(0) <= MOST_WAITING
             assert (await site.answered(other.ask("VER"))).ok
             heard = 0
@@ -243,7 +243,7 @@ def test_a_flood_is_slowed_not_lost_and_memory_stays_bounded():
 
 
 @pytest.mark.parametrize("junk", [b"A" * (LONGEST_REQUEST + 10), b"A" * 3000 + b"\n"])
-def test_a_line_without_end_is_refused_and_only_its_connection_closed(junk):
+def test_overlong_line_is_refused_and_only_its_connection_closed(junk):
     async def story():
         async with Site() as site:
             reader, writer = await site.typed(0)
@@ -280,7 +280,7 @@ class FullTransport(asyncio.Transport):
     abort = close
 
 
-def test_a_client_that_does_not_read_is_cut_off_and_costs_the_other_nothing():
+def test_client_that_does_not_read_is_cut_off_without_cost_to_others():
     async def story():
         async with Site() as site:
             other = await site.client(1)
@@ -363,13 +363,13 @@ def test_many_fuzzed_lines_neither_crash_nor_hang_the_ranger(seed):
     fuzz(10_000, seed)
 
 
-def test_it_listens_on_this_machine_only_and_says_when_a_port_is_taken():
+def test_server_listens_locally_and_reports_an_occupied_port():
     async def story():
         async with Site() as site:
             assert ZyServer(site.ranger).host == "127.0.0.1"
             assert ZyServer(site.ranger).ports == (5240, 5241)
             twin = ZyServer(site.ranger, ports=site.server.ports)
-            with pytest.raises(InputError, match="cannot be had"):
+            with pytest.raises(InputError, match="is not available"):
                 await twin.start()
             with pytest.raises(InputError, match="no ranger answers at"):
                 await ZyClient.connect(LOOPBACK, 1)
@@ -377,7 +377,7 @@ def test_it_listens_on_this_machine_only_and_says_when_a_port_is_taken():
     run(story)
 
 
-def test_a_client_counts_lines_that_it_cannot_read_and_goes_on():
+def test_client_counts_unreadable_lines_and_continues():
     async def story():
         async with Site() as site:
             client = await site.client()
@@ -392,7 +392,7 @@ def test_a_client_counts_lines_that_it_cannot_read_and_goes_on():
     run(story)
 
 
-def test_serve_turns_until_it_is_cancelled():
+def test_serve_runs_until_cancelled():
     async def story():
         async with Site() as site:
             task = asyncio.ensure_future(site.server.serve())
@@ -411,7 +411,7 @@ def test_serve_turns_until_it_is_cancelled():
 
 
 @pytest.mark.parametrize("first", [b"POST / HTTP/1.1\r\nHost: a\r\n\r\n", b"\x16\x03\x01\n", b"what? ever\n"])
-def test_no_line_behind_a_bad_first_one_is_looked_at(first, caplog):
+def test_lines_after_an_invalid_first_one_are_ignored(first, caplog):
     async def story():
         async with Site() as site:
             reader, writer = await site.typed()
@@ -433,7 +433,7 @@ def test_no_line_behind_a_bad_first_one_is_looked_at(first, caplog):
     run(story)
 
 
-def test_empty_lines_before_the_first_cost_no_memory_and_a_bad_later_line_closes_nothing():
+def test_leading_empty_lines_cost_no_memory_and_later_invalid_lines_close_nothing():
     async def story():
         async with Site() as site:
             reader, writer = await site.typed()
@@ -451,7 +451,7 @@ def test_empty_lines_before_the_first_cost_no_memory_and_a_bad_later_line_closes
     run(story)
 
 
-def test_two_sockets_that_say_nothing_give_their_places_to_who_speaks():
+def test_silent_connections_give_their_ports_to_others():
     async def story():
         async with Site() as site:
             mute = [await site.typed(0), await site.typed(1)]
@@ -464,7 +464,7 @@ def test_two_sockets_that_say_nothing_give_their_places_to_who_speaks():
             clients = [await site.client(0), await site.client(1, first_tid=SECOND_CLIENT_TID)]
             for client, (reader, writer) in zip(clients, mute, strict=True):
                 assert (await site.answered(client.ask("VER"))).ok
-                assert b"LINE 0, nothing was said for 10 s" in await site.answered(reader.read())
+                assert b"LINE 0, no line received for 10 s" in await site.answered(reader.read())
                 writer.close()
             site.now = MUTE + SILENT - 0.1
             reader, writer = await site.typed(0)
@@ -523,7 +523,7 @@ class VirtualSite:
             self.loop.close()
 
 
-def test_a_served_ranger_that_rests_turns_ten_times_a_second_and_once_where_nobody_listens():
+def test_idle_server_takes_ten_turns_a_second_and_one_without_clients():
     site = VirtualSite()
 
     async def story(client):
@@ -539,7 +539,7 @@ def test_a_served_ranger_that_rests_turns_ten_times_a_second_and_once_where_nobo
     site.run(story)
 
 
-def test_a_line_is_answered_at_once_though_the_ranger_rests():
+def test_idle_ranger_answers_at_once():
     """No virtual time passes: the line itself wakes the server."""
     site = VirtualSite()
 
@@ -553,7 +553,7 @@ def test_a_line_is_answered_at_once_though_the_ranger_rests():
     site.run(story)
 
 
-def test_a_served_ranger_keeps_times_to_the_stamp():
+def test_served_ranger_keeps_scheduled_times():
     site = VirtualSite()
 
     async def story(client):
@@ -575,7 +575,7 @@ def test_a_served_ranger_keeps_times_to_the_stamp():
     site.run(story)
 
 
-def test_a_client_streams_buffers_without_a_gap():
+def test_client_streams_buffers_without_gaps():
     """128 ms a buffer, a fine poll of 1 ms at most between them, on a network of 0.2 ms: 7.75 a second and more."""
     site = VirtualSite(2e-4)
 
@@ -603,7 +603,7 @@ def test_a_client_streams_buffers_without_a_gap():
     site.run(story)
 
 
-def test_what_came_too_fast_is_read_at_its_rate_while_the_ranger_sleeps():
+def test_excess_input_is_read_at_the_rate_limit_while_idle():
     site = VirtualSite()
 
     async def story(client):
@@ -634,7 +634,7 @@ async def heard(site, lines, words):
 
 
 @pytest.mark.parametrize("command", COMMANDING)
-def test_what_moves_lights_or_configures_needs_the_lease_and_asking_does_not(command):
+def test_commands_need_the_lease_and_queries_do_not(command):
     async def story():
         async with Site(door=Door()) as site:
             client = await site.client()
@@ -652,7 +652,7 @@ def test_what_moves_lights_or_configures_needs_the_lease_and_asking_does_not(com
     run(story)
 
 
-def test_who_takes_the_lease_by_name_commands_and_all_are_told():
+def test_lease_is_taken_by_name_and_published():
     async def story():
         async with Site(door=Door()) as site:
             lines = []
@@ -681,7 +681,7 @@ def test_who_takes_the_lease_by_name_commands_and_all_are_told():
 
 
 @pytest.mark.parametrize("feeds", ["CYC 64", "renewal"])
-def test_laser_and_motors_go_off_when_who_has_the_lease_orders_nothing(feeds):
+def test_dead_man_switch_turns_laser_and_motors_off(feeds):
     """Attack: a holder whose VER came each second kept the laser on for ever."""
 
     async def story():
@@ -715,7 +715,7 @@ def test_laser_and_motors_go_off_when_who_has_the_lease_orders_nothing(feeds):
     run(story)
 
 
-def test_an_open_interlock_makes_safe_at_once_and_refuses_light_and_moves():
+def test_open_interlock_makes_safe_at_once_and_refuses_light_and_moves():
     async def story():
         async with Site(door=Door()) as site:
             lines, pulled = [], []
@@ -740,7 +740,7 @@ def test_an_open_interlock_makes_safe_at_once_and_refuses_light_and_moves():
     run(story)
 
 
-def test_a_connection_that_says_nothing_for_an_hour_is_closed():
+def test_connection_silent_for_an_hour_is_closed():
     async def story():
         async with Site(door=Door(lease=False, idle=3600.0)) as site:
             client = await site.client()
@@ -762,7 +762,7 @@ def typed_word(line):
     return line.decode().split("\t")[2].split()[0]
 
 
-def test_a_port_with_a_key_tells_nothing_but_a_nonce_before_it_was_proved():
+def test_port_with_a_key_sends_only_a_nonce_before_authentication():
     async def story():
         async with Site(door=Door(key=KEY, lease=False)) as site:
             with_key = await site.client(0, key=KEY)
@@ -788,7 +788,7 @@ def test_a_port_with_a_key_tells_nothing_but_a_nonce_before_it_was_proved():
     run(story)
 
 
-def test_an_answer_heard_before_does_not_open_again():
+def test_replayed_answer_does_not_authenticate():
     async def story():
         async with Site(door=Door(key=KEY, lease=False)) as site:
             said = []
@@ -808,7 +808,7 @@ def test_an_answer_heard_before_does_not_open_again():
     run(story)
 
 
-def test_peers_without_the_key_take_no_place_from_who_has_it():
+def test_unauthenticated_peers_occupy_no_port():
     """Attack: two sockets that never gave the key kept the coordinator out."""
 
     async def story():
@@ -860,7 +860,7 @@ def test_wrong_keys_are_answered_late_and_counted_once_a_minute(caplog):
     run(story)
 
 
-def test_a_client_without_the_key_says_what_is_expected():
+def test_client_without_the_key_reports_what_is_expected():
     async def story():
         async with Site(door=Door(key=KEY, lease=False)) as site:
             client = await site.client(0)
@@ -870,7 +870,7 @@ def test_a_client_without_the_key_says_what_is_expected():
     run(story)
 
 
-def test_a_port_that_others_reach_is_refused_without_a_key_or_in_clear():
+def test_exposed_port_is_refused_without_key_or_tls():
     async def story():
         site = Site()
         for host in ("0.0.0.0", "::", "192.0.2.7", ""):

@@ -1,9 +1,4 @@
-"""Where the Sun watch's refusals begin: 5 degrees, what the servo may be off, and half of what lies between two looks.
-
-Both margins are turns of the beam, found here by beams from scipy's rotations (tests/sun_scene.py): that of axes which
-overshoot by 20 counts each, and that of axes which stand half a step from the nearest look. A Sun in the direction of
-that turn is the worst there is; there the boundary must stand where the beam would just touch the cone.
-"""
+"""Limits of the Sun watch: 5 degrees, the servo's overshoot, half the sampling step."""
 
 import numpy as np
 import pytest
@@ -34,7 +29,7 @@ def beyond(at, counts, angle):
 
 
 @pytest.mark.parametrize("away", [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)])
-def test_a_rest_is_refused_from_where_the_servo_could_overshoot_into_the_cone(away):
+def test_rest_is_refused_if_the_servo_could_overshoot_into_the_cone(away):
     corner = OVERSHOOT * away
     boundary = CONE + turn(corner)
     assert boundary - CONE == pytest.approx(580.0 / 3600 * DEGREE, rel=1e-3)  # 20 sqrt(12.96^2 + 25.92^2) arc seconds
@@ -47,7 +42,7 @@ def test_a_rest_is_refused_from_where_the_servo_could_overshoot_into_the_cone(aw
     assert apart(beam(LEVEL + corner), outside) > CONE > apart(beam(LEVEL + corner), inside)
 
 
-def test_no_rest_that_is_allowed_looks_into_the_cone_wherever_the_servo_stands_within_its_overshoot():
+def test_allowed_rest_stays_out_of_the_cone_within_the_overshoot():
     rng = np.random.default_rng(21)
     corners = OVERSHOOT * np.array([(1, 1), (1, -1), (-1, 1), (-1, -1), (1, 0), (-1, 0), (0, 1), (0, -1)])
     allowed = 0
@@ -72,7 +67,7 @@ MOVES = {  # counts: the step between two looks
 
 
 @pytest.mark.parametrize("move", MOVES)
-def test_a_move_is_refused_from_where_the_beam_between_two_looks_could_come_into_the_cone(move):
+def test_move_is_refused_if_the_beam_could_enter_the_cone_between_samples(move):
     """The Sun beyond the end of the move, in the direction of half a cell's diagonal: the end is the nearest look."""
     half = 0.5 * np.array(MOVES[move])
     end = LEVEL + np.array(move, dtype=float)
@@ -86,7 +81,7 @@ def test_a_move_is_refused_from_where_the_beam_between_two_looks_could_come_into
     assert refusal(STATION, LEVEL, end, suns=[nearer]) is not None
 
 
-def test_the_least_angle_of_a_move_is_never_more_than_that_of_any_counts_in_its_rectangle():
+def test_least_angle_of_a_move_is_a_lower_bound_over_its_rectangle():
     rng = np.random.default_rng(22)
     for _ in range(100):
         start = np.add(ZEROS, rng.uniform([-20_000, -20_000], [20_000, 20_000]))
@@ -113,7 +108,7 @@ def slack(aside):
     return least - (apart(beam(start), sun) - turn((200.0, 200.0)))
 
 
-def test_a_move_out_of_the_cone_may_come_nearer_than_it_began_by_what_the_grid_cannot_tell_and_no_more():
+def test_move_out_of_the_cone_may_come_nearer_only_within_grid_resolution():
     low, high = 0.0, 4.0 * DEGREE  # beside the Sun: straight over it, and hardly nearer than it began
     assert slack(low) < 0.0 < slack(high)
     for _ in range(40):
@@ -125,7 +120,7 @@ def test_a_move_out_of_the_cone_may_come_nearer_than_it_began_by_what_the_grid_c
         assert (refusal(STATION, start, end, suns=[sun]) is None) == (by > 0.0)
 
 
-def test_a_ranger_that_is_told_to_move_refuses_from_the_same_boundary():
+def test_ranger_refuses_moves_at_the_same_boundary():
     z = ready().ranger
     station = z.cubes.station
     at = np.array([3_000.0, 12_500.0])

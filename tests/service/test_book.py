@@ -1,4 +1,4 @@
-"""What is kept of a running site, and what it comes to in words and for programs."""
+"""Summary of a running site, in words and for programs."""
 
 import json
 import math
@@ -83,7 +83,7 @@ def filled(**other):
     return book, judge
 
 
-def test_it_counts_what_comes():
+def test_entries_are_counted():
     book, judge = filled()
     assert (book.acknowledged, dict(book.statuses)) == (3, {"used": 1, "reference": 1, "blocked": 1})
     assert dict(book.shots) == {"ZY101": 1, "ZY102": 1}
@@ -95,7 +95,7 @@ def test_it_counts_what_comes():
     assert book.latest.rms_mm == 0.1
 
 
-def test_programs_get_numbers_and_null_for_what_is_not_known():
+def test_json_has_numbers_and_null_for_unknown_values():
     book, _ = filled()
     world = TwinWords(60635.125, faults=("dead-ranger ZY104 1 2",))
     text = json_line(simulation_object(book, world, "night.db", seconds=60.0, rangers=18, told=3))
@@ -108,20 +108,20 @@ def test_programs_get_numbers_and_null_for_what_is_not_known():
     assert first["beam"]["focus_mm"] == {"found": None, "u": None, "true": None}
 
 
-def test_people_are_told_first_what_is_of_more_than_one_shot():
+def test_problems_of_more_than_one_shot_come_first():
     book, _ = filled()
     passages = dict(summary(book, TwinWords(60635.125), None, seconds=60.0, rangers=18, told=3))
-    assert passages["Noticed"].startswith("VER was not answered; ZY101 A: blocked (5 times)")
+    assert passages["Events"].startswith("VER was not answered; ZY101 A: blocked (5 times)")
     assert "3 by 18 rangers in 60 s, all acknowledged; 1 blocked, 1 reflected" in passages["Shots"]
-    assert "1 epochs, 1 held against the truth: 1 as claimed" in passages["Truth"]
-    assert "none was kept" in passages["Journal"]
+    assert "1 epochs, 1 compared with the truth: 1 as claimed" in passages["Truth"]
+    assert "none was written" in passages["Journal"]
     assert (
         "none was solved"
         in dict(summary(LiveBook(), TwinWords(60635.125), None, seconds=1.0, rangers=1, told=0))["Epochs"]
     )
 
 
-def test_the_verdict_and_the_lines_below_it_count_epochs_alike():
+def test_verdict_and_lines_count_epochs_alike():
     """Below its band an epoch is nearer the truth than it claims: good, and not "within its band"."""
     book, _ = filled(chi2=0.4)
     words = {"seconds": 60.0, "rangers": 18, "told": 3}
@@ -134,11 +134,11 @@ def test_the_verdict_and_the_lines_below_it_count_epochs_alike():
     assert simulation_object(beyond, TwinWords(60635.125), None, **words)["verdict"]["word"] == "doubtful"
 
 
-def test_epochs_that_doubt_themselves_are_no_good_verdict():
-    """As near the truth as they claim, since the claim takes the doubt in."""
+def test_doubtful_epochs_make_a_doubtful_verdict():
+    """As near the truth as claimed, since the claim covers the doubt."""
     book, _ = filled()
     doubted = epoch(2)
-    doubted.answer["doubts"] = ["WX2's thermometer is biased by some +2.5 °C, or the air is of few nights"]
+    doubted.answer["doubts"] = ["WX2's thermometer is biased by about +2.5 °C, or the air is unusual"]
     book.entry(doubted)
     words = {"seconds": 60.0, "rangers": 18, "told": 3}
     told = simulation_object(book, TwinWords(60635.125), None, **words)
@@ -147,7 +147,7 @@ def test_epochs_that_doubt_themselves_are_no_good_verdict():
     assert [each["doubt"] is None for each in told["epochs"]] == [True, False]
 
 
-def test_a_shot_counts_once_whatever_its_epochs_say_of_it():
+def test_shot_counts_once_in_any_number_of_epochs():
     """1 used, 2 overruled by its epoch, 3 blocked and named by it again, 4 of the next epoch, 5 of none yet."""
     book = LiveBook()
     for number, status in ((1, "used"), (2, "used"), (3, "blocked"), (4, "used")):
@@ -160,7 +160,7 @@ def test_a_shot_counts_once_whatever_its_epochs_say_of_it():
     assert sum(book.fates.values()) == book.acknowledged == 5
 
 
-def test_shots_that_were_told_and_not_kept_are_not_said_to_be_acknowledged():
+def test_shots_not_durable_are_not_counted_as_acknowledged():
     book, _ = filled()
     words = {"seconds": 60.0, "rangers": 18, "told": 5}
     passages = dict(summary(book, TwinWords(60635.125), None, **words))
@@ -169,7 +169,7 @@ def test_shots_that_were_told_and_not_kept_are_not_said_to_be_acknowledged():
     assert (told["shots"], told["acknowledged"]) == (5, 3)
 
 
-def test_rangers_that_were_left_out_are_not_counted():
+def test_excluded_rangers_are_not_counted():
     orders = SimpleNamespace(drop=("ZY102", "ZY102"))
     run = SimpleNamespace(site=site(), orders=orders, seconds=6.0, told=9, head=None)
     assert Simulation.totals.fget(run) == {"seconds": 6.0, "rangers": len(site().rangers) - 1, "told": 9, "head": None}
@@ -178,11 +178,11 @@ def test_rangers_that_were_left_out_are_not_counted():
 @pytest.mark.parametrize(
     ("chi2", "said"), [(0.5, "better than claimed"), (1.0, "as claimed"), (2.0, "worse than claimed")]
 )
-def test_an_epochs_line_judges_the_claim(chi2, said):
+def test_epoch_line_judges_the_claim(chi2, said):
     assert epoch_line(filled(chi2=chi2)[0].latest).endswith(said)
 
 
-def test_plain_lines_are_of_epochs_and_of_what_lasts():
+def test_plain_lines_show_epochs_and_ongoing_problems():
     said = []
     view = LinesView(said.append)
     book, _ = filled()

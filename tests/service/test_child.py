@@ -1,4 +1,4 @@
-"""A process beside this one."""
+"""A supervised child process."""
 
 import asyncio
 import os
@@ -34,7 +34,7 @@ def alive(pid):
     return True
 
 
-def test_it_is_there_when_it_has_spoken_and_gone_when_it_was_stopped():
+def test_child_runs_after_its_first_line_until_stopped():
     async def story():
         said = []
         one = child(SPEAKS, said)
@@ -48,7 +48,7 @@ def test_it_is_there_when_it_has_spoken_and_gone_when_it_was_stopped():
     asyncio.run(story())
 
 
-def test_one_that_does_not_listen_is_killed_in_time():
+def test_child_that_ignores_sigterm_is_killed_in_time():
     async def story():
         one = child(DEAF)
         await one.start()
@@ -60,7 +60,7 @@ def test_one_that_does_not_listen_is_killed_in_time():
     asyncio.run(story())
 
 
-def test_one_that_cannot_start_says_why_in_its_own_words():
+def test_child_that_cannot_start_reports_its_own_message():
     async def story():
         with pytest.raises(InputError, match=r"^twin: port 5240 is taken$"):
             await child(DIES).keep()
@@ -68,7 +68,7 @@ def test_one_that_cannot_start_says_why_in_its_own_words():
     asyncio.run(story())
 
 
-def test_a_patient_keeper_tries_again_what_cannot_start_the_first_time(monkeypatch):
+def test_patient_keep_retries_a_failed_first_start(monkeypatch):
     """As of a service: leaving would only have it started again at once, for ever."""
     monkeypatch.setattr("catseye.service.child.FIRST_WAIT", 0.05)
 
@@ -81,12 +81,12 @@ def test_a_patient_keeper_tries_again_what_cannot_start_the_first_time(monkeypat
         assert not task.done()
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
-        assert "did not start; started again in 0.05 s" in warned
+        assert "did not start; restarting in 0.05 s" in warned
 
     asyncio.run(asyncio.wait_for(story(), 30.0))
 
 
-def test_one_that_dies_is_started_again_and_ends_with_its_keeper():
+def test_dead_child_is_restarted_and_ends_with_its_parent():
     async def story():
         said, warned = [], []
         one = child(SPEAKS, said, warned)
@@ -108,7 +108,7 @@ def test_one_that_dies_is_started_again_and_ends_with_its_keeper():
     asyncio.run(story())
 
 
-def test_it_does_not_outlive_a_keeper_that_is_killed():
+def test_child_does_not_outlive_a_killed_parent():
     keeper = (
         "import asyncio, sys\n"
         "from catseye.service.child import LiveChild\n"

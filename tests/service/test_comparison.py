@@ -1,4 +1,4 @@
-"""Epochs beside the truth: what is put in is found, and a claim that is true is found true."""
+"""Epochs beside the truth: planted errors and claims are recovered."""
 
 from dataclasses import replace
 
@@ -48,7 +48,7 @@ def still(motion):
 
 
 @pytest.mark.parametrize("motion", ["fixed 145.3 30", "slew 145.3 30 150 35"])
-def test_on_a_telescope_that_does_not_bend_the_truth_is_where_the_point_is_at_the_instant(motion):
+def test_truth_of_a_rigid_telescope_is_the_position_at_the_instant(motion):
     """While it slews by degrees in ten seconds: half a micrometre is what ticks and told angles are rounded to."""
     world = still(motion)
     x = np.array(list(world.truth(NAMES, world.seconds_of_ticks(world.ticks(5.0))).values()))
@@ -58,7 +58,7 @@ def test_on_a_telescope_that_does_not_bend_the_truth_is_where_the_point_is_at_th
     assert found.mean_u_mm == pytest.approx(0.01)
 
 
-def test_a_difference_that_is_put_in_is_found():
+def test_planted_difference_is_recovered():
     world = still("slew 145.3 30 150 35")
     x = np.array(list(world.truth(NAMES, 5.0).values()))
     x[2] += (0.003, -0.004, 0.0)
@@ -68,7 +68,7 @@ def test_a_difference_that_is_put_in_is_found():
     assert found.chi2 == pytest.approx(25.0 / 15.0, rel=0.02)
 
 
-def test_a_claim_that_is_true_is_found_true_and_a_false_one_false():
+def test_true_claims_fit_and_false_claims_do_not():
     """Drawn from correlated covariances 200 times: 99 % within the band, so 190 to 200; half the u never, at 15."""
     world, rng = still("fixed 145.3 30"), np.random.default_rng(8)
     root = rng.normal(size=(15, 15)) * 1e-4
@@ -79,7 +79,7 @@ def test_a_claim_that_is_true_is_found_true_and_a_false_one_false():
     assert sum(compared(world, each, covariance / 4.0).fits for each in draws) < 100
 
 
-def test_points_with_too_few_shots_or_that_do_not_last_are_left_out():
+def test_points_with_few_shots_or_not_tracked_are_left_out():
     world = still("fixed 145.3 30")
     names = (*NAMES, "DP01C", "ZY101-F")
     x = np.array(list(world.truth(names, 5.0).values()))
@@ -87,12 +87,12 @@ def test_points_with_too_few_shots_or_that_do_not_last_are_left_out():
     assert compared(world, x[:5], np.eye(15), count=2) is None
 
 
-def test_an_epoch_that_gave_nothing_is_not_compared():
+def test_epoch_without_solution_is_not_compared():
     judge = TwinComparison(site(), still("fixed 145.3 30"), reference_after=1)
     assert judge.epoch(EpochSolution(0, {})) is None
 
 
-def test_the_beams_truth_is_what_the_telescope_did_since_the_reference_epoch():
+def test_true_beam_offset_counts_from_the_reference_epoch():
     """Nothing in the reference epoch; then elevation rises by degrees, and gravity moves the arm by some 0.1 mm."""
     world = twin("slew 145.3 30 145.3 34", planted=only("gravity"))
     prisms = (n for n in site().target_names if n.startswith("TR") and n.endswith(("-L", "-R")))
@@ -114,7 +114,7 @@ def test_the_beams_truth_is_what_the_telescope_did_since_the_reference_epoch():
     assert 1e-6 < np.linalg.norm(found[1].true_offset[:2]) < 1e-3
 
 
-def test_the_truth_of_a_shaking_point_is_its_mean_over_the_epochs_shots():
+def test_truth_of_a_vibrating_point_is_its_mean_over_the_shots():
     """The arm's tip shakes by some 0.05 mm; the mean at the shots' times is met to a micrometre, an instant is not."""
     world = twin("fixed 145.3 30", planted=only("vibration"))
     middles = np.linspace(0.5, 9.5, len(NUMBERS)) + 0.064
@@ -125,7 +125,7 @@ def test_the_truth_of_a_shaking_point_is_its_mean_over_the_epochs_shots():
     assert at_once > 3.0 * found.worst_mm
 
 
-def test_a_shot_is_of_the_middle_of_its_buffer():
+def test_shot_time_is_the_middle_of_its_buffer():
     """All shots of one buffer while the arm's tip shakes: the truth of its middle is met, that of its begin is not."""
     world = twin("fixed 145.3 30", planted=only("vibration"))
     judge = {}
@@ -141,7 +141,7 @@ def test_a_shot_is_of_the_middle_of_its_buffer():
     assert met[5.0] > 10.0 * met[5.064]
 
 
-def test_shots_that_come_while_an_epoch_is_solved_are_of_the_next_one():
+def test_shots_during_a_solution_belong_to_the_next_epoch():
     """The telescope slews: were the second epoch held against the times of none, or of the first, it would be off."""
     world = still("slew 145.3 30 150 35")
     judge = TwinComparison(site(), world, reference_after=1)

@@ -1,4 +1,4 @@
-"""Faults on command: named when they are found, and when they are not."""
+"""Injected faults: detected, or reported as not detected."""
 
 from typing import get_args
 
@@ -29,7 +29,7 @@ def found_after(fault, *happenings):
     return None if after is None else round(after, 2)
 
 
-def test_every_kind_of_fault_has_signs():
+def test_every_kind_of_fault_has_indicating_events():
     assert set(SIGNS) == set(get_args(Kind))
 
 
@@ -58,11 +58,11 @@ def test_every_kind_of_fault_has_signs():
         ("silent-telescope telescope 5", told(8.0, "telescope", "telescope-silent"), 3.0),
     ],
 )
-def test_a_fault_is_found_by_a_sign_of_it_where_and_when_it_is(fault, by, after):
+def test_fault_is_detected_by_an_event_at_its_place_and_time(fault, by, after):
     assert found_after(fault, by) == after
 
 
-def test_the_first_sign_counts_and_people_and_programs_are_told_of_both_kinds():
+def test_first_event_counts_in_text_and_json():
     world = TwinWords(START, faults=("dead-ranger ZY104 40 60", "lying-station WX2 30 90 0.2", "dew ZBM01 500"))
     book = LiveBook(finder=FaultFinder(world.faults, START))
     said = []
@@ -75,18 +75,18 @@ def test_the_first_sign_counts_and_people_and_programs_are_told_of_both_kinds():
         "2024-11-21T03:00:40.39Z  fault dead-ranger ZY104 40 60: found after 0.4 s (lost: ZY104: lost was seen)"
     ]
     passages = dict(summary(book, world, None, seconds=60.0, rangers=18, told=0))
-    assert passages["Noticed"].startswith(
+    assert passages["Events"].startswith(
         "dead-ranger ZY104 40 60: found after 0.4 s (lost: ZY104: lost was seen); lying-station WX2 30 90 0.2: "
-        "not noticed; dew ZBM01 500: begins in 400 s; "
+        "not detected; dew ZBM01 500: begins in 400 s; "
     )
-    assert passages["Faults"].endswith("not noticed: lying-station WX2 30 90 0.2.")
+    assert passages["Faults"].endswith("not detected: lying-station WX2 30 90 0.2.")
     found = simulation_object(book, world, None, seconds=60.0, rangers=18, told=0)["found"]
     assert [each["kind"] for each in found] == ["lost", None, None]
     assert found[0]["after_s"] == pytest.approx(0.4, abs=1e-3)
     assert found[0]["text"] == "ZY104: lost was seen"
 
 
-def test_one_happening_is_a_sign_of_one_fault_the_most_exact():
+def test_event_is_assigned_to_the_most_specific_fault():
     finder = FaultFinder(["dew * 10", "blocked-beam ZY103 10"], START)
     for seconds in (12.0, 25.0):
         finder.heard(told(seconds, "coordinator", "blocked", ranger="ZY103", target="ZBM05"))

@@ -1,4 +1,4 @@
-"""Journals looked after: copies of a running one, and what is told of one that was tampered with."""
+"""Backups of running journals, and checks of altered ones."""
 
 import os
 import shutil
@@ -65,14 +65,14 @@ def night(tmp_path):
 # What only a head can show -------------------------------------------------------------------------------------------
 
 
-def test_a_verdict_says_whether_heads_were_asked_for(night):
+def test_verdict_states_if_heads_were_given(night):
     path, (first, last) = night
     assert verdict(path).word == "good"
     assert "checked against no head" in verdict(path).why
     assert verdict(path, first, last).why.endswith("which contains the 2 given heads")
 
 
-def test_a_last_run_that_was_deleted_whole_is_found_by_its_head_in_one_line(night):
+def test_deleted_last_run_is_detected_by_its_head(night):
     path, (first, last) = night
     with sqlite3.connect(path) as connection:
         tables = [name for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
@@ -83,16 +83,16 @@ def test_a_last_run_that_was_deleted_whole_is_found_by_its_head_in_one_line(nigh
     assert verdict(path, first).word == "good"
     found = verdict(path, first, last)
     assert found.word == "failed"
-    assert f"no run has head {last}, which was told: a run was deleted, cut or written anew" in found.why
+    assert f"no run has the given head {last}: a run was deleted, cut or rewritten" in found.why
 
 
-def test_a_head_is_looked_for_in_the_run_that_is_named(night):
+def test_head_is_searched_in_the_selected_run(night):
     path, (first, last) = night
     assert verdict(path, first, run=1).word == "good"
     assert verdict(path, last, run=1).word == "failed"
 
 
-def test_behind_each_epoch_the_head_is_told_to_all_who_subscribe_to_events():
+def test_head_is_published_to_subscribers_after_each_epoch():
     """What is in the journal as an event was pushed: in a run of two epochs, and the heads are its chain's."""
     with JournalReader(recorded()) as reader:
         entries = list(reader.events(1, kinds=["happenings", "solutions"]))
@@ -112,22 +112,22 @@ def test_behind_each_epoch_the_head_is_told_to_all_who_subscribe_to_events():
 @pytest.mark.parametrize(
     ("script", "words"),
     [
-        ("DELETE FROM chain", "the run has no chain in a journal of version 2: it was taken away"),
-        ("DELETE FROM chain WHERE run = 1", "the run has no chain in a journal of version 2: it was taken away"),
-        ("DELETE FROM chain WHERE run = 2", "the run has no chain in a journal of version 2: it was taken away"),
+        ("DELETE FROM chain", "the run has no chain in a journal of version 2: it was removed"),
+        ("DELETE FROM chain WHERE run = 1", "the run has no chain in a journal of version 2: it was removed"),
+        ("DELETE FROM chain WHERE run = 2", "the run has no chain in a journal of version 2: it was removed"),
         ("DROP TABLE chain", "table 'chain' is missing (expected in a journal of version 2)"),
         ("DROP TABLE parts", "table 'parts' is missing"),
         ("DROP TABLE weather", "table 'weather' is missing"),
         (
             "UPDATE journal SET version = 1",
-            "its version is 1 and it has the table 'chain' of version 2",
+            "its version is 1, but it has the table 'chain' of version 2",
         ),
         ("UPDATE journal SET version = 1; DROP TABLE chain", "the table 'parts' of version 2"),
         ("DELETE FROM chain; UPDATE journal SET version = 1", "the version was set back"),
-        ("DELETE FROM chain WHERE run = 1; UPDATE runs SET catseye = '0.0.1' WHERE run = 1", "it was taken away"),
+        ("DELETE FROM chain WHERE run = 1; UPDATE runs SET catseye = '0.0.1' WHERE run = 1", "it was removed"),
     ],
 )
-def test_a_chain_that_was_taken_away_is_no_older_catseye(night, script, words):
+def test_removed_chain_is_not_taken_for_an_older_version(night, script, words):
     path, _ = night
     found = verdict(altered(path, script))
     assert found.word == "failed"
@@ -143,7 +143,7 @@ def test_a_chain_that_was_taken_away_is_no_older_catseye(night, script, words):
         ("ALTER TABLE weather RENAME TO w; CREATE VIEW weather AS SELECT * FROM w", 18),
     ],
 )
-def test_a_table_that_was_taken_away_hides_no_altered_shot_from_an_export(night, tmp_path, taken, left):
+def test_missing_table_hides_no_altered_shot_from_an_export(night, tmp_path, taken, left):
     """Two of twenty shots are altered; what contradicts its link is left out, whatever else is missing."""
     path, _ = night
     altered(path, f"UPDATE shots SET range_m = range_m + 1 WHERE run = 2 AND number IN (3, 7); {taken}")
@@ -154,7 +154,7 @@ def test_a_table_that_was_taken_away_hides_no_altered_shot_from_an_export(night,
 
 
 @pytest.mark.parametrize("script", ["DROP TABLE chain", "DELETE FROM chain WHERE run = 2"])
-def test_an_export_without_a_chain_says_that_nothing_vouches_for_it(night, tmp_path, script):
+def test_export_without_chain_is_doubtful(night, tmp_path, script):
     path, _ = night
     found = exported(str(altered(path, script)), tmp_path / "out", "csv", damaged=True, progress=quiet)
     assert found.rows["shots"] == 20  # nothing was left out
@@ -162,14 +162,14 @@ def test_an_export_without_a_chain_says_that_nothing_vouches_for_it(night, tmp_p
     assert found.verdict.why.startswith("nothing vouches for any of it: ")
 
 
-def test_a_chain_and_a_version_that_were_taken_away_are_shown_by_any_head(night):
+def test_removed_chain_and_version_are_detected_by_any_head(night):
     path, (_, last) = night
     altered(path, "UPDATE journal SET version = 1; DROP TABLE chain; DROP TABLE parts")
     assert verdict(path).word == "doubtful"  # as an older catseye wrote it: nothing of it was checked
     assert verdict(path, last).word == "failed"
 
 
-def test_a_run_of_an_older_catseye_is_still_that_in_a_journal_that_went_on(tmp_path):
+def test_run_of_an_older_version_is_recognised_in_a_newer_journal(tmp_path):
     path = tmp_path / "old.db"
     shutil.copy(FORMATS / "journal-1.db", path)
     assert verdict(path).word == "doubtful"
@@ -183,7 +183,7 @@ def test_a_run_of_an_older_catseye_is_still_that_in_a_journal_that_went_on(tmp_p
 
 @pytest.mark.parametrize("value", ["'zzz'", "x'ff00'", "-5", "5.5", str(10**15), str(2**63 - 1)])
 @pytest.mark.parametrize("table", ["chain", "postures"])
-def test_a_row_by_a_number_that_no_event_has_hides_nothing(night, table, value):
+def test_row_with_an_unused_number_hides_nothing(night, table, value):
     """Text and bytes stand above all numbers: the highest of a table is then none, and a killed run seems empty."""
     path, _ = night
     script = "UPDATE runs SET ended_ticks = NULL; DELETE FROM chain WHERE kind = 'end';"
@@ -204,19 +204,19 @@ def test_a_row_by_a_number_that_no_event_has_hides_nothing(night, table, value):
     ("follows", "followed_by"),
     [(None, "j.db"), ("j.db", None), ("j.db", "j.db"), (None, ""), (None, "../j.db"), (None, 7)],
 )
-def test_a_file_that_names_itself_or_no_neighbour_ends_in_one_line(night, follows, followed_by):
+def test_file_linked_to_itself_or_to_none_is_refused_in_one_line(night, follows, followed_by):
     path, _ = night
     with sqlite3.connect(path) as connection:
         connection.execute("INSERT INTO parts VALUES (2, ?, ?)", (follows, followed_by))
     found = verdict(path)
     assert found.word == "failed"
-    assert "the run's other files cannot be read" in found.why
+    assert "the run's other files are unreadable" in found.why
     with JournalReader(path) as reader, pytest.raises(InputError) as caught:
         list(reader.events(2))
     assert "\n" not in str(caught.value)
 
 
-def test_two_files_that_name_each_other_for_ever_end_in_one_line(night, tmp_path):
+def test_circular_file_links_are_refused_in_one_line(night, tmp_path):
     path, _ = night
     shutil.copy(path, tmp_path / "k.db")
     altered(path, "INSERT INTO parts VALUES (2, NULL, 'k.db')")
@@ -224,7 +224,7 @@ def test_two_files_that_name_each_other_for_ever_end_in_one_line(night, tmp_path
     assert "a circle" in verdict(path).why
 
 
-def test_a_link_to_a_journal_that_is_written_is_the_journal(tmp_path):
+def test_symbolic_link_to_an_open_journal_is_the_same_journal(tmp_path):
     real, link = tmp_path / "real.db", tmp_path / "link.db"
     with Journal.open(real, run=scene_run(), clock=ManualClock(START / 1e8)) as journal:
         journal.append(*scene_entries(5)).result(MOST_WAIT)
@@ -241,7 +241,7 @@ def test_a_link_to_a_journal_that_is_written_is_the_journal(tmp_path):
     assert link.is_symlink()
 
 
-def test_a_second_name_of_a_journal_is_not_written_by(tmp_path):
+def test_hard_link_to_a_journal_is_refused_for_writing(tmp_path):
     real, other = tmp_path / "real.db", tmp_path / "other.db"
     with Journal.open(real, run=scene_run(), clock=ManualClock(START / 1e8)) as journal:
         os.link(real, other)
@@ -254,7 +254,7 @@ def test_a_second_name_of_a_journal_is_not_written_by(tmp_path):
 
 
 @pytest.mark.parametrize("table", ["shots", "happenings", "texts", "runs", "run_files", "chain", "documents"])
-def test_bytes_that_are_no_utf8_are_one_line_that_says_where(night, table):
+def test_invalid_utf8_is_reported_in_one_line_with_its_place(night, table):
     path, _ = night
     column = {"runs": "site", "run_files": "path", "chain": "kind"}.get(table, "text")
     event = f"run = 2 AND seq = (SELECT min(seq) FROM {table} WHERE run = 2 AND seq > 0)"
@@ -302,7 +302,7 @@ def running(tmp_path):
     journal.close()
 
 
-def test_a_copy_of_a_journal_that_is_written_all_the_while_ends_and_is_whole(running, tmp_path):
+def test_backup_during_writing_finishes_and_verifies(running, tmp_path):
     path, count = running
     done = []
 
@@ -321,7 +321,7 @@ def test_a_copy_of_a_journal_that_is_written_all_the_while_ends_and_is_whole(run
     ]
 
 
-def test_a_copy_that_is_interrupted_leaves_nothing(running, tmp_path):
+def test_interrupted_backup_leaves_nothing(running, tmp_path):
     seen = []
 
     def interrupted(what, done, of):
@@ -334,7 +334,7 @@ def test_a_copy_that_is_interrupted_leaves_nothing(running, tmp_path):
     assert not [name for name in os.listdir(tmp_path) if "copy" in name]
 
 
-def test_what_a_killed_backup_left_is_taken_away_by_the_next_and_a_living_ones_is_not(night, tmp_path):
+def test_leftovers_of_killed_backups_are_removed_and_of_running_ones_kept(night, tmp_path):
     path, _ = night
     dead = subprocess.Popen(["true"])
     dead.wait()
@@ -348,27 +348,27 @@ def test_what_a_killed_backup_left_is_taken_away_by_the_next_and_a_living_ones_i
     assert verdict(tmp_path / "copy.db").word == "good"
 
 
-def test_a_copy_of_what_cannot_be_read_is_refused_and_leaves_nothing(night, tmp_path):
+def test_backup_of_an_unreadable_journal_is_refused_and_leaves_nothing(night, tmp_path):
     path, _ = night
     raw = path.read_bytes()
     path.write_bytes(raw[: len(raw) // 2])
-    with pytest.raises(InputError, match="a damaged one copy the file and its log"):
+    with pytest.raises(InputError, match="a damaged one with its -wal file"):
         copied(str(path), tmp_path / "copy.db", progress=quiet)
     assert not [name for name in os.listdir(tmp_path) if "copy" in name]
 
 
-def test_a_name_that_is_taken_is_left_alone(night, tmp_path):
+def test_existing_file_is_not_overwritten(night, tmp_path):
     path, _ = night
     for name, make in (("file.db", lambda at: at.write_text("x")), ("gone.db", lambda at: at.symlink_to("nowhere"))):
         make(tmp_path / name)
-        with pytest.raises(InputError, match="is there already"):
+        with pytest.raises(InputError, match="already exists"):
             copied(str(path), tmp_path / name, progress=quiet)
         assert os.path.lexists(tmp_path / name)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_backup_in_its_own_process_ends_at_a_signal_and_leaves_nothing(running, tmp_path, number, status):
+def test_backup_process_ends_at_a_signal_and_leaves_nothing(running, tmp_path, number, status):
     path, _ = running
     for _ in range(20):
         words = [*RUN, "journal", "backup", str(path), str(tmp_path / "copy.db"), "--quiet"]

@@ -1,4 +1,4 @@
-"""The log of a living command."""
+"""Log of a running command."""
 
 import json
 import logging
@@ -23,13 +23,13 @@ def lines(*entries, **how):
     return found
 
 
-def test_people_read_time_severity_who_and_text_on_one_line():
+def test_line_has_time_severity_source_and_text():
     first, last = lines(ALARM, LiveWeather("WX1", 1, 1.0, 2.0, 3.0))
     assert first == "2003-09-07T15:12:10.00Z  alarm    ZY105        VER was not answered"
     assert last == "2003-09-07T00:00:00.00Z  warning  twin         ended"
 
 
-def test_programs_read_an_object_a_line():
+def test_json_log_has_an_object_per_line():
     told = json.loads(lines(ALARM, json=True)[0])
     assert told == {
         "time_utc": "2003-09-07T15:12:10.00Z",
@@ -42,7 +42,7 @@ def test_programs_read_an_object_a_line():
     }
 
 
-def test_colour_is_for_what_is_wrong_and_ends_with_the_line():
+def test_colour_marks_problems_and_ends_with_the_line():
     alarm, warning = lines(ALARM, colour=True)
     assert alarm.startswith("\x1b[1;31m")
     assert warning.startswith("\x1b[33m")
@@ -51,27 +51,27 @@ def test_colour_is_for_what_is_wrong_and_ends_with_the_line():
     assert "\x1b" not in note
 
 
-def test_an_epoch_is_a_line_and_one_that_gave_nothing_a_warning():
+def test_epoch_is_a_line_and_without_solution_a_warning():
     answer = {"number": 3, "names": ["A", "B"], "used": [1, 2, 3], "rejected": {"4": "no"}, "variance_factor": 0.5}
     good, empty, _ = lines(EpochSolution(0, answer), EpochSolution(0, {}))
     assert good.endswith("epoch 3: 2 points from 3 shots, 1 not used, variance factor 0.50")
     assert "warning" in empty
 
 
-def test_routine_is_for_programs_alone():
+def test_routine_is_logged_only_as_json():
     """85 % of a night's lines were warnings about single shots."""
     routine = Happening(5288963344910, "coordinator", "weak-return", "ZY110 TR07-B: 4 % of usual", "debug")
     assert len(lines(routine)) == 1, "what is told here is the child's end"
     assert json.loads(lines(routine, json=True)[0])["severity"] == "debug"
 
 
-def test_a_doubtful_epoch_says_so_in_its_line():
+def test_doubtful_epoch_is_marked_in_its_line():
     answer = {"number": 3, "names": ["A"], "used": [1], "rejected": {}, "doubts": ["WX2's thermometer is biased"]}
     told, _ = lines(EpochSolution(0, answer))
     assert told.endswith("0 not used; doubtful: WX2's thermometer is biased")
 
 
-def test_what_python_itself_logs_or_warns_of_is_a_line_like_any_other():
+def test_python_logging_and_warnings_are_logged_like_events():
     """A port that turns a browser away said so as bare text between lines of JSON."""
     found = []
     log = LiveLog(found.append, clock=ManualClock(52889.0), json=True)

@@ -1,4 +1,4 @@
-"""Rangers served by this process: ready before anybody can connect, real heads behind the same ports."""
+"""Rangers served by this process, ready before anybody can connect."""
 
 import asyncio
 import socket
@@ -16,7 +16,7 @@ from catseye.simulator.clock.world_clock import ManualClock
 from simulator.living_scene import site
 
 
-def test_ports_are_had_at_once_and_answer_only_when_they_are_opened():
+def test_ports_are_bound_at_once_and_answer_after_open():
     async def story():
         sockets = LateSockets()
         listener = await sockets.serve(asyncio.Protocol, "127.0.0.1", 0)
@@ -34,11 +34,11 @@ def test_ports_are_had_at_once_and_answer_only_when_they_are_opened():
     asyncio.run(story())
 
 
-def test_a_port_that_another_took_meanwhile_is_named():
+def test_port_taken_meanwhile_is_named():
     async def story():
         sockets = LateSockets()
         listener = await sockets.serve(asyncio.Protocol, "127.0.0.1", 0)
-        taken, said = socket.create_server(("127.0.0.1", listener.port)), f"port {listener.port} cannot be had"
+        taken, said = socket.create_server(("127.0.0.1", listener.port)), f"port {listener.port} is not available"
         with taken, pytest.raises(InputError, match=said):
             await sockets.open()
         await listener.close()
@@ -46,7 +46,7 @@ def test_a_port_that_another_took_meanwhile_is_named():
     asyncio.run(story())
 
 
-def test_warmed_rangers_are_initialised_homed_and_know_the_sun_and_their_time_is_the_worlds():
+def test_warmed_rangers_are_initialised_homed_and_have_sun_and_time():
     names = ("ZY102", "ZY113")
     world = TwinWords(60635.125)
     twin, clock = world.twin(site()), ManualClock(60635.125)
@@ -77,7 +77,7 @@ def test_warmed_rangers_are_initialised_homed_and_know_the_sun_and_their_time_is
     assert at.feed == ("127.0.0.1", 24_100)
 
 
-def test_the_warming_clock_never_passes_the_one_that_it_becomes():
+def test_warming_clock_never_passes_the_other_clock():
     clock = ManualClock(60635.125)
     warming = WarmingClock(clock, before=10.0)
     assert clock.now_ns() - warming.now_ns() == 10 * 10**9

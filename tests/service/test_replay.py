@@ -1,4 +1,4 @@
-"""A run again under another version: texts apart, numbers to the last bit, and how far they moved, in mm and in u."""
+"""Replay under another version: texts, exact numbers, and sizes of changes."""
 
 import math
 from functools import cache
@@ -49,7 +49,7 @@ def moved_by(row, change):
     return in_epoch(2, other)
 
 
-def test_the_same_version_is_identical(tmp_path):
+def test_same_version_is_identical(tmp_path):
     outcome = again(rewritten(tmp_path / "j.db"))
     assert outcome.sameness is Sameness.IDENTICAL
     assert (outcome.same, outcome.identical, outcome.cause, outcome.first) == (True, True, None, "")
@@ -72,7 +72,7 @@ def test_reworded_notes_and_reasons_are_the_same_numbers(tmp_path):
     assert (found["same"], found["identical"], found["cause"], found["parts_differing"]) == (True, False, None, {})
 
 
-def test_one_ulp_of_one_coordinate_differs_and_its_size_is_said(tmp_path):
+def test_one_ulp_of_a_coordinate_is_reported_with_its_size(tmp_path):
     names, x, u, row = seen()
     ulp = math.ulp(x[row][0])
     outcome = again(rewritten(tmp_path / "j.db", moved_by(row, lambda at: [at[0] + ulp, *at[1:]])))
@@ -91,7 +91,7 @@ def test_one_ulp_of_one_coordinate_differs_and_its_size_is_said(tmp_path):
     assert "by its solution (x)" in verdict.why
 
 
-def test_another_status_of_a_shot_in_an_epoch_differs(tmp_path):
+def test_changed_shot_status_in_an_epoch_differs(tmp_path):
     def other(entry):
         number, line = next(iter(entry.answer["rejected"].items()))
         assert line.startswith("blocked: ")
@@ -99,10 +99,10 @@ def test_another_status_of_a_shot_in_an_epoch_differs(tmp_path):
 
     outcome = again(rewritten(tmp_path / "j.db", in_epoch(2, other)))
     assert (outcome.sameness, dict(outcome.parts)) == (Sameness.DIFFERENT, {"rejected": 1})
-    assert "no point moves" in replay_verdict(outcome).why
+    assert "no point changes" in replay_verdict(outcome).why
 
 
-def test_another_status_of_a_shot_itself_differs(tmp_path):
+def test_changed_status_of_a_shot_differs(tmp_path):
     def other(entry):
         if isinstance(entry, AnsweredShot) and entry.status == "dropout":
             return AnsweredShot(entry.shot, "stuck", entry.text, entry.range_, entry.u_range, entry.misfit)
@@ -113,7 +113,7 @@ def test_another_status_of_a_shot_itself_differs(tmp_path):
     assert (outcome.shots - outcome.same_shots, outcome.same_epochs) == (1, 2)
 
 
-def test_what_no_point_shows_is_named_and_measured(tmp_path):
+def test_changes_not_in_points_are_named_and_measured(tmp_path):
     """A thermometer by 0.1 of its u, and a covariance's last bit: parts and sizes are said."""
     with JournalReader(recorded()) as reader:
         value, u = next(s for _, s in reader.solutions(1)).answer["air"]["WX1"]
@@ -130,7 +130,7 @@ def test_what_no_point_shows_is_named_and_measured(tmp_path):
     assert "°C rms" in told(outcome)["Thermometers"]
 
 
-def test_a_journal_of_version_1_that_another_version_wrote_says_how_far_this_one_moves_it(tmp_path, monkeypatch):
+def test_journal_version_1_by_another_version_reports_size_of_changes(tmp_path, monkeypatch):
     """A point of epoch 2 stored 0.3 mm to the east, notes in other words: mm, u, which point, which epoch.
 
     Sizes to 1e-9: an ulp of 50 m is 2e-11 of 0.3 mm.
@@ -153,18 +153,18 @@ def test_a_journal_of_version_1_that_another_version_wrote_says_how_far_this_one
     assert verdict.word == "doubtful"
     assert "points by up to 0.300 mm" in verdict.why
     why = [text for title, text in replay_passages(outcome) if title == "Why"]
-    assert "it is the software: catseye 0.0.9" in why[0]
+    assert "the software differs: catseye 0.0.9" in why[0]
     assert "no chain" in why[1]
 
 
-def test_without_samples_it_is_not_the_software(tmp_path):
+def test_without_samples_the_software_is_not_blamed(tmp_path):
     outcome = again(rewritten(tmp_path / "j.db", keep_buffers=False))
     assert (outcome.sameness, outcome.cause) == (Sameness.DIFFERENT, Cause.SAMPLES)
     assert replay_verdict(outcome).word == "doubtful"
-    assert "kept no samples" in told(outcome)["Why"]
+    assert "stored no samples" in told(outcome)["Why"]
 
 
-def test_the_old_journal_in_the_vectors_loads_and_is_refused_in_one_line():
+def test_old_journal_vector_loads_and_is_refused_in_one_line():
     """Its solutions are of no reduction: it says no settings to reduce it with."""
-    with pytest.raises(InputError, match="does not say how it was reduced"):
+    with pytest.raises(InputError, match="reduction settings are missing"):
         again(JOURNAL_1)

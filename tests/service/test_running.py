@@ -1,4 +1,4 @@
-"""The loop of a living command: results, signals, virtual time."""
+"""Event loop of a running command: results, signals, virtual time."""
 
 import asyncio
 import os
@@ -16,7 +16,7 @@ def handlers():
     return [signal.getsignal(number) for number in NUMBERS]
 
 
-def test_what_the_coroutine_gives_is_the_result_and_the_handlers_are_as_before():
+def test_result_is_returned_and_handlers_are_restored():
     before = handlers()
 
     async def work():
@@ -29,7 +29,7 @@ def test_what_the_coroutine_gives_is_the_result_and_the_handlers_are_as_before()
 
 
 @pytest.mark.parametrize("number", NUMBERS)
-def test_a_signal_cancels_once_and_what_ends_in_order_has_its_time(number):
+def test_signal_cancels_once_and_allows_orderly_exit(number):
     ended = []
 
     async def work():
@@ -47,7 +47,7 @@ def test_a_signal_cancels_once_and_what_ends_in_order_has_its_time(number):
     assert threading.active_count() == threads  # the alarm that would leave by force is gone
 
 
-def test_what_goes_wrong_is_raised_and_the_handlers_are_as_before():
+def test_exceptions_are_raised_and_handlers_are_restored():
     before = handlers()
 
     async def work():
@@ -58,7 +58,7 @@ def test_what_goes_wrong_is_raised_and_the_handlers_are_as_before():
     assert handlers() == before
 
 
-def test_an_hour_of_virtual_time_takes_none_and_threads_may_have_worked():
+def test_virtual_hour_takes_no_time_and_allows_threads():
     async def work():
         await asyncio.sleep(3600.0)
         return await asyncio.to_thread(lambda: 3), asyncio.get_running_loop().time()
@@ -66,7 +66,7 @@ def test_an_hour_of_virtual_time_takes_none_and_threads_may_have_worked():
     assert LiveRun(work, loop_factory=FastLoop).result() == (3, 3600.0)
 
 
-def test_all_that_ends_in_order_does_so_before_force_and_force_within_five_seconds():
+def test_orderly_exit_comes_before_a_forced_one_within_five_seconds():
     """Each wait of a command's end has its share: rangers, the journal's thread, the child."""
     order = ZiySettings().leave + 0.2 + LONGEST_LEAVE
     assert order + 0.8 <= LONGEST_END

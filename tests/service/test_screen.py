@@ -1,4 +1,4 @@
-"""The operator's screen as text: 80 x 24 and 120 x 40, alarms first, every ranger, the last events."""
+"""Operator's screen at 80 x 24 and 120 x 40: alarms, rangers, events."""
 
 import asyncio
 from io import StringIO
@@ -51,21 +51,19 @@ def at_three_in_the_morning():
     site.shot("ZY115", "blocked")
     site.event("ZY109", "lost", "ZY109: the connection was reset " + 30 * "and so on ", "warning")
     site.event("ZY104", "made-safe", "ZY104: nobody had the lease for 30 s: laser and motors are off", "alarm")
-    site.epoch(
-        9, doubts=["WX2's thermometer is biased by some +2.5 °C, or the air between the stations is of few nights"]
-    )
+    site.epoch(9, doubts=["WX2's thermometer is biased by about +2.5 °C, or the air between the stations is unusual"])
     return site
 
 
 @pytest.mark.parametrize(("width", "height"), [(80, 24), (120, 40), (200, 60), (60, 20)])
-def test_all_of_it_is_within_the_screen(width, height):
+def test_picture_fits_the_screen(width, height):
     for site in (night(), at_three_in_the_morning(), ScenedSite()):
         lines = pictured(site, width, height)
         assert len(lines) < height, "one line is the cursor's"
         assert max(map(len, lines)) <= width
 
 
-def test_every_ranger_has_its_character_and_the_characters_are_said():
+def test_every_ranger_has_a_character_explained_in_a_legend():
     lines = pictured(at_three_in_the_morning(), 80, 24)
     text = "\n".join(lines)
     wrong = {"ZY104": "D", "ZY111": "D", "ZY109": "x", "ZY115": "b"}
@@ -77,7 +75,7 @@ def test_every_ranger_has_its_character_and_the_characters_are_said():
     assert "L another's" not in legend
 
 
-def test_where_there_is_room_every_ranger_has_a_line():
+def test_tall_screen_has_a_line_per_ranger():
     lines = pictured(at_three_in_the_morning(), 120, 40)
     for name in NAMES:
         assert sum(line.strip().startswith(name) for line in lines) == 1
@@ -88,7 +86,7 @@ def test_where_there_is_room_every_ranger_has_a_line():
     assert sum("event" in line for line in lines) >= 3
 
 
-def test_eighty_by_twenty_four_at_three_in_the_morning():
+def test_small_screen_shows_alarms_first():
     """The screen itself, as the person sees it."""
     lines = [line.rstrip() for line in pictured(at_three_in_the_morning(), 80, 24)]
     assert lines == [
@@ -96,7 +94,7 @@ def test_eighty_by_twenty_four_at_three_in_the_morning():
         " ALARM   active, round 4, 15 of 18 rangers measure, 145 shots",
         "alarm    2 dark: ZY104, ZY111",
         "alarm    1 not connected: ZY109",
-        "warning  epoch 9 doubtful: WX2's thermometer is biased by some +2.5 °C, or the …",
+        "warning  epoch 9 doubtful: WX2's thermometer is biased by about +2.5 °C, or the…",
         "epoch    9 doubtful",
         "clock well   disk none   journal well   lease anna",
         "ZY101 + ZY102 + ZY103 + ZY104 D ZY105 + ZY106 + ZY107 + ZY108 + ZY109 x ZY110 +",
@@ -114,16 +112,16 @@ def test_eighty_by_twenty_four_at_three_in_the_morning():
     ]
 
 
-def test_a_quiet_night_says_that_nothing_is_wrong_and_who_commands():
+def test_quiet_night_shows_no_problems_and_the_lease_holder():
     lines = pictured(night(), 80, 24)
     assert lines[1].startswith(" WELL ")
-    assert lines[2].rstrip() == "nothing is wrong"
+    assert lines[2].rstrip() == "no problems"
     assert any(line.startswith("epoch    8 good") for line in lines)
     assert any("lease anna" in line for line in lines)
     assert [line.split()[-1] for line in lines[-10:] if "event" in line][-1] == "7"
 
 
-def test_more_problems_than_there_is_room_for_are_counted_and_alarms_are_not_what_is_left_out():
+def test_surplus_problems_are_counted_and_alarms_stay():
     site = night()
     site.links["ZY101"], site.links["ZY102"] = link(troubles=("slow",)), link(state="preparing")
     site.links["ZY103"], site.links["ZY104"] = link(connected=False), link(troubles=("leased",))
@@ -133,7 +131,7 @@ def test_more_problems_than_there_is_room_for_are_counted_and_alarms_are_not_wha
     assert lines[5].split()[:3] == ["and", "3", "more"]
 
 
-def test_the_truth_of_a_simulation_stands_where_there_is_room():
+def test_truth_of_a_simulation_is_shown_if_there_is_room():
     site = night()
     nothing = np.full(3, np.nan)
     told = EpochComparison(8, 0, 30, "TR01-B", 0.5, 0.1, 0.12, 0.9, (0.7, 1.4), nothing, nothing, nothing)
@@ -141,7 +139,7 @@ def test_the_truth_of_a_simulation_stands_where_there_is_room():
     assert any("chi² 0.90 (0.70-1.40)" in line for line in pictured(site, 80, 24))
 
 
-def test_where_nothing_becomes_durable_the_screen_goes_on():
+def test_screen_is_updated_without_durable_entries():
     """The journal is away, so nothing is published: the picture is renewed all the same."""
 
     async def story():
@@ -161,7 +159,7 @@ def test_where_nothing_becomes_durable_the_screen_goes_on():
     asyncio.run(story())
 
 
-def test_before_anything_is_known_there_is_a_screen():
+def test_screen_works_before_any_entry():
     lines = pictured(ScenedSite(), 80, 24)
     assert lines[1].startswith(" STARTING ")
     assert LiveBook().latest is None

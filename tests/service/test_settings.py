@@ -1,4 +1,4 @@
-"""Settings of a living reduction that a journal keeps."""
+"""Settings of a live reduction stored in journals."""
 
 import json
 from dataclasses import replace
@@ -16,7 +16,7 @@ REAL = st.floats(1e-6, 1e6)
 
 
 @given(REAL, REAL, st.integers(1, 99), st.sampled_from(["random_walk", "constant_velocity"]))
-def test_any_settings_come_back_from_json_as_they_were(u, jitter, after, kind):
+def test_settings_survive_the_round_trip_through_json(u, jitter, after, kind):
     usual = LiveSettings()
     told = LiveSettings(
         reduction=ReductionSettings(critical=u),
@@ -29,20 +29,20 @@ def test_any_settings_come_back_from_json_as_they_were(u, jitter, after, kind):
     assert live_settings(json.loads(json.dumps(settings_object(told))), "run 1") == told
 
 
-def test_what_is_not_said_is_as_usual():
+def test_missing_settings_have_defaults():
     assert live_settings({"live": {"u_flexure_mm": 3}}, "run 1") == LiveSettings(u_flexure_mm=3.0)
 
 
 @pytest.mark.parametrize(
     ("stored", "said"),
     [
-        ({}, "does not say how it was reduced"),
-        ({"live": {"colour": 1}}, r"live\.colour is not known"),
+        ({}, "reduction settings are missing"),
+        ({"live": {"colour": 1}}, r"live\.colour is unknown"),
         ({"live": {"reduction": {"critical": "3"}}}, r"live\.reduction\.critical = '3'"),
         ({"live": {"filter": "magic"}}, r"live\.filter = 'magic'"),
         ({"live": {"reference_after": True}}, r"live\.reference_after = True"),
     ],
 )
-def test_what_cannot_be_meant_is_refused_with_its_place(stored, said):
+def test_invalid_settings_are_refused_with_their_place(stored, said):
     with pytest.raises(InputError, match=f"run 4.*{said}"):
         live_settings(stored, "run 4")

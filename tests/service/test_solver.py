@@ -1,4 +1,4 @@
-"""Epochs solved in a process beside: the same to the last bit, whatever becomes of the process."""
+"""Epochs solved in another process: the same bits, even if it dies."""
 
 import asyncio
 import os
@@ -43,12 +43,12 @@ def gone(pid):
 
 def same(found, expected):
     np.testing.assert_array_equal(found.coordinates.x, expected.coordinates.x)
-    np.testing.assert_array_equal(found.carried.covariance, expected.carried.covariance)
-    assert found.carried.names == expected.carried.names
+    np.testing.assert_array_equal(found.state.covariance, expected.state.covariance)
+    assert found.state.names == expected.state.names
     assert [row.numbers for row in found.rows] == [row.numbers for row in expected.rows]
 
 
-def test_the_process_gives_what_solving_here_gives_and_survives_a_mistake(live, job, here):
+def test_process_gives_the_local_result_and_survives_an_error(live, job, here):
     async def story():
         solver = SolverProcess(live.site)
         solver.start()
@@ -66,7 +66,7 @@ def test_the_process_gives_what_solving_here_gives_and_survives_a_mistake(live, 
     asyncio.run(story())
 
 
-def test_killed_the_epoch_is_solved_here_and_a_new_process_begun(live, job, here):
+def test_killed_process_is_replaced_and_the_epoch_solved_locally(live, job, here):
     async def story():
         solver = SolverProcess(live.site)
         solver.start()
@@ -81,7 +81,7 @@ def test_killed_the_epoch_is_solved_here_and_a_new_process_begun(live, job, here
     asyncio.run(story())
 
 
-def test_the_process_leaves_when_its_pipe_ends(live):
+def test_process_exits_when_its_pipe_ends(live):
     solver = SolverProcess(live.site)
     solver.start()
     solver._process.stdin.close()  # as the kernel does for a coordinator that is killed
@@ -89,10 +89,10 @@ def test_the_process_leaves_when_its_pipe_ends(live):
     solver.stop()
 
 
-def test_the_site_does_not_travel_and_is_the_very_same_there(live, job):
+def test_site_is_not_sent_and_is_the_same_object(live, job):
     message = dumped(job, live.site)
     assert b"SiteFolder" not in message
     assert b"SiteFolder" in dumped(live.site, None)
     assert loaded(message, live.site).motion.site is live.site
-    with pytest.raises(Exception, match="a site is meant that nobody gave"):
+    with pytest.raises(Exception, match="message refers to a site before one was sent"):
         loaded(message, None)

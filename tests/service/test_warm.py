@@ -1,4 +1,4 @@
-"""Starts at any hour: a mirror whose index looks at the Sun leaves it, or rests dark; the others serve."""
+"""Start at any hour: mirrors that look at the Sun, missing indices."""
 
 import asyncio
 from functools import cache
@@ -59,7 +59,7 @@ def worst(count):
     return [(hour, name) for _, hour, name in pairs[:count]]
 
 
-def test_the_sun_at_an_index_is_what_the_ranger_sees():
+def test_sun_at_an_index_agrees_with_the_ranger():
     hour, name = worst(1)[0]
     vantage = vantages_of(gbt())[name]
     own = own_sun(gbt().site.site)(YEAR + hour / 24.0)
@@ -68,7 +68,7 @@ def test_the_sun_at_an_index_is_what_the_ranger_sees():
     )
 
 
-def test_what_each_mirror_does_at_each_hour_of_a_year():
+def test_mirror_behaviour_at_each_hour_of_a_year():
     """It is lit, or it leaves by a move on which it never comes nearer, or it waits for a time that is known."""
     lit = left = waiting = 0
     for name, vantage in vantages_of(gbt()).items():
@@ -97,7 +97,7 @@ def test_what_each_mirror_does_at_each_hour_of_a_year():
 @pytest.mark.parametrize(
     ("hour", "name"), [pytest.param(*pair, marks=[pytest.mark.slow] * (k >= 2)) for k, pair in enumerate(worst(20))]
 )
-def test_a_site_starts_when_a_mirror_looks_at_the_sun(hour, name):
+def test_site_starts_with_a_mirror_looking_at_the_sun(hour, name):
     served, warned = started(YEAR + hour / 24.0 - 0.01)
     assert warned == []
     ranger = served[name]
@@ -113,7 +113,7 @@ def test_a_site_starts_when_a_mirror_looks_at_the_sun(hour, name):
     )
 
 
-def test_a_ranger_that_does_not_find_its_index_stays_dark_and_the_others_serve():
+def test_ranger_without_index_stays_dark_and_others_serve():
     served, warned = started(61000.0, faults=("lost-index ZY105:0 0",))
     assert len(warned) == 1
     assert warned[0].startswith("ZY105 stays dark: FHM 0 was refused: ")

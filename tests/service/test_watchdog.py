@@ -1,4 +1,4 @@
-"""Signs of life to a service manager."""
+"""Watchdog signals to a service manager."""
 
 import asyncio
 import os
@@ -30,7 +30,7 @@ def told(sock):
             return found
 
 
-def test_without_a_manager_nothing_is_told():
+def test_without_a_manager_nothing_is_sent():
     assert not notify("READY=1", {})
     assert not notify("READY=1", {"NOTIFY_SOCKET": "/none/such"})
     assert watchdog_seconds({}) is None
@@ -39,7 +39,7 @@ def test_without_a_manager_nothing_is_told():
     assert watchdog_seconds({"WATCHDOG_USEC": "3000000", "WATCHDOG_PID": str(os.getpid())}) == 3.0
 
 
-def test_the_loop_gives_signs_of_life_more_often_than_asked(manager):
+def test_watchdog_signals_are_sent_well_before_the_timeout(manager):
     sock, environment = manager
     heard = []
 
@@ -58,14 +58,14 @@ def test_the_loop_gives_signs_of_life_more_often_than_asked(manager):
     assert len([text for text in heard if text == "WATCHDOG=1"]) >= 4
 
 
-def test_a_manager_that_does_not_read_is_not_waited_for(manager):
+def test_loop_does_not_wait_for_an_unresponsive_manager(manager):
     _, environment = manager
     given = [notify("WATCHDOG=1", environment) for _ in range(2000)]
     assert given[0]
     assert not given[-1]  # its queue is full
 
 
-def test_without_a_watchdog_it_is_ready_and_that_is_all(manager):
+def test_without_a_watchdog_only_readiness_is_sent(manager):
     sock, environment = manager
 
     async def story():

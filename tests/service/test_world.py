@@ -1,4 +1,4 @@
-"""A twin in words: the same words make the same twin in every process."""
+"""Options of a twin: equal options make equal twins."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from catseye.service.world import TwinWords
 from simulator.living_scene import site
 
 
-def test_its_options_say_the_same_world_to_another_process(monkeypatch):
+def test_options_recreate_the_same_twin_in_another_process(monkeypatch):
     import catseye.cli.live.zy as command
     from catseye.cli.commands import app, join_commands
 
@@ -32,13 +32,13 @@ def test_its_options_say_the_same_world_to_another_process(monkeypatch):
 
 
 @pytest.mark.parametrize("offset", [None, 0.0, -864_000.0, 1e8])
-def test_without_a_start_a_twins_seconds_begin_now_by_its_own_time(offset):
+def test_without_a_start_the_twin_begins_now_in_its_own_time(offset):
     world = TwinOptions().world(offset)
     assert world.twin(site()).seconds(world.clock().now_ns()) == pytest.approx(0.0, abs=30.0)
     assert world.offset == pytest.approx(offset or 0.0, abs=30.0)
 
 
-def test_two_of_the_same_words_tell_the_same_truth_and_time():
+def test_equal_options_give_equal_truth_and_time():
     one, two = (TwinWords(60635.125, seed=3, offset=12.5) for _ in "ab")
     a, b = one.twin(site()).point("ZEG41040L", 7.0), two.twin(site()).point("ZEG41040L", 7.0)
     assert np.array_equal(a, b)
@@ -47,7 +47,7 @@ def test_two_of_the_same_words_tell_the_same_truth_and_time():
     assert low - 10**7 <= middle <= high + 10**7  # each read UTC once, between which its steps would show
 
 
-def test_one_that_starts_now_reads_its_start_and_one_that_is_late_reads_earlier():
+def test_starting_now_reads_the_start_and_late_reads_earlier():
     world = TwinWords.starting_now(52889.25)
     assert world.twin(site()).seconds(world.clock().now_ns()) == pytest.approx(0.0, abs=30.0)
     late = world.late(100.0)
@@ -55,7 +55,7 @@ def test_one_that_starts_now_reads_its_start_and_one_that_is_late_reads_earlier(
 
 
 @pytest.mark.parametrize("words", [{"motion": "dance"}, {"faults": ("sleepy ZY101",)}, {"conditions": "nice"}])
-def test_what_there_is_not_is_refused(words):
+def test_unknown_options_are_refused(words):
     with pytest.raises(InputError, match="expected"):
         TwinWords(60635.125, **words)
 
@@ -63,19 +63,19 @@ def test_what_there_is_not_is_refused(words):
 @pytest.mark.parametrize(
     ("fault", "said"),
     [
-        ("dead-ranger ZY999", "ZY999 is no ranger"),
-        ("lying-station ZY101", "ZY101 is no weather station"),
-        ("silent-telescope ZY101", "is no telescope"),
-        ("dew ZY999", "no target"),
-        ("stuck-axis ZY101:2", "2 is no axis"),
-        ("blocked-beam ZY101:NOWHERE", "NOWHERE is no target"),
+        ("dead-ranger ZY999", "unknown ranger ZY999"),
+        ("lying-station ZY101", "unknown weather station ZY101"),
+        ("silent-telescope ZY101", "unknown telescope"),
+        ("dew ZY999", "unknown target"),
+        ("stuck-axis ZY101:2", "2 is not an axis"),
+        ("blocked-beam ZY101:NOWHERE", "unknown target NOWHERE"),
     ],
 )
-def test_a_fault_on_nobody_is_refused(fault, said):
+def test_fault_on_an_unknown_device_is_refused(fault, said):
     with pytest.raises(InputError, match=said):
         TwinWords(60635.125, faults=(fault,)).twin(site())
 
 
 @pytest.mark.parametrize("fault", ["dead-ranger *", "blocked-beam ZY101:ZEG41040L", "lost-index ZY101:1", "dew *"])
-def test_a_fault_on_somebody_is_not(fault):
+def test_fault_on_a_known_device_is_accepted(fault):
     assert TwinWords(60635.125, faults=(fault,)).twin(site()).faults.faults[0].whom == fault.split()[1]

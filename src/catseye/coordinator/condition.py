@@ -1,4 +1,4 @@
-"""Condition of a site in one look, for an operator's screen and for STATUS: what is wrong first, then who measures."""
+"""Condition of a site for screen and STATUS: problems, rangers."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -15,11 +15,11 @@ from catseye.records.night.live import Severity
 from catseye.verdict import Verdict
 
 START_UP = 120.0  # s in which rangers are made ready and the first round is planned
-NOTHING_FIRED = 45.0  # s: some rounds
+NO_SHOT = 45.0  # s: some rounds
 IDLE = 120.0  # s without a shot, when a ranger counts as idle
 NO_EPOCH = 90.0  # s without a solution
 MOST_NAMES = 3
-SIGNS = {  # a character each, for where there is no room
+SIGNS = {  # a character each, for narrow screens
     "measures": "+",
     "last shot failed": "b",
     "idle": ".",
@@ -31,7 +31,7 @@ SIGNS = {  # a character each, for where there is no room
     "trouble": "!",
     "left out": "o",
 }
-WRONG: dict[str, Severity] = {  # of a ranger, and how bad it is
+WRONG: dict[str, Severity] = {  # states of a ranger, and their severity
     "idle": "warning",
     "dark": "alarm",
     "suspended": "warning",
@@ -45,7 +45,7 @@ WRONG: dict[str, Severity] = {  # of a ranger, and how bad it is
 
 @dataclass(frozen=True)
 class StandingProblem:
-    """Something that stands, in one line."""
+    """An ongoing problem, in one line."""
 
     severity: Severity
     text: str
@@ -55,16 +55,16 @@ class StandingProblem:
 class SiteCondition:
     """A site at one instant.
 
-    word       "starting", "well", "impaired", "alarm", or "stopped" where nothing is fired
+    word       "starting", "well", "impaired", "alarm", or "stopped" if no shots are taken
     problems   alarms first
     rangers    name: a word of `SIGNS`
-    troubles   name: what lasts with a ranger, kinds of happenings
+    troubles   name: ongoing conditions of a ranger, kinds of events
     epoch      number of the last epoch, 0 before the first
     verdict    on the last epoch; None before the first
-    clock      "well" or what is wrong
-    disk       of the journal: what is left; "none" without one
-    journal    "well" or what is wrong
-    holder     who may command the coordinator, "nobody"
+    clock      "well" or the problem
+    disk       of the journal: free space; "none" without one
+    journal    "well" or the problem
+    holder     holder of the coordinator's lease, "nobody"
     """
 
     word: str
@@ -85,13 +85,13 @@ class SiteCondition:
 
 
 class ConditionWatch:
-    """Judge of a site's condition, fed with durable entries.
+    """Assessment of a site's condition from durable entries.
 
     mode              of the coordinator
-    clock_believed    whether the host's clock is
-    telescope_known   whether its posture is fresh
+    clock_believed    True if the host's clock is trusted
+    telescope_known   True if its posture is recent
 
-    `disk` and `holder` are set by those who know them.
+    `disk` and `holder` are set from outside.
     """
 
     def __init__(
@@ -108,14 +108,14 @@ class ConditionWatch:
         self._clock, self._links, self._firing, self._intake = clock, links, firing, intake
         self._mode, self._clock_believed, self._telescope_known = mode, clock_believed, telescope_known
         self._began = ticks_now(clock)
-        self._last: dict[str, tuple[int, bool]] = {}  # of each ranger's last shot: ticks of now, whether it was good
+        self._last: dict[str, tuple[int, bool]] = {}  # each ranger's last shot: ticks of arrival, True if good
         self._epoch, self._solved = 0, self._began
         self._verdict: Verdict | None = None
         self.disk: DiskState | None = None
         self.holder = "nobody"
 
     def entry(self, entry: Entry) -> None:
-        """Take in what is durable."""
+        """Take in one durable journal entry."""
         if isinstance(entry, AnsweredShot):
             self._last[entry.shot.ranger] = ticks_now(self._clock), entry.status in GOOD
         elif isinstance(entry, EpochSolution):
@@ -152,7 +152,7 @@ class ConditionWatch:
 
     @property
     def _fired_since(self) -> float:
-        """s since the last shot, or since the start."""
+        """Time since the last shot, or since the start, s."""
         return self._since(max((ticks for ticks, _ in self._last.values()), default=self._began))
 
     def _ranger(self, name: str, link: RangerLink) -> str:
@@ -178,37 +178,37 @@ class ConditionWatch:
 
     def _machine(self) -> list[StandingProblem]:
         """Problems of journal, clock and disk."""
-        found = []
+        problems = []
         if self._intake.trouble is not None:
-            found.append(StandingProblem("alarm", f"journal: {self._intake.trouble}: nothing is measured"))
+            problems.append(StandingProblem("alarm", f"journal: {self._intake.trouble}: measuring suspended"))
         if not self._clock_believed():
-            found.append(StandingProblem("alarm", "clock: this machine's is in doubt: nothing is fired"))
+            problems.append(StandingProblem("alarm", "clock: this machine's clock is in doubt: no shots are taken"))
         if self.disk is not None and self.disk.seconds < A_DAY:
             severity: Severity = "alarm" if self.disk.seconds < AN_HOUR else "warning"
-            found.append(StandingProblem(severity, f"disk: full in {span_text(self.disk.seconds)}"))
-        return found
+            problems.append(StandingProblem(severity, f"disk: full in {span_text(self.disk.seconds)}"))
+        return problems
 
     def _measuring(self) -> list[StandingProblem]:
         """Problems of mode, telescope, shots and epochs."""
-        found = []
+        problems = []
         mode, quiet, unsolved = self._mode(), self._fired_since, self._since(self._solved)
         if mode != "active":
-            found.append(StandingProblem("warning", f"mode {mode}: nothing is fired"))
-        elif quiet > NOTHING_FIRED and not self._starting:
-            found.append(StandingProblem("alarm", f"no shot for {span_text(quiet)}"))
+            problems.append(StandingProblem("warning", f"mode {mode}: no shots are taken"))
+        elif quiet > NO_SHOT and not self._starting:
+            problems.append(StandingProblem("alarm", f"no shot for {span_text(quiet)}"))
         if not self._telescope_known() and not self._starting:
-            found.append(StandingProblem("alarm", "telescope: no posture: targets on it are not measured"))
+            problems.append(StandingProblem("alarm", "telescope: no posture, targets on it are not measured"))
         if self._verdict is not None and self._verdict.word != "good":
             severity: Severity = "alarm" if self._verdict.word == "failed" else "warning"
-            found.append(
+            problems.append(
                 StandingProblem(severity, f"epoch {self._epoch or 'none'} {self._verdict.word}: {self._verdict.why}")
             )
         elif mode == "active" and unsolved > NO_EPOCH and not self._starting:
-            found.append(StandingProblem("alarm", f"no epoch for {span_text(unsolved)}"))
-        return found
+            problems.append(StandingProblem("alarm", f"no epoch for {span_text(unsolved)}"))
+        return problems
 
     def _word(self, problems: list[StandingProblem]) -> str:
-        if self._mode() != "active" or (self._fired_since > NOTHING_FIRED and not self._starting):
+        if self._mode() != "active" or (self._fired_since > NO_SHOT and not self._starting):
             return "stopped"
         worst = {problem.severity for problem in problems}
         for severity, word in (("alarm", "alarm"), ("warning", "impaired")):
@@ -218,19 +218,19 @@ class ConditionWatch:
 
 
 def _of_rangers(rangers: Mapping[str, str], *, starting: bool) -> list[StandingProblem]:
-    """A line for each way in which rangers do not measure; while they start, being made ready is none."""
-    found = []
+    """A problem per state in which rangers do not measure."""
+    problems = []
     for word, severity in WRONG.items():
-        names = [name for name, each in rangers.items() if each == word]
+        names = [name for name, state in rangers.items() if state == word]
         if names and not (starting and word in ("not ready", "not connected", "dark", "idle")):
             more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-            found.append(StandingProblem(severity, f"{len(names)} {word}: {', '.join(names[:MOST_NAMES])}{more}"))
-    return found
+            problems.append(StandingProblem(severity, f"{len(names)} {word}: {', '.join(names[:MOST_NAMES])}{more}"))
+    return problems
 
 
 def verdict_of(solution: EpochSolution) -> Verdict:
-    """Verdict on an epoch: failed where nothing was solved, doubtful by its own doubts, else good."""
+    """Verdict on an epoch: failed without a solution, doubtful by its doubts, else good."""
     if not solution.answer:
-        return Verdict("failed", "nothing could be solved")
+        return Verdict("failed", "no solution")
     points, doubts = len(solution.answer.get("names") or ()), solution.answer.get("doubts") or ()
     return Verdict("good", f"{points} points").hearing(doubts)

@@ -1,4 +1,4 @@
-"""Telling what happened: once when something begins and once when it ends, and not the same thing again and again."""
+"""Event log with repetition limit and ongoing conditions."""
 
 from dataclasses import dataclass
 
@@ -6,28 +6,28 @@ from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, Tell, ticks_now
 from catseye.records.night.live import Happening, Severity
 
 QUIET = 10.0  # s between two of one kind
-MOST_KINDS = 4096  # kept; the oldest are forgotten
+MOST_KINDS = 4096  # remembered; the oldest are forgotten
 
 
 @dataclass
-class _Said:
+class _LoggedEvent:
     ticks: int
     unsaid: int = 0
 
 
 class EventLog:
-    """What one of the coordinator's parts has to say.
+    """Events of one of the coordinator's parts.
 
     who     a ranger, "telescope", "feed" ...
     clock   UTC
-    tell    where it goes
-    quiet   s in which something of the same kind and about the same is counted, not told
+    tell    receiver of the events
+    quiet   s in which a repeated event of the same kind and subject is only counted
     """
 
     def __init__(self, who: str, clock: Clock, tell: Tell, *, quiet: float = QUIET):
         self.who, self._clock, self._tell = who, clock, tell
         self._quiet = round(quiet * TICKS_PER_SECOND)
-        self._said: dict[tuple[str, str], _Said] = {}
+        self._logged: dict[tuple[str, str], _LoggedEvent] = {}
         self._standing: dict[str, str] = {}
 
     def tell(
@@ -40,57 +40,57 @@ class EventLog:
         always: bool = False,
         **details: float | str,
     ) -> None:
-        """Something happened.
+        """Log an event.
 
         kind      one word with hyphens
-        about     whom else it touches, such as a target: told apart within the quiet time
-        always    told also within the quiet time
-        details   for programs; `unsaid` counts those of the same kind that were kept back before
+        about     further subject, such as a target: events of different subjects are not repetitions
+        always    log also within the quiet time
+        details   for programs; `unsaid` counts suppressed events of the same kind before
         """
-        now = ticks_now(self._clock)
-        before = self._said.get((kind, about))
-        if before is not None and not always and 0 <= now - before.ticks < self._quiet:
+        now_ticks = ticks_now(self._clock)
+        before = self._logged.get((kind, about))
+        if before is not None and not always and 0 <= now_ticks - before.ticks < self._quiet:
             before.unsaid += 1
             return
         if before is not None and before.unsaid:
             details["unsaid"] = float(before.unsaid)
-        self._said.pop((kind, about), None)
-        self._said[kind, about] = _Said(now)
-        self._forget(now)
-        self._tell(Happening(now, self.who, kind, text, severity, details))
+        self._logged.pop((kind, about), None)
+        self._logged[kind, about] = _LoggedEvent(now_ticks)
+        self._forget(now_ticks)
+        self._tell(Happening(now_ticks, self.who, kind, text, severity, details))
 
-    def _forget(self, now: int) -> None:
-        """Forget what keeps nothing back any more: two of the oldest, since each time one comes.
+    def _forget(self, now_ticks: int) -> None:
+        """Forget two of the oldest kinds outside the quiet time.
 
-        One that was kept back stands behind the others until its kind is told again.
+        A kind with suppressed events moves behind the others until it is logged again.
         """
         for _ in range(2):
-            key, oldest = next(iter(self._said.items()))
-            full = len(self._said) > MOST_KINDS
-            if 0 <= now - oldest.ticks < self._quiet and not full:
+            key, oldest = next(iter(self._logged.items()))
+            full = len(self._logged) > MOST_KINDS
+            if 0 <= now_ticks - oldest.ticks < self._quiet and not full:
                 return
-            del self._said[key]
+            del self._logged[key]
             if oldest.unsaid and not full:
-                self._said[key] = oldest
+                self._logged[key] = oldest
 
     def standing(
         self, kind: str, text: str | None, severity: Severity = "warning", *, over: str = "", **details: float | str
     ) -> None:
-        """A state that lasts: told when it begins (a text where there was none) and when it is over (None).
+        """Log an ongoing condition at its start (text) and end (None).
 
-        over   what is said at its end; nothing where empty
+        over   text at its end; "" for no event
         """
-        began = self._standing.get(kind)
+        previous = self._standing.get(kind)
         if text is not None:
             self._standing[kind] = text
-            if began is None:
+            if previous is None:
                 self._tell(Happening(ticks_now(self._clock), self.who, kind, text, severity, details))
-        elif began is not None:
+        elif previous is not None:
             del self._standing[kind]
             if over:
                 self._tell(Happening(ticks_now(self._clock), self.who, f"{kind}-over", over, "note", details))
 
     @property
     def standings(self) -> tuple[str, ...]:
-        """Happenings that last at this instant."""
+        """Ongoing conditions at this instant."""
         return tuple(self._standing)

@@ -1,11 +1,11 @@
-"""What the coordinator hears of the world: the site's feed of weather and posture, or a motion from a script.
+"""The site's feed of weather and posture, or a motion script.
 
-The feed speaks in ZY lines, unasked:
+The feed sends unsolicited ZY lines:
 
-    0<TAB>TS<TAB>WX 1, station, temperature_c, pressure_hpa, humidity_percent      none where a sensor says nothing
+    0<TAB>TS<TAB>WX 1, station, temperature_c, pressure_hpa, humidity_percent      none if a sensor value is missing
     0<TAB>TS<TAB>TEL 1, azimuth_deg, elevation_deg, azimuth_rate_deg_s, elevation_rate_deg_s
 
-An observatory that has its own weather and position writes these two lines.
+An observatory with its own weather and position sends these two lines.
 """
 
 import asyncio
@@ -31,18 +31,18 @@ from catseye.records.night.live import TICKS_PER_DAY, LivePosture, LiveWeather
 
 REAL = re.compile(r"[+-]?[0-9]{1,9}(\.[0-9]{0,20})?([eE][+-]?[0-9]{1,2})?")
 STATION = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,15}")
-LOOK = 0.5  # s between two looks for silence
-START_UP = 30.0  # s before a telescope that has said nothing yet is missed: its feed may start later
-HELD_UP = 1.5  # s between two looks, by which the loop itself was late: what came meanwhile is read first
-SKEW = 5.0  # s that a reading's stamp may be from now
+LOOK = 0.5  # s between two checks for silence
+START_UP = 30.0  # s before a telescope without any posture counts as silent: its feed may start later
+HELD_UP = 1.5  # s between two checks, above which the loop itself was late: pending input is read first
+SKEW = 5.0  # s, limit of a reading's stamp from now
 MOST_STATIONS = 64
-WEATHER_LIMITS = ((-90.0, 90.0), (300.0, 1200.0), (0.0, 110.0))  # deg C, hPa, %: beyond is no reading
+WEATHER_LIMITS = ((-90.0, 90.0), (300.0, 1200.0), (0.0, 110.0))  # deg C, hPa, %: valid range
 COLUMNS = ("mjd", "azimuth_deg", "elevation_deg")
 
 
 @dataclass(frozen=True)
 class FeedSettings:
-    """Times in s: silence that is told, and the waits before a connection is tried again."""
+    """Times in s: allowed silence, and back-off of reconnection."""
 
     weather_silent: float = 60.0
     telescope_silent: float = 2.0
@@ -53,10 +53,10 @@ class FeedSettings:
 
 
 class FeedClient:
-    """Listens to a feed.
+    """Client of a feed.
 
-    weather, posture   called with each reading, in the order they came
-    stations           that should speak; those of the feed are added
+    weather, posture   called with each reading, in order of arrival
+    stations           expected stations; those of the feed are added
     """
 
     def __init__(
@@ -79,19 +79,19 @@ class FeedClient:
         self._network, self._key = environment.network, environment.key
         self._stations = {name: EventLog(name, clock, tell) for name in stations}
         self._telescope = EventLog("telescope", clock, tell)
-        self._heard: dict[str, float] = {}  # loop's time of the last good line, by station; "" is the telescope
+        self._heard: dict[str, float] = {}  # loop time of the last good line, by station; "" is the telescope
         self._stamps: dict[str, int] = {}
         self._began: float | None = None
         self._looked: float | None = None
 
     @property
     def telescope_known(self) -> bool:
-        """Whether the posture is fresh."""
-        heard = self._heard.get("")
-        return heard is not None and asyncio.get_running_loop().time() - heard <= self._settings.telescope_silent
+        """True if the posture is recent."""
+        last_s = self._heard.get("")
+        return last_s is not None and asyncio.get_running_loop().time() - last_s <= self._settings.telescope_silent
 
     async def run(self) -> None:
-        """Connect, listen, connect again; until cancelled."""
+        """Connect, receive, reconnect; until cancelled."""
         self._began = asyncio.get_running_loop().time()
         looking = asyncio.ensure_future(self._look())
         try:
@@ -115,14 +115,14 @@ class FeedClient:
                 if client is not None:
                     self._event_log.standing("feed-lost", None, over="the site's feed is connected")
                     why, wait = await self._listen(client), self._settings.first_wait
-                self._event_log.standing("feed-lost", f"{why}; trying again", "warning")
+                self._event_log.standing("feed-lost", f"{why}; reconnecting", "warning")
                 await asyncio.sleep(wait * self._rng.uniform(0.8, 1.2))
                 wait = min(self._settings.growth * wait, self._settings.longest_wait)
         finally:
             looking.cancel()
 
     async def _listen(self, client: ZyClient) -> str:
-        """Until the connection is over; one that says nothing at all is given up."""
+        """Receive until the connection is over; give up a silent one."""
         patience = max(self._settings.weather_silent, self._settings.telescope_silent)
         try:
             while not client.closed.done():
@@ -130,37 +130,37 @@ class FeedClient:
                 client.check()
                 last = max(self._heard.values(), default=self._began or 0.0)
                 if asyncio.get_running_loop().time() - last > 2.0 * patience and not client.closed.done():
-                    return f"nothing was read for {2.0 * patience:g} s"
+                    return f"no reading received for {2.0 * patience:g} s"
             return client.closed.result()
         finally:
             client.close()
 
     async def _look(self) -> None:
-        """Look again and again who is silent."""
+        """Check for silence repeatedly."""
         while True:
             await asyncio.sleep(LOOK)
             self.look()
 
     def look(self) -> None:
-        """Tell who has been silent for too long, and who speaks again."""
-        now, limit = asyncio.get_running_loop().time(), self._settings.telescope_silent
-        began = now if self._began is None else self._began
-        silent = now - self._heard.get("", began)
-        held_up, self._looked = now - (self._looked or now) > HELD_UP, now
+        """Log stations and telescope that fall silent or return."""
+        time_s, limit = asyncio.get_running_loop().time(), self._settings.telescope_silent
+        start_s = time_s if self._began is None else self._began
+        silent = time_s - self._heard.get("", start_s)
+        held_up, self._looked = time_s - (self._looked or time_s) > HELD_UP, time_s
         missed = silent > (limit if "" in self._heard else START_UP)
-        text = f"no posture for {limit:g} s: tracking stops, fixed targets go on" if missed else None
+        text = f"no posture for {limit:g} s: tracking stops, fixed targets continue" if missed else None
         if not held_up:
-            self._telescope.standing("telescope-silent", text, "alarm", over="the telescope tells its posture again")
+            self._telescope.standing(
+                "telescope-silent", text, "alarm", over="the telescope's posture is received again"
+            )
         limit = self._settings.weather_silent
         for name, event_log in self._stations.items():
-            silent = now - self._heard.get(name, began)
-            text = (
-                f"{name} has said nothing for {limit:g} s (see to the station or its line)" if silent > limit else None
-            )
-            event_log.standing("weather-silent", text, over=f"{name} speaks again")
+            silent = time_s - self._heard.get(name, start_s)
+            text = f"{name}: no reading for {limit:g} s (check the station and its line)" if silent > limit else None
+            event_log.standing("weather-silent", text, over=f"{name} is received again")
 
     def hear(self, reply: Reply) -> None:
-        """A line of the feed; what cannot be read is told, and not used."""
+        """Process a line of the feed; log and ignore invalid ones."""
         try:
             if reply.command == "WX":
                 self._take_weather(weather_of(reply))
@@ -174,7 +174,7 @@ class FeedClient:
             return
         if read.station not in self._stations:
             if len(self._stations) >= MOST_STATIONS:
-                raise InputError(f"WX: station {read.station} is one too many (expected at most {MOST_STATIONS})")
+                raise InputError(f"WX: too many stations with {read.station} (expected at most {MOST_STATIONS})")
             self._stations[read.station] = EventLog(read.station, self._clock, self._tell)
         if not math.isnan(read.temperature_c + read.pressure_hpa + read.humidity_percent):
             self._heard[read.station] = asyncio.get_running_loop().time()
@@ -186,9 +186,9 @@ class FeedClient:
             self._posture(read)
 
     def _fresh(self, who: str, ticks: int) -> bool:
-        """Whether a stamp is later than the last and not far from now."""
+        """True for a stamp later than the last and near now."""
         skew = (ticks - ticks_now(self._clock)) / TICKS_PER_SECOND
-        text = f"{who or 'the telescope'}'s stamps are {skew:+.1f} s from now (limit {SKEW:g} s): not used"
+        text = f"{who or 'the telescope'}'s stamps are {skew:+.1f} s from now (limit {SKEW:g} s); rejected"
         self._event_log.standing(f"feed-clock-{who or 'telescope'}", text if abs(skew) > SKEW else None)
         if abs(skew) > SKEW or ticks <= self._stamps.get(who, -1):
             return False
@@ -197,10 +197,13 @@ class FeedClient:
 
 
 def weather_of(reply: Reply) -> LiveWeather:
-    """A WX line. Raises InputError: another form, or a reading that none can be."""
+    """Reading of a WX line.
+
+    Raises InputError: another form, or an impossible reading.
+    """
     values = _values(reply, 4)
     if not STATION.fullmatch(values[0]):
-        raise InputError(f"WX: station {values[0][:20]!a} is no name")
+        raise InputError(f"WX: station {values[0][:20]!a} is not a name")
     read = []
     for text, (low, high), what in zip(values[1:], WEATHER_LIMITS, ("deg C", "hPa", "%"), strict=True):
         value = math.nan if text.lower() == "none" else _real(text, "WX")
@@ -211,7 +214,10 @@ def weather_of(reply: Reply) -> LiveWeather:
 
 
 def posture_of(reply: Reply) -> LivePosture:
-    """A TEL line. Raises InputError: another form, or angles that no telescope has."""
+    """Posture of a TEL line.
+
+    Raises InputError: another form, or impossible angles.
+    """
     angles = [_real(text, "TEL") for text in _values(reply, 4)]
     for angle, (low, high) in zip(angles, ((-360.0, 720.0), (-90.0, 180.0), (-10.0, 10.0), (-10.0, 10.0)), strict=True):
         if not low <= angle <= high:
@@ -220,10 +226,10 @@ def posture_of(reply: Reply) -> LivePosture:
 
 
 class MotionScript:
-    """A motion known beforehand, instead of a feed.
+    """A motion given beforehand, instead of a feed.
 
-    mjd                  (n,) days, rising; n = 1 stands still for ever
-    azimuth, elevation   (n,) rad, linear between; held at the ends
+    mjd                  (n,) days, rising; n = 1 for a fixed posture
+    azimuth, elevation   (n,) rad, linear between; constant beyond the ends
     """
 
     def __init__(self, mjd: NDArray[np.float64], azimuth: NDArray[np.float64], elevation: NDArray[np.float64]):
@@ -231,9 +237,11 @@ class MotionScript:
 
     @staticmethod
     def parse(text: str) -> "MotionScript":
-        """`fixed AZ EL` in degrees, or the path of a table mjd,azimuth_deg,elevation_deg.
+        """Motion from `fixed AZ EL` in degrees, or a table's path.
 
-        Raises InputError with what was wrong and what was expected.
+        The table has the columns mjd,azimuth_deg,elevation_deg.
+
+        Raises InputError with the problem and the expected form.
 
         >>> MotionScript.parse("fixed 145.3 30").at(5288900000000).elevation
         0.5235987755982988
@@ -245,12 +253,15 @@ class MotionScript:
         try:
             table = Path(text).read_text("utf-8")
         except (OSError, ValueError) as problem:
-            raise InputError(f"motion {text!a} is no file that can be read (expected it, or fixed AZ EL)") from problem
+            raise InputError(f"motion {text!a} is not a readable file (expected one, or fixed AZ EL)") from problem
         return MotionScript.of_table(table, text)
 
     @staticmethod
     def of_table(table: str, name: str) -> "MotionScript":
-        """The motion that a table's text tells. Raises InputError with its line."""
+        """Motion from a table's text.
+
+        Raises InputError with its line.
+        """
         rows = list(csv.reader(io.StringIO(table)))
         if not rows or tuple(word.strip() for word in rows[0]) != COLUMNS:
             raise InputError(f"{name} line 1: expected {','.join(COLUMNS)}")
@@ -262,7 +273,7 @@ class MotionScript:
             if len(values) > 1 and values[-1][0] <= values[-2][0]:
                 raise InputError(f"{name} line {number}: mjd {row[0]} is not later than the line before")
         if not values:
-            raise InputError(f"{name} holds no line of motion (expected one at least)")
+            raise InputError(f"{name} contains no motion (expected at least one line)")
         mjd, azimuth, elevation = np.array(values).T
         return MotionScript(mjd, azimuth * DEGREE, elevation * DEGREE)
 
@@ -279,12 +290,12 @@ class MotionScript:
 
 
 async def play(
-    script: MotionScript, clock: Clock, posture: Callable[[LivePosture], None], *, every: float = 0.1
+    script: MotionScript, clock: Clock, posture: Callable[[LivePosture], None], *, period: float = 0.1
 ) -> None:
-    """Give a script's postures at 10 Hz, until cancelled."""
+    """Emit a script's postures at 10 Hz, until cancelled."""
     while True:
         posture(script.at(ticks_now(clock)))
-        await asyncio.sleep(every)
+        await asyncio.sleep(period)
 
 
 def _values(reply: Reply, count: int) -> tuple[str, ...]:
@@ -295,5 +306,5 @@ def _values(reply: Reply, count: int) -> tuple[str, ...]:
 
 def _real(text: str, what: str) -> float:
     if not REAL.fullmatch(text):
-        raise InputError(f"{what}: {text[:20]!a} is no number")
+        raise InputError(f"{what}: {text[:20]!a} is not a number")
     return float(text)

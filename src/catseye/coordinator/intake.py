@@ -1,7 +1,7 @@
-"""What comes in, in one order: numbered, given to the reduction, journalled, and made known when it is durable.
+"""Ordered intake: number each item, reduce, journal, publish once durable.
 
-The journal's order is that in which the reduction was fed. While the journal cannot make things durable, weather and
-posture are dropped, shots that were on their way wait in line, and nothing is acknowledged until the journal is back.
+The journal's order is that of the reduction's input. While the journal fails, weather and postures are dropped, shots
+already taken are queued, and nothing is acknowledged until the journal works again.
 """
 
 import asyncio
@@ -30,25 +30,25 @@ from catseye.reduction.epoch.reason import ShotStatus
 from catseye.reduction.live.epoch import Epoch
 from catseye.reduction.live.live import EpochAnswer, EpochJob, Live
 
-TOGETHER = 0.001  # s in which what arrives is handled at once: the journal's commit gathers more
-OLDEST, FUTURE = 120.0, 0.5  # s that a shot's stamp may be from now: it comes behind its samples
-RETRY = 0.5  # s between two looks whether the journal is back
-MOST_HELD = 2000  # happenings kept while the journal is away
-Solver = Callable[[EpochJob], Awaitable[Epoch | str]]  # the epoch, or why there is none
+TOGETHER = 0.001  # s in which items are gathered; the journal's commit gathers more
+OLDEST, FUTURE = 120.0, 0.5  # s, limits of a shot's stamp from now: it arrives after its samples
+RETRY = 0.5  # s between two attempts to write the journal
+LARGEST_BACKLOG = 2000  # events kept while the journal fails
+Solver = Callable[[EpochJob], Awaitable[Epoch | str]]  # the epoch, or the reason why there is none
 Incoming = LiveShot | LiveWeather | LivePosture | Happening | SentCommand
 
 
 class Intake:
-    """The one way into reduction and journal.
+    """The only path into reduction and journal.
 
-    judged     called with each shot and what the reduction said of it, at once
+    judged     called with each shot and its answer, at once
     publish    called with each entry when it is durable
-    event_log  says what goes wrong with the journal; that itself is journalled when it can be
-    doubted    called with each reading of the weather and why the reduction does not believe it, "" where it does
+    event_log  reports journal problems; those are journalled when possible
+    doubted    called with each weather reading and the reason for its rejection, "" if accepted
     solver     solves an epoch beside the loop; None: in a thread
-    clock      UTC: a shot's stamp from now on, or long ago, is not believed; None: all are
+    clock      UTC: a shot stamped in the future, or long ago, is rejected; None: none is
 
-    `broken` is done when handling what came failed by a mistake of ours: nothing more is measured then.
+    `broken` gets the exception if processing failed by a bug: then measuring stops.
     """
 
     def __init__(
@@ -71,27 +71,27 @@ class Intake:
         self._arrived: list[Incoming] = []
         self._timer: asyncio.TimerHandle | None = None
         self._last: dict[str, int] = {}  # stamp of each ranger's last shot
-        self._across: tuple[int, int | None] | None = None  # ticks across which our clock jumped, None: not over yet
+        self._across: tuple[int, int | None] | None = None  # ticks of a jump of our clock, None: not over yet
         self._corrections = 0  # of our clock
-        self._held: deque[tuple[Entry, ...]] = deque()  # given to the reduction, and not yet taken by the journal
-        self._late: list[tuple[Entry, ...]] = []  # taken by the journal, and not durable when they should have been
+        self._backlog: deque[tuple[Entry, ...]] = deque()  # backlog: fed to the reduction, not yet in the journal
+        self._late: list[tuple[Entry, ...]] = []  # in the journal, but not durable in time
         self._fresh = 0  # shots since the last solution
         self._retrying = self._solving = False
         self.numbered = self.acknowledged = self.dropped = 0
 
     @property
     def trouble(self) -> str | None:
-        """Why nothing may be measured: the journal is away; None where all is well."""
+        """Reason why nothing may be measured (journal failing); else None."""
         if self._journal.trouble is not None:
             return self._journal.trouble
-        return "what was measured is not durable yet" if self._held or self._late else None
+        return "measured data are not durable yet" if self._backlog or self._late else None
 
     def take(self, item: Incoming) -> None:
-        """Something has come; what comes within `TOGETHER` is handled together."""
+        """Add an item; items within `TOGETHER` are processed together."""
         if self.trouble is not None:
             self._see_to_journal()
             if isinstance(item, LiveWeather | LivePosture) or (
-                isinstance(item, Happening | SentCommand) and len(self._held) + len(self._arrived) > MOST_HELD
+                isinstance(item, Happening | SentCommand) and len(self._backlog) + len(self._arrived) > LARGEST_BACKLOG
             ):
                 self.dropped += 1
                 return
@@ -100,7 +100,10 @@ class Intake:
             self._timer = asyncio.get_running_loop().call_later(TOGETHER, self._gathered)
 
     def _gathered(self) -> None:
-        """From the loop's timer, to which an exception is a line in a log: here it is the coordinator's end."""
+        """Process items from the loop's timer; an exception ends the coordinator.
+
+        The loop itself would only log it.
+        """
         try:
             self.flush()
         except Exception as problem:
@@ -109,7 +112,7 @@ class Intake:
             self.broken.set_exception(problem)
 
     def flush(self) -> None:
-        """Handle the shots that have come."""
+        """Process all items received."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -120,10 +123,10 @@ class Intake:
                 self._write(tuple(entries))
 
     async def solve(self, ticks: int) -> EpochAnswer | None:
-        """An epoch of all shots since the last, solved beside the loop; None where there is none.
+        """Solve an epoch of all shots since the last; None if there is none.
 
-        The journal has both instants, when its shots were taken out and when its answer was taken in: shots that are
-        fed between belong to the next epoch, in a replay too.
+        The journal has both instants, when its shots were taken out and when its answer was accepted: shots fed between
+        belong to the next epoch, in a replay too.
         """
         self.flush()
         if not self._fresh or self.trouble is not None or self._solving:
@@ -141,7 +144,7 @@ class Intake:
             self._solving = False
         self.flush()
         stale = corrections != self._corrections
-        answer = None if stale else self._live.take_in(job, epoch)
+        answer = None if stale else self._live.accept(job, epoch)
         self._write((EpochSolution.of(ticks, answer),))
         if answer is None:
             why = "the clock was corrected meanwhile" if stale else self._live.failed
@@ -149,23 +152,28 @@ class Intake:
         return answer
 
     def clock_jumped(self, since: int, until: int | None) -> None:
-        """Believe no shot whose buffer lies between two ticks, or from the first on while the second is None."""
+        """Reject shots overlapping two ticks; all later ones if the second is None."""
         self.flush()
         self._across = since, until
 
     def clock_corrected(self, seconds: float) -> None:
-        """Our clock gained so many s at once: what was stamped later than now is forgotten, in a replay too."""
+        """Discard everything stamped later than now after a clock correction.
+
+        seconds   gain of the clock
+
+        A replay does the same.
+        """
         if self._clock is None:
             return
         self.flush()
-        now = ticks_now(self._clock)
+        now_ticks = ticks_now(self._clock)
         self._corrections += 1
-        self._last = {ranger: ticks for ranger, ticks in self._last.items() if ticks <= now}
-        self._live.clock_corrected(now)
-        self._write((Document(now, CLOCK_CORRECTED, json.dumps({"gained_s": seconds})),))
+        self._last = {ranger: ticks for ranger, ticks in self._last.items() if ticks <= now_ticks}
+        self._live.clock_corrected(now_ticks)
+        self._write((Document(now_ticks, CLOCK_CORRECTED, json.dumps({"gained_s": seconds})),))
 
     def _fed(self, item: Incoming) -> Entry | None:
-        """The reduction has it now; what the journal is to have."""
+        """Feed an item to the reduction; the entry for the journal."""
         if isinstance(item, LiveWeather):
             self._doubted(item, self._live.weather(item) or "")
         elif isinstance(item, LivePosture):
@@ -178,19 +186,19 @@ class Intake:
         if self._clock is not None:
             off = (shot.ticks - ticks_now(self._clock)) / TICKS_PER_SECOND
             if not -OLDEST <= off <= FUTURE:
-                text = f"{shot.ranger}: a shot's stamp is {off:+.1f} s from now: its clock, or ours, is wrong: not used"
+                text = f"{shot.ranger}: a shot's stamp is {off:+.1f} s from now: its clock, or ours, is wrong; rejected"
                 self._event_log.tell("stamp-off", text, "alarm", about=shot.ranger, offset_s=off)
                 return None
         if self._across is not None:
             since, until = self._across
             end = shot.ticks + round(shot.cycles / shot.if_hz * TICKS_PER_SECOND)
             if end >= since and (until is None or shot.ticks <= until):
-                text = f"{shot.ranger}: a shot lies across a jump of this machine's clock: not used"
+                text = f"{shot.ranger}: a shot overlaps a jump of this machine's clock; rejected"
                 self._event_log.tell("stamp-across-jump", text, "warning", about=shot.ranger)
                 return None
         last = self._last.get(shot.ranger, -1)
-        if shot.ticks <= last:  # a clock that was set back; a journal has each shot once
-            text = f"{shot.ranger}: a shot's stamp is {last - shot.ticks} ticks before the last one's: not used"
+        if shot.ticks <= last:  # a clock was set back; a journal has each shot once
+            text = f"{shot.ranger}: a shot's stamp is {last - shot.ticks} ticks before the last one's; rejected"
             self._event_log.tell("stamp-not-later", text, "warning", about=shot.ranger)
             return None
         self._last[shot.ranger] = shot.ticks
@@ -205,26 +213,26 @@ class Intake:
         return answered
 
     def _write(self, entries: tuple[Entry, ...]) -> None:
-        self._held.append(entries)
+        self._backlog.append(entries)
         self._send()
 
     def _send(self) -> None:
-        """Give the journal what is held, in order."""
-        while self._held:
+        """Append queued entries to the journal, in order."""
+        while self._backlog:
             try:
-                future = self._journal.append(*self._held[0])
+                future = self._journal.append(*self._backlog[0])
             except InputError as problem:
                 self._away(str(problem))
                 return
-            entries = self._held.popleft()
+            entries = self._backlog.popleft()
             loop = asyncio.get_running_loop()
             future.add_done_callback(partial(_later, loop, partial(self._settled, entries)))
 
-    def _settled(self, entries: tuple[Entry, ...], done: "Future[int]") -> None:
-        """The journal has made entries durable, or not."""
-        problem = done.exception()
+    def _settled(self, entries: tuple[Entry, ...], outcome: "Future[int]") -> None:
+        """Publish entries that are durable, or report the failure."""
+        problem = outcome.exception()
         if problem is None:
-            self._acknowledge_late()  # the journal keeps the order: they stand before these, and are durable too
+            self._acknowledge_late()  # the journal keeps the order: earlier entries are durable, too
             self._acknowledge(entries)
         elif isinstance(problem, NotDurable) or self._journal.trouble is not None or self._late:
             self._late.append(entries)
@@ -243,7 +251,7 @@ class Intake:
             self._acknowledge(entries)
 
     def _away(self, why: str) -> None:
-        self._event_log.standing("journal-away", f"{why}: measuring stops", "alarm")
+        self._event_log.standing("journal-away", f"{why}: measuring suspended", "alarm")
         self._see_to_journal()
 
     def _see_to_journal(self) -> None:
@@ -252,7 +260,7 @@ class Intake:
             asyncio.get_running_loop().call_later(RETRY, self._retry)
 
     def _retry(self) -> None:
-        """Whether all that was given is durable now: an append of nothing is, when all before it are."""
+        """Append nothing: it succeeds once all entries before are durable."""
         self._retrying = False
         try:
             future = self._journal.append()
@@ -262,14 +270,14 @@ class Intake:
         loop = asyncio.get_running_loop()
         future.add_done_callback(partial(_later, loop, self._retried))
 
-    def _retried(self, done: "Future[int]") -> None:
-        if done.exception() is not None or self._journal.trouble is not None:
+    def _retried(self, outcome: "Future[int]") -> None:
+        if outcome.exception() is not None or self._journal.trouble is not None:
             self._see_to_journal()
             return
         self._acknowledge_late()
         self._send()
         if self.trouble is None:
-            self._event_log.standing("journal-away", None, over="the journal is back: measuring goes on")
+            self._event_log.standing("journal-away", None, over="the journal is writable again: measuring resumes")
         else:
             self._see_to_journal()
 
@@ -278,7 +286,7 @@ async def _in_a_thread(job: EpochJob) -> Epoch | str:
     return await asyncio.get_running_loop().run_in_executor(None, job.solve)
 
 
-def _later(loop: asyncio.AbstractEventLoop, call: Callable[["Future[int]"], None], done: "Future[int]") -> None:
-    """Call from the journal's thread into the loop, which may be closed by now."""
+def _later(loop: asyncio.AbstractEventLoop, call: Callable[["Future[int]"], None], outcome: "Future[int]") -> None:
+    """Call from the journal's thread into the loop, if it is open."""
     if not loop.is_closed():
-        loop.call_soon_threadsafe(call, done)
+        loop.call_soon_threadsafe(call, outcome)

@@ -1,4 +1,4 @@
-"""What the coordinator does at all, and what it leaves alone for a while."""
+"""Modes of the coordinator, and suspensions after failures."""
 
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -8,11 +8,11 @@ from catseye.errors import InputError
 
 Mode = Literal["active", "passive", "hold"]
 PATIENCE = 3  # failures in a row
-FIRST_REST, LONGEST_REST = 10.0, 600.0  # s
+FIRST_PAUSE, LONGEST_PAUSE = 10.0, 600.0  # s
 
 
 def mode_of(text: str) -> Mode:
-    """A mode as people type it.
+    """A mode from text.
 
     Raises InputError for another word.
 
@@ -28,38 +28,42 @@ def mode_of(text: str) -> Mode:
 @dataclass(slots=True)
 class _Record:
     failures: int = 0
-    rest: float = FIRST_REST
+    pause: float = FIRST_PAUSE
     until: int = 0
 
 
 class Suspensions:
-    """Lines (ranger, target), or whole rangers (ranger, ""), that failed three times in a row rest: 10 s, then twice
-    that, up to 600 s; one good shot forgives all.
+    """Suspensions of lines (ranger, target) and rangers (ranger, "").
+
+    Three failures in a row suspend for 10 s, then twice as long each time, up to 600 s; one good shot resets it.
     """
 
     def __init__(self) -> None:
         self._records: dict[tuple[str, str], _Record] = {}
 
     def failed(self, ranger: str, target: str, now_ticks: int) -> float | None:
-        """Count a failure; s of rest where it begins now."""
+        """Count a failure; duration of a suspension that starts now, s."""
         record = self._records.setdefault((ranger, target), _Record())
         record.failures += 1
         if record.failures < PATIENCE or now_ticks < record.until:
             return None
-        rest = record.rest
-        record.until = now_ticks + round(rest * TICKS_PER_SECOND)
-        record.rest, record.failures = min(2.0 * rest, LONGEST_REST), PATIENCE - 1  # after its rest one more is enough
-        return rest
+        pause = record.pause
+        record.until = now_ticks + round(pause * TICKS_PER_SECOND)
+        record.pause, record.failures = (
+            min(2.0 * pause, LONGEST_PAUSE),
+            PATIENCE - 1,
+        )  # afterwards one more failure suffices
+        return pause
 
     def good(self, ranger: str, target: str) -> None:
-        """A shot that was worth something."""
+        """Reset after a good shot."""
         self._records.pop((ranger, target), None)
 
     def resting(self, ranger: str, target: str, now_ticks: int) -> bool:
-        """Whether a ranger, or one of its lines, is left alone at a time."""
+        """True if a ranger or line is suspended at a time."""
         record = self._records.get((ranger, target))
         return record is not None and now_ticks < record.until
 
     def lines(self, now_ticks: int) -> frozenset[tuple[str, str]]:
-        """All lines that are left alone at a time."""
+        """All lines suspended at a time."""
         return frozenset(key for key, record in self._records.items() if key[1] and now_ticks < record.until)

@@ -1,4 +1,4 @@
-"""What the coordinator's parts hand to each other, and what it needs of those that others write."""
+"""Interfaces between the coordinator's parts, and of planner and guard."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -21,13 +21,14 @@ class PlannedShot:
     """One shot of a round.
 
     ranger, target   names; ZRG is the ranger's own cube
-    begin_ticks      when its buffer shall begin
+    begin_ticks      time of its buffer's start
     duration         s, of the buffer
-    at_begin, at_end (3,) m, where the target will be at `begin_ticks` and `duration` later: ground frame, or the
+    at_begin, at_end (3,) m, predicted position of the target at `begin_ticks` and `duration` later: ground frame, or
+    the
                      reflector frame for rangers of the feed arm
-    fixed            it does not move against its ranger: CIL instead of TRK
-    reason           one line: why this shot
-    via              counts (azimuth, elevation) at which the mirror halts on its way, in order: round the Sun or a box
+    fixed            True if it does not move against its ranger: CIL instead of TRK
+    reason           one line: purpose of the shot
+    via              counts (azimuth, elevation) of intermediate stops, in order, around the Sun or a box
     """
 
     ranger: str
@@ -43,7 +44,10 @@ class PlannedShot:
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """What each ranger shall shoot between two times, in order; `unseen` says why pairs were left out."""
+    """Shots of each ranger between two times, in order.
+
+    unseen   reasons why pairs were left out
+    """
 
     begin_ticks: int
     end_ticks: int
@@ -53,15 +57,15 @@ class Round:
 
 @dataclass(frozen=True, eq=False)
 class SiteState:
-    """What a planner is told.
+    """Input of a planner.
 
     posture          the latest
     ready            rangers that can shoot
-    counts           where their mirrors stand, azimuth and elevation
-    suspended        lines (ranger, target) that failed, left alone for now
-    since_reference  s since each ranger's last good shot on ZRG; a ranger without one is not in it
+    counts           positions of their mirrors, azimuth and elevation
+    suspended        lines (ranger, target) suspended after failures
+    since_reference  s since each ranger's last good shot on ZRG; a ranger without one is absent
     place            a point's name and times (MJD) to (n, 3) m, ground frame: `Live.place`
-    u                covariances (3, 3), m^2, of points as last known; may lack names
+    u                covariances (3, 3), m^2, of points as last estimated; may lack names
     """
 
     now_ticks: int
@@ -75,13 +79,17 @@ class SiteState:
 
 
 class Planner(Protocol):
-    """What chooses the shots of the next round."""
+    """Chooses the shots of the next round."""
 
     def round(self, state: SiteState) -> Round: ...
 
 
 class SafetyAlarm(Protocol):
-    """A beam at rest that something comes to: `within` s from now; `remedy` is "move" or "dark"."""
+    """A hazard that comes to a parked beam.
+
+    within   s from now
+    remedy   "move" or "dark"
+    """
 
     @property
     def ranger(self) -> str: ...
@@ -96,20 +104,26 @@ class SafetyAlarm(Protocol):
 
 
 class RequestGuard(Protocol):
-    """What has the last word before each request; it must hear what rangers answer, and how the telescope stands."""
+    """Safety check before each request.
+
+    It needs the rangers' replies, and the telescope's posture.
+    """
 
     def refusal(self, ranger: str, request: Request, now_ticks: int) -> str | None:
-        """Why a request must not be sent, None where it may."""
+        """Reason why a request must not be sent; None if it may."""
         ...
 
     def heard(self, ranger: str, reply: Reply) -> None: ...
     def telescope(self, posture: LivePosture) -> None: ...
     def sun_vector(self, ranger: str, now_ticks: int) -> tuple[float, float, float]:
-        """Unit vector to the Sun in the ranger's own frame. Raises InputError where the telescope's posture lacks."""
+        """Unit vector to the Sun in the ranger's frame.
+
+        Raises InputError if the telescope's posture is missing.
+        """
         ...
 
     def watch(self, now_ticks: int, counts: Mapping[str, tuple[float, float]]) -> Sequence[SafetyAlarm]:
-        """What comes to beams at rest."""
+        """Hazards of parked beams."""
         ...
 
 
@@ -118,12 +132,12 @@ Tell = Callable[[Happening], None]
 
 @dataclass(frozen=True, eq=False)
 class Environment:
-    """Time, network and chance of a coordinator: the world's, or a test's.
+    """Time, network and random seed of a coordinator.
 
     clock     UTC
-    network   where connections are made; None: TCP
-    seed      of the jitter of waits
-    key       of the site, said to ports that ask for one; None: there is none
+    network   connections; None: TCP
+    seed      of the jitter of back-off times
+    key       of the site, sent to ports that require one; None: none
     """
 
     clock: Clock
@@ -133,5 +147,5 @@ class Environment:
 
 
 def ticks_now(clock: Clock) -> int:
-    """Ticks of a clock at this instant."""
+    """Present time of a clock in ticks."""
     return (2 * clock.now_ns() + 864_000) // 1_728_000

@@ -1,4 +1,4 @@
-"""Events about the weather stations: readings that are not believed, thermometers that an epoch suspects."""
+"""Events about weather stations: rejected readings, suspected thermometers."""
 
 from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.parts import Clock, Tell
@@ -11,7 +11,7 @@ JUDGEMENTS = {"biased": BIASED, "apart": APART}
 
 
 class StationEvents:
-    """Events of each station: one when a doubt begins, one when it is over."""
+    """Events of each station at start and end of a suspicion."""
 
     def __init__(self, clock: Clock, tell: Tell):
         self._clock, self._tell = clock, tell
@@ -19,12 +19,15 @@ class StationEvents:
         self._reduction = EventLog("reduction", clock, tell)
 
     def read(self, reading: LiveWeather, doubt: str) -> None:
-        """Tell whether a reading is believed; `doubt` says why not, "" where it is."""
-        over = f"{reading.station} is believed again"
+        """Log the rejection of a reading, or its end.
+
+        doubt   reason, "" if accepted
+        """
+        over = f"{reading.station}'s readings are accepted again"
         self._log(reading.station).standing(DOUBTED, doubt or None, over=over)
 
     def solved(self, answer: EpochAnswer) -> None:
-        """Tell what an epoch suspects, and whether it is good."""
+        """Log an epoch's suspicions and doubts."""
         for stretch in answer.returned:
             log = self._log(stretch.station)
             log.tell(RETURNED, stretch.why, "warning", always=True, offset_c=stretch.offset_c)
@@ -33,8 +36,8 @@ class StationEvents:
             for judgement, kind in JUDGEMENTS.items():
                 if suspect is not None and suspect.judgement == judgement:
                     log.standing(kind, suspect.text(name), offset_c=suspect.offset_c)
-                elif DOUBTED not in log.standings:  # one that is not in the epoch is not suspected by it
-                    log.standing(kind, None, over=f"{name}'s thermometer is not suspected any more")
+                elif DOUBTED not in log.standings:  # a station that is not in the epoch is not suspected by it
+                    log.standing(kind, None, over=f"{name}'s thermometer is no longer suspected")
         doubt = answer.doubts[0] if answer.doubts else None
         self._reduction.standing("epoch-doubtful", doubt, over="epochs are good again")
 

@@ -1,7 +1,7 @@
-"""The ZIY: asks the planner what to shoot, has each ranger shoot it, gives what comes back to reduction and journal.
+"""Coordinator (ZIY): plan rounds, execute, reduce, journal.
 
-One asyncio loop. Each ranger goes through its list of a round by itself; when the round's time is over, the next one is
-planned and begun, and then the epoch is solved while the mirrors turn.
+One asyncio loop. Each ranger works through its list of a round independently; when the round's time is over, the next
+one is planned and started, and then the epoch is solved while the mirrors turn.
 """
 
 import asyncio
@@ -41,17 +41,17 @@ from catseye.records.night.live import Happening, LivePosture
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.live.live import EpochAnswer, Live
 
-WANTED: dict[Mode, Wanted] = {"active": "measure", "passive": "listen", "hold": "hold"}
+LINK_STATES: dict[Mode, Wanted] = {"active": "measure", "passive": "listen", "hold": "hold"}
 
 
 @dataclass(frozen=True)
 class ZiySettings:
     """Times in s.
 
-    posture_every   the reduction and the journal get no more postures than one each
-    idle            before it is asked again what to do, where nothing can be done
-    epoch_every     between two epochs where no round is planned: streams alone, passive mode
-    grace           past a round's end, for shots under way, before the next is planned without their rangers
+    posture_every   shortest interval of postures for reduction and journal
+    idle            before planning is retried if nothing can be done
+    epoch_every     between two epochs without planned rounds: streams only, passive mode
+    grace           after a round's end, for shots under way, before the next is planned without their rangers
     leave           for lasers to be switched off at the end
     links, feed     of the connections to rangers and feed
     """
@@ -67,12 +67,12 @@ class ZiySettings:
 
 @dataclass(frozen=True, eq=False)
 class CoordinatorParts:
-    """Who thinks, who refuses, who remembers.
+    """Components of a coordinator.
 
     live      the reduction
-    planner   chooses what is shot
-    guard     has the last word before each request
-    journal   keeps what happened
+    planner   chooses the shots
+    guard     checks each request
+    journal   stores what happened
     solver    solves epochs beside the loop; None: in a thread
     """
 
@@ -87,9 +87,9 @@ class Coordinator:
     """A site's rangers, feed, reduction and journal.
 
     addresses     of the rangers
-    feed          host and port of the site's feed, a script of a known motion, or None: no posture is ever known
-    mode          active: plans and fires; passive: hears what another client has measured; hold: connected, no more
-    commands      what initialises a ranger; None: from the site's records
+    feed          host and port of the site's feed, a motion script, or None: the posture is never known
+    mode          active: plans and measures; passive: listens to another client's measurements; hold: connected, idle
+    commands      initialisation commands of a ranger; None: from the site's records
     """
 
     def __init__(
@@ -158,18 +158,18 @@ class Coordinator:
         commands: Callable[[str], Sequence[Request]] | None,
         environment: Environment,
     ) -> dict[str, RangerLink]:
-        """A link to each ranger; of the dish's thousand prisms it is told before their first shots only."""
-        asked = commands or (lambda ranger: commands_of_ranger(self.site, ranger))
+        """Links to the rangers; dish prisms are sent on demand."""
+        commands_of = commands or (lambda ranger: commands_of_ranger(self.site, ranger))
         later = [t.name for t in self.site.targets.values() if t.type == "prism" and t.frame == "reflector"]
         return {
             name: RangerLink(
                 name,
                 address,
-                preparation=Preparation.of(asked(name), later),
+                preparation=Preparation.of(commands_of(name), later),
                 guard=self._guard,
                 environment=environment,
                 listeners=LinkListeners(self.tell, self._overheard, self.intake.take),
-                wanted=WANTED[self.mode],
+                wanted=LINK_STATES[self.mode],
                 settings=self.settings.links,
             )
             for name, address in sorted(addresses.items())
@@ -188,10 +188,13 @@ class Coordinator:
             settings=self.settings.feed,
         )
 
-    # Life -----------------------------------------------------------------------------------------------------------
+    # Running ---------------------------------------------------------------------------------------------------------
 
     async def run(self) -> None:
-        """Measure until cancelled; then lasers off that were switched on here, and the journal closed, within 5 s."""
+        """Measure until cancelled.
+
+        Then switch off lasers that were switched on here, and close the journal, within 5 s.
+        """
         self._event_log.tell(
             "started", f"coordinator of {self.site.site.campaign.name}, {len(self.links)} rangers, {self.mode}"
         )
@@ -200,7 +203,7 @@ class Coordinator:
         if self.feed is not None:
             self._spawn(self.feed.run(), "feed")
         if self._script is not None:
-            self._spawn(play(self._script, self.clock, self._posed, every=self.settings.posture_every), "script")
+            self._spawn(play(self._script, self.clock, self._posed, period=self.settings.posture_every), "script")
         self._spawn(
             BeamWatchdog(self.links, self._guard, clock=self.clock, event_log=self._event_log).run(), "watchdog"
         )
@@ -209,9 +212,9 @@ class Coordinator:
         self.firing.broken, self.intake.broken = (asyncio.get_running_loop().create_future() for _ in range(2))
         try:
             parts = [*self._tasks, self.firing.broken, self.intake.broken]
-            ended, _ = await asyncio.wait(parts, return_when=asyncio.FIRST_COMPLETED)
-            for part in ended:
-                await part  # none ends by itself: what it raises, a mistake of ours, is the coordinator's
+            finished, _ = await asyncio.wait(parts, return_when=asyncio.FIRST_COMPLETED)
+            for part in finished:
+                await part  # none ends by itself: an exception, a bug, ends the coordinator
         finally:
             await self._end()
 
@@ -221,24 +224,24 @@ class Coordinator:
         return task
 
     async def _end(self) -> None:
-        """No more shots, lasers off, connections closed, journal closed."""
+        """Stop shots, switch lasers off, close connections and journal."""
         await self.firing.stop()
         leaving = [asyncio.ensure_future(link.leave(self.settings.leave)) for link in self.links.values()]
-        last = [] if self._solving is None else [self._solving]  # an epoch under way may come to its end meanwhile
+        last = [] if self._solving is None else [self._solving]  # an epoch under way may finish meanwhile
         if leaving or last:
             await asyncio.wait([*leaving, *last], timeout=self.settings.leave + 0.2)
-        for each in (*leaving, *last):
-            each.cancel()
+        for pending in (*leaving, *last):
+            pending.cancel()
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         self._event_log.tell("stopped", f"{self.intake.numbered} shots, {self.intake.acknowledged} acknowledged")
         self.intake.flush()
-        with suppress(InputError):  # what could not be written has been told
+        with suppress(InputError):  # unwritten entries have been reported
             await asyncio.to_thread(self._journal.close)
 
     def _clock_corrected(self, seconds: float) -> None:
-        """Our clock was corrected: what any part keeps by it is looked at anew."""
+        """Reset everything that depends on the corrected clock."""
         self.intake.clock_corrected(seconds)
         self.firing.clock_corrected()
         self.posture = None
@@ -250,10 +253,10 @@ class Coordinator:
     async def _rounds(self) -> None:
         loop, next_epoch = asyncio.get_running_loop(), 0.0
         while True:
-            self.intake.flush()  # the planner shall know how the last shots were
-            now = ticks_now(self.clock)
+            self.intake.flush()  # the planner needs the status of the last shots
+            now_ticks = ticks_now(self.clock)
             stopped = self.mode != "active" or self.intake.trouble is not None or not self.host_clock.believed
-            planned = None if stopped else self._planned(now)
+            planned = None if stopped else self._planned(now_ticks)
             if planned is not None:
                 self.round_number += 1
                 self.firing.begin(planned)
@@ -262,20 +265,20 @@ class Coordinator:
             due = planned is not None or loop.time() >= next_epoch
             if due and (self._solving is None or self._solving.done()):
                 if self._solving is not None:
-                    self._solving.result()  # an epoch's own failure is told; anything else is the program's
-                self._solving = loop.create_task(self._solve(now), name="epoch")
+                    self._solving.result()  # an epoch's own failure is logged; anything else is a bug
+                self._solving = loop.create_task(self._solve(now_ticks), name="epoch")
                 next_epoch = loop.time() + self.settings.epoch_every
-            asked_again = loop.time() + self.settings.idle
+            retry_at = loop.time() + self.settings.idle
             if planned is not None and planned.shots:
-                left = (planned.end_ticks - ticks_now(self.clock)) / TICKS_PER_SECOND
-                await self.firing.done(tuple(planned.shots), max(self.settings.idle, left + self.settings.grace))
-            # a round may be over at once: nothing in it, or nothing that may be fired
-            await asyncio.sleep(max(0.0, asked_again - loop.time()))
+                remaining = (planned.end_ticks - ticks_now(self.clock)) / TICKS_PER_SECOND
+                await self.firing.done(tuple(planned.shots), max(self.settings.idle, remaining + self.settings.grace))
+            # a round may be over at once: no shots in it, or none allowed
+            await asyncio.sleep(max(0.0, retry_at - loop.time()))
 
-    def _planned(self, now: int) -> Round | None:
-        if self.posture is None or not self.firing.ready(now):
+    def _planned(self, now_ticks: int) -> Round | None:
+        if self.posture is None or not self.firing.ready(now_ticks):
             return None
-        state = self.state(now)
+        state = self.state(now_ticks)
         if state is None:
             return None
         try:
@@ -284,44 +287,44 @@ class Coordinator:
             self._event_log.tell("not-planned", f"no round could be planned: {problem}", "alarm")
             return None
 
-    def state(self, now: int) -> SiteState | None:
-        """What the planner is told; None before the posture is known."""
+    def state(self, now_ticks: int) -> SiteState | None:
+        """Input of the planner; None before the posture is known."""
         if self.posture is None:
             return None
         return SiteState(
-            now,
+            now_ticks,
             self.posture,
-            self.firing.ready(now),
+            self.firing.ready(now_ticks),
             {name: link.counts for name, link in self.links.items() if link.counts is not None},
-            self.firing.resting(now),
-            {name: (now - ticks) / TICKS_PER_SECOND for name, ticks in self.firing.references.items()},
+            self.firing.resting(now_ticks),
+            {name: (now_ticks - ticks) / TICKS_PER_SECOND for name, ticks in self.firing.references.items()},
             self._live.place,
             self._live.uncertainty(),
         )
 
-    async def _solve(self, now: int) -> None:
-        answer = await self.intake.solve(now)
+    async def _solve(self, now_ticks: int) -> None:
+        answer = await self.intake.solve(now_ticks)
         if answer is not None:
             self.answer = answer
             self._stations.solved(answer)
             self.firing.fitted(answer.used, answer.rejected)
 
-    # What comes in --------------------------------------------------------------------------------------------------
+    # Input --------------------------------------------------------------------------------------------------
 
     @property
     def telescope_known(self) -> bool:
-        """Whether targets that move can be followed."""
+        """True if moving targets can be tracked."""
         return self._script is not None or (self.feed is not None and self.feed.telescope_known)
 
     def _posed(self, read: LivePosture) -> None:
-        every = (self.settings.posture_every - 1e-3) * TICKS_PER_SECOND  # a stamp has steps
-        if self.posture is None or read.ticks - self.posture.ticks >= every:
+        interval = (self.settings.posture_every - 1e-3) * TICKS_PER_SECOND  # a stamp is quantised
+        if self.posture is None or read.ticks - self.posture.ticks >= interval:
             self.posture = read
             self._guard.telescope(read)
             self.intake.take(read)
 
     def _overheard(self, link: RangerLink, reply: Reply) -> None:
-        """Another client's shot, in passive mode."""
+        """Add another client's shot, in passive mode."""
         if self.mode != "passive" or reply.ok is not True:
             return
         try:
@@ -339,7 +342,7 @@ class Coordinator:
             self._event_log.tell("bad-shot", f"{link.ranger}: {problem}", "warning", about=link.ranger)
 
     def tell(self, happening: Happening) -> None:
-        """Journal and publish something that happened."""
+        """Journal and publish an event."""
         self.intake.take(happening)
 
     def _publish(self, entry: Entry) -> None:
@@ -347,44 +350,53 @@ class Coordinator:
         for listener in self.listeners:
             listener(entry)
 
-    # What people ask for --------------------------------------------------------------------------------------------
+    # Commands --------------------------------------------------------------------------------------------
 
     def set_mode(self, mode: Mode) -> None:
-        """Active, passive, hold; shots under way come to their end."""
+        """Set active, passive or hold; shots under way finish."""
         self.mode = mode
         for name, link in self.links.items():
-            link.wanted = "hold" if name in self.firing.dropped and mode == "active" else WANTED[mode]
+            link.wanted = "hold" if name in self.firing.dropped and mode == "active" else LINK_STATES[mode]
         self._event_log.tell("mode", f"mode is {mode}", always=True)
 
-    def leased(self, before: str, now: str) -> None:
-        """Note that another of its clients may command it."""
-        self.condition.holder = now
-        self._event_log.tell("lease", f"the coordinator's lease goes from {before} to {now}", always=True)
+    def leased(self, before: str, holder: str) -> None:
+        """Log a new holder of the coordinator's lease."""
+        self.condition.holder = holder
+        self._event_log.tell("lease", f"the coordinator's lease passes from {before} to {holder}", always=True)
 
     def drop(self, ranger: str) -> None:
-        """Leave a ranger out; it stays connected. Raises InputError: no such ranger."""
-        self._known(ranger)
+        """Exclude a ranger; it stays connected.
+
+        Raises InputError: no such ranger.
+        """
+        self._refuse_unknown(ranger)
         self.firing.dropped.add(ranger)
-        self.links[ranger].wanted = "hold" if self.mode == "active" else WANTED[self.mode]
-        self._event_log.tell("dropped", f"{ranger} is left out on purpose", always=True, ranger=ranger)
+        self.links[ranger].wanted = "hold" if self.mode == "active" else LINK_STATES[self.mode]
+        self._event_log.tell("dropped", f"{ranger} is excluded on purpose", always=True, ranger=ranger)
 
     def take(self, ranger: str) -> None:
-        """Use a ranger again. Raises InputError: no such ranger."""
-        self._known(ranger)
+        """Use a ranger again.
+
+        Raises InputError: no such ranger.
+        """
+        self._refuse_unknown(ranger)
         self.firing.dropped.discard(ranger)
-        self.links[ranger].wanted = WANTED[self.mode]
+        self.links[ranger].wanted = LINK_STATES[self.mode]
         self._event_log.tell("taken", f"{ranger} is used again", always=True, ranger=ranger)
 
     def stream(self, ranger: str, target: str | None) -> None:
-        """Have a ranger measure one target again and again; None ends it. Raises InputError: not known."""
-        self._known(ranger)
+        """Have a ranger measure one target repeatedly; None ends it.
+
+        Raises InputError: unknown ranger or target.
+        """
+        self._refuse_unknown(ranger)
         if target is None:
             self.firing.streams.pop(ranger, None)
             return
         if target not in self.links[ranger].preparation.numbers:
-            raise InputError(f"{ranger} does not know {target[:20]!a} (expected one of its cubes)")
+            raise InputError(f"{ranger} has no cube {target[:20]!a} (expected one of its cubes)")
         self.firing.streams[ranger] = target
 
-    def _known(self, ranger: str) -> None:
+    def _refuse_unknown(self, ranger: str) -> None:
         if ranger not in self.links:
-            raise InputError(f"{ranger[:20]!a} is no ranger here (expected one of {', '.join(self.links)})")
+            raise InputError(f"{ranger[:20]!a} is not a ranger here (expected one of {', '.join(self.links)})")

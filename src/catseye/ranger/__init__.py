@@ -1,1 +1,1 @@
-"""The ranger's own language: what it is told, what it answers, and the integers of its motion chips."""
+"""ZY protocol: ranger state, server, client, integers of its motion chips."""

@@ -1,9 +1,9 @@
-"""Where the rangers of a site listen, its feed, and its coordinator.
+"""Network addresses of a site's rangers, feed and coordinator.
 
     loopback        ranger k of 127.0.8.k, ports 5240 and 5241, as real ones; feed 127.0.0.1 port 5250
     a port base     all on 127.0.0.1: ranger k at base + 10 k and base + 10 k + 1; feed at base
 
-k counts the site's rangers in order of the alphabet, from 1.
+k counts the site's rangers in alphabetical order, from 1.
 """
 
 from typing import Literal
@@ -33,11 +33,15 @@ def ranger_addresses(site: SiteFolder, addresses: Addresses = PORT_BASE) -> dict
     names = site.rangers
     if addresses == "loopback":
         if len(names) > MOST_LOOPBACK:
-            raise InputError(f"{len(names)} rangers have no loopback address each (expected at most {MOST_LOOPBACK})")
+            raise InputError(
+                f"too many rangers for loopback addresses: {len(names)} (expected at most {MOST_LOOPBACK})"
+            )
         return {name: (f"127.0.8.{k}", *PORTS) for k, name in enumerate(names, start=1)}
     last = addresses + STRIDE * len(names) + 1
     if not 1 <= addresses <= last <= LAST_PORT:
-        raise InputError(f"port base {addresses} gives ports to {last} (expected 1 to {LAST_PORT}: a lower base)")
+        raise InputError(
+            f"port base {addresses} gives ports up to {last} (expected at most {LAST_PORT}: use a lower base)"
+        )
     return {name: (LOOPBACK, addresses + STRIDE * k, addresses + STRIDE * k + 1) for k, name in enumerate(names, 1)}
 
 

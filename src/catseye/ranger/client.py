@@ -1,7 +1,8 @@
-"""A client of a ZY: many requests outstanding, a future or a callback each, unsolicited lines, keep-alive.
+"""Client of a ZY: outstanding requests, unsolicited lines, keep-alive.
 
-Both clients of a ranger hear what is done, so their TIDs must differ: give the second another `first_tid`. Nothing here
-raises for what the network does: a lost connection answers what is outstanding with f = 0 and says why.
+Each request has a future or a callback. Both clients of a ranger hear state changes, so their TIDs must differ: give
+the second another `first_tid`. Network errors raise nothing here: a lost connection answers outstanding requests with f
+= 0 and the reason.
 """
 
 import asyncio
@@ -27,8 +28,8 @@ from catseye.ranger.network import ConnectionMaker, Sockets
 SECOND_CLIENT_TID = 2**31 + FIRST_CLIENT_TID  # for the client on 5241
 MOST_OUTSTANDING = 4096
 KEEP_ALIVE = 60.0  # s
-STREAMED = ("CMEAS", "BUF")  # what comes under the TID of STM
-SILENCE = 150.0  # s without a line: two keep-alives missed, the peer is gone
+STREAMED = ("CMEAS", "BUF")  # replies under the TID of STM
+SILENCE = 150.0  # s without a line: two keep-alives missed, the peer is lost
 Listener = Callable[[Reply], None]
 
 
@@ -36,11 +37,11 @@ class ZyClient(asyncio.Protocol):
     """One connection to one ranger.
 
     first_tid   TID of the first request, 1000 to 4 294 967 295
-    heard       called with every line that is no reply to this client: unsolicited, and the other client's
-    clock       s, never backwards
-    key         of the site, by which a server's nonce is answered; with one, requests wait for the server's first line
+    heard       called with every line that is not a reply to this client: unsolicited, and the other client's
+    clock       s, monotonic
+    key         of the site, to answer a server's nonce; with one, requests wait for the server's first line
 
-    `bad_lines` counts lines that could not be read; the last is in `last_bad`.
+    `bad_lines` counts unreadable lines; the last error is in `last_bad`.
     """
 
     def __init__(
@@ -57,7 +58,7 @@ class ZyClient(asyncio.Protocol):
         self._outstanding: dict[int, tuple[str, asyncio.Future[Reply], Listener | None]] = {}
         self._transport: asyncio.Transport | None = None
         self._unread = bytearray()
-        self._held: list[str] | None = None if key is None else []  # lines until the server has said its first
+        self._held: list[str] | None = None if key is None else []  # lines held until the server's first line
         self._last_sent = self._last_heard = clock()
         self.closed: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         self.bad_lines, self.last_bad = 0, ""
@@ -74,9 +75,9 @@ class ZyClient(asyncio.Protocol):
         network: ConnectionMaker | None = None,
         key: str | None = None,
     ) -> "ZyClient":
-        """A client that is connected, by sockets unless told otherwise.
+        """A connected client, by sockets unless stated otherwise.
 
-        Raises InputError where nobody listens there.
+        Raises InputError if nothing listens there.
         """
         factory = partial(cls, first_tid=first_tid, heard=heard, clock=clock, key=key)
         try:
@@ -90,11 +91,11 @@ class ZyClient(asyncio.Protocol):
         """Send a command at once; its TID, and a future of its first reply.
 
         command      name
-        parameters   as they are to travel; floats by their shortest text
+        parameters   as sent; floats by their shortest text
         ticks        not before this time, None at once
-        then         called with each reply of it, also those after the first, until `forget`
+        then         called with each reply to it, also those after the first, until `forget`
 
-        Raises InputError: a request that has no line, or too many outstanding.
+        Raises InputError: a request that cannot be a line, or too many outstanding.
         """
         if len(self._outstanding) >= MOST_OUTSTANDING:
             raise InputError(f"{MOST_OUTSTANDING} requests are outstanding (expected replies to be awaited)")
@@ -112,41 +113,44 @@ class ZyClient(asyncio.Protocol):
         return tid, future
 
     async def ask(self, command: str, *parameters: object, ticks: int | None = None) -> Reply:
-        """The first reply to a command."""
+        """First reply to a command."""
         return await self.request(command, *parameters, ticks=ticks)[1]
 
     async def ask_all(self, command: str, *parameters: object) -> list[Reply]:
-        """All replies to a command that gives many, page by page: a VER behind it, in the order received, ends one."""
-        whole: list[Reply] = []
+        """All replies to a command with many, page by page.
+
+        A VER sent after it marks the end, since replies come in order.
+        """
+        collected: list[Reply] = []
         while True:
             replies: list[Reply] = []
             tid, first = self.request(command, *parameters, then=replies.append)
             await self.ask("VER")
             self.forget(tid)
-            whole += replies or [await first]
-            if not (whole[-1].ok is True and whole[-1].values[:1] == ("more",)):
-                return whole
-            parameters = (whole.pop().values[1], LONGEST_PAGE)
+            collected += replies or [await first]
+            if not (collected[-1].ok is True and collected[-1].values[:1] == ("more",)):
+                return collected
+            parameters = (collected.pop().values[1], LONGEST_PAGE)
 
     def forget(self, tid: int) -> None:
-        """No more replies of a request with `then` are expected."""
+        """Stop waiting for further replies to a request with `then`."""
         self._outstanding.pop(tid, None)
 
     @property
     def outstanding(self) -> int:
-        """Requests that have not been answered, and those kept for more replies."""
+        """Number of requests without an answer, or waiting for more replies."""
         return len(self._outstanding)
 
     def check(self) -> None:
-        """Keep-alive and silence; call it every few seconds."""
-        now = self._clock()
-        if now - self._last_heard > SILENCE:
+        """Send keep-alive and detect silence; call it every few seconds."""
+        time_s = self._clock()
+        if time_s - self._last_heard > SILENCE:
             self.close(f"nothing heard for {SILENCE:g} s")
-        elif now - self._last_sent >= KEEP_ALIVE:
+        elif time_s - self._last_sent >= KEEP_ALIVE:
             self._write("")
 
     def close(self, why: str = "closed by this client") -> None:
-        """End the connection; what is outstanding is answered with f = 0."""
+        """Close the connection; outstanding requests are answered with f = 0."""
         if not self.closed.done():
             self.closed.set_result(why)
         if self._transport is not None:
@@ -168,12 +172,12 @@ class ZyClient(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         self._last_heard = self._clock()
         self._unread += data
-        *lines, rest = self._unread.split(b"\n")
-        self._unread = bytearray(rest)
+        *lines, remainder = self._unread.split(b"\n")
+        self._unread = bytearray(remainder)
         for line in lines:
             self._line(line.removesuffix(b"\r").decode("ascii", "replace"))
         if len(self._unread) > LONGEST_REPLY:
-            self.close(f"a line longer than {LONGEST_REPLY} bytes came")
+            self.close(f"received a line longer than {LONGEST_REPLY} bytes")
 
     def _line(self, line: str) -> None:
         try:
@@ -188,22 +192,22 @@ class ZyClient(asyncio.Protocol):
                 self.close("the port asks for the site's key (expected CATSEYE_KEY or CATSEYE_KEY_FILE)")
                 return
             self._send(f"KEY {answer_to(reply.values[0], self._key)}")
-        held, self._held = self._held or [], None
-        for each in held:
-            self._send(each)
+        waiting, self._held = self._held or [], None
+        for waiting_line in waiting:
+            self._send(waiting_line)
         self._answer(reply)
 
     def _answer(self, reply: Reply) -> None:
-        command, future, then = self._outstanding.get(reply.tid, ("", None, None))
+        command, future, callback = self._outstanding.get(reply.tid, ("", None, None))
         expected = reply.command in (command, "UNKNOWN") or (command == "STM" and reply.command in STREAMED)
         if future is None or not expected:
             if self._heard is not None:
                 self._heard(reply)
             return
-        if then is None:
+        if callback is None:
             del self._outstanding[reply.tid]
         else:
-            then(reply)
+            callback(reply)
         if not future.done():
             future.set_result(reply)
 

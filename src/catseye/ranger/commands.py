@@ -1,8 +1,8 @@
-"""The commands of a ZY: a row each, with the forms it takes, what they do, and a line of help.
+"""Table of ZY commands: forms, effects, help.
 
-A form is a list of parameters; the number of parameters decides between the forms of a command. `asks` says which of
-them leave the ranger as it is. The sources name about sixty of eighty-one commands; those marked `chosen` are ours, for
-what the sources say the ranger did without saying how it was asked (docs/formats/zy.md says why each is there).
+A form is a list of parameters; the number of parameters selects the form of a command. `asks` lists the forms that do
+not change the ranger. The sources name about sixty of eighty-one commands; those marked `chosen` are ours, for
+functions of the ranger whose command the sources do not state (docs/formats/zy.md gives the reasons).
 """
 
 import math
@@ -27,10 +27,10 @@ class CommandRow:
     """A row of the table.
 
     name     as on the line, upper case
-    forms    each a row of parameters; no two of one length
-    asks     lengths of the forms that only ask
+    forms    parameter lists; no two of one length
+    asks     lengths of the forms that only query
     help     one line
-    chosen   not in the sources: ours
+    chosen   True if not in the sources
     """
 
     name: str
@@ -41,7 +41,7 @@ class CommandRow:
 
     @property
     def usage(self) -> str:
-        """The forms as people write them.
+        """The forms as typed.
 
         >>> COMMANDS["ABV"].usage
         'ABV axis | ABV axis, velocity'
@@ -49,11 +49,11 @@ class CommandRow:
         return " | ".join(f"{self.name} {', '.join(p.name for p in form)}".rstrip() for form in self.forms)
 
     def read(self, request: Request) -> tuple[Value, ...]:
-        """The values of a request's parameters.
+        """Values of a request's parameters.
 
         request   of this command
 
-        Raises InputError: no form has so many parameters; one is of another kind or outside its limits.
+        Raises InputError: no form with this number of parameters; a value of the wrong kind or outside its limits.
 
         >>> COMMANDS["ABP"].read(Request("ABP", ("0", "29000")))
         (0, 29000)
@@ -65,7 +65,7 @@ class CommandRow:
         raise InputError(f"{self.name}: {count} parameters do not fit (expected {self.usage})")
 
     def only_asks(self, request: Request) -> bool:
-        """Whether a request of this command leaves the ranger as it is."""
+        """True if a request of this command changes nothing."""
         return len(request.parameters) in self.asks
 
 
@@ -156,7 +156,7 @@ ROWS = (
         (CUBE, *XYZ, CommandParameter("cube_name", "name")),
         asks=(0, 1, 2),
     ),
-    _row("INI", "allocate n cubes, dropping those there were", (_of("cubes", 0, MOST_CUBES),)),
+    _row("INI", "allocate n cubes, dropping all present ones", (_of("cubes", 0, MOST_CUBES),)),
     _setting("CYC", "cycles of a buffer", _of("cycles", 1, 65_536)),
     _setting("SFQ", "samples of a cycle", _of("samples", 3, 65_536)),
     _setting("IFF", "intermediate frequency", _of("frequency_hz", 1, 10_000, "Hz")),
@@ -225,18 +225,18 @@ ROWS = (
     ),
     _row(
         "LEASE",
-        "who may command; take it by a name, from whoever has it; with its token renew it; none gives it back",
+        "ask the holder; take it by a name, from any holder; renew it with its token; none gives it back",
         (),
         (CommandParameter("holder", "name"),),
         (CommandParameter("holder", "name"), CommandParameter("token", "text")),
         asks=(0, 1, 2),
         chosen=True,
     ),
-    _row("STOP", "at once and for everybody: laser and motors off, nothing goes on", chosen=True),
-    _row("LATCH", "the dark order from outside the lease that holds", asks=(0,), chosen=True),
+    _row("STOP", "at once, from any connection: laser and motors off, everything stops", chosen=True),
+    _row("LATCH", "the latched stop order from outside the lease", asks=(0,), chosen=True),
     _row(
         "UNLATCH",
-        "clear that order, by the name of a person who has not the lease",
+        "clear that order, with the name of a person who does not hold the lease",
         (CommandParameter("person", "name"),),
         asks=(1,),
         chosen=True,
@@ -250,11 +250,13 @@ ROWS = (
 )
 COMMANDS = {row.name: row for row in ROWS}
 UNSCHEDULED = ("AT", "BYE", "RST", "INITZY", "LEASE", "UNLATCH")
-WORDS = frozenset([*COMMANDS, "AT", "KEY"])  # what a connection's first line may begin with
+WORDS = frozenset([*COMMANDS, "AT", "KEY"])  # allowed first words of a connection
 
 
 def stops(request: Request) -> bool:
-    """True for a request that makes dark or stops: it passes every queue and needs no lease.
+    """True for a request that stops or switches light off.
+
+    It passes every queue and needs no lease.
 
     >>> [stops(Request(*words)) for words in (("PS", ("0",)), ("PS", ("1",)), ("STOP",), ("AXIS", ("0", "0")))]
     [True, False, True, True]
@@ -266,7 +268,7 @@ def stops(request: Request) -> bool:
 
 
 def undoes(request: Request, stop: Request) -> bool:
-    """True for a waiting request that would undo a stop given after it.
+    """True if a waiting request would undo a later stop.
 
     >>> undoes(Request("PS", ("1",)), Request("PS", ("0",))), undoes(Request("PS"), Request("PS", ("0",)))
     (True, False)
@@ -282,7 +284,7 @@ def undoes(request: Request, stop: Request) -> bool:
 
 
 def schedule_of(parameters: tuple[str, ...]) -> tuple[int, int, float, Request]:
-    """Start in ticks (0: at once), repeats, interval in s, and the command that AT schedules.
+    """Start in ticks (0: at once), repeats, interval in s, and AT's command.
 
     parameters   of the line
 
@@ -299,10 +301,10 @@ def schedule_of(parameters: tuple[str, ...]) -> tuple[int, int, float, Request]:
     repeats = _of("repeats", 1, 1_000_000).read("AT", parameters[1])
     interval = _real("interval_s", 0.0, 86_400.0, "s").read("AT", parameters[2])
     word, _, first = parameters[3].partition(" ")
-    rest = tuple(part for part in (first.strip(" "), *parameters[4:]) if part)
+    parts = tuple(part for part in (first.strip(" "), *parameters[4:]) if part)
     name = word.upper()
     if name in UNSCHEDULED or name not in COMMANDS:
         raise InputError(f"AT: {word!a} cannot be scheduled (expected a command other than {', '.join(UNSCHEDULED)})")
-    request = Request(name, rest)
+    request = Request(name, parts)
     COMMANDS[name].read(request)
     return int(start), int(repeats), float(interval), request

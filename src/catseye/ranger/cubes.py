@@ -1,7 +1,7 @@
-"""The cubes that a ZY knows, where its mirror must look for them, and what was measured last.
+"""Cubes of a ZY: coordinates, encoder values, last measurements.
 
-Encoder values are computed when they are asked for, kept, and dropped when the cube's coordinates or the ranger's own
-geometry change. Those of the internal cube, number 0, ZRG, are never computed: they are set.
+Encoder values are computed on demand, cached, and dropped when the cube's coordinates or the ranger's geometry change.
+Those of the internal cube, number 0, ZRG, are never computed: they are set.
 """
 
 from dataclasses import dataclass, replace
@@ -21,7 +21,10 @@ GEOMETRY = ("BP", "ALPHA", "BETA", "MO", "EZ")
 
 @dataclass(frozen=True)
 class RangerShot:
-    """What one measurement gave: V, rad, mm (of a benchmark the group index; None without a reference), ticks."""
+    """Result of one measurement.
+
+    V, rad, mm (for a benchmark the group index; None without a reference), ticks.
+    """
 
     amplitude: float
     phase: float
@@ -49,7 +52,7 @@ class Cube:
 
 
 class Cubes:
-    """Table of cubes and the ranger's geometry.
+    """Table of cubes, and the ranger's geometry.
 
     limits   counts, lowest and highest azimuth
     """
@@ -68,7 +71,7 @@ class Cubes:
         self._numbers = {REFERENCE: 0}  # by name in capitals
         self._counts: dict[int, list[float | None]] = {0: [None, None]}
         self._station: MirrorStation | None = None
-        self.computed = 0  # times that encoder values were computed
+        self.computed = 0  # number of times that encoder values were computed
 
     @property
     def station(self) -> MirrorStation:
@@ -85,31 +88,31 @@ class Cubes:
         return self._station
 
     def allocate(self, count: int) -> None:
-        """Room for cubes 1 to count; those there were are dropped, ZRG stays."""
+        """Allocate cubes 1 to count; existing ones but ZRG are dropped."""
         self.allocated = count
         self.by_number = {0: self.by_number[0]}
         self._numbers = {REFERENCE: 0}
         self._counts = {0: self._counts[0]}
 
     def set_geometry(self, name: str, values: tuple[float, ...]) -> None:
-        """Set one of `GEOMETRY`; every encoder value but ZRG's is dropped."""
+        """Set one of `GEOMETRY`; encoder values but ZRG's are dropped."""
         self.geometry[name] = values
         self._station = None
         self._counts = {0: self._counts[0]}
 
     def find(self, key: Value) -> Cube:
-        """The cube of a number or a name, whatever its case.
+        """Cube by number or name, in any case.
 
         Raises InputError: no such cube.
         """
         number = key if isinstance(key, int) else self._numbers.get(str(key).upper(), -1)
         cube = self.by_number.get(number)
         if cube is None:
-            raise InputError(f"cube {key} is not known (expected one of {len(self.by_number)} that COO lists)")
+            raise InputError(f"unknown cube {key} (expected one of {len(self.by_number)} listed by COO)")
         return cube
 
     def place(self, key: Value, place_mm: tuple[float, float, float], name: str | None) -> Cube:
-        """Move a cube, or create or replace it where a name is given.
+        """Move a cube, or with a name create or replace it.
 
         Raises InputError: ZRG, not allocated, unknown without a name, or the name of another cube.
         """
@@ -122,15 +125,15 @@ class Cubes:
             raise InputError("cube 0 is ZRG, inside the instrument (expected 1 or above; its distance is D0)")
         if not 1 <= cube.number <= self.allocated:
             raise InputError(f"cube {cube.number} is not allocated (expected 1 to {self.allocated}; INI allocates)")
-        other = self._numbers.get(cube.name.upper(), cube.number)
-        if other != cube.number:
-            raise InputError(f"name {cube.name} is that of cube {other} (expected another)")
+        owner = self._numbers.get(cube.name.upper(), cube.number)
+        if owner != cube.number:
+            raise InputError(f"name {cube.name} belongs to cube {owner} (expected another)")
         self.put(cube)
         self._counts.pop(cube.number, None)
         return cube
 
     def put(self, cube: Cube) -> None:
-        """The cube instead of the one of its number, its encoder values untouched."""
+        """Replace the cube of this number; its encoder values stay."""
         if cube.number in self.by_number:
             del self._numbers[self.by_number[cube.number].name.upper()]
         self.by_number[cube.number] = cube
@@ -139,30 +142,30 @@ class Cubes:
     def counts(self, cube: Cube) -> tuple[float, float]:
         """Encoder values of a cube.
 
-        Raises InputError: ZRG's were not set, or no setting within the stops looks at the cube.
+        Raises InputError: ZRG's were not set, or no setting within the stops points at the cube.
         """
-        kept = self._counts.setdefault(cube.number, [None, None])
-        if None in kept:
+        cached = self._counts.setdefault(cube.number, [None, None])
+        if None in cached:
             if cube.number == 0:
                 raise InputError("encoder values of ZRG are not set (expected AZM 0, e and ELV 0, e first)")
-            looked = self.look(cube.place_mm)
-            kept[:] = [old if old is not None else new for old, new in zip(kept, looked.tolist(), strict=True)]
-        return float(kept[0] or 0.0), float(kept[1] or 0.0)
+            computed = self.look(cube.place_mm)
+            cached[:] = [old if old is not None else new for old, new in zip(cached, computed.tolist(), strict=True)]
+        return float(cached[0] or 0.0), float(cached[1] or 0.0)
 
     def set_counts(self, cube: Cube, axis: int, value: float) -> None:
-        """An encoder value given by hand, kept until it would be dropped."""
+        """Set an encoder value by hand, until it would be dropped."""
         self._counts.setdefault(cube.number, [None, None])[axis] = value
 
     def one_count(self, cube: Cube, axis: int) -> float:
-        """One encoder value; of ZRG the other need not be set."""
-        kept = self._counts.get(cube.number, [None, None])[axis]
-        return kept if kept is not None else self.counts(cube)[axis]
+        """One encoder value; for ZRG the other may be unset."""
+        cached = self._counts.get(cube.number, [None, None])[axis]
+        return cached if cached is not None else self.counts(cube)[axis]
 
     def look(self, place_mm: tuple[float, ...], current: tuple[float, float] | None = None) -> NDArray[np.float64]:
-        """(2,) counts for a point, direct pointing where the stops allow it, else the prime one.
+        """Counts (2,) for a point, direct pointing if the stops allow it, else prime.
 
         place_mm   ground frame
-        current    counts where the mirror stands: then the nearer of the two pointings
+        current    present counts of the mirror: then the nearer of the two pointings
 
         Raises InputError: neither is allowed. Source: [PARKER04] eq. 2.12 to 2.26, section 2.4.
         """
@@ -170,14 +173,14 @@ class Cubes:
         pointing = aim(self.station, np.array(place_mm) * MILLIMETRE)
         direct = np.array([pointing.azimuth_counts, pointing.elevation_counts])
         prime = np.array(prime_counts(direct[0], direct[1], self.station.zeros[1]))
-        taken = choice(direct, prime, low=self.limits[0], high=self.limits[1], current=current)
-        if not taken.allowed:
+        chosen = choice(direct, prime, low=self.limits[0], high=self.limits[1], current=current)
+        if not chosen.allowed:
             raise InputError(
                 f"no setting within the stops {self.limits[0]:g} to {self.limits[1]:g} counts looks at "
                 f"{', '.join(f'{v:.3f}' for v in place_mm)} mm"
             )
-        return np.asarray(taken.counts)
+        return np.asarray(chosen.counts)
 
     def coarse_mm(self, cube: Cube) -> float:
-        """Distance from the scan point by coordinates."""
+        """Distance from the scan point by coordinates, mm."""
         return float(np.linalg.norm(np.array(cube.place_mm) - self.station.scan_point / MILLIMETRE))

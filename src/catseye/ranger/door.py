@@ -1,8 +1,8 @@
-"""Who may come in at a port, and for how long a silent connection keeps its place: at rangers, feed and coordinator.
+"""Access policy of a port: site key, lease, time-outs; for rangers, feed and coordinator.
 
-A port beyond this machine asks for the site's key, which never travels: the server says NONCE and a random word, and
-the first line of a connection is KEY and the HMAC-SHA256 of that word by the key, in hexadecimal; until then nothing
-is told.
+A port beyond this machine requires the site's key, which is never sent: the server sends NONCE and a random word, and
+the first line of a connection is KEY and the HMAC-SHA256 of that word by the key, in hexadecimal; until then the server
+sends nothing else.
 """
 
 import asyncio
@@ -20,22 +20,28 @@ from catseye.ranger.network import NO_TLS, TlsFiles, is_here
 
 KEY, KEY_FILE = "CATSEYE_KEY", "CATSEYE_KEY_FILE"  # in the environment
 SHORTEST = 16  # characters
-FEWEST_LETTERS = 8  # different ones: fewer are soon guessed
-LONGEST_RUN = 7  # characters that follow each other as in the alphabet
+FEWEST_LETTERS = 8  # different ones: fewer are easily guessed
+LONGEST_RUN = 7  # consecutive characters as in the alphabet
 TYPED = ("password", "changeme", "letmein", "secret", "qwerty", "admin", "default")
-PROBES = ((socket.TCP_KEEPIDLE, 20), (socket.TCP_KEEPINTVL, 5), (socket.TCP_KEEPCNT, 3))  # s: gone is noticed in 35
+PROBES = (
+    (socket.TCP_KEEPIDLE, 20),
+    (socket.TCP_KEEPINTVL, 5),
+    (socket.TCP_KEEPCNT, 3),
+)  # s: a lost peer is detected in 35
 
 
 @dataclass(frozen=True)
 class Door:
-    """What a port asks of those who come.
+    """Requirements of a port.
 
-    key        the site's; None: whoever reaches the port comes in
-    lease      commands that move, light or configure need the lease
-    dead_man   s without an order of who has the lease, or without one who has it, until laser and motors go off
+    key        the site's; None: no authentication
+    lease      True if commands that move, light or configure need the lease
+    dead_man   s of the dead-man switch: without an order of the lease's holder, or without a holder, laser and motors
+               go off
     idle       s without a line after which a connection is closed
     tls        files for addresses beyond this machine
-    laser_at_boot  as at the notes' rangers the laser is at boot as its hardware has it; else off until it is lit
+    laser_at_boot  True as for the notes' rangers: the laser at boot is as its hardware has it; else off until switched
+    on
     """
 
     key: str | None = None
@@ -50,9 +56,9 @@ USUAL_DOOR = Door()
 
 
 def key_of(environment: Mapping[str, str] = os.environ) -> str | None:
-    """The site's key, of CATSEYE_KEY or the file that CATSEYE_KEY_FILE names; None where neither is set.
+    """The site's key from CATSEYE_KEY or CATSEYE_KEY_FILE; None if unset.
 
-    Raises InputError: a file that cannot be read or that others can read, a key too short, trivial, or not of printable
+    Raises InputError: a file that is unreadable or readable by others, a key too short, trivial, or not of printable
     ASCII without blanks and commas.
     """
     key, where = environment.get(KEY), KEY
@@ -72,20 +78,25 @@ def key_of(environment: Mapping[str, str] = os.environ) -> str | None:
 
 
 def _key_in(path: Path, where: str) -> str:
-    """The line of a key's file. Raises InputError: not readable, or readable by others."""
+    """The line of a key's file.
+
+    Raises InputError if it is unreadable, or readable by others.
+    """
     try:
         about = path.stat()
         key = path.read_text("ascii").strip()
     except (OSError, UnicodeDecodeError) as problem:
         raise InputError(f"{where}: cannot be read (expected a file of one line of ASCII)") from problem
-    of_root = about.st_uid == about.st_gid == 0  # as systemd's credentials, whose group bits are a list's mask
+    of_root = about.st_uid == about.st_gid == 0  # as systemd's credentials, whose group bits are an ACL mask
     if about.st_mode & (0o037 if of_root else 0o077):
-        raise InputError(f"{where}: others can use it, {stat.filemode(about.st_mode)} (expected -rw-------: chmod 600)")
+        raise InputError(
+            f"{where}: accessible by others, {stat.filemode(about.st_mode)} (expected -rw-------: chmod 600)"
+        )
     return key
 
 
 def triviality(key: str) -> str | None:
-    """Weakness of a key, in words; None for one that is hard to guess.
+    """Weakness of a key in words, None if hard to guess.
 
     >>> triviality("aaaaaaaaaaaaaaaab"), triviality("f3b0c44298fc1c14")
     ('2 different characters', None)
@@ -95,16 +106,16 @@ def triviality(key: str) -> str | None:
     steps = [ord(b) - ord(a) for a, b in pairwise(key)]
     for step in (1, -1):
         if any(all(s == step for s in steps[at : at + LONGEST_RUN]) for at in range(len(steps) - LONGEST_RUN + 1)):
-            return "characters in a row of the alphabet or of digits"
+            return "consecutive letters or digits"
     half = len(key) // 2
     if any(key == (key[:n] * (len(key) // n + 1))[: len(key)] for n in range(1, half + 1)):
-        return "one part again and again"
+        return "a repeated part"
     word = next((word for word in TYPED if word in key.lower()), None)
-    return None if word is None else f"it holds {word!a}"
+    return None if word is None else f"it contains {word!a}"
 
 
 def refuse_open(what: str, host: str, door: Door) -> None:
-    """Raises InputError where a port would be open to others without a key, or their lines in clear unasked."""
+    """Raise InputError for an exposed port without key or TLS."""
     if is_here(host):
         return
     if door.key is None:
@@ -119,7 +130,7 @@ def refuse_open(what: str, host: str, door: Door) -> None:
 
 
 def answer_to(nonce: str, key: str) -> str:
-    """Proof of the key: HMAC-SHA256 of a server's random word, hexadecimal.
+    """Proof of the key: HMAC-SHA256 of a server's nonce, hexadecimal.
 
     >>> answer_to("00", "Jefe-of-the-site-11")[:16]
     '2dc447d20cdc3ef5'
@@ -128,7 +139,7 @@ def answer_to(nonce: str, key: str) -> str:
 
 
 def notice_death(transport: asyncio.BaseTransport) -> None:
-    """Have the system ask a silent peer whether it is there still."""
+    """Enable TCP keep-alive probes, to detect a lost peer."""
     sock = transport.get_extra_info("socket")
     if sock is None or sock.family not in (socket.AF_INET, socket.AF_INET6):
         return

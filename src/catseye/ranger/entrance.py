@@ -1,7 +1,7 @@
-"""The way into a port: first bytes, first word, the site's key; a place is taken only behind it.
+"""Authentication of connections to a port, before they get its place.
 
-Those who are not in yet are few, are not told anything but a nonce, and are closed after a while. A wrong key is
-answered late, and wrong ones are counted in the log once a minute.
+Pending connections are few, are sent nothing but a nonce, and are closed after a while. A wrong key is answered late,
+and wrong ones are counted in the log once a minute.
 """
 
 import asyncio
@@ -16,31 +16,31 @@ from catseye.ranger.door import Door, answer_to
 from catseye.ranger.first_line import BLANK, opening_of, peer_of
 from catseye.ranger.line import Reply, Request, parse_request
 
-PATIENCE = 10.0  # s that the key may take
+PATIENCE = 10.0  # s within which the key must arrive
 SLOWED = 1.0  # s until a wrong key is answered
-MOST_PENDING = 16  # connections that are not in yet; the oldest of the address with most of them makes room
+MOST_PENDING = 16  # pending connections; the oldest of the address with most of them makes room
 COUNTED = 60.0  # s between two lines of the log about wrong keys
 NONCE_BYTES = 16
 LOG = logging.getLogger(__name__)
 
 
 class Doorway:
-    """Shared part of one port's entrances: who is not in yet, and wrong keys.
+    """Pending connections of one port, and wrong keys.
 
     name    of the port, for the log: "ZY101: port 5240"
-    door    what it asks
-    words   that a first line may begin with
-    clock   s, never backwards
+    door    its access policy
+    words   allowed first words
+    clock   s, monotonic
     """
 
     def __init__(self, name: Callable[[], str], door: Door, words: Collection[str], clock: Callable[[], float]):
         self.name, self.door, self.words, self.clock = name, door, words, clock
-        self._pending: dict[Entrance, float] = {}  # when each is closed, in the order they came
+        self._pending: dict[Entrance, float] = {}  # time of closing, in order of arrival
         self._wrong, self._last_wrong = 0, ""
         self._counted = float("-inf")
 
     def wait_for(self, entrance: "Entrance", seconds: float) -> None:
-        """A connection that is not in; it is closed after so long."""
+        """Add a pending connection; it is closed after so many seconds."""
         self._pending[entrance] = self.clock() + seconds
         if len(self._pending) > MOST_PENDING:
             hosts = Counter(each.host for each in self._pending)  # who opens many makes room for who opens one
@@ -49,30 +49,30 @@ class Doorway:
             first.close()
 
     def forget(self, entrance: "Entrance") -> None:
-        """A connection is in, or over."""
+        """Remove a connection that is admitted or closed."""
         self._pending.pop(entrance, None)
 
     def wrong_key(self, peer: str) -> None:
-        """Count a wrong key; the first is told at once."""
+        """Count a wrong key; the first is logged at once."""
         self._wrong, self._last_wrong = self._wrong + 1, peer
         self.check()
 
     def check(self) -> None:
-        """Close who took too long, answer wrong keys, tell the log; to be called again and again."""
-        now = self.clock()
+        """Close late connections, answer wrong keys, log; call it repeatedly."""
+        time_s = self.clock()
         for entrance, due in list(self._pending.items()):
-            if now >= due:
+            if time_s >= due:
                 self.forget(entrance)
                 entrance.refuse()
-        if self._wrong and now - self._counted >= COUNTED:
+        if self._wrong and time_s - self._counted >= COUNTED:
             LOG.warning("%s: wrong keys: %d, the last of %s", self.name(), self._wrong, self._last_wrong)
-            self._wrong, self._counted = 0, now
+            self._wrong, self._counted = 0, time_s
 
 
 class Entrance:
-    """One connection's way in.
+    """Authentication of one connection.
 
-    say   sends it a reply, which needs a stamp still
+    say   sends it a reply, which still needs a stamp
     """
 
     def __init__(self, gate: Doorway, transport: asyncio.Transport, say: Callable[[Reply], None]):
@@ -85,18 +85,18 @@ class Entrance:
         self.host = peer_of(transport).partition(" port ")[0]
 
     def begin(self) -> None:
-        """Ask for the key, where one is asked for."""
+        """Send a nonce, if a key is required."""
         if not self.admitted:
             self._nonce = secrets.token_hex(NONCE_BYTES)
             self._gate.wait_for(self, PATIENCE)
             self._say(Reply("NONCE", True, (self._nonce,)))
 
     def take(self, data: bytes) -> bytes | None:
-        """Bytes that go on from here; None while the first line is not whole, or where it is refused."""
+        """Bytes after the first line; None if it is incomplete or refused."""
         if self._open:
             return data
         if self.judged or self._transport.is_closing():
-            return None  # turned away: what else it sends is not looked at
+            return None  # refused: the rest of its input is ignored
         self._unread += data
         opening, problem = opening_of(bytes(self._unread), self._gate.words)
         if opening == "waiting":
@@ -105,27 +105,27 @@ class Entrance:
         if opening != "read":
             self._turned_away(problem, answered=opening == "unreadable")
             return None
-        begun, self._unread = bytes(self._unread), bytearray()
+        opening_bytes, self._unread = bytes(self._unread), bytearray()
         if self.admitted:
             self._open = True
-            return begun
-        line, _, rest = begun.lstrip(BLANK).partition(b"\n")
-        return rest if self._unlocked(line.decode("ascii", "replace").removesuffix("\r")) else None
+            return opening_bytes
+        line, _, remainder = opening_bytes.lstrip(BLANK).partition(b"\n")
+        return remainder if self._unlocked(line.decode("ascii", "replace").removesuffix("\r")) else None
 
     def over(self) -> None:
-        """Forget a connection that is gone."""
+        """Forget a closed connection."""
         self._gate.forget(self)
 
     def refuse(self) -> None:
-        """Close: the time for the key is over, or that for a wrong one's answer."""
+        """Close: the key is late, or was wrong."""
         self._refuse(f"the site's key is expected first: KEY and the HMAC-SHA256 of the nonce within {PATIENCE:g} s")
 
     def close(self) -> None:
-        """Close the connection without a word."""
+        """Close the connection without a message."""
         self._transport.abort()
 
     def _unlocked(self, line: str) -> bool:
-        """Take the first line, which must be KEY and the answer to the nonce."""
+        """Check the first line, which must be KEY and the proof."""
         request = _request(line)
         if request is None or request.command != "KEY" or len(request.parameters) != 1:
             self._gate.forget(self)
@@ -133,8 +133,8 @@ class Entrance:
             self.judged = True
             self.refuse()
             return False
-        wanted = answer_to(self._nonce, self._gate.door.key or "")
-        if not hmac.compare_digest(request.parameters[0].lower().encode(), wanted.encode()):
+        proof = answer_to(self._nonce, self._gate.door.key or "")
+        if not hmac.compare_digest(request.parameters[0].lower().encode(), proof.encode()):
             self.judged = True
             self._gate.wait_for(self, SLOWED)
             self._gate.wrong_key(peer_of(self._transport))

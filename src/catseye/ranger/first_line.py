@@ -1,4 +1,4 @@
-"""What a connection begins with: a browser, or what is no line, is turned away before a second line is looked at.
+"""Check of a connection's first line, to turn browsers away.
 
 A page in a browser can make it send bytes to any port of the machine: a request's body would be lines of this language.
 It always begins with a request line, a TLS hello or binary (WebRTC's STUN), which no line of the language does.
@@ -15,22 +15,22 @@ from catseye.ranger.line import LONGEST_REQUEST, parse_request
 
 HTTP = re.compile(rb"[A-Z]{3,16} +(/|\*|[a-z][a-z0-9+.-]*:)|[ -~]* HTTP/[0-9]|Host *:", re.IGNORECASE)
 TLS_HELLO = b"\x16\x03"
-BLANK = b"\r\n\t "  # lines of nothing else ask nothing
-SHOWN = 40  # bytes in the log
+BLANK = b"\r\n\t "  # lines of only these are ignored
+LOGGED = 40  # bytes in the log
 CREDENTIALS = struct.Struct("3i")  # process, user and group at the other end of a Unix socket
 Opening = Literal["waiting", "foreign", "unreadable", "read"]
 
 
 def opening_of(data: bytes, words: Collection[str] | None = None) -> tuple[Opening, str]:
-    """How a connection's first bytes stand, and what is wrong with them.
+    """Classification of a connection's first bytes, and their problem.
 
-    data    all that came so far
-    words   commands that a first line may give; None: any
+    data    all received so far
+    words   allowed commands of a first line; None: any
 
-    "waiting"     no whole line yet but empty ones, which ask nothing
+    "waiting"     no complete line yet but empty ones, which are ignored
     "foreign"     HTTP, TLS or binary: close at once, with no answer
-    "unreadable"  no line of the language, or an unknown command: answer, then close
-    "read"        a line of the language, whatever it asks
+    "unreadable"  not a line of the language, or an unknown command: answer, then close
+    "read"        a line of the language
 
     >>> opening_of(b"POST / HTTP/1.1\\r\\n")
     ('foreign', "begins with b'POST / HTTP/1.1', which is HTTP")
@@ -41,15 +41,15 @@ def opening_of(data: bytes, words: Collection[str] | None = None) -> tuple[Openi
     """
     if data.startswith(TLS_HELLO):
         return "foreign", "begins with a TLS hello"
-    begun = data.lstrip(BLANK)
-    if begun and not 0x20 <= begun[0] <= 0x7E:
-        return "foreign", f"begins with byte 0x{begun[0]:02x}, which is no printable ASCII"
-    line, end, _ = begun.partition(b"\n")
+    stripped = data.lstrip(BLANK)
+    if stripped and not 0x20 <= stripped[0] <= 0x7E:
+        return "foreign", f"begins with byte 0x{stripped[0]:02x}, which is no printable ASCII"
+    line, end, _ = stripped.partition(b"\n")
     line = line.removesuffix(b"\r")
     if HTTP.match(line):
-        return "foreign", f"begins with {line[:SHOWN]!r}, which is HTTP"
+        return "foreign", f"begins with {line[:LOGGED]!r}, which is HTTP"
     if not end:
-        if len(begun) > LONGEST_REQUEST + 2:
+        if len(stripped) > LONGEST_REQUEST + 2:
             return "unreadable", f"line is longer than {LONGEST_REQUEST} bytes"
         return "waiting", ""
     if len(line) > LONGEST_REQUEST:
@@ -64,7 +64,7 @@ def opening_of(data: bytes, words: Collection[str] | None = None) -> tuple[Openi
 
 
 def peer_of(transport: object) -> str:
-    """Who is at the other end, for a log; "a peer" where that is not known."""
+    """The peer in words, for a log; "a peer" if unknown."""
     about = getattr(transport, "get_extra_info", None)
     if about is None:
         return "a peer"

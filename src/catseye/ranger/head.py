@@ -1,8 +1,8 @@
-"""What a ZY server asks of hardware: fire and give a buffer, axes, power, temperature, clock.
+"""Hardware interface of a ranger: buffer, axes, power, temperature, clock.
 
-No call may block: a buffer, a move and a search for the index are started, and asked about later. The server looks at
-each head in its own loop. Axis 0 is azimuth, 1 elevation. A real head is an A/D card, a motion chip for each axis and
-a clock card behind these methods; tests/ranger/head_conformance.py is what all heads must meet.
+No call may block: a buffer, a move and a search for the index are started, and polled later. The server polls each
+head in its own loop. Axis 0 is azimuth, 1 elevation. A real head is an A/D card, a motion chip for each axis and
+a clock card behind these methods; tests/ranger/head_conformance.py is the conformance test of all heads.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ Homing = Literal["never", "searching", "home", "failed"]
 
 @dataclass(frozen=True)
 class SamplingSettings:
-    """How a buffer is taken: `SFQ`, `CYC`, `IFF`.
+    """Sampling of a buffer: `SFQ`, `CYC`, `IFF`.
 
     samples        of a cycle, at least 3
     cycles         at least 1; samples times cycles at most 65 536
@@ -55,17 +55,17 @@ class SamplingSettings:
 
     @property
     def duration(self) -> float:
-        """How long a buffer takes, s."""
+        """Duration of a buffer, s."""
         return self.cycles / self.frequency_hz
 
 
 @dataclass(frozen=True, eq=False)
 class Buffer:
-    """The samples of one shot.
+    """Samples of one shot.
 
     samples          (m n,) int16, codes of the converter
-    triggered        when the first was taken
-    sampling         how
+    triggered        time of the first sample
+    sampling         settings
     volts_per_code   V
     """
 
@@ -79,7 +79,7 @@ class RangerHead(Protocol):
     """The hardware of one ranger."""
 
     def now(self) -> TimeTag:
-        """UTC of the head's clock, which does not run backwards unless set."""
+        """UTC of the head's clock, monotonic unless set."""
         ...
 
     def set_clock(self, tag: TimeTag) -> None:
@@ -87,67 +87,70 @@ class RangerHead(Protocol):
         ...
 
     def clock_locked(self) -> bool:
-        """Whether the clock follows its time signal."""
+        """True if the clock follows its time signal."""
         ...
 
     def trigger(self, sampling: SamplingSettings) -> None:
-        """Begin to take a buffer; one being taken is given up."""
+        """Start taking a buffer; one under way is abandoned."""
         ...
 
     def buffer(self) -> Buffer | None:
-        """The last buffer whole; None before the first and while one is being taken."""
+        """Last complete buffer; None before the first and during one."""
         ...
 
     def enable(self, axis: int, on: bool) -> None:
-        """The amplifier of an axis; off at boot."""
+        """Switch the amplifier of an axis; off at boot."""
         ...
 
     def enabled(self, axis: int) -> bool:
-        """Whether the amplifier is on."""
+        """True if the amplifier is on."""
         ...
 
     def actual(self, axis: int) -> int:
-        """Where the encoder says the axis is, counts."""
+        """Encoder position of the axis, counts."""
         ...
 
     def desired(self, axis: int) -> int:
-        """Where the profile wants it, counts."""
+        """Desired position by the profile, counts."""
         ...
 
     def start(self, axis: int, position: int, *, velocity: int, acceleration: int) -> bool:
-        """Begin a trapezoidal move in the motion chip's integers; False where it cannot begin."""
+        """Start a trapezoidal move in the motion chip's integers; False if impossible."""
         ...
 
     def follow(self, counts: tuple[NDArray[np.float64], NDArray[np.float64]], when: tuple[TimeTag, TimeTag]) -> bool:
-        """Follow counts (2,) linearly from the first time to the second, both axes; False where it cannot."""
+        """Track counts (2,) linearly between two times; False if impossible."""
         ...
 
     def moving(self, axis: int) -> bool:
-        """Whether a profile, or a search for the index, is under way."""
+        """True if a profile, or a search for the index, is under way."""
         ...
 
     def motor_off(self, axis: int) -> bool:
-        """Whether the chip switched the motor off: position error past its limit. The next move clears it."""
+        """True if the chip switched the motor off: position error past its limit.
+
+        The next move clears it.
+        """
         ...
 
     def set_filter(self, axis: int, values: tuple[int, int, int, int, int]) -> None:
-        """Filter: kp, ki, kd, integration limit, derivative interval."""
+        """Set the filter: kp, ki, kd, integration limit, derivative interval."""
         ...
 
     def set_error_limit(self, axis: int, counts: int) -> None:
-        """Position error past which the motor goes off."""
+        """Set the position error past which the motor goes off."""
         ...
 
     def find_home(self, axis: int) -> None:
-        """Begin to look for the index, which becomes zero."""
+        """Start the search for the index, which becomes zero."""
         ...
 
     def homing(self, axis: int) -> Homing:
-        """How the last search stands."""
+        """State of the last search."""
         ...
 
     def stop(self) -> None:
-        """Both axes stop as they can; what is under way is given up."""
+        """Stop both axes and abandon what is under way."""
         ...
 
     def switch_laser(self, on: bool) -> None:
@@ -155,7 +158,7 @@ class RangerHead(Protocol):
         ...
 
     def laser_on(self) -> bool:
-        """Whether the laser shines."""
+        """True if the laser is on."""
         ...
 
     def supplies(self) -> dict[str, float]:
@@ -163,9 +166,12 @@ class RangerHead(Protocol):
         ...
 
     def enclosure_temperature_c(self) -> float:
-        """Temperature in the enclosure, NaN where it is not known."""
+        """Temperature in the enclosure, NaN if unknown."""
         ...
 
     def reset(self) -> None:
-        """As when power comes on: amplifiers off, nothing homed, no buffer, laser as the hardware has it."""
+        """Reset to the state at power-on.
+
+        Amplifiers off, nothing homed, no buffer, laser as the hardware has it.
+        """
         ...

@@ -1,8 +1,8 @@
-"""What a ranger must be told before it can point and measure, from a site's records: commands, and its three files.
+"""Initialisation of a ranger from a site's records: commands and files.
 
-A ranger lives in one frame of its own, in which its BP, ALPHA, SUN and all coordinates of cubes are given: a ground
-ranger in the ground frame, one on the feed arm in the reflector frame, with which it turns. Cubes have the same numbers
-on all rangers of a site.
+A ranger works in one frame, in which its BP, ALPHA, SUN and all coordinates of cubes are given: a ground ranger in the
+ground frame, one on the feed arm in the reflector frame, with which it turns. Cubes have the same numbers on all
+rangers of a site.
 """
 
 from collections.abc import Iterable, Mapping
@@ -28,7 +28,7 @@ Frame = Literal["ground", "reflector"]
 
 
 def frame_of(site: SiteFolder, ranger: str) -> Frame:
-    """The frame in which a ranger is told its base point, its cubes and the Sun.
+    """Frame of a ranger's base point, cubes and Sun vector.
 
     Raises InputError: no such ranger.
     """
@@ -39,10 +39,11 @@ def frame_of(site: SiteFolder, ranger: str) -> Frame:
 
 
 def mount_from_reflector(site: SiteFolder, ranger: str) -> NDArray[np.float64]:
-    """(3, 3): mount axes of a feed-arm ranger of vectors in the reflector frame, by its record or else the default.
+    """Mount axes (3, 3) of a feed-arm ranger, in the reflector frame.
 
-    Default, chosen: y^ looks at the centre of the dish, z^ along the reflector's x as far as it can; so the dish lies
-    within 45 deg of Theta = Phi = 90 deg, far from the azimuth axis, where a mirror cannot follow, and from the stops.
+    By its record or else the default, chosen: y^ points at the centre of the dish, z^ along the reflector's x as far as
+    possible; so the dish lies within 45 deg of Theta = Phi = 90 deg, far from the azimuth axis, where a mirror cannot
+    follow, and from the stops.
     """
     record = _feed_arm_record(site, ranger)
     if record.mount_z is not None and record.mount_y is not None:
@@ -56,13 +57,15 @@ def mount_from_reflector(site: SiteFolder, ranger: str) -> NDArray[np.float64]:
 
 
 def dish_centre(site: SiteFolder) -> NDArray[np.float64]:
-    """(3,) m, reflector frame: the point of the paraboloid over the centre of the aperture."""
+    """Paraboloid point (3,) over the aperture's centre, m, reflector frame."""
     x, y = (value * MILLIMETRE for value in site.site.paraboloid.aperture_centre_mm)
     return np.array([x, y, (x**2 + y**2) / (4.0 * site.site.paraboloid.focal_length_mm * MILLIMETRE)])
 
 
 def own_station(site: SiteFolder, ranger: str) -> MirrorStation:
-    """The mirror on its mount, in the ranger's own frame, which for the feed arm is the reflector's.
+    """The mirror on its mount, in the ranger's frame.
+
+    For the feed arm that is the reflector frame.
 
     Source: [PARKER04] section 2.2.
     """
@@ -80,7 +83,9 @@ def own_station(site: SiteFolder, ranger: str) -> MirrorStation:
 
 
 def cube_numbers(site: SiteFolder) -> dict[str, int]:
-    """Number of every cube by its target's name, the same on all rangers: ZRG is 0, the rest in order of the alphabet.
+    """Number of every cube by its target's name, equal on all rangers.
+
+    ZRG is 0, the others in alphabetical order.
 
     Raises InputError: more than a ranger has room for.
     """
@@ -91,7 +96,10 @@ def cube_numbers(site: SiteFolder) -> dict[str, int]:
 
 
 def cube_places_mm(site: SiteFolder, ranger: str) -> dict[str, NDArray[np.float64]]:
-    """(3,) mm by name: every target but ZRG and the ranger itself, in the ranger's own frame, in the site's posture."""
+    """Positions (3,) mm by name of all targets but ZRG and itself.
+
+    In the ranger's frame, for the site's posture.
+    """
     return _in_own_frame(site, ranger, places_of(site))
 
 
@@ -102,9 +110,10 @@ def cubes_commands(
     *,
     places: Mapping[str, RangedPoint] | None = None,
 ) -> list[Request]:
-    """INI, then COO and KND of the targets, all of them unless told which; ZRG and the ranger itself have none.
+    """INI, then COO and KND of the targets but ZRG and itself.
 
-    places   of the site, where the caller has them already
+    targets   names; None: all
+    places    of the site, if already computed
     """
     numbers, places = cube_numbers(site), places or places_of(site)
     at = _in_own_frame(site, ranger, places)
@@ -112,7 +121,7 @@ def cubes_commands(
     commands = [_command("INI", len(numbers) - 1)]
     for name in sorted(at) if targets is None else [t for t in targets if t not in (REFERENCE, ranger)]:
         if name not in at:
-            raise InputError(f"target {name} is not at this site (expected one of its {len(at)} targets)")
+            raise InputError(f"unknown target {name} (expected one of the site's {len(at)} targets)")
         commands.append(_command("COO", numbers[name], *(f"{v:.3f}" for v in at[name]), name))
         if name in certified:
             commands.append(_command("KND", numbers[name], "B", f"{certified[name]:.4f}"))
@@ -122,7 +131,7 @@ def cubes_commands(
 
 
 def monument_commands(site: SiteFolder, ranger: str) -> list[Request]:
-    """BP and ALPHA, in the ranger's own frame."""
+    """BP and ALPHA, in the ranger's frame."""
     station = own_station(site, ranger)
     return [
         _command("BP", *(f"{v:.4f}" for v in station.fixed_point / MILLIMETRE)),
@@ -131,7 +140,7 @@ def monument_commands(site: SiteFolder, ranger: str) -> list[Request]:
 
 
 def head_commands(site: SiteFolder, ranger: str) -> list[Request]:
-    """BETA, MO, EZ, D0, the counts of ZRG, and what the mirror's record says of its motion."""
+    """BETA, MO, EZ, D0, counts of ZRG, and the mirror's motion settings."""
     mirror = site.mirror_of(ranger)
     return [
         _command("BETA", f"{mirror.beta1_rad:.9f}", f"{mirror.beta2_rad:.9f}"),
@@ -145,11 +154,13 @@ def head_commands(site: SiteFolder, ranger: str) -> list[Request]:
 
 
 def commands_of_ranger(site: SiteFolder, ranger: str, targets: Iterable[str] | None = None) -> list[Request]:
-    """Everything that initialises a ranger: monument, head, then cubes. Amplifiers, homing and the Sun are not in it.
+    """All initialisation commands of a ranger: monument, head, cubes.
+
+    Amplifiers, homing and the Sun are not included.
 
     site      its records
     ranger    name
-    targets   names of the cubes to tell; None: all
+    targets   names of the cubes; None: all
 
     Raises InputError: no such ranger or target, or more targets than a ranger has room for.
     """
@@ -163,11 +174,13 @@ def commands_of_ranger(site: SiteFolder, ranger: str, targets: Iterable[str] | N
 def files_of_ranger(
     site: SiteFolder, ranger: str, *, places: Mapping[str, RangedPoint] | None = None
 ) -> dict[str, str]:
-    """CUBES.INI, ZYnnn.INI and the head's file, text by name, in the order in which INITZY runs them.
+    """Initialisation files: text by name, in INITZY's order.
 
-    places   of the site, where the caller has them already
+    They are CUBES.INI, ZYnnn.INI and the head's file.
 
-    Rangers of the ground share their CUBES.INI but for what is theirs: benchmarks, and that none is its own target.
+    places   of the site, if already computed
+
+    Ground rangers share their CUBES.INI except for benchmarks, and that none is its own target.
     """
     zp = site.mirror_of(ranger).zp
     frame = frame_of(site, ranger)
@@ -188,12 +201,12 @@ def _in_own_frame(site: SiteFolder, ranger: str, places: Mapping[str, RangedPoin
 
 
 def _motion(mirror: Mirror, axis: int) -> list[Request]:
-    """Filter, error limit, speed and acceleration where the record has them, in an order that no check refuses."""
+    """Filter, error limit, speed and acceleration from the record, in a valid order."""
     slow = (getattr(mirror, f"abv_{axis}") or BOOT_ACCELERATION) < BOOT_ACCELERATION
     order = (*FILTER, "ERL", *(("ABA", "ABV") if slow else ("ABV", "ABA")))
     values = {name: getattr(mirror, f"{name.lower()}_{axis}") for name in order}
     if slow and values["ABA"] is None:
-        values["ABA"] = values["ABV"]  # no move may be slower than its acceleration
+        values["ABA"] = values["ABV"]  # the velocity must not be below the acceleration
     return [_command(name, axis, value) for name, value in values.items() if value is not None]
 
 
@@ -201,7 +214,7 @@ def _feed_arm_record(site: SiteFolder, ranger: str) -> FeedArmRanger:
     ranger_record = next((record for record in site.feedarm.ranger if record.name == ranger), None)
     if ranger_record is None:
         raise InputError(
-            f"{ranger} is no ranger of {site.site.campaign.name} (expected one of {', '.join(site.rangers)})"
+            f"unknown ranger {ranger} at {site.site.campaign.name} (expected one of {', '.join(site.rangers)})"
         )
     return ranger_record
 

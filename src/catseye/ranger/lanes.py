@@ -1,6 +1,6 @@
-"""Queues of commands, one a connection: a long answer, or a wait, of one connection keeps no other waiting.
+"""Command queues, one per connection, so that none blocks another.
 
-Of commands that change the ranger one runs at a time, whosever it is; questions of other connections pass it by.
+Of commands that change the ranger one runs at a time, whosever it is; queries of other connections pass it.
 """
 
 from collections import deque
@@ -11,15 +11,15 @@ from catseye.ranger.commands import COMMANDS
 from catseye.ranger.line import Request
 from catseye.ranger.state import Work
 
-SCHEDULE = -1  # the lane of scheduled commands
+SCHEDULE = -1  # the queue of scheduled commands
 
 
 @dataclass
 class Running:
-    """A command under way: of a connection, and when what it waits for is asked again (None: soon).
+    """A command under way, and when to poll it (None: soon).
 
-    acts   it is more than a question
-    more   a slice of its answer is out, and the next can come at once
+    acts   True if it is more than a query
+    more   True if a part of its answer is sent, and the next can follow at once
     """
 
     client: int
@@ -32,7 +32,7 @@ class Running:
 
 @dataclass
 class Lane:
-    """Commands of one connection in the order received."""
+    """Queue of one connection, in order of arrival."""
 
     client: int
     waiting: deque[Request] = field(default_factory=deque)
@@ -40,7 +40,9 @@ class Lane:
 
 
 def acts(request: Request) -> bool:
-    """True for a request that changes the ranger: those need the lease, and run one at a time.
+    """True for a request that changes the ranger.
+
+    Those need the lease, and run one at a time.
 
     >>> acts(Request("ACP", ("0",))), acts(Request("CIL", ("1",))), acts(Request("BYE")), acts(Request("XYZ"))
     (False, True, False, False)
@@ -50,24 +52,24 @@ def acts(request: Request) -> bool:
 
 
 class Lanes:
-    """The lanes of a ranger's connections, and that of what was scheduled."""
+    """Queues of a ranger's connections, and of scheduled commands."""
 
     def __init__(self) -> None:
         self._lanes: dict[int, Lane] = {SCHEDULE: Lane(SCHEDULE)}
 
     def of(self, client: int) -> Lane:
-        """The lane of one connection."""
+        """Queue of one connection."""
         return self._lanes.setdefault(client, Lane(client))
 
     def drop(self, client: int) -> None:
-        """Forget a connection's commands."""
+        """Drop a connection's commands."""
         self._lanes.pop(client, None)
         scheduled = self._lanes[SCHEDULE]
         if scheduled.running is not None and scheduled.running.client == client:
             scheduled.running = None
 
     def in_turn(self, first: int | None) -> Iterator[Lane]:
-        """All lanes, `first` before the others."""
+        """All queues, `first` before the others."""
         yield from (lane for _, lane in sorted(self._lanes.items(), key=lambda item: item[0] != first))
 
     @property
@@ -76,7 +78,7 @@ class Lanes:
         return next((lane.running for lane in self._lanes.values() if lane.running and lane.running.acts), None)
 
     def can_begin(self, lane: Lane) -> bool:
-        """True where a lane's next command can begin now."""
+        """True if a queue's next command can start now."""
         return bool(lane.waiting) and lane.running is None and (self.acting is None or not acts(lane.waiting[0]))
 
     @property
@@ -86,28 +88,28 @@ class Lanes:
 
     @property
     def running(self) -> list[Running]:
-        """Commands under way, of all lanes."""
+        """Commands under way, of all queues."""
         return [lane.running for lane in self._lanes.values() if lane.running is not None]
 
     def take_out(
         self, which: Callable[[Request], bool], client: int | None = None, *, running: bool = False
     ) -> list[tuple[int, Request]]:
-        """Take commands out of the lanes: whose they were, and what.
+        """Remove commands from the queues: client and request of each.
 
-        which     of those that wait
+        which     True for waiting requests to remove
         client    of this connection only; None: of all
-        running   what runs and changes the ranger, too
+        running   True to remove also what runs and changes the ranger
         """
         out: list[tuple[int, Request]] = []
         for number, lane in self._lanes.items():
-            under_way = lane.running
-            whose = number if under_way is None else under_way.client
+            current = lane.running
+            whose = number if current is None else current.client
             if client is not None and whose != client:
                 continue
-            if running and under_way is not None and under_way.acts:
-                under_way.work.close()
+            if running and current is not None and current.acts:
+                current.work.close()
                 lane.running = None
-                out.append((under_way.client, under_way.request))
+                out.append((current.client, current.request))
             out += [(number, request) for request in lane.waiting if which(request)]
             lane.waiting = deque(request for request in lane.waiting if not which(request))
         return out

@@ -1,6 +1,6 @@
-"""A dark order from outside the lease, which holds until a person clears it, also over a new start of the server.
+"""Stop order from outside the lease, latched until a person clears it.
 
-Where a ranger has a folder of its own, the order is a file in it: a program that is started again reads it.
+If a ranger has a folder, the order is a file in it, and survives a restart of the server.
 """
 
 import logging
@@ -17,22 +17,22 @@ MOVING = frozenset(["AXIS", "STT", "FHM", "CIL", "CMEAS", "TRK", "SCN"])
 class Latch:
     """An order that holds until it is cleared.
 
-    light, moves   which of both
-    order          the command and who gave it, in words
+    light, moves   True for what is forbidden
+    order          the command and its sender, in words
     """
 
     light: bool
     moves: bool
     order: str
 
-    def joined(self, other: "Latch | None") -> "Latch":
-        """This order on top of one that holds already, whose words stay."""
-        if other is None:
+    def joined(self, standing_order: "Latch | None") -> "Latch":
+        """This order added to an existing one, whose text stays."""
+        if standing_order is None:
             return self
-        return Latch(self.light or other.light, self.moves or other.moves, other.order)
+        return Latch(self.light or standing_order.light, self.moves or standing_order.moves, standing_order.order)
 
     def refuses(self, command: str) -> bool:
-        """True for a command that it forbids, of those that switch on, fire or move."""
+        """True for a command that it forbids."""
         return (self.light and command in LIGHTING) or (self.moves and command in MOVING)
 
     @property
@@ -42,7 +42,7 @@ class Latch:
 
 
 def stored_latch(folder: Path | None) -> Latch | None:
-    """The order that a ranger's folder holds; a file that cannot be read counts as one for light and moves."""
+    """Order stored in a folder; an unreadable one forbids light and moves."""
     if folder is None:
         return None
     try:
@@ -56,7 +56,7 @@ def stored_latch(folder: Path | None) -> Latch | None:
 
 
 def store_latch(folder: Path | None, latch: Latch | None) -> None:
-    """Write the order to a ranger's folder, or take it away; a folder that cannot be written keeps none."""
+    """Write the order to a folder or remove it; errors are logged."""
     if folder is None:
         return
     path, new = folder / FILE, folder / f".{FILE}.new"
@@ -67,4 +67,4 @@ def store_latch(folder: Path | None, latch: Latch | None) -> None:
         new.write_text(f"{latch.extent}\n{latch.order}\n", "ascii")
         new.replace(path)
     except OSError as problem:
-        LOG.warning("%s: the order holds until this program ends only: %s", path, problem)
+        LOG.warning("%s: not stored, the order is lost when this program ends: %s", path, problem)

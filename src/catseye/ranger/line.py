@@ -1,12 +1,14 @@
-"""Lines of the ZY language: requests, replies, stamps, comments. Text in, values out; no socket, no clock.
+"""Lines of the ZY language: requests, replies, stamps, comments.
+
+Text in, values out; no socket, no clock.
 
     request   [TID<TAB>[TS<TAB>]]CMD[ P1[, P2 ...]]
     reply     TID<TAB>TS<TAB>CMD f[, P1, ...]       f = 1 or 0; after 0 comes a text, which may hold commas
 
-Lines are printable ASCII. A command's case does not matter. A stamp is an MJD with eight decimals; inside it is a whole
-number of *ticks*, 1e-8 day = 864 000 ns, so that it compares and travels without loss. Open in the sources and chosen
-here: what a request's stamp means (docs/formats/zy.md), the limits of length, and that every line of the ZY, greeting
-included, carries TID and stamp; a greeting without them is read, too.
+Lines are printable ASCII. Commands are case-insensitive. A stamp is an MJD with eight decimals; internally it is a
+whole number of *ticks*, 1e-8 day = 864 000 ns, so that it compares and travels without loss. Open in the sources and
+chosen here: the meaning of a request's stamp (docs/formats/zy.md), the limits of length, and that every line of the ZY,
+greeting included, carries TID and stamp; a greeting without them is accepted, too.
 """
 
 import re
@@ -24,16 +26,16 @@ FIRST_CLIENT_TID = 1000  # 0 to 999 belong to the ZY
 LONGEST_REQUEST = 1024  # bytes without the line's end
 LONGEST_REPLY = 2**18  # a buffer of 65 536 samples in base64 has 174 764
 MOST_PARAMETERS = 32
-LONG = 512  # characters, from which on arrays are faster than str
+LONG = 512  # characters, above which arrays are faster than str
 COMMAND = re.compile(r"[A-Za-z][A-Za-z0-9]{0,15}")
-STAMP = re.compile(r"([0-9]{1,5})\.([0-9]{8})")  # as all are that a program writes
+STAMP = re.compile(r"([0-9]{1,5})\.([0-9]{8})")  # the form that programs write
 DIGITS = re.compile(r"[0-9]{1,10}")
 STATEMENTS = ("HELLO", "UNKNOWN")  # a text follows, no f
 
 
 @dataclass(frozen=True)
 class Request:
-    """What a client asks: `tid` 0 when it gave none, `ticks` None when it gave no stamp."""
+    """A client's request; `tid` 0 and `ticks` None if not given."""
 
     command: str
     parameters: tuple[str, ...] = ()
@@ -43,9 +45,9 @@ class Request:
 
 @dataclass(frozen=True)
 class Reply:
-    """What a ranger says: `ok` is f, None for HELLO and UNKNOWN; `values` is one text where f is not 1.
+    """A ranger's reply; `ok` is f, None for HELLO and UNKNOWN.
 
-    `ticks` is None only for a greeting that came without.
+    `values` is one text if f is not 1. `ticks` is None only for a greeting without a stamp.
     """
 
     command: str
@@ -56,12 +58,12 @@ class Reply:
 
     @property
     def text(self) -> str:
-        """What was wrong, or was stated; the values in a row otherwise."""
+        """Error text or statement; otherwise the values in a row."""
         return ", ".join(self.values)
 
 
 def ticks_of(tag: TimeTag) -> int:
-    """The nearest stamp to an instant, in ticks of 1e-8 day since MJD 0.
+    """Nearest stamp to an instant, in ticks of 1e-8 day since MJD 0.
 
     tag   one instant
 
@@ -77,28 +79,28 @@ def nanoseconds_of(tag: TimeTag) -> int:
 
 
 def nanoseconds_to_ticks(nanoseconds: int) -> int:
-    """The nearest tick, halves up."""
+    """Nearest tick of whole nanoseconds, halves up."""
     return (2 * nanoseconds + TICK_NS) // (2 * TICK_NS)
 
 
 def tag_of(ticks: int) -> TimeTag:
-    """The instant of a stamp, exact: a tick is 864 000 ns."""
-    day, rest = divmod(ticks, TICKS_PER_DAY)
-    return TimeTag(np.asarray(day), np.asarray(rest * TICK_NS))
+    """Instant of a stamp, exact: a tick is 864 000 ns."""
+    day, ticks_of_day = divmod(ticks, TICKS_PER_DAY)
+    return TimeTag(np.asarray(day), np.asarray(ticks_of_day * TICK_NS))
 
 
 def stamp_text(ticks: int) -> str:
-    """A stamp as it travels.
+    """Text of a stamp, as sent.
 
     >>> stamp_text(5288912500000)
     '52889.12500000'
     """
-    day, rest = divmod(ticks, TICKS_PER_DAY)
-    return f"{day}.{rest:08d}"
+    day, ticks_of_day = divmod(ticks, TICKS_PER_DAY)
+    return f"{day}.{ticks_of_day:08d}"
 
 
 def parse_stamp(text: str) -> int:
-    """Ticks of a decimal MJD; more than eight decimals are rounded to the nearest tick.
+    """Ticks of a decimal MJD, rounded to the nearest tick.
 
     text   such as 52889.12500000
 
@@ -110,15 +112,15 @@ def parse_stamp(text: str) -> int:
     try:
         return ticks_of(TimeTag.parse(text))
     except ValidityError as problem:
-        raise InputError(f"stamp {_shown(text)} is not an MJD (expected digits such as 52889.12500000)") from problem
+        raise InputError(f"stamp {_quoted(text)} is not an MJD (expected digits such as 52889.12500000)") from problem
 
 
 def parse_request(line: str) -> Request | None:
-    """The request on a line without its end; None for an empty line, which asks nothing.
+    """Request of a line without its end; None for an empty line.
 
     line   [TID<TAB>[TS<TAB>]]CMD[ P1[, P2 ...]]
 
-    Raises InputError: too long, not ASCII, no command, a TID or stamp that is none, too many or empty parameters, a
+    Raises InputError: too long, not ASCII, no command, an invalid TID or stamp, too many or empty parameters, a
     semicolon (a comment in files; on the wire one line is one command).
 
     >>> parse_request("1000\\tcmeas 1, 17")
@@ -146,11 +148,11 @@ def parse_request(line: str) -> Request | None:
 
 
 def format_request(request: Request) -> str:
-    """The line of a request, without its end.
+    """Line of a request, without its end.
 
-    request   with values that hold no comma, tab, semicolon, line end, or blanks at their ends
+    request   with values without comma, tab, semicolon, line end, or blanks at their ends
 
-    Raises InputError where the line would be read as something else.
+    Raises InputError if the line would not be parsed back to the same.
 
     >>> format_request(Request("CMEAS", ("1", "17"), 1000))
     '1000\\tCMEAS 1, 17'
@@ -160,12 +162,12 @@ def format_request(request: Request) -> str:
         head = f"{request.tid}\t" + ("" if request.ticks is None else f"{stamp_text(request.ticks)}\t")
     line = head + request.command + (" " + ", ".join(request.parameters) if request.parameters else "")
     if parse_request(line) != request:
-        raise InputError(f"request {_shown(line)} would be read otherwise (expected plain values without , ; or tab)")
+        raise InputError(f"request {_quoted(line)} contains separators (expected plain values without , ; or tab)")
     return line
 
 
 def parse_reply(line: str) -> Reply | None:
-    """What a ranger said on a line without its end; None for an empty line, its keep-alive.
+    """Reply of a line without its end; None for a keep-alive.
 
     line   TID<TAB>TS<TAB>CMD f[, P1, ...]; HELLO and CONNECT also without TID and stamp
 
@@ -180,15 +182,15 @@ def parse_reply(line: str) -> Reply | None:
         return None
     *head, body = line.split("\t")
     _printable(body)
-    command, rest = _body(body)
+    command, body_text = _body(body)
     if len(head) != 2 and (head or command not in ("HELLO", "CONNECT")):
-        raise InputError(f"reply {_shown(line)} has {len(head)} tabs (expected TID<TAB>TS<TAB>CMD f, ...)")
+        raise InputError(f"reply {_quoted(line)} has {len(head)} tabs (expected TID<TAB>TS<TAB>CMD f, ...)")
     tid, ticks = (_tid(head[0]), parse_stamp(head[1])) if head else (0, None)
     if command in STATEMENTS:
-        return Reply(command, None, (rest,) if rest else (), tid, ticks)
-    flag, comma, values = rest.partition(",")
+        return Reply(command, None, (body_text,) if body_text else (), tid, ticks)
+    flag, comma, values = body_text.partition(",")
     if flag.strip(" ") not in ("0", "1"):
-        raise InputError(f"reply {_shown(line)}: {_shown(flag)} is neither 1 nor 0")
+        raise InputError(f"reply {_quoted(line)}: {_quoted(flag)} is neither 1 nor 0")
     ok = flag.strip(" ") == "1"
     if not comma:
         return Reply(command, ok, (), tid, ticks)
@@ -197,11 +199,11 @@ def parse_reply(line: str) -> Reply | None:
 
 
 def format_reply(reply: Reply) -> str:
-    """The line of a reply, without its end.
+    """Line of a reply, without its end.
 
     reply   with a stamp
 
-    Raises InputError where the line would be read as something else.
+    Raises InputError if the line would not be parsed back to the same.
 
     >>> format_reply(Reply("DST", True, ("17", "108453.287"), 1000, 5288912500000))
     '1000\\t52889.12500000\\tDST 1, 17, 108453.287'
@@ -212,17 +214,17 @@ def format_reply(reply: Reply) -> str:
         words = [f"{reply.command} {int(reply.ok)}", *reply.values]
     line = f"{reply.tid}\t{stamp_text(reply.ticks or 0)}\t" + ", ".join(words)
     if parse_reply(line) != reply:
-        raise InputError(f"reply {_shown(line)} would be read otherwise (expected plain values without , or tab)")
+        raise InputError(f"reply {_quoted(line)} contains separators (expected plain values without , or tab)")
     return line
 
 
 def commands_of_file(text: str, name: str) -> list[tuple[int, Request]]:
-    """The commands of an initialisation file with their line numbers; what follows a semicolon is a comment.
+    """Commands of an initialisation file with line numbers, without comments.
 
     text   of the file
     name   of the file, for messages
 
-    Raises InputError with the line that cannot be read.
+    Raises InputError with the unreadable line.
 
     >>> commands_of_file("; cubes\\nINI 40 ; places\\n\\nD0 181.2\\n", "CUBES.INI")[1]
     (4, Request(command='D0', parameters=('181.2',), tid=0, ticks=None))
@@ -239,7 +241,7 @@ def commands_of_file(text: str, name: str) -> list[tuple[int, Request]]:
 
 
 def next_tid(tid: int) -> int:
-    """The client's next TID: 1000 to 4 294 967 295, then 1000 again.
+    """Next TID of a client: 1000 to 4 294 967 295, then 1000 again.
 
     >>> next_tid(4_294_967_295)
     1000
@@ -250,28 +252,28 @@ def next_tid(tid: int) -> int:
 def _tid(text: str) -> int:
     word = text.strip(" ")
     if not DIGITS.fullmatch(word) or int(word) > LAST_TID:
-        raise InputError(f"TID {_shown(text)} is not a whole number of 0 to {LAST_TID}")
+        raise InputError(f"TID {_quoted(text)} is not a whole number of 0 to {LAST_TID}")
     return int(word)
 
 
 def _printable(body: str) -> None:
-    if not body.isascii() or not (_all_shown(body) if len(body) > LONG else body.isprintable()):
+    if not body.isascii() or not (_all_printable(body) if len(body) > LONG else body.isprintable()):
         at = next(i for i, letter in enumerate(body) if not " " <= letter <= "~")
         raise InputError(f"character {at + 1} is {body[at]!a} (expected printable ASCII)")
 
 
-def _all_shown(body: str) -> bool:
-    """`isprintable` of ASCII, ten times as fast for a buffer's line."""
+def _all_printable(body: str) -> bool:
+    """True for printable ASCII, ten times as fast as `isprintable` for long lines."""
     codes = np.frombuffer(body.encode("ascii"), dtype=np.uint8)
     return bool(codes.min() >= ord(" ") and codes.max() <= ord("~"))
 
 
 def _body(body: str) -> tuple[str, str]:
-    word, _, rest = body.strip(" ").partition(" ")
+    word, _, parameters = body.strip(" ").partition(" ")
     if not COMMAND.fullmatch(word):
-        raise InputError(f"{_shown(word)} is no command (expected a letter, then at most 15 letters and digits)")
-    return word.upper(), rest.strip(" ")
+        raise InputError(f"{_quoted(word)} is not a command (expected a letter, then at most 15 letters and digits)")
+    return word.upper(), parameters.strip(" ")
 
 
-def _shown(text: str) -> str:
+def _quoted(text: str) -> str:
     return ascii(text if len(text) <= 40 else f"{text[:40]}...")

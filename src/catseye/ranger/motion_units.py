@@ -1,4 +1,4 @@
-"""People's units and the integers of the LM628 motion chip, there and back, and what each ZY command accepts.
+"""Units of the LM628 motion chip: conversion to counts and limits.
 
 Velocities and accelerations are counts a sample, and a sample squared, times 65 536; a sample lasts 2048 periods of the
 clock: 341.33 us at the ranger's 6 MHz. The data sheet's worked example rounds it to 341 us: it loads 446 956 for 600
@@ -27,7 +27,7 @@ LARGEST_ERROR_LIMIT = 25_000  # of the ZY; the chip's own is 32 767
 
 @dataclass(frozen=True)
 class ValueLimits:
-    """What one command accepts: the name of its value, lowest, highest, unit."""
+    """Limits of one command: value name, lowest, highest, unit."""
 
     name: str
     low: int
@@ -49,12 +49,13 @@ LIMITS = {
 
 
 def checked(command: str, value: int) -> int:
-    """The value of a command as a plain integer, when the command accepts it.
+    """Value of a command as a plain integer, if within limits.
 
     command   ABA, ABV, ABP, FKP, FKI, FKD, FIL, FSI or ERL
     value     as the command takes it
 
-    Raises ValidityError: no integer, or outside the command's limits. Source: [CREAGER02], the pages of the commands.
+    Raises ValidityError: not an integer, or outside the command's limits. Source: [CREAGER02], the pages of the
+    commands.
 
     >>> checked("ERL", 25_001)
     Traceback (most recent call last):
@@ -68,7 +69,7 @@ def checked(command: str, value: int) -> int:
         number = None
     if number is None or isinstance(value, bool):
         raise ValidityError(
-            f"{command}: {limits.name} {value!r} is no integer (expected {limits.low} to {limits.high})"
+            f"{command}: {limits.name} {value!r} is not an integer (expected {limits.low} to {limits.high})"
         )
     if not limits.low <= number <= limits.high:
         raise ValidityError(
@@ -143,7 +144,7 @@ def radians_from_counts(counts: float, counts_per_turn: float = COUNTS_PER_TURN)
 
 
 def velocity_integer(counts_per_second: float, sample: float = SAMPLE_TIME) -> int:
-    """The integer that ABV takes for a speed.
+    """Integer of ABV for a speed.
 
     counts_per_second   speed, counts/s, 0 or above
     sample              time between samples, s
@@ -157,7 +158,7 @@ def velocity_integer(counts_per_second: float, sample: float = SAMPLE_TIME) -> i
 
 
 def acceleration_integer(counts_per_second2: float, sample: float = SAMPLE_TIME) -> int:
-    """The integer that ABA takes for an acceleration.
+    """Integer of ABA for an acceleration.
 
     counts_per_second2   acceleration, counts/s^2, 0 or above
     sample               time between samples, s
@@ -192,16 +193,18 @@ def acceleration_counts(integer: int, sample: float = SAMPLE_TIME) -> float:
 
 
 def pace_of(mirror: MirrorGeometry, sample: float = SAMPLE_TIME) -> Pace:
-    """How fast a mirror's axes go and accelerate by its record.
+    """Speeds and accelerations of a mirror's axes from its record.
 
     mirror    with abv_0, aba_0, abv_1, aba_1
     sample    time between samples, s
 
-    Raises ValidityError where the record does not say it, or says zero.
+    Raises ValidityError if the record lacks them, or has zero.
     """
     for key in ("abv_0", "aba_0", "abv_1", "aba_1"):
         if not getattr(mirror, key):
-            raise ValidityError(f"{mirror.zp}: {key} = {getattr(mirror, key)} (expected above 0: how fast its axes go)")
+            raise ValidityError(
+                f"{mirror.zp}: {key} = {getattr(mirror, key)} (expected above 0: speed or acceleration of its axes)"
+            )
     return Pace(
         (velocity_counts(mirror.abv_0 or 0, sample), velocity_counts(mirror.abv_1 or 0, sample)),
         (acceleration_counts(mirror.aba_0 or 0, sample), acceleration_counts(mirror.aba_1 or 0, sample)),
@@ -209,7 +212,7 @@ def pace_of(mirror: MirrorGeometry, sample: float = SAMPLE_TIME) -> Pace:
 
 
 def derivative_interval(setting: int, sample: float = SAMPLE_TIME) -> float:
-    """Time between two differences of the derivative term, s, for a setting of FSI.
+    """Interval of the derivative term, s, for a setting of FSI.
 
     setting   0 to 255: an interval of setting + 1 samples
     sample    time between samples, s
@@ -222,11 +225,11 @@ def derivative_interval(setting: int, sample: float = SAMPLE_TIME) -> float:
     return (checked("FSI", setting) + 1) * sample
 
 
-def _integer(command: str, exact: float, asked: str) -> int:
+def _integer(command: str, exact: float, request: str) -> int:
     limits = LIMITS[command]
     if not 0.0 <= exact < limits.high + 0.5:
-        raise ValidityError(f"{command}: {limits.name} {asked} is outside 0 to {limits.high} ({limits.unit})")
+        raise ValidityError(f"{command}: {limits.name} {request} is outside 0 to {limits.high} ({limits.unit})")
     rounded = round(exact)
     if rounded == 0 and exact > 0.0:
-        raise ValidityError(f"{command}: {limits.name} {asked} is below half of {limits.unit}: nothing would move")
+        raise ValidityError(f"{command}: {limits.name} {request} is below half of {limits.unit}: nothing would move")
     return rounded

@@ -1,7 +1,7 @@
-"""How servers and clients reach each other: real sockets, or whatever a test or a fast run puts in their place.
+"""Connections between servers and clients: real sockets, or a substitute for tests.
 
-A host that begins with `unix:` is a folder, and a port in it the socket PORT.sock, which only its owner may use. Where
-an address is not this machine's own the sockets speak TLS.
+A host that begins with `unix:` is a folder, and a port in it the socket PORT.sock, which only its owner may use. The
+sockets use TLS for addresses beyond this machine.
 """
 
 import asyncio
@@ -29,12 +29,12 @@ LOG = logging.getLogger(__name__)
 
 
 class Listener(Protocol):
-    """A port that is listened at; `port` is its number, also where any free one was asked for."""
+    """A listening port; `port` is its actual number."""
 
     port: int
 
     async def close(self) -> None:
-        """Listen no more; connections that stand are their owner's to close, before."""
+        """Stop listening; open connections are closed by their owner, before."""
         ...
 
 
@@ -42,21 +42,27 @@ class ConnectionMaker(Protocol):
     """Makes connections between protocols."""
 
     async def serve(self, factory: Callable[[], asyncio.Protocol], host: str, port: int) -> Listener:
-        """Listen: a new protocol for each connection. Raises OSError: the port cannot be had."""
+        """Listen, with a new protocol for each connection.
+
+        Raises OSError if the port is not available.
+        """
         ...
 
     async def connect(self, factory: Callable[[], P], host: str, port: int) -> P:
-        """A protocol that is connected. Raises OSError: nobody listens there."""
+        """A connected protocol.
+
+        Raises OSError if nothing listens there.
+        """
         ...
 
 
 @dataclass(frozen=True)
 class TlsFiles:
-    """Files of TLS, PEM; and leave to do without it.
+    """TLS files, PEM, and permission to do without.
 
-    certificate, key   of who listens
-    authority          certificate that those of others must come from; None: the system's
-    clear              addresses beyond this machine without TLS: behind a tunnel of one's own
+    certificate, key   of the listener
+    authority          certificate that others' certificates must be signed by; None: the system's
+    clear              True for addresses beyond this machine without TLS: behind a private tunnel
     """
 
     certificate: Path | None = None
@@ -66,9 +72,11 @@ class TlsFiles:
 
     @staticmethod
     def of(environment: Mapping[str, str] = os.environ) -> "TlsFiles":
-        """From CATSEYE_TLS_CERTIFICATE, CATSEYE_TLS_KEY, CATSEYE_TLS_AUTHORITY and CATSEYE_CLEAR=yes.
+        """Files from the environment.
 
-        Raises InputError: a file that is not there, a certificate without its key, another word for CATSEYE_CLEAR.
+        CATSEYE_TLS_CERTIFICATE, CATSEYE_TLS_KEY, CATSEYE_TLS_AUTHORITY and CATSEYE_CLEAR=yes.
+
+        Raises InputError: a missing file, a certificate without its key, another value of CATSEYE_CLEAR.
         """
         files = {name: environment.get(name) for name in (CERTIFICATE, CERTIFICATE_KEY, AUTHORITY)}
         for name, path in files.items():
@@ -82,16 +90,16 @@ class TlsFiles:
         return TlsFiles(certificate, key, authority, environment.get(CLEAR) == "yes")
 
     def of_server(self, host: str) -> ssl.SSLContext | None:
-        """Context to listen with; None where only this machine reaches the address.
+        """Context to listen with; None for an address of this machine only.
 
-        Raises InputError: no certificate, or one that cannot be used.
+        Raises InputError: no certificate, or an unusable one.
         """
         if is_here(host) or self.clear:
             return None
         if self.certificate is None:
             raise InputError(
                 f"{host} can be reached by other machines (expected {CERTIFICATE} and {CERTIFICATE_KEY}, "
-                f"or {CLEAR}=yes behind a tunnel of one's own)"
+                f"or {CLEAR}=yes behind a private tunnel)"
             )
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         context.minimum_version = ssl.TLSVersion.TLSv1_2
@@ -102,7 +110,10 @@ class TlsFiles:
         return context
 
     def of_client(self, host: str) -> ssl.SSLContext | None:
-        """Context to connect with; None where the address is this machine's. Raises InputError: a bad authority."""
+        """Context to connect with; None for an address of this machine.
+
+        Raises InputError: an unusable authority.
+        """
         if is_here(host) or self.clear:
             return None
         try:
@@ -117,7 +128,7 @@ NO_TLS = TlsFiles()
 
 
 def is_here(host: str) -> bool:
-    """True for an address that only this machine reaches.
+    """True for an address reachable only from this machine.
 
     >>> is_here("127.0.8.3"), is_here("::1"), is_here("localhost"), is_here("unix:/run/site"), is_here("0.0.0.0")
     (True, True, True, True, False)
@@ -131,7 +142,7 @@ def is_here(host: str) -> bool:
 
 
 class Sockets:
-    """Connections over TCP, with TLS beyond this machine, or over Unix sockets.
+    """Connections by TCP, with TLS beyond this machine, or Unix sockets.
 
     tls   files of both sides
     """
@@ -141,10 +152,12 @@ class Sockets:
         self._warned: set[str] = set()
 
     def _warn(self, host: str) -> None:
-        """Tell the log once of an address that is reached in clear."""
+        """Warn once of an address that is used without TLS."""
         if self._tls.clear and not is_here(host) and host not in self._warned:
             self._warned.add(host)
-            LOG.warning("%s: lines go in clear (%s=yes): whoever is on the way reads and commands", host, CLEAR)
+            LOG.warning(
+                "%s: connection without TLS (%s=yes): anyone on the network path can read and command", host, CLEAR
+            )
 
     async def serve(self, factory: Callable[[], asyncio.Protocol], host: str, port: int) -> "SocketListener":
         return await self.listen(factory, host, port)
@@ -152,7 +165,7 @@ class Sockets:
     async def listen(
         self, factory: Callable[[], asyncio.Protocol], host: str, port: int, *, at_once: bool = True
     ) -> "SocketListener":
-        """Listen; with `at_once` false the port is had, and answers when its server is started."""
+        """Listen; with `at_once` False the port answers after its server is started."""
         loop = asyncio.get_running_loop()
         if host.startswith(UNIX):
             bound, number = bound_socket(Path(host.removeprefix(UNIX)), port)
@@ -179,7 +192,7 @@ class Sockets:
 
 
 class SocketListener:
-    """A port that is listened at."""
+    """A listening port of a server."""
 
     def __init__(self, server: asyncio.Server, port: int):
         self.server, self.port = server, port
@@ -193,14 +206,14 @@ class SocketListener:
 
 
 def socket_path(folder: str | Path, port: int) -> Path:
-    """File of a port in a folder of Unix sockets."""
+    """Path of a port's Unix socket in a folder."""
     return Path(folder) / f"{port}.sock"
 
 
 def bound_socket(folder: Path, port: int) -> tuple[socket.socket, int]:
-    """A Unix socket of a port that only its owner may use, and the port's number; 0 takes the lowest that is free.
+    """Bound Unix socket for its owner only, and the port; 0: lowest free.
 
-    Raises OSError: somebody listens there already, or the folder cannot be made or is another's to write in.
+    Raises OSError: already in use, or the folder cannot be made or is writable by others.
     """
     folder.mkdir(mode=FOLDER_OWNER_ONLY, parents=True, exist_ok=True)
     if folder.stat().st_mode & 0o022:
@@ -211,7 +224,7 @@ def bound_socket(folder: Path, port: int) -> tuple[socket.socket, int]:
     _clear_stale(path)
     bound = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
-        os.fchmod(bound.fileno(), OWNER_ONLY)  # before it has a name, so that it never is open to others
+        os.fchmod(bound.fileno(), OWNER_ONLY)  # before it has a name, so that it is never open to others
         bound.bind(str(path))
         path.chmod(OWNER_ONLY)
     except OSError:
@@ -221,7 +234,10 @@ def bound_socket(folder: Path, port: int) -> tuple[socket.socket, int]:
 
 
 def _clear_stale(path: Path) -> None:
-    """Take away the socket of a server that is gone. Raises OSError: somebody listens there."""
+    """Remove the socket of a dead server.
+
+    Raises OSError if a server listens there.
+    """
     if not path.is_socket():
         return
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as trial:
@@ -234,7 +250,7 @@ def _clear_stale(path: Path) -> None:
 
 
 def _unix_path(server: asyncio.Server) -> Path | None:
-    """File of a Unix server's socket."""
+    """Path of a Unix server's socket."""
     if server.sockets[0].family != socket.AF_UNIX:
         return None
     return Path(server.sockets[0].getsockname())

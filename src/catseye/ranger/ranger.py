@@ -1,10 +1,10 @@
-"""One ZY: the loop that serves commands, schedule, scan, updates and status, around its state. No socket here.
+"""A ZY: its loop of commands, schedule, scan, updates and status. No socket here.
 
-A transport gives it lines of connections (`receive`), calls `turn` again and again, and sends what that returns.
-Each connection's commands run in the order received, one at a time; one that waits for the hardware gives its turn
-back and is asked again, and a long answer comes in slices. What makes dark or stops passes all queues: it is carried
-out when it is received. In a turn: interlock and laser, the holder's command, then the others', at most one scheduled
-one, a step of the scan or the stream, the Sun, updates, the status word. `rest` says how long nothing will be due.
+A transport gives it lines of connections (`receive`), calls `turn` repeatedly, and sends what that returns.
+Each connection's commands run in the order received, one at a time; one that waits for the hardware yields and is
+polled later, and a long answer is sent in parts. Commands that switch light off or stop pass all queues: they are
+executed on receipt. In a turn: interlock and laser, the holder's command, then the others', at most one scheduled
+one, a step of the scan or the stream, the Sun, updates, the status word. `rest` is the time until something is due.
 """
 
 from collections.abc import Callable
@@ -25,15 +25,15 @@ from catseye.ranger.status import StatusWord, word_text
 from catseye.ranger.sun_watch import SunSource
 
 MOST_QUEUED = 256  # commands of one connection
-REPLIES_A_TURN = 16  # of a long answer: what else is due waits no longer
+REPLIES_A_TURN = 16  # of a long answer: everything else waits no longer
 UPDATE_NS = PER_SECOND // 2
-POLL_NS = 5_000_000  # while something is under way
-FINE_NS, FINE_SPAN_NS = 1_000_000, 10_000_000  # when it is due, and for how long
-WATCH_NS = 100_000_000  # the head's own changes
-UNHEARD_NS = PER_SECOND  # the same where nobody listens
-SLOW_NS = 20_000_000  # a long answer that waits for its reader
-LIVE_NS = 50_000_000  # an interlock, while there is light or an amplifier is on
-BY_HAND = frozenset(["LEASE", "UNLATCH"])  # a person's word of now: no stamp to come
+POLL_NS = 5_000_000  # poll interval while something is under way
+FINE_NS, FINE_SPAN_NS = 1_000_000, 10_000_000  # poll interval once it is due, and its duration
+WATCH_NS = 100_000_000  # poll interval for the head's own changes
+UNHEARD_NS = PER_SECOND  # the same without clients
+SLOW_NS = 20_000_000  # poll interval of a long answer that waits for its reader
+LIVE_NS = 50_000_000  # poll interval of an interlock, while the laser or an amplifier is on
+IMMEDIATE = frozenset(["LEASE", "UNLATCH"])  # commands that take no future stamp
 OF_A_SHOT = frozenset(["TRG", "MPC", "RAD", "MAG", "SEQ", "CMEAS", "BUF"])
 WATCHED = (
     ("ACP", "0"),
@@ -45,17 +45,16 @@ WATCHED = (
 class Ranger(RangerState):
     """A ZY behind its head.
 
-    name      as it greets: ZY101
+    name      as in its greeting: ZY101
     head      the hardware
     limits    counts, lowest and highest azimuth that the stops allow
     files     folder of the initialisation files, None without
     mirror    name of its head, as in its initialisation file's
     sun       the ranger's own direction of the Sun for an MJD, None without
-    turning   its frame turns, as on the feed arm: it moves only if SUN was told within 60 s, and has no own Sun
-    laser_at_boot   as the notes' rangers: at boot the laser is as its hardware has it, homed or not
+    turning   True if its frame turns, as on the feed arm: it needs SUN within 60 s to move, and has no Sun of its own
+    laser_at_boot   True as for the notes' rangers: at boot the laser is as its hardware has it, homed or not
 
-    `room` says whether a connection can be given more of a long answer now; `orders` counts what the holder of the
-    lease has ordered.
+    `room` is True if a connection can take more of a long answer now; `orders` counts commands of the lease's holder.
     """
 
     def __init__(
@@ -75,17 +74,17 @@ class Ranger(RangerState):
         self.room: Callable[[int], bool] = lambda client: True
         self.orders = 0
         self._lanes = Lanes()
-        self._ask_at: dict[str, int | None] = {}  # by what waits for the head: when to ask it again
+        self._ask_at: dict[str, int | None] = {}  # work waiting for the head: time of the next poll
         self._word: StatusWord | None = None
         self._pushed: dict[tuple[str, ...], Values] = {}
         self._next_update = 0
-        self._told_lease: Lease | None = None
-        self._told_latch: Latch | None = self.latch
+        self._published_lease: Lease | None = None
+        self._published_latch: Latch | None = self.latch
 
-    # What a transport calls -----------------------------------------------------------------------------------------
+    # Interface of a transport -----------------------------------------------------------------------------------------
 
     def greeting(self, port: int) -> list[Outgoing]:
-        """What a new connection hears: HELLO, CONNECT, STW."""
+        """Greeting of a new connection: HELLO, CONNECT, STW."""
         greetings = [
             Reply("HELLO", None, (f"This is {self.name} ver. {VERSION}",)),
             Reply("CONNECT", True, (str(port),)),
@@ -94,26 +93,26 @@ class Ranger(RangerState):
         return [Outgoing(replace(reply, ticks=self.now_ticks())) for reply in greetings]
 
     def receive(self, client: int, line: str) -> list[Outgoing]:
-        """A line of a connection: queued, refused or, where it cannot wait, done at once; an empty one asks nothing."""
+        """Queue, refuse or at once execute a line; ignore an empty one."""
         try:
             request = parse_request(line)
             if request is None:
                 return []
             lane = self._lanes.of(client)
             if len(lane.waiting) >= MOST_QUEUED:
-                raise InputError(f"{MOST_QUEUED} commands wait already (expected fewer: send slower)")
+                raise InputError(f"{MOST_QUEUED} commands are queued already (send more slowly)")
         except InputError as problem:
             return [Outgoing(Reply("LINE", False, (plain_text(str(problem)),), 0, self.now_ticks()), client)]
         due = request.ticks is None or request.ticks * TICK_NS <= self.now_ns()
         if stops(request) and due:
             return self._stop(client, request)
-        if request.command in BY_HAND and not due:
+        if request.command in IMMEDIATE and not due:
             return [self._refused(request, "it is for now (expected it without a stamp)", client)]
         if request.command == "LEASE" and self._leases_at_once(client, request):
             return self._leased(client, request)
-        stranger = self._stranger(client, request)
-        if stranger is not None:
-            return [self._refused(request, stranger, client)]
+        refusal = self._lease_refusal(client, request)
+        if refusal is not None:
+            return [self._refused(request, refusal, client)]
         if self._holds(client) and acts(request):
             self.orders += 1
         lane.waiting.append(request)
@@ -122,20 +121,20 @@ class Ranger(RangerState):
     def _holds(self, client: int) -> bool:
         return self.lease is not None and self.lease.client == client
 
-    def _stranger(self, client: int, request: Request) -> str | None:
-        """Why a connection may not give a command, having no lease; None where it may."""
+    def _lease_refusal(self, client: int, request: Request) -> str | None:
+        """Reason why a connection without the lease may not command; else None."""
         if not self.guarded or not acts(request) or self._holds(client):
             return None
         who = "nobody has it" if self.lease is None else f"{self.lease.name} has it"
         return f"{request.command} needs the lease: {who} (expected LEASE and a name first)"
 
     def _leases_at_once(self, client: int, request: Request) -> bool:
-        """True for a request that renews or takes the lease: it waits for nothing."""
+        """True for a request that takes or renews the lease."""
         words = request.parameters
         return len(words) == 2 or (len(words) == 1 and words[0].lower() != "none")
 
     def _leased(self, client: int, request: Request) -> list[Outgoing]:
-        """Take or renew the lease; what the holder before it had ordered is dropped."""
+        """Take or renew the lease; the former holder's commands are dropped."""
         before = self.lease
         try:
             values = self.work_of(client, request)
@@ -148,10 +147,13 @@ class Ranger(RangerState):
             outgoing += self._dropped(f"{self.lease.name} has the lease now", before.client)
         return outgoing
 
-    # Dark and still -------------------------------------------------------------------------------------------------
+    # Stops -------------------------------------------------------------------------------------------------
 
     def _stop(self, client: int, request: Request) -> list[Outgoing]:
-        """Make dark, or stop, before all that waits; from outside the lease it holds until it is cleared."""
+        """Execute a stop before all waiting commands.
+
+        From outside the lease it is latched until it is cleared.
+        """
         outside = self.guarded and not self._holds(client)
         outgoing: list[Outgoing] = []
         try:
@@ -169,29 +171,29 @@ class Ranger(RangerState):
             order = f"{request.command} from {self.peer(client)} which has not the lease"
             light, moves = request.command != "AXIS", request.command != "PS"
             self.set_latch(Latch(light, moves, order).joined(self.latch))
-        return [self._answer(client, request, answer), *outgoing, *self._latch_told()]
+        return [self._answer(client, request, answer), *outgoing, *self._latch_notices()]
 
     def _all_stopped(self, why: str) -> list[Outgoing]:
         outgoing = self.make_safe(why, free=False)
         self.scheduler = Scheduler()
         return [*outgoing, *self._dropped(why)]
 
-    def _latch_told(self) -> list[Outgoing]:
-        """Tell all that a dark order holds now, or is cleared."""
-        if self.latch == self._told_latch:
+    def _latch_notices(self) -> list[Outgoing]:
+        """Notify all that a stop order is latched, or cleared."""
+        if self.latch == self._published_latch:
             return []
-        self._told_latch = self.latch
+        self._published_latch = self.latch
         if self.latch is None:
             cleared = f"cleared by {self.cleared_by or 'a person'}"
             return [Outgoing(self._reply(Request("LATCH"), True, ("none", cleared)))]
         return [Outgoing(self._reply(Request("LATCH"), True, latch_of(self)))]
 
     def make_safe(self, why: str, *, free: bool = True) -> list[Outgoing]:
-        """Laser and motors off, nothing under way or scheduled any more; what is to be told.
+        """Switch laser and motors off and drop all commands; notifications.
 
-        free   the lease, too
+        free   True to free the lease, too
 
-        Nothing is told where all that was so already.
+        Nothing is reported if all that was so already.
         """
         head = self.head
         if not (head.laser_on() or head.enabled(0) or head.enabled(1) or (free and self.lease is not None)):
@@ -208,12 +210,12 @@ class Ranger(RangerState):
         return [safe, *self._dropped("laser and motors are off")]
 
     def _dropped(self, why: str, client: int | None = None) -> list[Outgoing]:
-        """Drop what changes the ranger, under way or waiting; those who asked are answered."""
-        taken = self._lanes.take_out(acts, client, running=True)
-        return [self._refused(request, f"dropped: {why}", whose) for whose, request in taken]
+        """Drop commands that change the ranger; refusals for their clients."""
+        removed = self._lanes.take_out(acts, client, running=True)
+        return [self._refused(request, f"dropped: {why}", whose) for whose, request in removed]
 
     def _watch(self) -> list[Outgoing]:
-        """The interlock, and light that nobody switched on or whose direction nobody knows."""
+        """Check the interlock, and light without a command or direction."""
         why = self.interlock()
         outgoing = self.make_safe(f"the interlock is open ({why})", free=False) if why else []
         if not self.head.laser_on():
@@ -230,7 +232,7 @@ class Ranger(RangerState):
     # Turns ----------------------------------------------------------------------------------------------------------
 
     def disconnect(self, client: int) -> None:
-        """A connection is gone, its lease with it: its commands are dropped, also scheduled ones; a scan goes on."""
+        """Forget a closed connection, its lease and its commands; a scan goes on."""
         if self._holds(client):
             self.lease = None
         self._lanes.drop(client)
@@ -240,7 +242,7 @@ class Ranger(RangerState):
             self.end_stream()
 
     def turn(self) -> list[Outgoing]:
-        """One pass of the loop; what is to be sent."""
+        """One pass of the loop; lines to be sent."""
         outgoing = self._watch()
         for lane in self._lanes.in_turn(None if self.lease is None else self.lease.client):
             outgoing += self._lane_step(lane)
@@ -251,11 +253,11 @@ class Ranger(RangerState):
         outgoing += self._scan_step()
         outgoing += self._stream_step()
         outgoing += [Outgoing(self._reply(Request("SUN"), False, (text,))) for text in watch_sun(self)]
-        if self.lease != self._told_lease:
-            self._told_lease = self.lease
-            but = None if self.lease is None else self.lease.client  # who has been answered
+        if self.lease != self._published_lease:
+            self._published_lease = self.lease
+            but = None if self.lease is None else self.lease.client  # already answered
             outgoing.append(Outgoing(self._reply(Request("LEASE"), True, holder_of(self)), but=but))
-        outgoing += self._latch_told()
+        outgoing += self._latch_notices()
         outgoing += self._updates()
         word = self.status()
         if word != self._word:
@@ -265,52 +267,52 @@ class Ranger(RangerState):
         return outgoing
 
     def rest(self, *, heard: bool = True) -> float:
-        """How long, s, nothing can be due if no line comes.
+        """Time until something can be due without a new line, s.
 
-        heard   somebody listens; else only the Sun and what is under way count
+        heard   True if a client is connected; otherwise only the Sun and what is under way count
         """
         if self.has_queued:
             return 0.0
         if self.idle and not self.updates and not self.scheduler.entries:
             return self._watch_ns(heard) / PER_SECOND
-        now = self.now_ns()
-        due = [now + self._watch_ns(heard)]
-        waits = [(each.ask_at, each.more) for each in self._lanes.running]
+        now_ns = self.now_ns()
+        due = [now_ns + self._watch_ns(heard)]
+        waits = [(command.ask_at, command.more) for command in self._lanes.running]
         if self._scan_work is not None:
             waits.append((self._ask_at.get("scan"), False))
         if self._stream_work is not None:
             waits.append((self._ask_at.get("stream"), False))
         for at, more in waits:
-            if more:  # a long answer whose reader takes no more for now
-                due.append(now + SLOW_NS)
+            if more:  # a long answer whose reader is full
+                due.append(now_ns + SLOW_NS)
                 continue
-            fine = at is not None and now < at + FINE_SPAN_NS
-            due.append(now + POLL_NS if at is None else max(at, now + (FINE_NS if fine else POLL_NS)))
+            fine = at is not None and now_ns < at + FINE_SPAN_NS
+            due.append(now_ns + POLL_NS if at is None else max(at, now_ns + (FINE_NS if fine else POLL_NS)))
         if (self.scanning and self._scan_work is None) or (self.stream is not None and self._stream_work is None):
             return 0.0
         if self._lanes.acting is None and not self.scanning and self.scheduler.due_ns is not None:
             due.append(self.scheduler.due_ns)
         if self.updates:
             due.append(self._next_update)
-        return max(0, min(due) - now) / PER_SECOND
+        return max(0, min(due) - now_ns) / PER_SECOND
 
     def _watch_ns(self, heard: bool) -> int:
-        """ns after which the head is looked at again, when nothing is under way."""
+        """Poll interval of an idle head, ns."""
         head = self.head
         if self._head_interlock is not None and (head.laser_on() or head.enabled(0) or head.enabled(1)):
             return LIVE_NS
         return WATCH_NS if heard else UNHEARD_NS
 
     def waiting(self, client: int) -> int:
-        """Commands of a connection that have not begun."""
+        """Number of a connection's commands that have not started."""
         return len(self._lanes.of(client).waiting)
 
     @property
     def has_queued(self) -> bool:
-        """True where the next turn can begin a command, or go on with a long answer."""
+        """True if the next turn can start a command or continue an answer."""
         lanes = self._lanes
         return any(lanes.can_begin(lane) for lane in lanes.in_turn(None)) or any(
-            each.more and self.room(each.client) for each in lanes.running
+            command.more and self.room(command.client) for command in lanes.running
         )
 
     @property
@@ -320,13 +322,13 @@ class Ranger(RangerState):
 
     @property
     def idle(self) -> bool:
-        """Whether nothing runs, waits, scans or streams."""
+        """True if nothing runs, waits, scans or streams."""
         return not self._lanes.busy and not self.scanning and self.stream is None
 
     # Inside ---------------------------------------------------------------------------------------------------------
 
     def _lane_step(self, lane: Lane) -> list[Outgoing]:
-        """Go on with a connection's command, or begin its next."""
+        """Continue a connection's command, or start its next."""
         if lane.running is not None:
             return self._go_on(lane, lane.running)
         if not self._lanes.can_begin(lane):
@@ -336,10 +338,10 @@ class Ranger(RangerState):
 
     def _begin(self, lane: Lane, client: int, request: Request) -> list[Outgoing]:
         if stops(request) and (request.ticks is None or request.ticks * TICK_NS <= self.now_ns()):
-            return self._stop(client, request)  # it was scheduled
-        stranger = self._stranger(client, request)
-        if stranger is not None:  # the lease went elsewhere meanwhile
-            return [self._refused(request, stranger, client)]
+            return self._stop(client, request)  # scheduled before
+        refusal = self._lease_refusal(client, request)
+        if refusal is not None:  # the lease was taken meanwhile
+            return [self._refused(request, refusal, client)]
         if request.command != "AT" and request.command not in COMMANDS:
             unknown = Reply("UNKNOWN", None, (f"command {request.command}",), request.tid, self.now_ticks())
             return [Outgoing(unknown, client)]
@@ -378,7 +380,7 @@ class Ranger(RangerState):
             if values is None or isinstance(values, int):
                 running.ask_at = values
                 return outgoing
-            if isinstance(values, Reply):  # of a command that this one runs
+            if isinstance(values, Reply):  # reply of a command run by this one
                 outgoing.append(Outgoing(replace(values, tid=request.tid, ticks=self._stamp(values))))
             else:
                 outgoing.append(self._answer(client, request, values))
@@ -386,11 +388,11 @@ class Ranger(RangerState):
         return outgoing
 
     def _answer(self, client: int, request: Request, values: Values) -> Outgoing:
-        """To who asked; what was done all hear."""
+        """Answer for its client, or for all if the ranger changed."""
         return Outgoing(self._reply(request, True, values), None if acts(request) else client)
 
     def _refused(self, request: Request, text: str, client: int) -> Outgoing:
-        """To who asked; of what would have changed the ranger all hear."""
+        """Refusal for its client, or for all if it would change the ranger."""
         reply = self._reply(request, False, (plain_text(text.removeprefix(f"{request.command}: ")),))
         return Outgoing(reply, None if acts(request) and self._may(client) else client)
 
@@ -402,7 +404,7 @@ class Ranger(RangerState):
         return replace(reply, ticks=self._stamp(reply))
 
     def _stamp(self, reply: Reply) -> int:
-        """Just after the trigger for a measurement, completion for all else."""
+        """Time just after the trigger for a measurement, else of completion."""
         if reply.ok and reply.command in OF_A_SHOT and self.measured is not None:
             return nanoseconds_to_ticks(nanoseconds_of(self.measured.buffer.triggered))
         return self.now_ticks()
@@ -428,34 +430,34 @@ class Ranger(RangerState):
         if self._stream_work is None:
             self._stream_work = stream_shots(self, self.stream)
         outgoing: list[Outgoing] = []
-        for each in self._stream_work:
-            if not isinstance(each, Outgoing):
-                self._ask_at["stream"] = each
+        for item in self._stream_work:
+            if not isinstance(item, Outgoing):
+                self._ask_at["stream"] = item
                 return outgoing
-            outgoing.append(replace(each, reply=replace(each.reply, ticks=self._stamp(each.reply))))
+            outgoing.append(replace(item, reply=replace(item.reply, ticks=self._stamp(item.reply))))
         self.end_stream()
         return outgoing
 
     def _updates(self) -> list[Outgoing]:
         if not self.updates:
             return []
-        now = self.now_ns()
-        if 0 < self._next_update - now <= UPDATE_NS:  # further off: the clock was set back
+        now_ns = self.now_ns()
+        if 0 < self._next_update - now_ns <= UPDATE_NS:  # later: the clock was set back
             return []
-        self._next_update = now + UPDATE_NS
+        self._next_update = now_ns + UPDATE_NS
         outgoing = []
-        for name, *rest in WATCHED:
-            request = Request(name, tuple(rest))
+        for name, *arguments in WATCHED:
+            request = Request(name, tuple(arguments))
             try:
                 values = self.work_of(-1, request)
             except CatseyeError:
-                continue  # not known now: there is nothing to push
-            if isinstance(values, tuple) and self._pushed.get((name, *rest)) != values:
-                self._pushed[name, *rest] = values
+                continue  # unknown now: nothing to push
+            if isinstance(values, tuple) and self._pushed.get((name, *arguments)) != values:
+                self._pushed[name, *arguments] = values
                 outgoing.append(Outgoing(self._reply(request, True, values)))
         return outgoing
 
 
 def plain_text(text: str) -> str:
-    """Printable ASCII in one line."""
+    """Text as printable ASCII in one line."""
     return "".join(c if " " <= c <= "~" else "?" for c in text)[:500]

@@ -1,6 +1,6 @@
-"""From a phase to the distance or the group index that a ZY reports: a first answer, not the reduction's.
+"""Distance or group index that a ZY reports for a phase.
 
-No leakage, amplitude, cyclic or axis terms are taken out here: those are the reduction's, which starts from the buffer.
+A preliminary answer: leakage, amplitude, cyclic and axis corrections are the reduction's, which starts from the buffer.
 """
 
 import math
@@ -30,8 +30,8 @@ def distance_mm(
     >>> f"{distance_mm(1.0, 1.0, 180.0, index=NOMINAL_INDEX, d0_mm=181.2):.3f}"
     '181.200'
     """
-    whole = _waves(phase, reference, index * (coarse_mm - constant_mm - d0_mm))
-    return whole * HALF_WAVE_MM / index + constant_mm + d0_mm
+    waves = _waves(phase, reference, index * (coarse_mm - constant_mm - d0_mm))
+    return waves * HALF_WAVE_MM / index + constant_mm + d0_mm
 
 
 def group_index(

@@ -1,4 +1,4 @@
-"""Commands that wait for their time: never early, perhaps late, round robin, no priorities."""
+"""Scheduled commands: never early, perhaps late, round robin, no priorities."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,10 @@ MOST_ENTRIES = 64  # of one connection
 
 @dataclass
 class ScheduledCommand:
-    """A command of a connection, due at nanoseconds since MJD 0, so many times, so far apart."""
+    """A scheduled command of a connection.
+
+    due_ns in nanoseconds since MJD 0, repeated so many times, so far apart.
+    """
 
     client: int
     request: Request
@@ -21,24 +24,24 @@ class ScheduledCommand:
 
 
 class Scheduler:
-    """Entries of all connections; the turn goes round."""
+    """Scheduled commands of all connections, served round robin."""
 
     def __init__(self) -> None:
         self.entries: list[ScheduledCommand] = []
 
     def add(self, client: int, request: Request, due_ns: int, repeats: int = 1, interval: float = 0.0) -> None:
-        """Add a command; `interval` in s, between its repeats.
+        """Schedule a command; `interval` in s, between its repeats.
 
         Raises InputError: the connection has too many.
         """
         if sum(e.client == client for e in self.entries) >= MOST_ENTRIES:
-            raise InputError(f"{MOST_ENTRIES} commands wait already (expected fewer: CLR, or let some run)")
+            raise InputError(f"{MOST_ENTRIES} commands are scheduled already (use CLR, or let some run)")
         self.entries.append(ScheduledCommand(client, request, due_ns, repeats, round(interval * PER_SECOND)))
 
     def take(self, now_ns: int) -> ScheduledCommand | None:
-        """The next command that is due, which goes to the back of the row; None where none is.
+        """Next due command, moved to the end of the queue; None if none.
 
-        A repeated command keeps its times: one that comes late does not move those after it.
+        A repeated command keeps its times: a late one does not move those after it.
         """
         for at, entry in enumerate(self.entries):
             if entry.due_ns > now_ns:
@@ -54,11 +57,11 @@ class Scheduler:
 
     @property
     def due_ns(self) -> int | None:
-        """When the next command is due, nanoseconds since MJD 0; None without one."""
+        """Time of the next command, ns since MJD 0; None without one."""
         return min((e.due_ns for e in self.entries), default=None)
 
     def clear(self, client: int) -> int:
-        """Drop a connection's commands; how many they were."""
+        """Drop a connection's commands; their number."""
         before = len(self.entries)
         self.entries = [e for e in self.entries if e.client != client]
         return before - len(self.entries)

@@ -1,9 +1,10 @@
-"""A ZY on TCP: two ports, one connection each; what is done both hear, an answer who asked; who has the lease commands.
+"""A ZY on TCP: two ports, one connection each.
 
-The server sleeps until a line comes or something is due; a ranger that rests costs next to nothing.
-What one connection may cost is bounded: a line of 1024 bytes, 200 lines a second (what comes faster is left unread, not
-dropped), 64 commands that wait, 2000 lines a second of long answers, 4 MiB not yet taken by a slow peer (which is then
-cut off). What makes dark or stops is looked for in all that has come, also behind lines whose turn is far off.
+Both connections hear state changes; an answer goes to its client; the lease's holder commands. The server sleeps until
+a line comes or something is due; an idle ranger costs next to nothing. The cost of one connection is bounded: a line of
+1024 bytes, 200 lines a second (more are left unread, not dropped), 64 queued commands, 2000 lines a second of long
+answers, 4 MiB not yet read by a slow peer (which is then cut off). Stops are searched for in all received input, also
+behind lines that must wait.
 """
 
 import asyncio
@@ -27,19 +28,19 @@ from catseye.ranger.state import Outgoing
 PORTS = (5240, 5241)
 LOOPBACK = "127.0.0.1"
 KEEP_ALIVE = 60.0  # s
-MUTE = 10.0  # s, after which a connection that never said a line gives its place to another
-SILENT = 60.0  # s, the same of one that once did
+MUTE = 10.0  # s, after which a connection without any line gives its port to another
+SILENT = 60.0  # s, the same after its last line
 LINES_A_SECOND = 200.0
-MOST_AT_ONCE = 400.0  # lines
+LINE_BURST = 400.0  # lines
 STOPS_A_SECOND = 50.0
-MOST_STOPS = 50.0  # at once; what is more waits its turn
+MOST_STOPS = 50.0  # at once; more of them wait in the queue
 REPLIES_A_SECOND = 2000.0  # lines of long answers to one connection
 MOST_REPLIES = 1000.0  # at once
 MOST_WAITING = 64  # commands of one connection
-MOST_UNREAD = 2**16  # bytes of one connection that are looked through before their turn; more stay with the peer
-MOST_HELD = 2**18  # bytes not yet taken, from which on a long answer waits
+MOST_UNREAD = 2**16  # bytes of one connection that are searched for stops; more stay with the peer
+MOST_PENDING_BYTES = 2**18  # bytes not yet read, above which a long answer waits
 MOST_UNSENT = 4 * 2**20  # bytes
-STOPPING = re.compile(  # lines that may make dark or stop
+STOPPING = re.compile(  # lines that may stop or switch light off
     rb"^[ \t0-9]*(?:(?:PS|SCN) +[+-]?0+|(?:AXIS|STM) +[0-9A-Z_+-]+ *, *[+-]?0+|STOP) *\r?\n",
     re.IGNORECASE | re.MULTILINE,
 )
@@ -47,22 +48,22 @@ LOG = logging.getLogger(__name__)
 
 
 class ClientConnection(asyncio.Protocol):
-    """One client; `number` is its place among the ports."""
+    """One client; `number` is the index of its port."""
 
     def __init__(self, server: "ZyServer", number: int):
         self.server, self.number = server, number
         self.transport: asyncio.Transport | None = None
         self.entrance: Entrance | None = None
         self.unread = bytearray()
-        self.looked = 0  # bytes of it in which a stop was looked for
-        self.lines_left, self.paused = MOST_AT_ONCE, False
+        self.searched = 0  # bytes already searched for a stop
+        self.lines_left, self.paused = LINE_BURST, False
         self.stops_left, self.replies_left = MOST_STOPS, MOST_REPLIES
         self.began = self.heard = server.clock()
-        self.opened = False  # its first line was one of the language
+        self.opened = False  # its first line was valid
 
     @property
     def admitted(self) -> bool:
-        """True once it is in: it may hear."""
+        """True once it is authenticated and may receive."""
         return self.entrance is not None and self.entrance.admitted
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -81,7 +82,7 @@ class ClientConnection(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         if self.entrance is None or self.transport is None or self.transport.is_closing():
-            return  # turned away: what else it sends is not looked at
+            return  # refused: the rest of its input is ignored
         was_in = self.admitted
         more = self.entrance.take(data)
         if more is not None:
@@ -94,23 +95,26 @@ class ClientConnection(asyncio.Protocol):
         self.server.wake()
 
     def look_ahead(self) -> None:
-        """Carry out what makes dark or stops, wherever it stands in what has come."""
+        """Execute stops anywhere in the received input."""
         while self.stops_left >= 1.0:
-            found = STOPPING.search(self.unread, self.looked)
-            if found is None:
-                self.looked = self.unread.rfind(b"\n") + 1
+            match = STOPPING.search(self.unread, self.searched)
+            if match is None:
+                self.searched = self.unread.rfind(b"\n") + 1
                 return
             self.stops_left -= 1.0
-            line = found[0].decode("ascii").rstrip("\r\n")
-            self.looked = found.end()
+            line = match[0].decode("ascii").rstrip("\r\n")
+            self.searched = match.end()
             if _stops(line):
-                del self.unread[found.start() : found.end()]
-                self.looked = found.start()
+                del self.unread[match.start() : match.end()]
+                self.searched = match.start()
                 self.heard = self.server.clock()
                 self.server.send(self.server.ranger.receive(self.number, line))
 
     def read_on(self) -> None:
-        """Hand over whole lines as far as rate and queue allow; otherwise stop reading from the peer."""
+        """Process complete lines as far as rate and queue allow.
+
+        Beyond that, stop reading from the peer.
+        """
         ranger = self.server.ranger
         while self.lines_left >= 1.0 and ranger.waiting(self.number) < MOST_WAITING:
             end = self.unread.find(b"\n", 0, LONGEST_REQUEST + 3)
@@ -120,7 +124,7 @@ class ClientConnection(asyncio.Protocol):
                 break
             line = bytes(self.unread[:end]).removesuffix(b"\r")
             del self.unread[: end + 1]
-            self.looked = max(0, self.looked - end - 1)
+            self.searched = max(0, self.searched - end - 1)
             self.lines_left -= 1.0
             self.heard = self.server.clock()
             self.server.send(ranger.receive(self.number, line.decode("ascii", "replace")))
@@ -130,39 +134,39 @@ class ClientConnection(asyncio.Protocol):
             self.paused = full
 
     def gain(self, seconds: float) -> None:
-        """Let the budgets grow with time."""
-        self.lines_left = min(MOST_AT_ONCE, self.lines_left + seconds * LINES_A_SECOND)
+        """Refill the rate limits after a time."""
+        self.lines_left = min(LINE_BURST, self.lines_left + seconds * LINES_A_SECOND)
         self.stops_left = min(MOST_STOPS, self.stops_left + seconds * STOPS_A_SECOND)
         self.replies_left = min(MOST_REPLIES, self.replies_left + seconds * REPLIES_A_SECOND)
 
     @property
     def has_room(self) -> bool:
-        """True where it can be given more of a long answer."""
-        held = 0 if self.transport is None else self.transport.get_write_buffer_size()
-        return self.replies_left >= 1.0 and held <= MOST_HELD
+        """True if it can take more of a long answer."""
+        unsent = 0 if self.transport is None else self.transport.get_write_buffer_size()
+        return self.replies_left >= 1.0 and unsent <= MOST_PENDING_BYTES
 
     def refuse(self, text: str) -> None:
-        """Tell a client why not, and close its connection."""
+        """Send the reason and close the connection."""
         self.unread.clear()
-        self.looked = 0
+        self.searched = 0
         self.say(Reply("LINE", False, (text,)))
         if self.transport is not None:
             self.transport.close()
 
     def say(self, reply: Reply) -> None:
-        """Send a reply, stamped with this instant."""
+        """Send a reply, stamped now."""
         self.tell(replace(reply, ticks=self.server.ranger.now_ticks()))
 
     def tell(self, reply: Reply) -> None:
         self.write(format_reply(reply).encode("ascii") + b"\n")
 
     def write(self, data: bytes) -> None:
-        """Send; a peer that does not take what it is sent is cut off."""
+        """Send; a peer that does not read is cut off."""
         if self.transport is None or self.transport.is_closing():
             return
         self.transport.write(data)
         if self.transport.get_write_buffer_size() > MOST_UNSENT:
-            LOG.warning("%s: port %d cut off: more than %d bytes not taken", *self._named(), MOST_UNSENT)
+            LOG.warning("%s: port %d cut off: more than %d bytes not read", *self._named(), MOST_UNSENT)
             self.transport.abort()
 
     def _named(self) -> tuple[str, int]:
@@ -170,7 +174,7 @@ class ClientConnection(asyncio.Protocol):
 
 
 def _stops(line: str) -> bool:
-    """True for a line that makes dark or stops at once."""
+    """True for a line that stops or switches light off at once."""
     try:
         request = parse_request(line)
     except InputError:
@@ -182,11 +186,11 @@ class ZyServer:
     """A ranger behind its two ports.
 
     ranger   with its head
-    door     what its ports ask of those who come
-    host     address to listen at; only this machine unless told otherwise
-    ports    two; 0 takes any free one, `ports` says which after `start`
-    clock    s, never backwards; for keep-alive and rates
-    network  sockets unless told otherwise
+    door     access policy of its ports
+    host     address to listen at; by default only this machine
+    ports    two; 0 takes any free one, `ports` has the actual ones after `start`
+    clock    s, monotonic; for keep-alive and rates
+    network  sockets by default
     """
 
     def __init__(
@@ -200,7 +204,7 @@ class ZyServer:
         network: ConnectionMaker | None = None,
     ):
         self.host, self.ports, self.clock, self.door = host, ports, clock, door
-        self._commanded = clock()  # when who has the lease last ordered anything, or renewed it
+        self._commanded = clock()  # time of the holder's last order or renewal
         self._orders = 0
         self.network: ConnectionMaker = network or Sockets(door.tls)
         self.connections: dict[int, ClientConnection] = {}
@@ -212,7 +216,7 @@ class ZyServer:
 
     @property
     def ranger(self) -> Ranger:
-        """The ranger that is served; a new one after a loss of power."""
+        """The served ranger; a new one after a loss of power."""
         return self._ranger
 
     @ranger.setter
@@ -230,11 +234,14 @@ class ZyServer:
         return f"{self.ranger.name}: port {self.ports[number]}"
 
     def rearm(self) -> None:
-        """Count the dead man's time from now on: the ranger is ready, and nobody could command before."""
+        """Restart the dead-man timer: the ranger is ready now."""
         self._commanded = self.clock()
 
     async def start(self) -> None:
-        """Listen. Raises InputError where a port cannot be had, or would be open to others without a key."""
+        """Listen.
+
+        Raises InputError if a port is not available, or would be exposed without a key.
+        """
         refuse_open(self.ranger.name, self.host, self.door)
         self.rearm()
         for number, port in enumerate(self.ports):
@@ -245,12 +252,12 @@ class ZyServer:
             except OSError as problem:
                 await self.stop()
                 raise InputError(
-                    f"{self.ranger.name}: {self.host} port {port} cannot be had: {problem.strerror or problem}"
+                    f"{self.ranger.name}: {self.host} port {port} is not available: {problem.strerror or problem}"
                 ) from problem
         self.ports = (self._listeners[0].port, self._listeners[1].port)
 
     async def stop(self) -> None:
-        """Close the connections and listen no more."""
+        """Close the connections and stop listening."""
         for connection in list(self.connections.values()):
             if connection.transport is not None:
                 connection.transport.close()
@@ -259,7 +266,7 @@ class ZyServer:
             await listener.close()
 
     async def serve(self) -> None:
-        """Turn when something comes or is due, until cancelled; `start` first."""
+        """Run turns when something is due, until cancelled; `start` first."""
         loop = asyncio.get_running_loop()
         while True:
             self.turn()
@@ -276,48 +283,48 @@ class ZyServer:
                 alarm.cancel()
 
     def wake(self) -> None:
-        """Turn now: a line came, or something is due."""
+        """Run a turn now: a line came, or something is due."""
         if self._waker is not None and not self._waker.done():
             self._waker.set_result(None)
 
     def turn(self) -> None:
         """One pass: rates, the ranger's own pass, keep-alive."""
-        now = self.clock()
-        passed, self._last_rate = now - self._last_rate, now
+        time_s = self.clock()
+        passed, self._last_rate = time_s - self._last_rate, time_s
         for connection in list(self.connections.values()):
             connection.gain(passed)
             if connection.unread and connection.opened:
                 connection.look_ahead()
                 connection.read_on()
         self.send(self.ranger.turn())
-        self._watch_dead_man(now)
+        self._watch_dead_man(time_s)
         for gate in self.gates:
             gate.check()
         for connection in list(self.connections.values()):
-            if now - max(connection.heard, connection.began) > self.door.idle:
-                connection.refuse(f"nothing was said for {self.door.idle:g} s")
-        if now - self._last_keep_alive >= KEEP_ALIVE:
-            self._last_keep_alive = now
+            if time_s - max(connection.heard, connection.began) > self.door.idle:
+                connection.refuse(f"no line received for {self.door.idle:g} s")
+        if time_s - self._last_keep_alive >= KEEP_ALIVE:
+            self._last_keep_alive = time_s
             for connection in list(self.connections.values()):
                 if connection.admitted:
                     connection.write(b"\n")
 
-    def _watch_dead_man(self, now: float) -> None:
-        """Laser and motors off where nobody who has the lease has ordered anything for so long."""
+    def _watch_dead_man(self, time_s: float) -> None:
+        """Dead-man switch: laser and motors off without orders for too long."""
         if not self.door.lease:
             return
         lease = self.ranger.lease
         if self._orders != self.ranger.orders:
-            self._orders, self._commanded = self.ranger.orders, now
-        if now - self._commanded > self.door.dead_man:
+            self._orders, self._commanded = self.ranger.orders, time_s
+        if time_s - self._commanded > self.door.dead_man:
             who = "nobody had the lease" if lease is None else f"nothing was ordered by {lease.name}"
-            said = self.ranger.make_safe(f"{who} for {self.door.dead_man:g} s")
-            if said:
-                LOG.warning("%s: %s", self.ranger.name, said[0].reply.text)
-            self.send(said)
+            notices = self.ranger.make_safe(f"{who} for {self.door.dead_man:g} s")
+            if notices:
+                LOG.warning("%s: %s", self.ranger.name, notices[0].reply.text)
+            self.send(notices)
 
     def send(self, outgoing: list[Outgoing]) -> None:
-        """Give replies to those they are for, each connection's together."""
+        """Send replies to their connections, grouped."""
         lines: dict[int, bytearray] = {}
         byes = []
         for out in outgoing:
@@ -332,14 +339,14 @@ class ZyServer:
                 if (out.client == number or (out.client is None and out.but != number)) and connection.admitted:
                     lines.setdefault(number, bytearray()).extend(line)
                     connection.replies_left -= out.client is not None
-        for number, told in lines.items():
-            self.connections[number].write(bytes(told))
+        for number, content in lines.items():
+            self.connections[number].write(bytes(content))
         for number in byes:
             if number in self.connections and (transport := self.connections[number].transport) is not None:
                 transport.close()
 
     def joined(self, connection: ClientConnection) -> None:
-        """A connection is in; a second one on a port is turned away."""
+        """Admit a connection, or refuse a second one on a port."""
         port = self.ports[connection.number]
         holder = self.connections.get(connection.number)
         if holder is not None:
@@ -349,7 +356,7 @@ class ZyServer:
                 holder = None
         if holder is not None:
             who = peer_of(connection.transport)
-            LOG.warning("%s: port %d: %s turned away: the port is taken", self.ranger.name, port, who)
+            LOG.warning("%s: port %d: %s refused: the port is taken", self.ranger.name, port, who)
             connection.tell(
                 Reply(
                     "CONNECT", False, (f"port {port} is taken (expected the other port)",), 0, self.ranger.now_ticks()
@@ -364,18 +371,18 @@ class ZyServer:
         self.greet(connection)
 
     def greet(self, connection: ClientConnection) -> None:
-        """Who this is, that the port is had, the status word, who has the lease."""
+        """Send the greeting: name, port, status word, lease."""
         for out in self.ranger.greeting(self.ports[connection.number]):
             connection.tell(out.reply)
 
     def give_up(self, holder: ClientConnection, limit: float) -> None:
-        """A connection that says nothing is closed: another one wants its place."""
-        LOG.warning("%s: %s said nothing: closed", self._port_name(holder.number), peer_of(holder.transport))
-        holder.refuse(f"nothing was said for {limit:g} s, and another wants this port")
+        """Close a silent connection whose port another one needs."""
+        LOG.warning("%s: %s was silent: closed", self._port_name(holder.number), peer_of(holder.transport))
+        holder.refuse(f"no line received for {limit:g} s, and another client needs this port")
         self.left(holder)
 
     def left(self, connection: ClientConnection) -> None:
-        """A connection is over: what it had queued and scheduled is dropped, and its port is free."""
+        """Forget a closed connection: drop its commands, free its port."""
         if self.connections.get(connection.number) is connection:
             del self.connections[connection.number]
             self.ranger.disconnect(connection.number)

@@ -1,4 +1,4 @@
-"""What a ZY is between two commands, and what a handler of commands may ask of it: clock, mirror, Sun, settings."""
+"""State of a ZY between commands: clock, mirror, Sun, settings."""
 
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, replace
@@ -20,10 +20,10 @@ from catseye.ranger.status import StatusWord
 from catseye.ranger.sun_watch import SunSource, refusal
 
 Values = tuple[str, ...]
-# What a command that waits gives: values or a reply; else its turn back: None (ask soon) or when to ask, ns since MJD 0
+# Yielded by a waiting command: values or a reply; or None (poll soon) or the time to poll, ns since MJD 0
 Work = Generator[Values | Reply | int | None, None, Values | None]
 VERSION = "2.20"
-SUN_AGE = 60.0  # s that a vector from the coordinator holds where the ranger's frame turns
+SUN_AGE = 60.0  # s of validity of the coordinator's vector, if the ranger's frame turns
 NEEDED = ("BP", "ALPHA", "BETA", "MO", "EZ", "D0")
 REFUSED_IN_A_SCAN = (
     *("STT", "FHM", "CIL", "CMEAS", "CWT", "TRG", "TRK", "RST"),
@@ -36,7 +36,10 @@ BITS = tuple(int(bit) for bit in StatusWord)  # in the order of `RangerState.sta
 
 @dataclass(frozen=True)
 class Outgoing:
-    """A reply and the one connection it is for, None for all; `but` is left out of all."""
+    """A reply and its connection, None for all.
+
+    but   connection excluded from all
+    """
 
     reply: Reply
     client: int | None = None
@@ -44,7 +47,10 @@ class Outgoing:
 
 
 class Lease(NamedTuple):
-    """Right to command: a connection, the name it gave, the token that only it was told, its peer's address."""
+    """Right to command.
+
+    A connection, the name it gave, its secret token, its peer's address.
+    """
 
     client: int
     name: str
@@ -54,7 +60,10 @@ class Lease(NamedTuple):
 
 @dataclass(frozen=True)
 class Stream:
-    """What STM asked: `count` buffers of a cube, for a connection, under the TID of its request."""
+    """Request of STM: `count` buffers of a cube.
+
+    For a connection, under the TID of its request.
+    """
 
     client: int
     tid: int
@@ -64,7 +73,7 @@ class Stream:
 
 @dataclass
 class AxisSettings:
-    """What an axis's next move and filter are, in the motion chip's integers."""
+    """Settings of an axis's next move and filter, motion chip's integers."""
 
     velocity: int = 400_000
     acceleration: int = 2_000
@@ -75,7 +84,10 @@ class AxisSettings:
 
 @dataclass(frozen=True)
 class MeasuredBuffer:
-    """A buffer and what was computed from it: amplitude in V and phase in rad, None before MPC; whose it is."""
+    """A buffer with its cube, amplitude in V and phase in rad.
+
+    Both None before MPC.
+    """
 
     buffer: Buffer
     cube: int | None
@@ -87,16 +99,16 @@ class MeasuredBuffer:
 class RangerState:
     """A ZY behind its head, without the loop that serves it.
 
-    name      as it greets: ZY101
+    name      as in its greeting: ZY101
     head      the hardware
-    handlers  by command: functions of this, the client and the values, which give Values or Work
+    handlers  by command: functions of this, the client and the values, which return Values or Work
     limits    counts, lowest and highest azimuth that the stops allow
     files     folder of the initialisation files, None without
     mirror    name of its head, as in its initialisation file's
     sun       the ranger's own direction of the Sun for an MJD, None without
-    turning   its frame turns, as on the feed arm: it moves only if SUN was told within 60 s, and has no own Sun
+    turning   True if its frame turns, as on the feed arm: it needs SUN within 60 s to move, and has no Sun of its own
 
-    `laser_at_boot`: as the notes' rangers, at boot the laser is as its hardware has it, homed or not.
+    `laser_at_boot`: True as for the notes' rangers: at boot the laser is as its hardware has it, homed or not.
     """
 
     laser_at_boot = False
@@ -118,23 +130,23 @@ class RangerState:
         self.turning = turning
         self._scan_work: Generator[Reply | int | None, None, None] | None = None
         self._stream_work: Generator[Outgoing | int | None, None, None] | None = None
-        self.tid = 0  # of the command that runs
-        self.guarded = False  # whether commands need the lease
+        self.tid = 0  # of the running command
+        self.guarded = False  # True if commands need the lease
         self.lease: Lease | None = None
-        self.peers: dict[int, str] = {}  # who is at the other end of a connection, in words
+        self.peers: dict[int, str] = {}  # peer of each connection, in words
         self.latch: Latch | None = stored_latch(files)
-        self.times_off = 0  # that the laser was switched off
-        self.cleared_by = ""  # who cleared the last one, and from where
-        self._head_interlock: Callable[[], str] | None = getattr(head, "interlock", None)  # a head may offer it
+        self.times_off = 0  # times that the laser was switched off
+        self.cleared_by = ""  # person who cleared the last one, and address
+        self._head_interlock: Callable[[], str] | None = getattr(head, "interlock", None)  # optional in a head
         self.scheduler = Scheduler()
         self.next_sun_ns = 0
-        head_now = getattr(head, "now_ns", None)  # a head may offer it: the same as `now`, cheaper
-        self._head_now_ns: Callable[[], int] = head_now or (lambda: nanoseconds_of(head.now()))
+        head_now_ns = getattr(head, "now_ns", None)  # optional in a head: as `now`, cheaper
+        self._head_now_ns: Callable[[], int] = head_now_ns or (lambda: nanoseconds_of(head.now()))
         self._boot()
 
     def _boot(self) -> None:
-        """Everything but hardware and queues as when power comes on; the laser is off."""
-        self.lit = self.laser_at_boot and self.head.laser_on()  # a command switched it on
+        """Reset all but hardware and queues to power-on; laser off."""
+        self.lit = self.laser_at_boot and self.head.laser_on()  # switched on by command
         if not self.lit:
             self.head.switch_laser(False)
         self.cubes = Cubes(self.limits)
@@ -150,7 +162,7 @@ class RangerState:
         self.sun_vector: tuple[float, ...] | None = None
         self.sun_told_ns = 0
         self.sun_refused = self.in_sun = False
-        self.heading: tuple[float, float] | None = None  # counts where the last move ends
+        self.heading: tuple[float, float] | None = None  # end of the last move, counts
         self.stream: Stream | None = None
         self.order: list[int] = []
         self.scan_start, self.scan_rounds, self.scanning = 0, 0, False
@@ -159,18 +171,18 @@ class RangerState:
             self.head.set_error_limit(axis, settings.error_limit)
 
     def reset(self) -> None:
-        """A cold boot, as RST asks for."""
+        """Boot cold, as RST commands."""
         self._scan_work = self._stream_work = None
         self.scheduler = Scheduler()
         self.head.reset()
         self._boot()
 
     def interlock(self) -> str:
-        """Why hardware forbids light and moves at this instant; empty where it does not, or there is none."""
+        """Reason why hardware forbids light and moves now; else ""."""
         return "" if self._head_interlock is None else self._head_interlock()
 
     def set_latch(self, latch: Latch | None) -> None:
-        """Hold a dark order, or clear it; also in the ranger's folder."""
+        """Latch a stop order or clear it, also in the ranger's folder."""
         self.latch = latch
         store_latch(self.files, latch)
 
@@ -179,7 +191,7 @@ class RangerState:
         return self.peers.get(client, f"connection {client + 1}")
 
     def switch_laser(self, on: bool) -> None:
-        """Switch the laser as a command asks, which is remembered: one that comes on by itself is switched off."""
+        """Switch the laser by command; light without a command is switched off."""
         self.lit = on
         self.times_off += not on
         self.head.switch_laser(on)
@@ -218,30 +230,35 @@ class RangerState:
 
     @property
     def initialised(self) -> bool:
-        """Whether the geometry and D0 have been given since boot."""
+        """True if the geometry and D0 were given since boot."""
         return self.given.issuperset(NEEDED)
 
     @property
     def homed(self) -> bool:
-        """Whether counts are directions."""
+        """True if counts are directions."""
         return self.head.homing(0) == "home" and self.head.homing(1) == "home"
 
     @property
     def here(self) -> tuple[float, float]:
-        """Counts where the mirror is."""
+        """Present counts of the mirror."""
         return float(self.head.actual(0)), float(self.head.actual(1))
 
     def suns(self) -> list[ArrayLike]:
-        """Directions of the Sun that are known, each with its cone."""
-        known: list[ArrayLike] = [] if self.sun_vector is None else [self.sun_vector]
-        own = None if self.sun is None else self.sun(self.now_ns() / PER_DAY)
-        return known if own is None else [*known, own]
+        """Known directions of the Sun, each with its cone."""
+        vectors: list[ArrayLike] = [] if self.sun_vector is None else [self.sun_vector]
+        ranger_sun = None if self.sun is None else self.sun(self.now_ns() / PER_DAY)
+        return vectors if ranger_sun is None else [*vectors, ranger_sun]
 
     def refuse_sun(self, end: ArrayLike, start: ArrayLike | None = None) -> None:
-        """Raises InputError where a move, from here unless told, could look into the Sun; the status word says so."""
+        """Raise InputError for a move that could look into the Sun.
+
+        start   counts; None: the present ones
+
+        The status word shows the refusal.
+        """
         if self.turning and not 0 <= self.now_ns() - self.sun_told_ns <= SUN_AGE * PER_SECOND:
             reason: str | None = (
-                f"where the Sun is was not told for {SUN_AGE:g} s (expected SUN x, y, z, as this ranger turns)"
+                f"no Sun vector received for {SUN_AGE:g} s (expected SUN x, y, z, as this ranger turns)"
             )
         else:
             reason = refusal(self.cubes.station, self.here if start is None else start, end, suns=self.suns())
@@ -250,9 +267,9 @@ class RangerState:
             raise InputError(reason)
 
     def work_of(self, client: int, request: Request) -> Values | Work:
-        """What a command's handler gives.
+        """Result of a command's handler.
 
-        Raises CatseyeError: refused, the state as it was.
+        Raises CatseyeError if refused, with the state unchanged.
         """
         if request.command == "AT":
             start, repeats, interval, later = schedule_of(request.parameters)
@@ -280,5 +297,5 @@ class RangerState:
         self.head.stop()
 
     def end_stream(self) -> None:
-        """No more buffers; the one being taken is not told."""
+        """Stop the stream; the buffer under way is not reported."""
         self.stream = self._stream_work = None

@@ -1,9 +1,10 @@
-"""A ranger refuses by itself to look into the Sun, whatever it is told, and leaves when the Sun comes to its beam.
+"""Sun avoidance of a ranger: moves refused, beam driven away.
 
-The coordinator's unit vector to the Sun (SUN) is one source, the ranger's own, from its clock and place, another: each
-has its cone. A vector that lies can so only add a cone. Cone size is open in the sources; 5 degrees, as in the site's
-keep-out record. Axes that are started one by one, or while the other moves, may cross any pair of counts between their
-ends; so a move is asked for the whole rectangle of counts, which refuses a few moves that would be free.
+It works whatever the ranger is commanded. The coordinator's unit vector to the Sun (SUN) is one source, the ranger's
+own, from its clock and place, another: each has its cone. A wrong vector can so only add a cone. Cone size is open in
+the sources; 5 degrees, as in the site's keep-out record. Axes that are started one by one, or while the other moves,
+may pass any pair of counts between their ends; so a move is checked for the whole rectangle of counts, which refuses a
+few moves that would be safe.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,14 +22,16 @@ from catseye.reduction.site.earth_rotation import FramePlace, place_of, rotation
 
 HALF_ANGLE = 5.0 * DEGREE
 MARGIN = servo_margin([20.0, 20.0])  # overshoot
-LARGEST_STEP = 400  # counts between two looks: 1.4 deg of azimuth, 2.9 of the beam's elevation
-PARKED = 20.0 * DEGREE  # from the Sun, where a beam is left alone: 80 minutes of its way
-SET = -1.5 * DEGREE  # altitude from which on its rim is down also for a ranger 100 m up
-SunSource = Callable[[float], ArrayLike | None]  # MJD -> vector in the ground frame, None where it is set
+LARGEST_STEP = 400  # counts between two samples: 1.4 deg of azimuth, 2.9 of the beam's elevation
+PARKED = 20.0 * DEGREE  # from the Sun, at which a beam is left parked: 80 minutes of its path
+SET = -1.5 * DEGREE  # altitude below which its rim has set also for a ranger 100 m up
+SunSource = Callable[[float], ArrayLike | None]  # MJD -> vector in the ground frame, None if it is set
 
 
 class OwnSun:
-    """Where the Sun stands over a place, looked up once a second of its time: 7.5" off at most.
+    """Direction of the Sun at a place, updated once a second.
+
+    Error 7.5" at most.
 
     place   of the ground frame's origin
     """
@@ -39,7 +42,7 @@ class OwnSun:
         self._seen: NDArray[np.float64] | None = None
 
     def __call__(self, mjd: float) -> NDArray[np.float64] | None:
-        """(3,) unit, ground frame; None where it is set."""
+        """Unit vector (3,), ground frame; None if the Sun is set."""
         second = int(mjd * SECONDS_PER_DAY)
         if second != self._second:
             towards = sun_at((second + 0.5) / SECONDS_PER_DAY, self._place).direction
@@ -49,22 +52,27 @@ class OwnSun:
 
 
 def own_sun(site: Location) -> OwnSun:
-    """The Sun of a site record's table [site], for all its rangers on the ground; the Earth's turn is read now."""
-    rotation_at(EARLIEST_MJD)  # a second or two that no turn of a ranger shall wait
+    """Sun of a site record's table [site], for its ground rangers.
+
+    The Earth rotation table is read now.
+    """
+    rotation_at(EARLIEST_MJD)  # takes a second or two, which no loop of a ranger should wait for
     return OwnSun(place_of(site))
 
 
 def nearest_sun(
     station: MirrorStation, start: ArrayLike, end: ArrayLike, *, suns: Sequence[ArrayLike], exact: bool = False
 ) -> float:
-    """Least angle, rad, that the beam can come to any of the Suns while both axes move between counts; inf without one.
+    """Least angle of the beam to any Sun during a move, rad.
+
+    Both axes move between counts; inf without a Sun.
 
     station      the ranger
     start, end   (2,) counts, azimuth and elevation
     suns         vectors (3,), ground frame, any length
     exact        at `end` only
 
-    The rectangle of counts is looked at on a grid, and half a cell's diagonal is taken off, so it is never too large.
+    The rectangle of counts is sampled on a grid, and half a cell's diagonal is subtracted, so it is never too large.
     Directions only: the Sun is turned by gamma then lambda. Source: [PARKER04] section 2.7, eq. 2.47.
     """
     if not suns:
@@ -78,12 +86,12 @@ def nearest_sun(
 
 
 def refusal(station: MirrorStation, start: ArrayLike, end: ArrayLike, *, suns: Sequence[ArrayLike]) -> str | None:
-    """Why a move must not be made, in words; None where it may.
+    """Reason why a move is not allowed, in words; None if it is.
 
     station, start, end, suns   as for `nearest_sun`
 
-    A move that begins inside a Sun's cone may be made if it ends outside and nowhere comes nearer than it began, as far
-    as the grid can tell: 1.6 deg.
+    A move that begins inside a Sun's cone is allowed if it ends outside and nowhere comes nearer than at its start, as
+    far as the grid can tell: 1.6 deg.
     """
     allowed, all_least = HALF_ANGLE + MARGIN, nearest_sun(station, start, end, suns=suns)
     if all_least >= allowed:
@@ -100,26 +108,30 @@ def refusal(station: MirrorStation, start: ArrayLike, end: ArrayLike, *, suns: S
     least = min(blocked)
     return (
         f"the beam could come within {max(least, 0.0) / DEGREE:.1f} deg of the Sun (expected at least "
-        f"{allowed / DEGREE:.1f}): choose another way or wait"
+        f"{allowed / DEGREE:.1f}): choose another path or wait"
     )
 
 
 def way_out(
-    station: MirrorStation, here: ArrayLike, suns: Sequence[ArrayLike], *, limits: tuple[float, float]
+    station: MirrorStation, position: ArrayLike, suns: Sequence[ArrayLike], *, limits: tuple[float, float]
 ) -> tuple[int, int] | None:
-    """Counts to drive to from inside a cone: the shortest free move of one axis that ends 20 deg from every Sun.
+    """Counts of the shortest safe move out of a cone, or None.
+
+    A move of one axis that ends 20 deg from every Sun.
 
     station, suns   as for `nearest_sun`
-    here            (2,) counts, where the mirror is
+    position        (2,) counts of the mirror
     limits          counts, lowest and highest azimuth
 
-    None where no such move of a quarter turn of azimuth or of the beam's elevation is free.
+    None if no such move of a quarter turn of azimuth or of the beam's elevation is safe.
     """
-    at = np.asarray(here, dtype=float)
+    at = np.asarray(position, dtype=float)
     steps = LARGEST_STEP * np.arange(1, round(COUNTS_PER_TURN / 4 / LARGEST_STEP) + 1)
-    both = np.stack([steps, -steps], axis=1).ravel()  # near ones first
-    azimuth = at + np.stack([both, np.zeros(len(both))], axis=1)
-    elevation = at + np.stack([np.zeros(len(both)), both], axis=1)[: len(both) // 2]  # the beam turns twice as far
+    signed_steps = np.stack([steps, -steps], axis=1).ravel()  # near ones first
+    azimuth = at + np.stack([signed_steps, np.zeros(len(signed_steps))], axis=1)
+    elevation = (
+        at + np.stack([np.zeros(len(signed_steps)), signed_steps], axis=1)[: len(signed_steps) // 2]
+    )  # the beam turns twice as far
     elevation = elevation[np.abs(elevation[:, 1] - station.zeros[1]) <= COUNTS_PER_TURN / 4]  # Phi of half a turn
     ends = np.concatenate([elevation, azimuth[(azimuth[:, 0] >= limits[0]) & (azimuth[:, 0] <= limits[1])]])
     for end in ends[np.min(_angles(station, beam(station, ends), suns), axis=1) >= PARKED]:
@@ -128,22 +140,24 @@ def way_out(
     return None
 
 
-def sun_leaves(station: MirrorStation, here: ArrayLike, sun: SunSource, mjd: float) -> float | None:
-    """MJD, to a minute, from which on the Sun is out of the cone of a beam at rest; None where that takes over a day.
+def sun_leaves(station: MirrorStation, position: ArrayLike, sun: SunSource, mjd: float) -> float | None:
+    """MJD, to a minute, at which the Sun leaves a parked beam.
 
-    station, here   as for `way_out`
-    sun             where it is, as a ranger knows it
+    None if that takes over a day.
+
+    station, position  as for `way_out`
+    sun             its direction, as a ranger knows it
     """
     for minute in range(24 * 60 + 1):
         at = mjd + minute / (24 * 60)
         direction = sun(at)
-        if direction is None or nearest_sun(station, here, here, suns=[direction], exact=True) >= HALF_ANGLE:
+        if direction is None or nearest_sun(station, position, position, suns=[direction], exact=True) >= HALF_ANGLE:
             return at
     return None
 
 
 def _angles(station: MirrorStation, looks: NDArray[np.float64], suns: Sequence[ArrayLike]) -> NDArray[np.float64]:
-    """(n, suns) rad between beams (n, 3) in the mirror's axes and the Suns."""
+    """Angles (n, suns), rad, between beams (n, 3) and Suns."""
     inside: NDArray[np.float64] = np.stack([np.asarray(s, dtype=float) for s in suns])
     turned = inside / np.linalg.norm(inside, axis=-1, keepdims=True) @ station.mirror_from_ground.T
     return np.arccos(np.clip(looks @ turned.T, -1.0, 1.0))

@@ -1,4 +1,4 @@
-"""Kinds of parameters of ZY commands: how each is read from its text, its limits, and how it is refused."""
+"""Parameters of ZY commands: kinds, limits, parsing."""
 
 import math
 import re
@@ -8,7 +8,7 @@ from typing import Literal
 from catseye.errors import InputError
 from catseye.ranger.line import parse_stamp
 
-WHOLE = re.compile(r"[+-]?[0-9]{1,12}")
+INTEGER = re.compile(r"[+-]?[0-9]{1,12}")
 REAL = re.compile(r"[+-]?([0-9]{1,15}(\.[0-9]{0,15})?|\.[0-9]{1,15})([eE][+-]?[0-9]{1,3})?")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,15}")
 Value = int | float | str
@@ -19,9 +19,9 @@ Kind = Literal["whole", "real", "cube", "name", "stamp", "text"]
 class CommandParameter:
     """One parameter of a command.
 
-    name      as messages and help call it, its unit in it
+    name      in messages and help, its unit in it
     kind      whole, real, cube (a number or a name), name, stamp (ticks of an MJD), text
-    low, high what is accepted, both included
+    low, high accepted range, inclusive
     unit      in words, "" for none
     """
 
@@ -32,10 +32,10 @@ class CommandParameter:
     unit: str = ""
 
     def read(self, command: str, text: str) -> Value:
-        """The value of a text.
+        """Value of a text.
 
-        command   whose parameter it is, for the message
-        text      as it came on the line
+        command   of the parameter, for messages
+        text      as received
 
         Raises InputError: not of this kind, or outside its limits.
 
@@ -43,7 +43,7 @@ class CommandParameter:
         1
         """
         if self.kind == "cube":
-            return int(text) if text.isdecimal() and WHOLE.fullmatch(text) else self._word(command, text)
+            return int(text) if text.isdecimal() and INTEGER.fullmatch(text) else self._word(command, text)
         if self.kind == "name":
             return self._word(command, text)
         if self.kind == "text":
@@ -53,9 +53,9 @@ class CommandParameter:
                 return parse_stamp(text)
             except InputError as problem:
                 raise InputError(f"{command}: {problem}") from problem
-        form, what = (WHOLE, "a whole number") if self.kind == "whole" else (REAL, "a number")
+        form, what = (INTEGER, "a whole number") if self.kind == "whole" else (REAL, "a number")
         if not form.fullmatch(text):
-            raise InputError(f"{command}: {self.name} {_shown(text)} is not {what}{self._expected()}")
+            raise InputError(f"{command}: {self.name} {_quoted(text)} is not {what}{self._expected()}")
         value: int | float = int(text) if self.kind == "whole" else float(text)
         if not self.low <= value <= self.high:
             raise InputError(f"{command}: {self.name} {text} is outside{self._limits()}")
@@ -64,7 +64,7 @@ class CommandParameter:
     def _word(self, command: str, text: str) -> str:
         if not NAME.fullmatch(text):
             raise InputError(
-                f"{command}: {self.name} {_shown(text)} is no name (expected a letter, then at most 15 letters, "
+                f"{command}: {self.name} {_quoted(text)} is not a name (expected a letter, then at most 15 letters, "
                 "digits, - or _)"
             )
         return text
@@ -77,5 +77,5 @@ class CommandParameter:
         return f" (expected{self._limits()})" if math.isfinite(self.high) else ""
 
 
-def _shown(text: str) -> str:
+def _quoted(text: str) -> str:
     return ascii(text if len(text) <= 40 else f"{text[:40]}...")

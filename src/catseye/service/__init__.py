@@ -1,1 +1,1 @@
-"""What runs a living site: processes, the loop, the screen, the logs. It starts what other layers compute."""
+"""Processes of a living site: event loop, screen, logs; formulas are in other layers."""

@@ -1,12 +1,12 @@
-"""addresses.toml: where each ranger of a site is, and its feed.
+"""addresses.toml: network addresses of a site's rangers and feed.
 
 format = "catseye-addresses-1"
-feed = "10.1.0.2:5250"                                # may be left out
+feed = "10.1.0.2:5250"                                # optional
 
 [[ranger]]
 name = "ZY101"
 host = "10.1.8.1"
-ports = [5240, 5241]                                  # these unless said
+ports = [5240, 5241]                                  # default
 """
 
 from pathlib import Path
@@ -23,9 +23,11 @@ LAST_PORT = 65_535
 
 
 def read_addresses(path: Path, site: SiteFolder) -> tuple[dict[str, Address], tuple[str, int] | None]:
-    """Addresses by ranger, and the feed's. A site's ranger that is not in it is not of this coordinator.
+    """Addresses by ranger, and the feed's.
 
-    Raises InputError with file, place, value and what was expected.
+    A ranger of the site without an address does not belong to this coordinator.
+
+    Raises InputError with file, place, value and expected value.
     """
     name = path.name
     values = toml_of(Folder(path.parent).text(name), name)
@@ -36,9 +38,11 @@ def read_addresses(path: Path, site: SiteFolder) -> tuple[dict[str, Address], tu
     for table in top.tables("ranger"):
         ranger = table.text("name")
         if ranger not in site.rangers:
-            raise table.refuse(f"name = {shown(ranger)} is no ranger of the site (expected {', '.join(site.rangers)})")
+            raise table.refuse(
+                f"name = {shown(ranger)} is not a ranger of the site (expected {', '.join(site.rangers)})"
+            )
         if ranger in addresses:
-            raise table.refuse(f"name = {shown(ranger)} stands there twice (expected once)")
+            raise table.refuse(f"name = {shown(ranger)} is listed twice (expected once)")
         addresses[ranger] = Address(table.text("host"), _ports(table))
     if not addresses:
         raise refusal(name, "names no ranger (expected [[ranger]] with name and host)")

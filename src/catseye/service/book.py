@@ -1,4 +1,4 @@
-"""What a person wants to see of a running site, kept as it comes: shots, last ranges, epochs, what went wrong."""
+"""Summary of a running site: shots, last ranges, epochs, problems."""
 
 from collections import Counter, deque
 from dataclasses import dataclass, field
@@ -12,14 +12,17 @@ from catseye.service.comparison import EpochComparison, TwinComparison
 from catseye.service.found import FaultFinder
 from catseye.service.logs import epoch_of
 
-UNKNOWN = "unknown"  # to this version
+UNKNOWN = "unknown"  # status of a later version
 KEPT_EVENTS, KEPT_EPOCHS = 60, 10_000
-MOST_UNJUDGED = 50_000  # shots kept while nothing is solved
+MOST_UNJUDGED = 50_000  # shots remembered while nothing is solved
 
 
 @dataclass(frozen=True)
 class LastShot:
-    """A ranger's last: range and its u, m, NaN where it gave none."""
+    """Last shot of a ranger.
+
+    Range and its u in m, NaN if it gave none.
+    """
 
     target: str
     status: str
@@ -29,7 +32,7 @@ class LastShot:
 
 @dataclass
 class Troubles:
-    """What went wrong: how often, and the last words, by who and kind."""
+    """Counts and latest texts of problems, by source and kind."""
 
     counts: Counter[tuple[str, str]] = field(default_factory=Counter)
     texts: dict[tuple[str, str], str] = field(default_factory=dict)
@@ -41,24 +44,24 @@ class Troubles:
 
 
 class LiveBook:
-    """Fed with what is durable, in its order.
+    """Summary built from durable journal entries, in their order.
 
-    comparison   against the twin's truth; None: there is none
-    finder       of faults on command
+    comparison   with the twin's truth; None if there is none
+    finder       of injected faults
     """
 
     def __init__(self, comparison: TwinComparison | None = None, finder: FaultFinder | None = None):
         self._comparison = comparison
         self._finder = finder or FaultFinder()
         self.faults = self._finder.found
-        self.ticks = 0  # of the latest that came
+        self.ticks = 0  # of the latest entry
         self.posture: LivePosture | None = None
         self.last: dict[str, LastShot] = {}
-        self.shots: Counter[str] = Counter()  # good ones by ranger
+        self.shots: Counter[str] = Counter()  # good shots by ranger
         self.statuses: Counter[str] = Counter()
-        self.left_out: Counter[str] = Counter()  # why epochs did not use shots that were good by themselves
-        self._overruled: Counter[str] = Counter()  # the statuses that those shots had
-        self._good: dict[int, str] = {}  # status by number, of good shots that no epoch has judged yet
+        self.left_out: Counter[str] = Counter()  # statuses of epochs for shots that were good by themselves
+        self._overruled: Counter[str] = Counter()  # their original statuses
+        self._good: dict[int, str] = {}  # status by number, of good shots not yet in an epoch
         self.events: deque[Happening] = deque(maxlen=KEPT_EVENTS)
         self.troubles = Troubles()
         self.epochs: deque[dict[str, Any]] = deque(maxlen=KEPT_EPOCHS)  # number, ticks, names, used, rejected, doubt
@@ -66,7 +69,7 @@ class LiveBook:
         self.answer: StoredAnswer = {}  # of the last epoch
 
     def entry(self, entry: Any) -> None:
-        """Take in one entry of the journal."""
+        """Add one entry of the journal."""
         self.ticks = max(self.ticks, entry.shot.ticks if isinstance(entry, AnsweredShot) else entry.ticks)
         if isinstance(entry, AnsweredShot):
             self._shot(entry)
@@ -83,12 +86,12 @@ class LiveBook:
 
     @property
     def acknowledged(self) -> int:
-        """Number of shots that are durable."""
+        """Number of durable shots."""
         return sum(self.statuses.values())
 
     @property
     def fates(self) -> Counter[str]:
-        """What became of each durable shot, once: what its epoch said of it, or else its own status."""
+        """Final status of each durable shot: its epoch's, else its own."""
         return +(self.statuses - self._overruled + self.left_out)
 
     @property
@@ -123,14 +126,16 @@ class LiveBook:
             "used": answer.get("used", ()),
             "rejected": answer.get("rejected", ()),
         }
-        counts = {key: len(each) for key, each in lists.items()}
+        counts = {key: len(values) for key, values in lists.items()}
         doubt = next(iter(answer.get("doubts") or ()), None)
         self.epochs.append({"number": answer.get("number"), "ticks": solution.ticks, **counts, "doubt": doubt})
         rejected = {int(number): reason for number, reason in (answer.get("rejected") or {}).items()}
         for number, reason in rejected.items():
-            status = self._good.pop(number, None)  # one that was bad by itself is counted already
+            status = self._good.pop(number, None)  # shots bad by themselves are counted already
             if status is not None:
                 self._overruled[status] += 1
                 self.left_out[str(status_of(reason) or UNKNOWN)] += 1
-        last = max([*rejected, *answer.get("used", ())], default=0)  # what came while it was solved is of the next one
+        last = max(
+            [*rejected, *answer.get("used", ())], default=0
+        )  # shots received during the solution belong to the next epoch
         self._good = {number: status for number, status in self._good.items() if number > last}

@@ -1,7 +1,7 @@
-"""A process of ours beside this one: started, listened to, started again when it dies, and never left behind.
+"""A supervised child process: started, read, restarted when it dies, never orphaned.
 
-The child gets a pipe as its standard input and leaves when that ends: whatever becomes of this process, by whatever
-signal, the child does not outlive it.
+The child's standard input is a pipe, and it exits at its end: however this process ends, by whatever signal, the child
+does not outlive it.
 """
 
 import asyncio
@@ -15,19 +15,19 @@ from catseye.errors import InputError
 from catseye.gateways.writers.interruption import undone_when_interrupted
 
 PROGRAM = (sys.executable, "-P", "-m", "catseye")
-LONGEST_START = 120.0  # s until the child says that it listens: the first time its kernels are compiled
-LONGEST_LEAVE = 1.0  # s from SIGTERM until it is killed: its keeper has to be gone within five
-FIRST_WAIT, LONGEST_WAIT, LIVED = 1.0, 30.0, 60.0  # s before it is started again, longer each time unless it lived
-Heard = Callable[[str], None]
+LONGEST_START = 120.0  # s until the child's first line: its kernels are compiled the first time
+LONGEST_LEAVE = 1.0  # s from SIGTERM until it is killed: the parent has to exit within five
+FIRST_WAIT, LONGEST_WAIT, LIVED = 1.0, 30.0, 60.0  # s of back-off before a restart, doubled unless it ran for LIVED
+LineHandler = Callable[[str], None]
 
 
 class LiveChild:
-    """One child.
+    """One child process.
 
     name       for people
     arguments  of `catseye`
-    said       told of each line that it writes to its standard output
-    warned     of each line that it writes to its standard error
+    said       called with each line of its standard output
+    warned     called with each line of its standard error
     program    that takes the arguments
     """
 
@@ -36,8 +36,8 @@ class LiveChild:
         name: str,
         arguments: Sequence[str],
         *,
-        said: Heard,
-        warned: Heard,
+        said: LineHandler,
+        warned: LineHandler,
         program: Sequence[str] = PROGRAM,
     ):
         self._program = tuple(program)
@@ -45,16 +45,19 @@ class LiveChild:
         self._process: asyncio.subprocess.Process | None = None
         self._readers: list[asyncio.Task[None]] = []
         self._last_warning = ""
-        self._spoke = asyncio.Event()
+        self._output_seen = asyncio.Event()
 
     @property
     def pid(self) -> int | None:
-        """Process id of the child that runs."""
+        """Process id of the running child."""
         return None if self._process is None else self._process.pid
 
     async def start(self) -> None:
-        """Until its first line. Raises InputError: it ended before, with its own words; or took too long."""
-        self._spoke.clear()
+        """Start it and wait for its first line.
+
+        Raises InputError if it exits before, with its last message, or takes too long.
+        """
+        self._output_seen.clear()
         self._last_warning = ""
         self._process = await asyncio.create_subprocess_exec(
             *self._program,
@@ -62,52 +65,52 @@ class LiveChild:
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE,
-            start_new_session=True,  # Ctrl-C is for this process, which ends the child in its turn
+            start_new_session=True,  # Ctrl-C is for this process, which then stops the child
         )
         process = self._process
         self._readers = [
             asyncio.create_task(self._read(process.stdout, self._hear)),
             asyncio.create_task(self._read(process.stderr, self._warn)),
         ]
-        ended, spoke = asyncio.create_task(process.wait()), asyncio.create_task(self._spoke.wait())
+        exit_task, output_task = asyncio.create_task(process.wait()), asyncio.create_task(self._output_seen.wait())
         try:
-            await asyncio.wait([ended, spoke], timeout=LONGEST_START, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait([exit_task, output_task], timeout=LONGEST_START, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            ended.cancel()
-            spoke.cancel()
-        if self._spoke.is_set():
+            exit_task.cancel()
+            output_task.cancel()
+        if self._output_seen.is_set():
             return
         await self.stop()
-        why = self._last_warning.removeprefix("catseye: ") or f"it said nothing for {LONGEST_START:g} s"
+        why = self._last_warning.removeprefix("catseye: ") or f"no output for {LONGEST_START:g} s"
         raise InputError(f"{self.name}: {why}")
 
     async def keep(self, *, patient: bool = False) -> None:
-        """Start it, and again whenever it ends, until cancelled.
+        """Start it and restart it whenever it ends, until cancelled.
 
-        patient   also where it cannot start the first time: what stands in its way may go, as a port's holder does
+        patient   retry also if the first start fails: the cause, such as an occupied port, may go away
 
-        Raises InputError: it cannot start the first time, unless `patient`.
+        Raises InputError if the first start fails, unless `patient`.
         """
         wait, loop = FIRST_WAIT, asyncio.get_running_loop()
         with undone_when_interrupted(self.kill):
             try:
-                with suppress(InputError) if patient else nullcontext():  # its own words have been passed on
+                with suppress(InputError) if patient else nullcontext():  # its message has been passed on
                     await self.start()
                 while True:
-                    began = loop.time()
+                    started = loop.time()
                     status = await self._process.wait() if self._process is not None else None
-                    wait = FIRST_WAIT if loop.time() - began > LIVED else wait
+                    wait = FIRST_WAIT if loop.time() - started > LIVED else wait
                     what = "did not start" if self._process is None else f"ended with status {status}"
-                    self._warned(f"{what}; started again in {wait:g} s")
+                    self._warned(f"{what}; restarting in {wait:g} s")
                     await asyncio.sleep(wait)
                     wait = min(2.0 * wait, LONGEST_WAIT)
-                    with suppress(InputError):  # its own words have been passed on
+                    with suppress(InputError):  # its message has been passed on
                         await self.start()
             finally:
                 await self.stop()
 
     async def stop(self) -> None:
-        """End it: asked first, killed if it does not."""
+        """Terminate it, and kill it if it does not exit."""
         process, self._process = self._process, None
         if process is None:
             return
@@ -125,18 +128,18 @@ class LiveChild:
             process.stdin.close()
 
     def kill(self) -> None:
-        """End the child at once, by SIGKILL."""
+        """Kill the child at once, by SIGKILL."""
         if self._process is not None and self._process.returncode is None:
             with suppress(OSError):
                 os.kill(self._process.pid, signal.SIGKILL)
 
-    async def _read(self, stream: asyncio.StreamReader | None, heard: Heard) -> None:
+    async def _read(self, stream: asyncio.StreamReader | None, handle: LineHandler) -> None:
         while stream is not None and (line := await stream.readline()):
-            heard(line.decode("utf-8", "replace").rstrip("\n"))
+            handle(line.decode("utf-8", "replace").rstrip("\n"))
 
     def _hear(self, line: str) -> None:
         self._said(line)
-        self._spoke.set()
+        self._output_seen.set()
 
     def _warn(self, line: str) -> None:
         self._last_warning = line

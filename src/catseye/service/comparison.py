@@ -1,7 +1,7 @@
-"""Epochs held against the twin's truth: how far off, what was claimed, and whether the two fit.
+"""Compare epochs with the twin's truth: errors, claims, consistency.
 
-The truth of a point in an epoch is the mean of its true places over the epoch's shots, each carried to the epoch's
-instant in the frame that carries the point: what an epoch answers. Points that last and have three shots are compared.
+The truth of a point in an epoch is the mean of its true positions over the epoch's shots, each predicted for the
+epoch's instant in the point's body frame, like an epoch's answer. Tracked points with three shots are compared.
 """
 
 from collections.abc import Mapping
@@ -22,8 +22,8 @@ from catseye.simulator.twin.site import Twin
 
 Array = NDArray[np.float64]
 FEWEST_SHOTS = 3
-INSTANTS = 32  # of an epoch's shots at which the truth is looked at: vibrations are means over ten seconds
-MOST_SHOTS = 50_000  # kept while nothing is solved
+INSTANTS = 32  # of an epoch's shots at which the truth is sampled: vibrations average over ten seconds
+MOST_SHOTS = 50_000  # remembered while nothing is solved
 BAND = (0.005, 0.995)
 FEWEST_POINTS = 3  # of a body
 
@@ -33,13 +33,13 @@ class EpochComparison:
     """One epoch beside the truth; lengths in mm.
 
     number, ticks   of the epoch
-    points          compared
+    points          number compared
     worst, worst_mm name and length of the largest difference
     rms_mm          of the differences' coordinates
     mean_u_mm       claimed, of a coordinate
     chi2            per coordinate, of all differences with their joint covariance
-    band            99 % of epochs lie within, if what is claimed is true
-    offset, u_offset, true_offset   (3,) of the beam: azimuth times cos E and elevation, rad; focus, m; NaN: not known
+    band            99 % of epochs lie within, if the claims are right
+    offset, u_offset, true_offset   (3,) of the beam: azimuth times cos E and elevation, rad; focus, m; NaN if unknown
     """
 
     number: int
@@ -57,14 +57,14 @@ class EpochComparison:
 
     @property
     def fits(self) -> bool:
-        """Whether chi2 is within its band."""
+        """True if chi2 is within its band."""
         return self.band[0] <= self.chi2 <= self.band[1]
 
 
 class TwinComparison:
-    """Shots and solutions in the order of the journal; a comparison for each solution.
+    """Compare shots and solutions in the journal's order.
 
-    reference_after   number of the epoch from which poses count
+    reference_after   number of the reference epoch of poses
     """
 
     def __init__(self, site: SiteFolder, twin: Twin, *, reference_after: int):
@@ -73,20 +73,20 @@ class TwinComparison:
         self._lasting = frozenset(lasting_names(site))
         self._dish = TracedDish.of(site.site.paraboloid)
         self._middles: dict[int, float] = {}  # s since the twin's start, by number
-        self._reference: dict[str, Array] = {}  # true places in the reflector frame, at the reference epoch
+        self._reference: dict[str, Array] = {}  # true positions in the reflector frame, at the reference epoch
 
     def shot(self, answered: AnsweredShot) -> None:
-        """Compare one shot with the truth."""
+        """Store the time of one shot."""
         shot = answered.shot
         if len(self._middles) >= MOST_SHOTS:
             del self._middles[next(iter(self._middles))]
         self._middles[shot.number] = self._twin.seconds_of_ticks(shot.ticks) + 0.5 * shot.duration
 
     def epoch(self, solution: EpochSolution) -> EpochComparison | None:
-        """The epoch beside the truth; None where nothing was solved, or too little of it can be compared."""
+        """The epoch beside the truth; None if too little can be compared."""
         answer = solution.answer
         middles, numbers = self._middles, [*answer.get("used", ()), *map(int, answer.get("rejected") or ())]
-        last = max(numbers, default=0)  # shots that came while it was solved are of the next one
+        last = max(numbers, default=0)  # shots received during the solution belong to the next epoch
         self._middles = {number: at for number, at in middles.items() if number > last}
         times = np.array(sorted(middles[n] for n in answer.get("used", ()) if n in middles))
         if not len(times) or solution.covariance is None:
@@ -94,17 +94,17 @@ class TwinComparison:
         times = times[np.unique(np.linspace(0, len(times) - 1, INSTANTS).round().astype(int))]
         shots = dict(zip(answer["names"], answer["shots"], strict=True))
         names = [n for n in answer["names"] if n in self._lasting and n in self._frames]
-        own, carried = self._truth(names, times, answer)
+        body_places, ground_places = self._truth(names, times, answer)
         chosen = [k for k, n in enumerate(names) if shots[n] >= FEWEST_SHOTS]
         if not chosen:
             return None
         at = [answer["names"].index(names[k]) for k in chosen]
-        off = np.array(answer["x"], dtype=float)[at] - carried[chosen]
+        off = np.array(answer["x"], dtype=float)[at] - ground_places[chosen]
         rows = np.concatenate([np.arange(3 * k, 3 * k + 3) for k in at])
         covariance = solution.covariance[np.ix_(rows, rows)]
         length = np.linalg.norm(off, axis=1)
         worst = int(np.argmax(length))
-        offset, u_offset, true_offset = self._offsets(answer, dict(zip(names, own, strict=True)))
+        offset, u_offset, true_offset = self._offsets(answer, dict(zip(names, body_places, strict=True)))
         return EpochComparison(
             answer["number"],
             int(answer["ticks"]),
@@ -121,41 +121,44 @@ class TwinComparison:
         )
 
     def _truth(self, names: list[str], times: Array, answer: Mapping[str, Any]) -> tuple[Array, Array]:
-        """Mean true places (n, 3), in each point's own frame and carried to the epoch's instant, ground frame."""
+        """Mean true positions (n, 3) in body frames, and in the ground frame.
+
+        The latter predicted for the epoch's instant.
+        """
         places = self._twin.points(names, times)
         posture = self._twin.posture(times)
-        own = places.mean(axis=0)
-        carried = own.copy()
+        body_places = places.mean(axis=0)
+        ground_places = body_places.copy()
         for frame in sorted({self._frames[n] for n in names} - {GROUND}):
             members = [k for k, n in enumerate(names) if self._frames[n] == frame]
             back = ground_from(self._site, frame, posture.azimuth, posture.elevation).inverse()
-            here = np.stack([back.points(places[:, k]) for k in members], axis=1).mean(axis=0)
-            then = ground_from(self._site, frame, answer["azimuth"], answer["elevation"]).single
-            own[members], carried[members] = here, then.points(here)
-        return own, carried
+            means = np.stack([back.points(places[:, k]) for k in members], axis=1).mean(axis=0)
+            at_epoch = ground_from(self._site, frame, answer["azimuth"], answer["elevation"]).single
+            body_places[members], ground_places[members] = means, at_epoch.points(means)
+        return body_places, ground_places
 
-    def _offsets(self, answer: Mapping[str, Any], own: Mapping[str, Array]) -> tuple[Array, Array, Array]:
-        """Of the beam since the reference epoch: found, its u, and by the true places."""
+    def _offsets(self, answer: Mapping[str, Any], body_places: Mapping[str, Array]) -> tuple[Array, Array, Array]:
+        """Beam offset since the reference epoch: estimate, u, truth."""
         unknown = np.full(3, np.nan)
-        riding = {n: x for n, x in own.items() if self._bodies.get(n) in ("dish", "arm")}
+        points = {n: x for n, x in body_places.items() if self._bodies.get(n) in ("dish", "arm")}
         if answer["number"] <= self._reference_after:
-            self._reference = riding if answer["number"] == self._reference_after else {}
+            self._reference = points if answer["number"] == self._reference_after else {}
         pose = answer.get("pose")
         if not pose or pose["missing"]:
             return unknown, unknown, unknown
         u = np.sqrt(np.diag(np.array(pose["covariance"], dtype=float)))
-        return np.array(pose["offset"], dtype=float), u, self._true_offset(riding)
+        return np.array(pose["offset"], dtype=float), u, self._true_offset(points)
 
-    def _true_offset(self, own: Mapping[str, Array]) -> Array:
-        """By rays, with the rigid motions of dish and arm that fit the true places, all points alike."""
+    def _true_offset(self, body_places: Mapping[str, Array]) -> Array:
+        """True beam offset by ray tracing, from rigid motions of true positions."""
         moved = {}
         for body, pivot in (("dish", np.zeros(3)), ("arm", self._dish.focus)):
-            names = [n for n in own if n in self._reference and self._bodies[n] == body]
+            names = [n for n in body_places if n in self._reference and self._bodies[n] == body]
             if len(names) < FEWEST_POINTS:
                 return np.full(3, np.nan)
-            rest = np.array([self._reference[n] for n in names])
-            change = np.array([own[n] for n in names]) - rest
-            moved[body] = np.linalg.lstsq(motions(rest, pivot, 1.0)[:, :6], change.ravel(), rcond=None)[0]
+            reference = np.array([self._reference[n] for n in names])
+            change = np.array([body_places[n] for n in names]) - reference
+            moved[body] = np.linalg.lstsq(motions(reference, pivot, 1.0)[:, :6], change.ravel(), rcond=None)[0]
         return self._dish.offset(moved["dish"], moved["arm"])
 
 
@@ -165,7 +168,7 @@ def _chi2(off: Array, covariance: Array) -> float:
 
 
 def _band(size: int) -> tuple[float, float]:
-    """Per coordinate, of 99 % of epochs."""
+    """Band per coordinate that holds 99 % of epochs."""
     from scipy.stats import chi2
 
     low, high = chi2.ppf(BAND, size) / size

@@ -1,4 +1,4 @@
-"""A coordinator put together: reduction, planner, guard, journal, its own port; run until cancelled."""
+"""Assemble a coordinator: reduction, planner, guard, journal, port; run it."""
 
 import asyncio
 import gc
@@ -17,8 +17,7 @@ from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.feed import MotionScript
 from catseye.coordinator.guard.guard import SafetyGuard
 from catseye.coordinator.journal.chain import Head
-from catseye.coordinator.journal.disk import EVERY as DISK_EVERY
-from catseye.coordinator.journal.disk import DiskWatch
+from catseye.coordinator.journal.disk import CHECK_PERIOD, DiskWatch
 from catseye.coordinator.journal.entries import Entry, EpochSolution, Run
 from catseye.coordinator.journal.writer import Journal, JournalSettings
 from catseye.coordinator.link.settings import Address
@@ -45,10 +44,10 @@ from catseye.service.settings import settings_object
 from catseye.service.solver import SolverProcess
 from catseye.service.warm import initialising_commands
 
-SWITCH = 0.0005  # s after which a thread gives way: epochs are solved beside the loop, which must not wait for them
-GROUP = 0.0005  # s that a commit waits for more; what comes while one is written is in the next
+SWITCH = 0.0005  # s, thread switch interval: epochs are solved beside the loop, which must not wait for them
+GROUP = 0.0005  # s that a commit waits for more entries; those received during a commit are in the next
 SOLVER_AFTER = 4.0  # s
-SETTLE = 0.35  # s from the end of a planned move to its buffer: a mirror that begins to follow a line swings so long
+SETTLE = 0.35  # s from the end of a planned move to its buffer: settling time of a mirror that starts to track
 Filter = Literal["random_walk", "constant_velocity"]
 Feed = tuple[str, int] | MotionScript | None
 JournalTell = Callable[[str, str, Severity], None]
@@ -56,20 +55,20 @@ JournalTell = Callable[[str, str, Severity], None]
 
 @dataclass(frozen=True)
 class Orders:
-    """How a coordinator shall work.
+    """Options of a coordinator.
 
     mode           active, passive or hold
-    drop           rangers left out from the start
-    round_s        of a round
-    filter         between epochs
-    journal        file or URL; None: nothing is kept
-    keep_buffers   samples too: only with them a replay is the same bit for bit
-    rotate_gb      size of a file from which the journal goes on in another; 0: never
-    rotate_night   whether it does at noon UTC
+    drop           rangers excluded from the start
+    round_s        duration of a round
+    filter         motion model between epochs
+    journal        file or URL; None for no journal
+    keep_buffers   store samples: without them a replay is not bit for bit
+    rotate_gb      size at which the journal continues in another file; 0: never
+    rotate_night   True to rotate at noon UTC, too
     host, port     of its own clients; port 0: any free one
-    key            of the site, asked for at its own port and said to those of rangers and feed; None: there is none
+    key            of the site, required at its own port and sent to those of rangers and feed; None for none
     tls            files of TLS for addresses beyond this machine
-    keep_out, interlocks, solids   files; None: only the Sun is kept clear of, nothing stands in the way
+    keep_out, interlocks, solids   files; None: only the Sun is avoided, nothing obstructs
     """
 
     mode: Mode = "active"
@@ -91,10 +90,10 @@ class Orders:
 
 @dataclass(frozen=True)
 class Peers:
-    """Whom a coordinator connects to.
+    """Peers that a coordinator connects to.
 
-    rangers   their addresses by name; those that are not in it are not of this coordinator
-    feed      host and port of weather and telescope, a motion known beforehand, or None
+    rangers   their addresses by name; other rangers do not belong to this coordinator
+    feed      host and port of weather and telescope, a motion script, or None
     """
 
     rangers: Mapping[str, Address]
@@ -102,41 +101,44 @@ class Peers:
 
 
 class NoJournal:
-    """Nothing is kept: everything is acknowledged at once."""
+    """Stand-in without storage: everything is acknowledged at once."""
 
     trouble: str | None = None
     head: Head | None = None
 
     def append(self, *items: Any) -> "Future[int]":
-        done: Future[int] = Future()
-        done.set_result(0)
-        return done
+        future: Future[int] = Future()
+        future.set_result(0)
+        return future
 
     def close(self) -> None:
-        """There is nothing to close."""
+        """Do nothing: no journal is open."""
 
 
 class WaitingJournal:
-    """A journal whose entries are durable before `append` returns: in virtual time no time passes meanwhile."""
+    """A journal whose `append` waits until entries are durable.
+
+    In virtual time no time passes meanwhile.
+    """
 
     def __init__(self, journal: Journal):
         self._journal = journal
 
     @property
     def trouble(self) -> str | None:
-        """Why nothing is durable at present."""
+        """Reason why writing fails at present."""
         return self._journal.trouble
 
     @property
     def head(self) -> Head:
-        """The chain's last link that is durable."""
+        """The last durable link of the chain."""
         return self._journal.head
 
     def append(self, *items: Any) -> "Future[int]":
-        done = self._journal.append(*items)
-        with suppress(InputError):  # whoever has the future sees why
-            done.result()
-        return done
+        future = self._journal.append(*items)
+        with suppress(InputError):  # the future has the reason
+            future.result()
+        return future
 
     def close(self) -> None:
         self._journal.close()
@@ -147,11 +149,11 @@ class LiveCoordinator:
 
     peers     rangers and feed
     seed      of a simulated site, for the journal
-    virtual   its loop's time is not the machine's; epochs are solved in a thread then, time stands still meanwhile
-    tell      told of the journal at once, by any thread: its trouble ("journal"), and its chain's last head at the end
-              ("journal-head"); heads of epochs are events like others
+    virtual   True for virtual time; epochs are then solved in a thread while time stands still
+    tell      called at once, by any thread, with journal messages: its trouble ("journal"), and its chain's last head
+              at the end ("journal-head"); heads of epochs are ordinary events
 
-    Raises InputError: a file or a journal that cannot be used, a ranger that is not there.
+    Raises InputError: a file or a journal that cannot be used, an unknown ranger.
     """
 
     def __init__(
@@ -168,7 +170,7 @@ class LiveCoordinator:
     ):
         strange = sorted(set(orders.drop) - set(peers.rangers))
         if strange:
-            raise InputError(f"--drop {strange[0]}: no such ranger here (expected one of {', '.join(peers.rangers)})")
+            raise InputError(f"--drop {strange[0]}: unknown ranger (expected one of {', '.join(peers.rangers)})")
         self.site, self.orders = site, orders
         self.settings = LiveSettings(filter=orders.filter)
         self.live = Live(site, self.settings)
@@ -179,7 +181,7 @@ class LiveCoordinator:
         self.planner = RoundPlanner(site, keep_clear=keep_clear, solids=solids, settings=plan)
         self.guard = SafetyGuard(site, keep_clear=keep_clear, interlocks=locks)
         self._tell = tell
-        self._run = 0  # its number in the journal
+        self._run = 0  # number of the run in the journal
         self._journal = self._opened(clock, seed, virtual, tell)
         self._solver = None if virtual else SolverProcess(self.live.site)
         self.ziy = Coordinator(
@@ -230,55 +232,61 @@ class LiveCoordinator:
         return WaitingJournal(journal) if virtual else journal
 
     async def _start_solver(self, solver: SolverProcess) -> None:
-        """Seconds before the first epoch, but not before the rangers are initialised: it loads for a second or two."""
+        """Start the solver before the first epoch, after the rangers' initialisation.
+
+        Loading takes a second or two.
+        """
         await asyncio.sleep(SOLVER_AFTER)
         await asyncio.to_thread(solver.start)
 
     @property
     def journal_head(self) -> Head | None:
-        """The head of the journal's chain; None without a journal."""
+        """Head of the journal's chain; None without a journal."""
         return self._journal.head
 
     @property
     def journal_end(self) -> str | None:
-        """Where the journal's chain ends, in a line to be kept elsewhere; None without a journal."""
+        """Chain head and run in a line; None without a journal."""
         head = self.journal_head
         return None if head is None else f"head {head} of run {self._run}"
 
     def _tell_head(self, entry: Entry) -> None:
-        """The chain's head behind each epoch, to the log and all who subscribe: kept elsewhere, it vouches for all."""
+        """Publish the chain's head after each epoch, to log and subscribers.
+
+        A copy kept elsewhere authenticates everything before it.
+        """
         if isinstance(entry, EpochSolution) and self.journal_end is not None:
             log = EventLog("journal", self.ziy.clock, self.ziy.tell)
             log.tell("journal-head", self.journal_end, head=str(self.journal_head), run=float(self._run))
 
     def _tell_expired(self) -> None:
-        """Certificates that are not valid today: measured with all the same, and told."""
+        """Warn of certificates not valid today; they are used all the same."""
         mjd = ticks_now(self.ziy.clock) / TICKS_PER_DAY
         log = EventLog("records", self.ziy.clock, self.ziy.tell)
         for text in (*expired_of_site(self.site, mjd), *expired(self._certificates, mjd)):
             log.tell("certificate-expired", text, "warning", always=True)
 
     async def _watch_disk(self, journal: Journal) -> None:
-        """Foretell when the journal's disk is full; until cancelled."""
+        """Predict when the journal's disk will be full, until cancelled."""
         watch = DiskWatch(EventLog("journal", self.ziy.clock, self.ziy.tell), journal.hold)
         loop = asyncio.get_running_loop()
         while True:
             path = journal.address.path
-            if path is None:  # a server sees to its own
+            if path is None:  # a database server watches its own disk
                 return
-            with suppress(OSError):  # a journal that is gone tells so itself
+            with suppress(OSError):  # a missing journal is reported by the writer
                 self.ziy.condition.disk = watch.look(path.absolute().parent, loop.time())
-            await asyncio.sleep(DISK_EVERY)
+            await asyncio.sleep(CHECK_PERIOD)
 
     @property
     def solver_pid(self) -> int | None:
-        """Of the process that solves epochs."""
+        """Process id of the solver."""
         return None if self._solver is None else self._solver.pid
 
     async def run(self, started: Callable[[], None] = lambda: None) -> None:
-        """Measure until cancelled; everything is switched off and closed then, within five seconds.
+        """Measure until cancelled; then switch everything off within five seconds.
 
-        Raises InputError: its own port cannot be had.
+        Raises InputError if its own port is not available.
         """
         before, loading = sys.getswitchinterval(), None
         watching = None
@@ -292,7 +300,7 @@ class LiveCoordinator:
             if self._solver is not None:  # beside the loop, while the mirrors go to their first targets
                 loading = asyncio.gather(self._start_solver(self._solver), asyncio.to_thread(_load_kernel))
                 gc.collect()
-                gc.freeze()  # a site of thousands of records is looked through at each full collection: 40 ms
+                gc.freeze()  # a full collection of a site with thousands of records takes 40 ms
             await self.ziy.run()
         finally:
             if watching is not None:
@@ -307,14 +315,17 @@ class LiveCoordinator:
             sys.setswitchinterval(before)
             await self.server.stop()
             if self._journal is not None:
-                with suppress(InputError):  # what could not be written has been told
+                with suppress(InputError):  # unwritten entries have been reported
                     await asyncio.to_thread(self._journal.close)
             if self.journal_end is not None:
-                self._tell("journal-head", f"{self.journal_end}, its last", "note")
+                self._tell("journal-head", f"{self.journal_end}, the last one", "note")
 
 
 def _load_kernel() -> None:
-    """What the first buffer needs, compiled code from its cache: 0.5 s in which a loop would hear nobody."""
+    """Load compiled code for the first buffer from its cache.
+
+    It takes 0.5 s, during which the event loop would not respond.
+    """
     from catseye.signal.detection.buffer_kernel import one_buffer
 
     one_buffer(np.zeros(64, dtype=np.int16), 16, (-32768, 32767), 0.0, 0j, np.zeros(16), np.zeros(8))

@@ -1,4 +1,4 @@
-"""Faults on command: which of them the site named, when, and which nobody noticed."""
+"""Injected faults: when the site detected each, and which it missed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from catseye.coordinator.station_events import APART, BIASED, DOUBTED, RETURNED
 from catseye.records.night.live import TICKS_PER_DAY, Happening
 from catseye.simulator.twin.faults import Fault
 
-SIGNS: dict[str, tuple[str, ...]] = {  # kinds of happenings that name a fault
+SIGNS: dict[str, tuple[str, ...]] = {  # kinds of events that indicate a fault
     "blocked-beam": ("blocked", "dead", "no-return"),
     "dead-ranger": ("lost", "hung", "no-reply"),
     "hung-ranger": ("hung", "lost", "no-reply"),
@@ -26,13 +26,13 @@ SIGNS: dict[str, tuple[str, ...]] = {  # kinds of happenings that name a fault
     "dew": ("weak-return", "blocked", "dead"),
 }
 AXES = ("motor-off-0", "motor-off-1")
-LATE = 60.0  # s after a fault's end in which it may still be named
-LIKE = 3.0  # factor within which a named size is the fault's
+LATE = 60.0  # s after a fault's end in which it may still be detected
+LIKE = 3.0  # factor within which a reported size matches the fault's
 
 
 @dataclass
 class FoundFault:
-    """A fault and the first happening that named it, None while there is none."""
+    """An injected fault and the first event that detected it, or None."""
 
     fault: Fault
     text: str
@@ -41,31 +41,31 @@ class FoundFault:
 
     @property
     def ends(self) -> float:
-        """Ticks at which the fault ends; infinite of one that goes on."""
+        """Ticks at which the fault ends; infinite if it does not."""
         return self.begins + (self.fault.end - self.fault.start) * TICKS_PER_SECOND
 
     @property
     def after(self) -> float | None:
-        """s from its beginning until it was named."""
+        """Delay of the detection from the fault's beginning, s."""
         return None if self.by is None else (self.by.ticks - self.begins) / TICKS_PER_SECOND
 
-    def line(self, now: int) -> str:
-        """How it stands, for people, at a time in ticks.
+    def line(self, ticks: int) -> str:
+        """State of the fault at a time in ticks, for people.
 
         >>> FoundFault(Fault.parse("dead-ranger ZY104 40"), "dead-ranger ZY104 40", 0).line(0)
-        'dead-ranger ZY104 40: not noticed'
+        'dead-ranger ZY104 40: not detected'
         """
         if self.by is not None:
             return f"{self.text}: found after {max(self.after or 0.0, 0.0):.1f} s ({self.by.kind}: {self.by.text})"
-        if now < self.begins:
-            return f"{self.text}: begins in {(self.begins - now) / TICKS_PER_SECOND:.0f} s"
-        return f"{self.text}: not noticed"
+        if ticks < self.begins:
+            return f"{self.text}: begins in {(self.begins - ticks) / TICKS_PER_SECOND:.0f} s"
+        return f"{self.text}: not detected"
 
 
 class FaultFinder:
-    """Fed with happenings; knows which fault on command each names.
+    """Match events to injected faults.
 
-    faults      as people typed them
+    faults      as typed
     start_mjd   of the twin, from which their times count
     """
 
@@ -78,29 +78,29 @@ class FaultFinder:
         ]
 
     def heard(self, what: Happening) -> None:
-        """Take in one happening, in the journal's order; it names one fault, the one that says whom most exactly."""
-        named = [each for each in self.found if _names(what, each)]
-        if not named:
+        """Add one event, in journal order; assign it to the most specific fault."""
+        matches = [fault for fault in self.found if _names(what, fault)]
+        if not matches:
             return
-        most = max(_exactness(each) for each in named)
-        first = next((each for each in named if _exactness(each) == most and each.by is None), None)
+        most = max(_exactness(fault) for fault in matches)
+        first = next((fault for fault in matches if _exactness(fault) == most and fault.by is None), None)
         if first is not None:
             first.by = what
 
 
-def _exactness(each: FoundFault) -> int:
-    """2 of a fault on a part of somebody, 1 on somebody, 0 on all."""
-    whom, _, part = each.fault.whom.partition(":")
+def _exactness(fault: FoundFault) -> int:
+    """Specificity: 2 for a part of a device, 1 for a device, 0 for all."""
+    whom, _, part = fault.fault.whom.partition(":")
     return 0 if whom == "*" else 1 + bool(part)
 
 
-def _names(what: Happening, each: FoundFault) -> bool:
-    """True for an event that names a fault and its victim, while it lasted or soon after."""
-    whom, _, part = each.fault.whom.partition(":")
+def _names(what: Happening, fault: FoundFault) -> bool:
+    """True for an event that indicates a fault on its device and in time."""
+    whom, _, part = fault.fault.whom.partition(":")
     late = LATE * TICKS_PER_SECOND
-    if what.kind not in SIGNS[each.fault.kind] or not each.begins <= what.ticks <= each.ends + late:
+    if what.kind not in SIGNS[fault.fault.kind] or not fault.begins <= what.ticks <= fault.ends + late:
         return False
-    if each.fault.kind == "lying-station" and not _says_the_bias(what, each):
+    if fault.fault.kind == "lying-station" and not _says_the_bias(what, fault):
         return False
     if part and what.kind in AXES:
         return what.kind == f"motor-off-{part}" and whom == what.who
@@ -109,9 +109,9 @@ def _names(what: Happening, each: FoundFault) -> bool:
     return (whom == "*" or whom in named) and not elsewhere
 
 
-def _says_the_bias(what: Happening, each: FoundFault) -> bool:
-    """True for a doubt about the fault's own readings, with its sign and size."""
+def _says_the_bias(what: Happening, fault: FoundFault) -> bool:
+    """True if a suspicion matches the fault in readings, sign and size."""
     if what.kind == DOUBTED:
-        return what.ticks < each.ends
+        return what.ticks < fault.ends
     offset = float(what.details.get("offset_c", "nan"))
-    return each.fault.size * offset > 0.0 and 1.0 / LIKE <= offset / each.fault.size <= LIKE
+    return fault.fault.size * offset > 0.0 and 1.0 / LIKE <= offset / fault.fault.size <= LIKE

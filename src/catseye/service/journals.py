@@ -1,4 +1,4 @@
-"""Journals looked after: all runs checked, against heads and copies; a copy made while it is written; an export."""
+"""Journal maintenance: check all runs, back up while writing, export."""
 
 import glob
 import os
@@ -24,7 +24,7 @@ from catseye.gateways.journal.export import export_tables
 from catseye.gateways.writers.interruption import Unfinished, undone_when_interrupted
 from catseye.verdict import Verdict
 
-STEP = 500  # of SQLite's virtual machine between two looks at signals and progress: some ms, 2 MB of buffers
+STEP = 500  # SQLite VM steps between checks for signals and progress: some ms, 2 MB of buffers
 Progress = Callable[[str, int, int], None]
 Span = tuple[int, int]  # ticks
 Format = Literal["csv", "fits", "campaign"]
@@ -33,49 +33,49 @@ Format = Literal["csv", "fits", "campaign"]
 def checked(
     journal: str, which: int | str | None, heads: Sequence[str], against: str | None, *, progress: Progress
 ) -> tuple[list[ChainReport], list[dict[str, Any]]]:
-    """Reports of one run, or of all; and where a copy's runs part from them.
+    """Check reports of one run or of all, and differences from a copy.
 
-    heads   EVENT:HASH, of the run that is named; where none is, of whichever run has it
+    heads   EVENT:HASH, of the selected run; if none is selected, of whichever run has it
 
-    Raises InputError: no such journal, run or copy; a text that is no head.
+    Raises InputError: no such journal, run or copy; an invalid head.
     """
-    told = [Head.parse(text) for text in heads]
+    given_heads = [Head.parse(text) for text in heads]
     with JournalReader(journal) as reader:
         runs = reader.runs() if which is None else (reader.run(which),)
         if not runs:
-            raise InputError(f"journal {reader.place}: holds no run (expected one at least)")
+            raise InputError(f"journal {reader.place}: contains no run (expected at least one)")
         numbers = [run.run for run in runs]
-        holders = {head: _holder(reader, numbers, head) for head in told}
+        holders = {head: _holder(reader, numbers, head) for head in given_heads}
         reports = []
         for run in runs:
-            mine = [head for head in told if holders[head] == run.run or which is not None]
-            reports.append(check_whole(reader, run.run, heads=mine, progress=progress))
-        for head in told if which is None else ():
+            run_heads = [head for head in given_heads if holders[head] == run.run or which is not None]
+            reports.append(check_whole(reader, run.run, heads=run_heads, progress=progress))
+        for head in given_heads if which is None else ():
             if holders[head] is None:
-                text = f"no run has head {head}, which was told: a run was deleted, cut or written anew"
+                text = f"no run has the given head {head}: a run was deleted, cut or rewritten"
                 reports[-1].given += 1
                 reports[-1].wrong(reports[-1].last[0] + 1, text)
         if against is None:
             return reports, []
-        with JournalReader(against) as other:
-            shared = {r.uuid for r in other.runs()}
-            found = []
+        with JournalReader(against) as copy:
+            shared = {r.uuid for r in copy.runs()}
+            differences = []
             for run in runs:
                 if run.uuid not in shared:
-                    text = f"{other.place} does not hold it."
-                    found.append({"run": run.run, "parts_at_event": None, "both_up_to": None, "text": text})
+                    text = f"{copy.place} does not contain it."
+                    differences.append({"run": run.run, "parts_at_event": None, "both_up_to": None, "text": text})
                     continue
-                first, last = parted(reader, other, run.uuid)
-                same = f"{other.place} is the same up to event {last}, the last that both have."
-                text = same if first is None else f"{other.place} has another history from event {first} on."
-                found.append({"run": run.run, "parts_at_event": first, "both_up_to": last, "text": text})
-            return reports, found
+                first, last = parted(reader, copy, run.uuid)
+                identical = f"{copy.place} is the same up to event {last}, the last in both."
+                text = identical if first is None else f"{copy.place} has another history from event {first} on."
+                differences.append({"run": run.run, "parts_at_event": first, "both_up_to": last, "text": text})
+            return reports, differences
 
 
 def _holder(reader: JournalReader, runs: Sequence[int], head: Head) -> int | None:
-    """The run that has a head, None where none has."""
+    """The run that has a head, None if none has."""
     for run in runs:
-        with suppress(InputError):  # checking that run will say so
+        with suppress(InputError):  # reported by that run's check
             if held_by(reader, run, head):
                 return run
     return None
@@ -85,20 +85,19 @@ def _holder(reader: JournalReader, runs: Sequence[int], head: Head) -> int | Non
 
 
 def copied(journal: str, copy: Path, *, progress: Progress) -> list[ChainReport]:
-    """A file's copy in one read transaction, beside which a writer goes on; what checking the copy said.
+    """Copy a journal file in one read transaction; reports of the copy's check.
 
-    An interruption ends it within some ms, and leaves nothing.
+    The writer goes on beside it. An interruption ends it within some ms, and leaves nothing.
 
-    Raises InputError: a server's journal, a name that is taken, a disk that cannot take it, a journal that cannot be
-    read; then nothing is left.
+    Raises InputError: a server's journal, an existing name, a full disk, an unreadable journal; then nothing is left.
     """
     place = place_of(journal)
     refuse_foreign(place, fresh=False)
     if place.path is None:
-        raise InputError(f"journal {place.shown}: is a server's (expected a file; a server's is copied by pg_dump)")
+        raise InputError(f"journal {place.shown}: is on a server (expected a file; use pg_dump for a server)")
     if os.path.lexists(copy):
-        raise InputError(f"{copy}: is there already (expected a new name)")
-    folder = copy.with_name(f".{copy.name}.{os.getpid()}.new")  # of its own: SQLite puts a file beside what it makes
+        raise InputError(f"{copy}: already exists (expected a new name)")
+    folder = copy.with_name(f".{copy.name}.{os.getpid()}.new")  # private: SQLite puts a file beside the new one
     new = folder / copy.name
     _forget_dead(copy)
     try:
@@ -106,13 +105,13 @@ def copied(journal: str, copy: Path, *, progress: Progress) -> list[ChainReport]
             folder.mkdir()
             _copy(place.path, new, progress)
             if os.path.lexists(copy):
-                raise FileExistsError(f"{copy.name} has come meanwhile")
+                raise FileExistsError(f"{copy.name} was created meanwhile")
             new.rename(copy)
         _sync(copy.absolute().parent)
     except (sqlite3.Error, OSError) as problem:
         raise InputError(
-            f"{copy}: cannot be written: {problem} (expected room and leave to write, and a journal that is whole: of "
-            "a damaged one copy the file and its log)"
+            f"{copy}: cannot be written: {problem} (expected disk space, write permission and an undamaged journal; "
+            "copy a damaged one with its -wal file)"
         ) from problem
     finally:
         shutil.rmtree(folder, ignore_errors=True)
@@ -121,16 +120,19 @@ def copied(journal: str, copy: Path, *, progress: Progress) -> list[ChainReport]
 
 
 def _copy(source: Path, new: Path, progress: Progress) -> None:
-    """All of one state of a journal into a new file, and on the disk; signals are answered between two steps."""
-    whole = source.stat().st_size
+    """Copy one consistent state of a journal to disk.
 
-    ended: list[BaseException] = []
+    Signals are handled between two steps.
+    """
+    size = source.stat().st_size
+
+    interruptions: list[BaseException] = []
 
     def step() -> int:
         try:
-            progress("bytes", min(new.stat().st_size, whole) if new.exists() else 0, whole)
-        except (KeyboardInterrupt, SystemExit, OSError, ValueError) as problem:  # SQLite says only: interrupted
-            ended.append(problem)
+            progress("bytes", min(new.stat().st_size, size) if new.exists() else 0, size)
+        except (KeyboardInterrupt, SystemExit, OSError, ValueError) as problem:  # SQLite reports only an interruption
+            interruptions.append(problem)
             return 1
         return 0
 
@@ -140,14 +142,14 @@ def _copy(source: Path, new: Path, progress: Progress) -> None:
             connection.set_progress_handler(step, STEP)
             connection.execute("VACUUM INTO ?", (str(new.absolute()),))
     except sqlite3.Error:
-        for problem in ended:
+        for problem in interruptions:
             raise problem from None
         raise
     _sync(new)
 
 
 def _sync(path: Path) -> None:
-    """Flush a file, or a folder's names, to the disk."""
+    """Flush a file, or a folder's names, to disk."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -156,7 +158,7 @@ def _sync(path: Path) -> None:
 
 
 def _forget_dead(copy: Path) -> None:
-    """Remove what a backup to this name left that was killed."""
+    """Remove what a killed backup to this name left."""
     for path in copy.absolute().parent.glob(f".{glob.escape(copy.name)}.*.new"):
         number = path.name.removeprefix(f".{copy.name}.").partition(".")[0]
         if number.isdecimal() and not Path(f"/proc/{number}").exists() and Path("/proc/self").exists():
@@ -171,9 +173,9 @@ class ExportOutcome:
     """Counts of one exported run.
 
     run      its number
-    chain    what checking said
+    chain    report of the check
     rows     written, by table
-    notes    lines for people: what was left out, what was recovered
+    notes    lines for people: omitted or recovered entries
     verdict  of all of it
     """
 
@@ -194,25 +196,25 @@ def exported(
     damaged: bool = False,
     progress: Progress,
 ) -> ExportOutcome:
-    """A run's tables, or the campaign that it is.
+    """Export a run as tables or as a campaign.
 
     out       directory
     which     the last run if None
-    damaged   also of a journal that does not check: what can be read and is as it was written
+    damaged   also export a journal that fails the check, skipping altered and unreadable entries
 
-    Raises InputError: no such journal or run, one that does not check, a directory that is another's.
+    Raises InputError: no such journal or run, one that fails the check, a foreign directory.
     """
     with _readable(journal, out, damaged=damaged, progress=progress) as (reader, notes):
         number = reader.run(which).run
         chain = check_whole(reader, number, progress=progress)
         if chain.count and not damaged:
             raise InputError(
-                f"journal {reader.place}: run {number} is not as it was written: {chain.problems[0]} (expected a "
-                "journal that checks: take its backup, or --damaged to leave out what does not)"
+                f"journal {reader.place}: run {number} fails verification: {chain.problems[0]} (use its "
+                "backup, or --damaged to skip altered entries)"
             )
-        if notes and chain.unvouched:  # pages were lost, links or samples among them: they were not put in for that
+        if notes and chain.unvouched:  # explained by lost pages with links or samples, not by insertion
             count = len(chain.unvouched)
-            notes = (*notes, f"{count} events are in it that lost link or samples: nothing vouches for them")
+            notes = (*notes, f"{count} exported events lost their link or samples: they cannot be verified")
             chain.bad -= chain.unvouched
         if form == "campaign":
             progress("writing the campaign", 0, 1)
@@ -227,7 +229,10 @@ def exported(
 def _readable(
     journal: str, out: Path, *, damaged: bool, progress: Progress
 ) -> Iterator[tuple[JournalReader, tuple[str, ...]]]:
-    """A journal's reader; of one that the database refuses, and that is asked for all the same, what is recovered."""
+    """Reader of a journal, or of what is recovered from it.
+
+    Recovery is for a journal that the database refuses, if `damaged` is set.
+    """
     place = place_of(journal)
     if not damaged or place.path is None or _sound(journal):
         with JournalReader(journal) as reader:
@@ -243,17 +248,17 @@ def _readable(
         with JournalReader(Path(folder) / place.path.name) as reader:
             reader.place = place.shown
             if not reader.runs():
-                raise InputError(f"journal {place.shown}: no run's record can be read (expected one at least)")
+                raise InputError(f"journal {place.shown}: no readable run record (expected at least one)")
             try:
                 reader.parts(reader.run(None).run)
             except InputError as problem:
                 reader.alone = True
-                notes = (*notes, f"of its other files nothing is in it: {problem}")
+                notes = (*notes, f"nothing of its other files is included: {problem}")
             yield reader, notes
 
 
 def _sound(journal: str) -> bool:
-    """True where the database can read a journal in all its files."""
+    """True if the database can read all files of a journal."""
     try:
         with JournalReader(journal) as reader:
             for run in reader.runs():
@@ -267,17 +272,17 @@ def _sound(journal: str) -> bool:
 
 
 def _recovered(path: Path, folder: Path, progress: Progress) -> tuple[str, ...]:
-    """Recover a journal's file and those beside it in which its runs stand; what came of each."""
-    notes, ahead, done = [], [path.name], set[str]()
-    while ahead:
-        name = ahead.pop(0)
-        beside = path.with_name(name)
-        if name in done or Path(name).name != name or not beside.is_file():
+    """Recover a journal's file and its other parts; results in lines."""
+    notes, pending, finished = [], [path.name], set[str]()
+    while pending:
+        name = pending.pop(0)
+        part = path.with_name(name)
+        if name in finished or Path(name).name != name or not part.is_file():
             continue
-        done.add(name)
+        finished.add(name)
         progress(f"recovering {name}", 0, 1)
-        notes.append(f"{name} is damaged: {recover(beside, folder / name)}")
+        notes.append(f"{name} is damaged: {recover(part, folder / name)}")
         with closing(sqlite3.connect(folder / name)) as connection, suppress(sqlite3.Error):
             for follows, followed in connection.execute("SELECT follows, followed_by FROM parts").fetchall():
-                ahead += [each for each in (follows, followed) if each]
+                pending += [other for other in (follows, followed) if other]
     return tuple(notes)

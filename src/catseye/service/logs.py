@@ -1,4 +1,4 @@
-"""The log of a living command: a line for each happening and each epoch, for people or for programs."""
+"""Log of a running site: a line per event and epoch."""
 
 import json
 import logging
@@ -17,30 +17,30 @@ PLAIN = "\x1b[0m"
 
 
 class LiveLog:
-    """Lines about what happens.
+    """Log lines of events, for people or programs.
 
     write    takes a line without its end
-    json     one JSON object a line: time_utc, mjd, severity, who, kind, text, details; else routine is left out
+    json     one JSON object per line: time_utc, mjd, severity, who, kind, text, details; otherwise routine is omitted
     colour   warnings yellow, alarms red
-    clock    for what has no time of its own
+    clock    for messages without a time
     """
 
     def __init__(self, write: Callable[[str], None], *, clock: Clock, json: bool = False, colour: bool = False):
         self._write, self._clock, self._json, self._colour = write, clock, json, colour
 
     def entry(self, entry: Any) -> None:
-        """What was made durable: happenings and solutions have a line."""
+        """Log a durable entry, if it is an event or a solution."""
         if isinstance(entry, Happening):
             self.happened(entry)
         elif isinstance(entry, EpochSolution):
             self.happened(epoch_of(entry))
 
     def tell(self, who: str, kind: str, text: str, severity: Any = "note") -> None:
-        """Log something that happens at this instant."""
+        """Log a message with the present time."""
         self.happened(Happening(ticks_now(self._clock), who, kind, text, severity))
 
     def happened(self, what: Happening) -> None:
-        """Log one happening as a line; people are spared the routine."""
+        """Log one event as a line; routine only in JSON."""
         if self._json:
             row = {
                 "time_utc": time_text(what.ticks),
@@ -61,10 +61,10 @@ class LiveLog:
 
 
 def epoch_of(solution: EpochSolution) -> Happening:
-    """An epoch as something that happened."""
+    """An epoch's solution as an event."""
     answer = solution.answer
     if not answer:
-        return Happening(solution.ticks, "reduction", "epoch-empty", "nothing could be solved", "warning")
+        return Happening(solution.ticks, "reduction", "epoch-empty", "no solution", "warning")
     text = (
         f"epoch {answer.get('number')}: {len(answer.get('names', ()))} points from {len(answer.get('used', ()))} shots"
         f", {len(answer.get('rejected', ()))} not used"
@@ -76,7 +76,7 @@ def epoch_of(solution: EpochSolution) -> Happening:
 
 
 class LogHandler(logging.Handler):
-    """Route Python's logging into a site's log: warnings of ports, libraries and the event loop."""
+    """Route Python's logging to a site's log."""
 
     def __init__(self, log: LiveLog):
         super().__init__()
@@ -92,7 +92,7 @@ class LogHandler(logging.Handler):
 
 @contextmanager
 def logging_to(log: LiveLog) -> Iterator[None]:
-    """Take Python's own logging and warnings into a log for a while."""
+    """Redirect Python's logging and warnings to a log."""
     handler, root = LogHandler(log), logging.getLogger()
     root.addHandler(handler)
     logging.captureWarnings(True)
@@ -104,7 +104,7 @@ def logging_to(log: LiveLog) -> Iterator[None]:
 
 
 def time_text(ticks: int) -> str:
-    """UTC to a hundredth of a second, cut.
+    """UTC to a hundredth of a second, truncated.
 
     >>> time_text(5288963344910)
     '2003-09-07T15:12:10.00Z'
@@ -116,5 +116,5 @@ def time_text(ticks: int) -> str:
 
 
 def one_line(text: str) -> str:
-    """The text on one line, whatever it holds."""
+    """The text on one line, without control characters."""
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())

@@ -1,4 +1,4 @@
-"""What a simulation came to: one JSON object for programs, a few lines for people."""
+"""Result of a simulation: JSON for programs, lines for people."""
 
 import math
 from collections import Counter
@@ -14,7 +14,7 @@ from catseye.service.book import LiveBook
 from catseye.service.comparison import EpochComparison
 from catseye.service.world import TwinWords
 
-TOLD = 5  # troubles that people are told of: first those that are of more than single shots
+SHOWN = 5  # problems shown to people: first those of more than single shots
 CLAIMS = ("as claimed", "better than claimed", "worse than claimed")  # an epoch's chi² in, below, above its band
 OFFSETS = (
     ("cross_elevation_arcsec", "beam azimuth × cos E", ARCSECOND, "″"),
@@ -24,20 +24,20 @@ OFFSETS = (
 
 
 def simulation_verdict(book: LiveBook) -> Verdict:
-    """Verdict on a simulation: epochs as near the truth as they claim, and good by their own judgement."""
+    """Verdict on a simulation: epochs against truth and their own doubts."""
     if not book.epochs:
-        return Verdict("failed", "no epoch was solved: the time was too short (expected half a minute at least)")
+        return Verdict("failed", "no epoch was solved: the run was too short (expected at least half a minute)")
     compared = list(book.comparisons.values())
     if not compared:
-        return Verdict("doubtful", "no epoch could be held against the truth")
-    beyond = sum(each.chi2 > each.band[1] for each in compared)
-    if beyond > len(compared) // 10:
-        return Verdict("doubtful", f"{beyond} of {len(compared)} epochs are farther from the truth than they claim")
-    doubted = [row for row in book.epochs if row["doubt"]]
-    if len(doubted) > len(book.epochs) // 10:
-        text = f"{len(doubted)} of {len(book.epochs)} epochs are doubtful: {doubted[-1]['doubt']}"
+        return Verdict("doubtful", "no epoch could be compared with the truth")
+    worse = sum(comparison.chi2 > comparison.band[1] for comparison in compared)
+    if worse > len(compared) // 10:
+        return Verdict("doubtful", f"{worse} of {len(compared)} epochs are farther from the truth than claimed")
+    doubtful = [row for row in book.epochs if row["doubt"]]
+    if len(doubtful) > len(book.epochs) // 10:
+        text = f"{len(doubtful)} of {len(book.epochs)} epochs are doubtful: {doubtful[-1]['doubt']}"
         return Verdict("doubtful", text)
-    return Verdict("good", f"{len(compared) - beyond} of {len(compared)} epochs are as near the truth as they claim")
+    return Verdict("good", f"{len(compared) - worse} of {len(compared)} epochs are as near the truth as claimed")
 
 
 def simulation_object(
@@ -50,11 +50,11 @@ def simulation_object(
     told: int,
     head: Head | None = None,
 ) -> dict[str, Any]:
-    """What `catseye simulate --json` prints.
+    """JSON object of `catseye simulate --json`.
 
     seconds   of the site's time, from the first round on
-    rangers   that were not left out
-    told      shots that rangers told of; those that are durable are in the book
+    rangers   number of rangers not excluded
+    told      shots reported by rangers; durable ones are in the book
     """
     return {
         "verdict": simulation_verdict(book).to_object(),
@@ -71,12 +71,12 @@ def simulation_object(
         "faults": list(world.faults),
         "found": [
             {
-                "fault": each.text,
-                "after_s": each.after,
-                "kind": None if each.by is None else each.by.kind,
-                "text": None if each.by is None else each.by.text,
+                "fault": fault.text,
+                "after_s": fault.after,
+                "kind": None if fault.by is None else fault.by.kind,
+                "text": None if fault.by is None else fault.by.text,
             }
-            for each in book.faults
+            for fault in book.faults
         ],
         "troubles": [
             {"who": who, "kind": kind, "count": n, "text": book.troubles.texts[who, kind]}
@@ -88,7 +88,7 @@ def simulation_object(
 
 
 def epoch_object(row: dict[str, Any], compared: EpochComparison | None) -> dict[str, Any]:
-    """An epoch as `--json` has it, with how far it is from the truth where it was held against it."""
+    """An epoch for `--json`, with its errors if compared with truth."""
     epoch = {
         "number": row["number"],
         "mjd": row["ticks"] / TICKS_PER_DAY,
@@ -133,7 +133,7 @@ def _claim(compared: EpochComparison) -> str:
 
 
 def beam_lines(compared: EpochComparison) -> Iterator[str]:
-    """Where the beam points since the reference epoch, beside the truth; nothing before."""
+    """Beam offset since the reference epoch, beside the truth; else nothing."""
     for (_, name, unit, symbol), offset, u, true in zip(
         OFFSETS, compared.offset, compared.u_offset, compared.true_offset, strict=True
     ):
@@ -153,27 +153,27 @@ def summary(
 ) -> list[tuple[str, str]]:
     """Title and text of each passage; arguments as of `simulation_object`."""
     bad = {reason: n for reason, n in sorted(book.fates.items()) if reason not in GOOD}
-    lost = told - book.acknowledged
-    kept = "all acknowledged" if not lost else f"{book.acknowledged} acknowledged, {lost} not"
+    missing = told - book.acknowledged
+    acknowledged = "all acknowledged" if not missing else f"{book.acknowledged} acknowledged, {missing} not"
     passages = [
         (
             "Shots",
-            f"{told} by {rangers} rangers in {seconds:.0f} s, {kept}; "
-            + (", ".join(f"{n} {reason}" for reason, n in bad.items()) or "none left out")
+            f"{told} by {rangers} rangers in {seconds:.0f} s, {acknowledged}; "
+            + (", ".join(f"{n} {reason}" for reason, n in bad.items()) or "none rejected")
             + ".",
         )
     ]
     if not book.epochs:
-        passages.append(("Epochs", "none was solved: the time was too short (expected half a minute at least)."))
+        passages.append(("Epochs", "none was solved: the run was too short (expected at least half a minute)."))
     compared = list(book.comparisons.values())
     if compared:
         last = compared[-1]
-        by_claim = Counter(_claim(each) for each in compared)
+        by_claim = Counter(_claim(item) for item in compared)
         claims = ", ".join(f"{by_claim[claim]} {claim}" for claim in CLAIMS if by_claim[claim])
         passages.append(
             (
                 "Truth",
-                f"{len(book.epochs)} epochs, {len(compared)} held against the truth: {claims}. "
+                f"{len(book.epochs)} epochs, {len(compared)} compared with the truth: {claims}. "
                 f"The last, {epoch_line(last)}.",
             )
         )
@@ -183,21 +183,21 @@ def summary(
                 ("Beam", "; ".join(" ".join(line.split()) for line in lines) + ", since the reference epoch.")
             )
     counts = book.troubles.counts
-    worst = sorted(counts.items(), key=lambda pair: (pair[0][1] in OF_THE_LINE, -pair[1]))[:TOLD]
-    noticed = [each.line(book.ticks) for each in book.faults]
+    worst = sorted(counts.items(), key=lambda pair: (pair[0][1] in OF_THE_LINE, -pair[1]))[:SHOWN]
+    noticed = [item.line(book.ticks) for item in book.faults]
     noticed += [f"{book.troubles.texts[key]}" + (f" ({n} times)" if n > 1 else "") for key, n in worst]
     if noticed:
-        passages.append(("Noticed", "; ".join(noticed) + "."))
+        passages.append(("Events", "; ".join(noticed) + "."))
     if world.faults:
-        missed = [each.text for each in book.faults if each.by is None and each.begins <= book.ticks]
-        none = f"; not noticed: {', '.join(missed)}" if missed else ", each that began was noticed for what it is"
-        passages.append(("Faults", "on command: " + "; ".join(world.faults) + none + "."))
+        missed = [item.text for item in book.faults if item.by is None and item.begins <= book.ticks]
+        detection = f"; not detected: {', '.join(missed)}" if missed else "; all that began were detected"
+        passages.append(("Faults", "injected: " + "; ".join(world.faults) + detection + "."))
     passages.append(
         (
             "Journal",
             f"{journal}, head {head}: catseye replay {journal}"
             if journal
-            else "none was kept (--journal FILE keeps it).",
+            else "none was written (use --journal FILE).",
         )
     )
     return passages

@@ -1,4 +1,4 @@
-"""The rangers of a site served by this process, and a twin's feed with them."""
+"""Serve a site's rangers from this process, with a twin's feed."""
 
 import asyncio
 import gc
@@ -30,13 +30,16 @@ LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Listening:
-    """Where what is served listens: host and both ports of each ranger; host and port of the feed, if any."""
+    """Addresses of what is served.
+
+    Host and both ports of each ranger; host and port of the feed, if any.
+    """
 
     rangers: Mapping[str, Address]
     feed: tuple[str, int] | None = None
 
     def plain(self) -> dict[str, Any]:
-        """Where rangers and feed listen, as a plain object for JSON."""
+        """Addresses of rangers and feed as an object for JSON."""
         return {
             "rangers": {name: list(at) for name, at in self.rangers.items()},
             "feed": None if self.feed is None else list(self.feed),
@@ -44,7 +47,10 @@ class Listening:
 
 
 class LateSockets(Sockets):
-    """TCP whose ports are had at once, and answer from `open` on: nobody connects to rangers that are not ready."""
+    """TCP listeners whose ports are bound at once and answer after `open`.
+
+    Nobody can connect to rangers that are not ready.
+    """
 
     def __init__(self, tls: TlsFiles = NO_TLS) -> None:
         super().__init__(tls)
@@ -58,7 +64,10 @@ class LateSockets(Sockets):
         return listener
 
     async def open(self) -> None:
-        """Answer from now on. Raises InputError: somebody else has taken a port meanwhile."""
+        """Start accepting connections.
+
+        Raises InputError if another process has taken a port meanwhile.
+        """
         servers, self._closed = self._closed, None
         for server in servers or ():
             try:
@@ -66,17 +75,17 @@ class LateSockets(Sockets):
             except OSError as problem:
                 at = server.sockets[0].getsockname()
                 where = at if isinstance(at, str) else f"{at[0]} port {at[1]}"
-                raise InputError(f"{where} cannot be had: {problem.strerror} (expected a free one)") from problem
+                raise InputError(f"{where} is not available: {problem.strerror} (expected a free one)") from problem
 
 
 @dataclass(frozen=True)
 class ServedAt:
-    """Where rangers shall listen.
+    """Addresses for rangers to listen at.
 
     addresses   "loopback", a port base, 0 for any free ports
-    host        of all ports; None: as `addresses` says
-    ports       of the one ranger that is served; None: as `addresses` says
-    door        what all ports ask of those who come
+    host        of all ports; None: by `addresses`
+    ports       of the only ranger served; None: by `addresses`
+    door        access policy of all ports
     """
 
     addresses: Addresses = PORT_BASE
@@ -89,12 +98,12 @@ USUAL_PORTS = ServedAt()
 
 
 class RangersServed:
-    """Rangers on TCP, with the twin's feed where there is a twin.
+    """Rangers on TCP, with the twin's feed if there is a twin.
 
     site        its records
     heads       by ranger; only these are served
     clock       of the twin, or of the machine
-    twin        whose faults and feed count; None: real heads, no feed
+    twin        source of faults and feed; None: real heads, no feed
     at          where they listen
     files       folder of initialisation files; None: a temporary one
     warming     the heads' clock: with it the rangers are ready before anybody connects
@@ -115,21 +124,21 @@ class RangersServed:
         self._site, self._twin, self._warming = site, twin, warming
         self._late = LateSockets(at.door.tls) if network is None else None
         network = network or self._late
-        begun = clock.now_ns()
+        start_ns = clock.now_ns()
         self._served = TwinSite(
             site,
             heads,
             world_faults=FaultBoard() if twin is None else twin.faults,
-            seconds=lambda: (clock.now_ns() - begun) * 1e-9 if twin is None else twin.seconds(clock.now_ns()),
+            seconds=lambda: (clock.now_ns() - start_ns) * 1e-9 if twin is None else twin.seconds(clock.now_ns()),
             addresses=at.addresses,
             files=files,
             network=network,
             door=at.door,
         )
-        for name, (usual, *both) in list(self._served.addresses.items()):
-            first, second = at.ports or both
+        for name, (usual, *base_ports) in list(self._served.addresses.items()):
+            first, second = at.ports or base_ports
             self._served.addresses[name] = (at.host or usual, first, second)
-        self.warned: Callable[[str], None] = LOG.warning  # told of rangers that could not be made ready
+        self.warned: Callable[[str], None] = LOG.warning  # called with rangers that could not be made ready
         self._feed: SiteFeed | None = None
         self._feed_at = feed_address(at.addresses) if at.addresses else (feed_address()[0], 0)
         if at.host is not None:
@@ -140,18 +149,21 @@ class RangersServed:
 
     @property
     def rangers(self) -> Mapping[str, Ranger]:
-        """Those that are served, by name."""
+        """Rangers served, by name."""
         return self._served.rangers
 
     async def serve(self, listening: Callable[[Listening], None]) -> None:
-        """Listen, say where, and serve until cancelled. Raises InputError: a port or a folder that cannot be had."""
+        """Listen, report the addresses, and serve until cancelled.
+
+        Raises InputError if a port or a folder is not available.
+        """
         try:
             await self._served.start()
             if self._warming is not None and self._twin is not None:
                 posture = self._twin.live_posture
                 for text in await warm(self._site, self._served.rangers, self._warming, posture=posture):
                     self.warned(text)
-            self._served.rearm()  # the time of the warm-up is not the dead man's
+            self._served.rearm()  # the warm-up does not count for the dead-man switch
             if self._late is not None:
                 await self._late.open()
             at = None
@@ -159,7 +171,7 @@ class RangersServed:
                 await self._feed.start(*self._feed_at)
                 at = (self._feed_at[0], self._feed.port)
             gc.collect()
-            gc.freeze()  # thousands of cubes a ranger: a full collection is 100 ms in which nobody is answered
+            gc.freeze()  # thousands of cubes a ranger: a full collection takes 100 ms without answers
             listening(Listening(dict(self._served.addresses), at))
             await asyncio.gather(self._served.serve(), *([] if self._feed is None else [self._feed.serve()]))
         finally:
@@ -170,9 +182,9 @@ class RangersServed:
 
 
 def heads_of(factory: str, rangers: tuple[str, ...]) -> dict[str, RangerHead]:
-    """A real head for each ranger: `package.module:factory` is called with the ranger's name.
+    """Real heads by ranger: `package.module:factory` is called with each name.
 
-    The current directory is looked in, too. Raises InputError: no such module or factory, or it gives no head.
+    The current directory is searched, too. Raises InputError: no such module or factory, or it returns no head.
     """
     module, _, name = factory.partition(":")
     if not module or not name:
@@ -182,17 +194,21 @@ def heads_of(factory: str, rangers: tuple[str, ...]) -> dict[str, RangerHead]:
     try:
         head_of = getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError, SyntaxError) as problem:
-        raise InputError(f"--head {factory}: cannot be had: {problem} (expected package.module:factory)") from problem
+        raise InputError(
+            f"--head {factory}: cannot be imported: {problem} (expected package.module:factory)"
+        ) from problem
     if not callable(head_of):
-        raise InputError(f"--head {factory}: {name} cannot be called (expected a function of a ranger's name)")
+        raise InputError(f"--head {factory}: {name} is not callable (expected a function of a ranger's name)")
     heads: dict[str, RangerHead] = {}
     for ranger in rangers:
         try:
             head = head_of(ranger)
         except (CatseyeError, OSError) as problem:
             raise InputError(f"--head {factory}: no head for {ranger}: {problem}") from problem
-        missing = [each for each in dir(RangerHead) if not each.startswith("_") and not hasattr(head, each)]
+        missing = [
+            attribute for attribute in dir(RangerHead) if not attribute.startswith("_") and not hasattr(head, attribute)
+        ]
         if missing:
-            raise InputError(f"--head {factory}: what it gives for {ranger} has no {missing[0]} (expected a Head)")
+            raise InputError(f"--head {factory}: the object for {ranger} has no {missing[0]} (expected a Head)")
         heads[ranger] = head
     return heads

@@ -1,4 +1,4 @@
-"""A run of a journal reduced again: the same, or how far this version or other calibrations move its points."""
+"""Reduce a journal's run again and compare it with its answers."""
 
 import math
 import platform
@@ -26,28 +26,28 @@ from catseye.reduction.live.live import Live
 from catseye.service.settings import live_settings
 from catseye.version import __version__
 
-TOLD = 20  # points that people are told of: those that move most
-LEAST_TOLD_MM = 5e-4  # a point that moves less shows nothing in three decimals
+SHOWN_POINTS = 20  # points shown to people: those that move most
+LEAST_SHOWN_MM = 5e-4  # a smaller change is zero in three decimals
 Progress = Callable[[str, int, int], None]
 
 
 class Cause(StrEnum):
-    """Why a replay's numbers are not the stored ones; the value is what programs read."""
+    """Cause of a replay's differing numbers; the value is for programs."""
 
-    RECORDS = "records"  # other ones were given
-    JOURNAL = "journal"  # it is not as it was written
-    SAMPLES = "samples"  # none were kept
+    RECORDS = "records"  # other records were given
+    JOURNAL = "journal"  # it fails verification
+    SAMPLES = "samples"  # none were stored
     SOFTWARE = "software"  # all else is the run's own: catseye, what it computes with, or the machine's rounding
 
 
 @dataclass(frozen=True)
 class Moved:
-    """A point's difference, new less stored, over epochs.
+    """Difference of a point, new less stored, over epochs.
 
     mean_mm      (x, y, z)
     largest_mm   length
-    largest_u    of a coordinate over its stored u; NaN where none was stored
-    epochs       in how many
+    largest_u    of a coordinate over its stored u; NaN if none was stored
+    epochs       number of epochs
     """
 
     mean_mm: tuple[float, float, float]
@@ -58,21 +58,21 @@ class Moved:
 
 @dataclass
 class ReplayOutcome:
-    """What came of a run that was replayed: counts of what is the same, and how far answers moved.
+    """Result of a replay: counts of equal answers, and differences.
 
-    "Same" is of numbers, reason codes and statuses, to the last bit; "identical" is of the texts, too.
+    "Same" applies to numbers, reason codes and statuses, to the last bit; "identical" includes texts.
 
-    run                that was replayed
+    run                the run replayed
     calibrations       folder of other records, None for the run's own
     epochs, shots      fed
     same_epochs, identical_epochs   by their solutions
     same_shots, identical_shots     by their answers
-    late_shots         of all shots, those behind the last epoch
-    unasked            shots with which no answer is stored: not compared
-    chain              what the journal's chain says of the run
+    late_shots         of all shots, those after the last epoch
+    unasked            shots without a stored answer: not compared
+    chain              report on the journal's chain for the run
     first              number of the first epoch that differs, and by what
     parts              of solutions that differ: in how many epochs
-    unstored           keys that answers have now and the stored ones have not: not compared
+    unstored           keys that only the new answers have: not compared
     movements          by kind, in its unit and in u
     moved              by point
     lost               points of stored epochs that the new ones do not have
@@ -99,26 +99,28 @@ class ReplayOutcome:
     @property
     def sameness(self) -> Sameness:
         """Sameness of the whole run, solutions and shots."""
-        asked = self.shots - self.unasked
-        if (self.same_epochs, self.same_shots) != (self.epochs, asked):
+        compared = self.shots - self.unasked
+        if (self.same_epochs, self.same_shots) != (self.epochs, compared):
             return Sameness.DIFFERENT
-        identical = (self.identical_epochs, self.identical_shots) == (self.epochs, asked)
+        identical = (self.identical_epochs, self.identical_shots) == (self.epochs, compared)
         return Sameness.IDENTICAL if identical else Sameness.TEXTS
 
     @property
     def same(self) -> bool:
-        """Whether all numbers, reason codes and statuses are the same to the last bit."""
+        """True if numbers, codes and statuses agree to the last bit."""
         return self.sameness is not Sameness.DIFFERENT
 
     @property
     def identical(self) -> bool:
-        """Whether all answers are the same to the last bit, texts included."""
+        """True if all answers agree to the last bit, texts included."""
         return self.sameness is Sameness.IDENTICAL
 
     @property
     def cause(self) -> Cause | None:
-        """Why numbers differ, None where none does: what is left when records, journal and samples are the run's own
-        is the software. A version's name does not decide it: many states of the source may have one name.
+        """Cause of differing numbers, None if none differs.
+
+        With the run's own records, journal and samples it is the software. A version's name does not decide it: many
+        states of the source may have one name.
         """
         if self.same:
             return None
@@ -130,66 +132,66 @@ class ReplayOutcome:
 
     @property
     def other_version(self) -> bool:
-        """Whether the run was written by another catseye, Python or numpy, by their names."""
+        """True if another catseye, Python or numpy wrote the run."""
         return self.run.versions != versions_here()
 
     @property
     def not_compared(self) -> tuple[str, ...]:
-        """What a replay says nothing about."""
-        told = [f"{self.unasked} shots whose answer was not stored"] * bool(self.unasked)
+        """Parts of a run that a replay does not compare."""
+        parts = [f"{self.unasked} shots whose answer was not stored"] * bool(self.unasked)
         if self.unstored:
-            told.append(f"what the journal's version did not store ({', '.join(sorted(self.unstored))})")
-        return (*told, "commands, happenings and documents, which the reduction does not see")
+            parts.append(f"what the journal's version did not store ({', '.join(sorted(self.unstored))})")
+        return (*parts, "commands, happenings and documents, which the reduction does not use")
 
 
 def versions_here() -> dict[str, str]:
-    """Versions of this software by name, as a run's record has them."""
+    """Versions of this software by name, as in a run's record."""
     return {"catseye": __version__, "python": platform.python_version(), "numpy": np.__version__}
 
 
 def replayed(journal: str, which: int | str | None, calibrations: Path | None, *, progress: Progress) -> ReplayOutcome:
-    """A run again, with its own records or others.
+    """Reduce a run again, with its own records or others.
 
-    Raises InputError: no such journal, run or folder; a run that does not say how it was reduced; nothing solved in it.
+    Raises InputError: no such journal, run or folder; a run without its settings, or without solutions.
     """
-    other = None if calibrations is None else read_site(calibrations)
+    records = None if calibrations is None else read_site(calibrations)
     with JournalReader(journal) as reader:
         run = reader.run(which)
         settings = live_settings(run.settings, f"journal {reader.place}: run {run.run}")
         movements = Movements()
 
-        def made(site: SiteFolder, _: StoredRun) -> Live:
+        def new_live(site: SiteFolder, _: StoredRun) -> Live:
             movements.stations = [station.name for station in site.site.weather_station]
-            return Live(site if other is None else other, settings)
+            return Live(site if records is None else records, settings)
 
         chain = check_whole(reader, run.run, progress=progress)
-        if chain.bad:  # what does not check is not fed: the rest says how much hangs on it
+        if chain.bad:  # altered entries are skipped: the differences show their weight
             reader.left_out = {run.run: chain.bad}
         total = sum(1 for _ in reader.solutions(run.run))
         if not total:
-            raise InputError(f"journal {reader.place}: run {run.run} holds no epoch (expected one at least)")
+            raise InputError(f"journal {reader.place}: run {run.run} contains no epoch (expected at least one)")
         outcome = ReplayOutcome(run, calibrations, chain)
         off: dict[str, list[tuple[np.ndarray, np.ndarray]]] = defaultdict(list)
-        for each in replay(reader, run.run, made):
+        for epoch in replay(reader, run.run, new_live):
             progress("epochs", outcome.epochs, total)
-            _count(outcome, each)
-            _compare(outcome, each, off)
-            movements.add(each)
+            _count(outcome, epoch)
+            _compare(outcome, epoch, off)
+            movements.add(epoch)
     outcome.movements = movements.found
     outcome.moved = {name: _moved(rows) for name, rows in sorted(off.items())}
     return outcome
 
 
-def _count(outcome: ReplayOutcome, each: Replayed) -> None:
-    shots, solution = each.shots, each.solution
+def _count(outcome: ReplayOutcome, epoch: Replayed) -> None:
+    shots, solution = epoch.shots, epoch.solution
     same_shots = shots.count - len(shots.differing) - len(shots.unasked)
     outcome.shots += shots.count
     outcome.same_shots += same_shots
     outcome.identical_shots += same_shots - len(shots.reworded)
     outcome.unasked += len(shots.unasked)
-    if each.stored is None:
+    if epoch.stored is None:
         outcome.late_shots += shots.count
-        where = f"shots behind the last epoch (event {shots.differing[0]})" if shots.differing else ""
+        where = f"shots after the last epoch (event {shots.differing[0]})" if shots.differing else ""
     else:
         outcome.epochs += 1
         outcome.same_epochs += solution.sameness is not Sameness.DIFFERENT
@@ -197,16 +199,16 @@ def _count(outcome: ReplayOutcome, each: Replayed) -> None:
         outcome.parts.update(solution.parts)
         outcome.unstored.update(solution.unstored)
         what = "a shot" if shots.differing else f"its solution ({', '.join(solution.parts)})"
-        where = f"epoch {each.stored.answer.get('number')} (event {each.seq}) by {what}"
-    if not each.same and not outcome.first:
+        where = f"epoch {epoch.stored.answer.get('number')} (event {epoch.seq}) by {what}"
+    if not epoch.same and not outcome.first:
         outcome.first = where
 
 
-def _compare(outcome: ReplayOutcome, each: Replayed, off: dict[str, list[tuple[np.ndarray, np.ndarray]]]) -> None:
-    if each.stored is None or each.new is None:
+def _compare(outcome: ReplayOutcome, epoch: Replayed, off: dict[str, list[tuple[np.ndarray, np.ndarray]]]) -> None:
+    if epoch.stored is None or epoch.new is None:
         return
-    outcome.lost += len(set(places(each.stored)) - set(places(each.new)))
-    for name, change, u in point_moves(each.stored, each.new):
+    outcome.lost += len(set(places(epoch.stored)) - set(places(epoch.new)))
+    for name, change, u in point_moves(epoch.stored, epoch.new):
         off[name].append((change, u))
 
 
@@ -219,39 +221,40 @@ def _moved(rows: list[tuple[np.ndarray, np.ndarray]]) -> Moved:
 
 
 def replay_verdict(outcome: ReplayOutcome) -> Verdict:
-    """Whether the run's own records give its numbers again to the last bit; otherwise what moved them, and how far."""
+    """Verdict: the same numbers to the last bit, or the cause and size."""
     chain = outcome.chain
     if chain.count:
-        return Verdict("failed", f"the journal is not as it was written: {chain.problems[0]}")
+        return Verdict("failed", f"the journal fails verification: {chain.problems[0]}")
     if outcome.same:
-        kept = "" if chain.chained else "; an older catseye wrote it, without a chain that could be checked"
+        unverified = "" if chain.chained else "; written by an older catseye without a chain to verify"
         if outcome.identical:
-            return Verdict("good", f"every answer is the same bit for bit{kept}")
+            return Verdict("good", f"every answer is the same bit for bit{unverified}")
         return Verdict(
-            "good", f"every number, reason code and status is the same bit for bit, texts are another version's{kept}"
+            "good",
+            f"every number, reason code and status is the same bit for bit, texts are another version's{unverified}",
         )
     if outcome.cause is Cause.RECORDS:
         furthest = max((m.largest_mm for m in outcome.moved.values()), default=0.0)
-        return Verdict("good", f"reduced with other records, which move points by up to {furthest:.3f} mm")
+        return Verdict("good", f"reduced with other records, which change points by up to {furthest:.3f} mm")
     if outcome.cause is Cause.SAMPLES:
-        return Verdict("doubtful", "the run kept no samples, so its answers cannot be had again bit for bit")
-    by = f"this version moves the run's answers: {_how_far(outcome)}, first {outcome.first}"
+        return Verdict("doubtful", "the run stored no samples, so its answers cannot be reproduced bit for bit")
+    by = f"this version changes the run's answers: {_how_far(outcome)}, first {outcome.first}"
     if outcome.other_version:
         return Verdict("doubtful", by)
     return Verdict("failed", f"{by}; a version of the same name should not")
 
 
 def _how_far(outcome: ReplayOutcome) -> str:
-    """The furthest move of a point in words."""
+    """Largest change of a point in words."""
     points = outcome.movements.get(Moving.POINTS)
     if points is None or not points.largest.size:
-        return "no point moves"
+        return "no point changes"
     largest = f"points by up to {shown(points.largest.size / MILLIMETRE)} mm"
     return largest if points.largest_u is None else f"{largest}, {shown(points.largest_u.size)} of a coordinate's u"
 
 
 def replay_object(outcome: ReplayOutcome) -> dict[str, Any]:
-    """What `catseye replay --json` prints."""
+    """JSON object of `catseye replay --json`."""
     return {
         "verdict": replay_verdict(outcome).to_object(),
         "run": outcome.run.run,
@@ -288,12 +291,12 @@ def replay_object(outcome: ReplayOutcome) -> dict[str, Any]:
 
 
 def replay_passages(outcome: ReplayOutcome) -> list[tuple[str, str]]:
-    """What a replay came to: title and text of each passage."""
+    """Result of a replay: title and text of each passage."""
     run = outcome.run
-    late = f", {outcome.late_shots} of them behind the last epoch" if outcome.late_shots else ""
+    late = f", {outcome.late_shots} of them after the last epoch" if outcome.late_shots else ""
     passages = [("Run", f"{run.run} of {run.site}, catseye {run.versions['catseye']}, {outcome.shots} shots{late}.")]
     passages += [("Chain", text) for text in chain_words(outcome.chain)]
-    passages.append(("Not seen", f"{'; '.join(outcome.not_compared)}."))
+    passages.append(("Not compared", f"{'; '.join(outcome.not_compared)}."))
     if outcome.identical:
         passages.append(("Epochs", f"{outcome.epochs} the same bit for bit, and all {outcome.same_shots} shots."))
         return passages
@@ -303,7 +306,7 @@ def replay_passages(outcome: ReplayOutcome) -> list[tuple[str, str]]:
         (
             "Epochs",
             f"{outcome.same_epochs} of {outcome.epochs} the same bit for bit, {outcome.same_shots} of {outcome.shots} "
-            f"shots; the first that differs is {outcome.first}.",
+            f"shots; the first difference is {outcome.first}.",
         )
     )
     if outcome.parts:
@@ -312,47 +315,47 @@ def replay_passages(outcome: ReplayOutcome) -> list[tuple[str, str]]:
     passages += [("Why", why) for why in _why(outcome)]
     passages += movement_words(outcome.movements)
     furthest = sorted(outcome.moved.items(), key=lambda pair: -pair[1].largest_mm)
-    told = [pair for pair in furthest[:TOLD] if pair[1].largest_mm >= LEAST_TOLD_MM]
-    passages += [(name, _point_words(m)) for name, m in told]
-    if len(furthest) > len(told):
-        passages.append(("And", f"{len(furthest) - len(told)} more points, which moved less (--json has them)."))
+    largest = [pair for pair in furthest[:SHOWN_POINTS] if pair[1].largest_mm >= LEAST_SHOWN_MM]
+    passages += [(name, _point_words(m)) for name, m in largest]
+    if len(furthest) > len(largest):
+        passages.append(("And", f"{len(furthest) - len(largest)} more points with smaller changes (see --json)."))
     return passages
 
 
 def _reworded(outcome: ReplayOutcome) -> str:
-    """Counts of a run whose texts alone have changed."""
-    asked = outcome.shots - outcome.unasked
+    """Counts for a run that differs only in texts."""
+    compared = outcome.shots - outcome.unasked
     return (
         f"{outcome.epochs} with the same numbers, reason codes and statuses bit for bit, and all {outcome.same_shots} "
-        f"shots; {outcome.epochs - outcome.identical_epochs} epochs and {asked - outcome.identical_shots} shots have "
-        "texts of another version."
+        f"shots; {outcome.epochs - outcome.identical_epochs} epochs and {compared - outcome.identical_shots} shots "
+        "have texts of another version."
     )
 
 
 def _why(outcome: ReplayOutcome) -> list[str]:
-    """What made numbers differ, in sentences."""
+    """Causes of differing numbers, in sentences."""
     if outcome.cause is Cause.SAMPLES:
-        return ["the run kept no samples (catseye ziy --keep-buffers keeps them)."]
+        return ["the run stored no samples (use catseye ziy --keep-buffers)."]
     if outcome.cause is not Cause.SOFTWARE:
         return []
-    stored, here = (
+    stored, current = (
         ", ".join(f"{name} {version}" for name, version in versions.items())
         for versions in (outcome.run.versions, versions_here())
     )
     if outcome.other_version:
-        told = [f"samples and records are the run's own, so it is the software: {stored} then, {here} now."]
+        causes = [f"samples and records are the run's own, so the software differs: {stored} then, {current} now."]
     else:
-        told = [
-            f"samples and records are the run's own, so it is the software: another state of {here}, or a machine that "
-            "rounds otherwise."
+        causes = [
+            f"samples and records are the run's own, so the software differs: another build of {current}, or another "
+            "machine's rounding."
         ]
     if not outcome.chain.chained:
-        told.append("the journal has no chain, so that a change of the file cannot be told from one of the software.")
-    return told
+        causes.append("the journal has no chain, so a changed file cannot be distinguished from changed software.")
+    return causes
 
 
 def _point_words(m: Moved) -> str:
-    """A point's move in words."""
+    """Change of a point in words."""
     x, y, z = m.mean_mm
     in_u = "" if math.isnan(m.largest_u) else f", {shown(m.largest_u)} of its u"
     epochs = f"on the mean of {m.epochs} epochs"

@@ -1,4 +1,4 @@
-"""A living command's event loop: Ctrl-C and termination end it in order, and by force where order takes too long."""
+"""Event loop of a running command, with orderly and forced exit."""
 
 import asyncio
 import os
@@ -11,12 +11,12 @@ from typing import Any, Generic, TypeVar
 from catseye.simulator.clock.virtual_time import VirtualLoop
 
 T = TypeVar("T")
-LONGEST_END = 4.0  # s from the signal until the process leaves by force: gone within five, ten others beside
+LONGEST_END = 4.0  # s from the signal until a forced exit: within five in all, with ten other processes running
 NUMBERS = (signal.SIGINT, signal.SIGTERM)
 
 
 class FastLoop(VirtualLoop):
-    """Virtual time in a loop that can be closed though threads have worked for it."""
+    """Virtual-time loop that can be closed after threads worked for it."""
 
     async def shutdown_default_executor(self, timeout: float | None = None) -> None:
         with self.outside():  # the threads end in real time
@@ -24,12 +24,12 @@ class FastLoop(VirtualLoop):
 
 
 class LiveRun(Generic[T]):
-    """One coroutine, run until it ends or a signal asks for its end.
+    """One coroutine, run until it ends or a signal stops it.
 
     work           makes the coroutine; a signal cancels it, once
     loop_factory   of the loop; asyncio's own if None
 
-    The first signal cancels; a second one, or 4 s, leave at once in the way that `gateways.writers.interruption` has.
+    The first signal cancels; a second one, or 4 s, exit at once as `gateways.writers.interruption` does.
     """
 
     def __init__(
@@ -42,16 +42,16 @@ class LiveRun(Generic[T]):
         self._before: dict[int, Any] = {}
         self._task: asyncio.Task[T] | None = None
         self._alarm: threading.Timer | None = None
-        self.signal = 0  # that ended it; 0 of none
+        self.signal = 0  # signal that ended it; 0 if none
 
     def result(self) -> T | None:
-        """What the coroutine gave; None where a signal ended it before it gave anything."""
+        """Result of the coroutine; None if a signal ended it before."""
         with asyncio.Runner(loop_factory=self._factory) as runner:
             loop = runner.get_loop()
 
             async def watched() -> T:
                 self._task = asyncio.current_task()
-                if self.signal:  # it came before there was anything to cancel
+                if self.signal:  # received before there was anything to cancel
                     raise asyncio.CancelledError
                 return await self._work()
 
@@ -75,7 +75,7 @@ class LiveRun(Generic[T]):
                 self._restore()
 
     def _leave(self, number: int) -> None:
-        """At once: as this process leaves on signals otherwise, its undoings with it."""
+        """Exit at once, by the signal handler installed before, with its cleanup."""
         before = self._before.get(number)
         if callable(before) and before is not signal.default_int_handler:
             before(number, None)

@@ -1,7 +1,7 @@
-"""Views of a running site: a screen on a terminal of 80 x 24 or more, plain lines elsewhere, or nothing.
+"""Views of a running site: full screen, plain lines, or nothing.
 
-The screen is read at three in the morning: what is wrong stands first, all rangers have a character at least, and
-nothing that lasts is pushed off by what comes.
+The screen needs a terminal of 80 x 24 or more. It is read at three in the morning: problems come first, all rangers
+have at least a character, and ongoing problems are not pushed off by new events.
 """
 
 import asyncio
@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 
     from catseye.service.coordinator import LiveCoordinator
 
-EVERY = 0.25  # s between two pictures
-AT_LEAST = 1.0  # s in which there is a new one, also where nothing becomes durable
-NARROW = 138  # columns: below, one thing stands beneath the other
-TALL = 34  # lines from which the wide one has room
+PERIOD = 0.25  # s between two updates
+IDLE_PERIOD = 1.0  # s between two updates without durable entries
+NARROW = 138  # columns: in a narrower console the parts are stacked
+TALL = 34  # lines that the wide layout needs
 LEAST_WIDTH, LEAST_HEIGHT = 60, 20
 MOST_PROBLEMS, LAST_EVENTS = 4, 5
 WORDS = {
@@ -43,7 +43,7 @@ WORDS = {
     "alarm": "bold white on red",
     "stopped": "bold white on red",
 }
-TOLD = ("warning", "alarm")
+SHOWN_SEVERITIES = ("warning", "alarm")
 EPOCHS, EVENTS = 7, 9  # shown
 STYLES = {"debug": "dim", "note": "", "warning": "yellow", "alarm": "bold red"}
 
@@ -52,20 +52,20 @@ class SilentView:
     """A view that shows nothing."""
 
     def tell(self, text: str) -> None:
-        """Tell a person: there is no screen."""
+        """Do nothing: there is no screen."""
 
     def begin(self, book: LiveBook, running: "LiveCoordinator") -> None:
-        """Begin to show: there is no screen."""
+        """Do nothing: there is no screen."""
 
     def entry(self, entry: Any) -> None:
-        """Show an entry: there is no screen."""
+        """Do nothing: there is no screen."""
 
     def end(self) -> None:
-        """End to show: there is no screen."""
+        """Do nothing: there is no screen."""
 
 
 class LinesView(SilentView):
-    """A line for each epoch, and for each warning that is of more than one shot.
+    """A line per epoch, and per warning of more than one shot.
 
     say   takes a line
     """
@@ -73,7 +73,7 @@ class LinesView(SilentView):
     def __init__(self, say: Callable[[str], None]):
         self._say = say
         self._book: LiveBook | None = None
-        self._found: set[str] = set()  # faults on command that were told
+        self._found: set[str] = set()  # detected faults already shown
 
     def tell(self, text: str) -> None:
         self._say(one_line(text))
@@ -86,16 +86,18 @@ class LinesView(SilentView):
             latest = self._book.latest
             if latest is not None and latest.number == entry.answer.get("number"):
                 self._say(f"{time_text(entry.ticks)}  {epoch_line(latest)}")
-        elif isinstance(entry, Happening) and entry.severity in TOLD:
+        elif isinstance(entry, Happening) and entry.severity in SHOWN_SEVERITIES:
             self._say(f"{time_text(entry.ticks)}  {entry.severity}: {one_line(entry.text)}")
-        for each in self._book.faults if self._book is not None else ():
-            if each.by is not None and each.text not in self._found:
-                self._found.add(each.text)
-                self._say(f"{time_text(each.by.ticks)}  fault {one_line(each.line(each.by.ticks))}")
+        for fault in self._book.faults if self._book is not None else ():
+            if fault.by is not None and fault.text not in self._found:
+                self._found.add(fault.text)
+                self._say(f"{time_text(fault.by.ticks)}  fault {one_line(fault.line(fault.by.ticks))}")
 
 
 class ScreenView(SilentView):
-    """A picture on the terminal that stderr is, four times a second; the last one stays.
+    """A full-screen view on stderr, updated four times a second.
+
+    The last picture stays.
 
     console   None: a new one on stderr
     """
@@ -122,17 +124,17 @@ class ScreenView(SilentView):
         self._live = Live(console=self._console, auto_refresh=False, redirect_stdout=False, redirect_stderr=False)
         self._stack.enter_context(undone_when_interrupted(_show_cursor))
         self._stack.enter_context(self._live)
-        self._timer = asyncio.get_running_loop().call_later(AT_LEAST, self._tick)
+        self._timer = asyncio.get_running_loop().call_later(IDLE_PERIOD, self._tick)
 
     def _tick(self) -> None:
-        """A new picture, whether anything came or not: where nothing comes, that has to be seen."""
+        """Redraw even without new entries, to show that none come."""
         self.entry(None)
-        self._timer = asyncio.get_running_loop().call_later(AT_LEAST, self._tick)
+        self._timer = asyncio.get_running_loop().call_later(IDLE_PERIOD, self._tick)
 
     def entry(self, entry: Any) -> None:
-        now = time.monotonic()
-        if self._live is not None and (now >= self._next or isinstance(entry, EpochSolution)):
-            self._next = now + EVERY
+        time_s = time.monotonic()
+        if self._live is not None and (time_s >= self._next or isinstance(entry, EpochSolution)):
+            self._next = time_s + PERIOD
             self._live.update(self.picture(), refresh=True)
 
     def end(self) -> None:
@@ -144,7 +146,7 @@ class ScreenView(SilentView):
         self._live = None
 
     def picture(self) -> "RenderableType":
-        """All of it, for the console's width and height."""
+        """The whole picture, for the console's width and height."""
         from rich.console import Group
         from rich.table import Table
         from rich.text import Text
@@ -156,22 +158,22 @@ class ScreenView(SilentView):
         height = max(self._console.height, LEAST_HEIGHT) - 1  # the cursor's line
         top = [*self._head(condition), *_problem_lines(condition), *self._state_lines(condition, width)]
         if width >= NARROW and height >= TALL:
-            both = Table.grid(padding=(0, 2), expand=True)
-            both.add_column()
-            both.add_column(ratio=1)
-            both.add_row(self._rangers(condition), Group(self._epochs(), self._beam(), self._events(EVENTS)))
-            return Group(*_cut(top, width), both)
+            columns = Table.grid(padding=(0, 2), expand=True)
+            columns.add_column()
+            columns.add_column(ratio=1)
+            columns.add_row(self._rangers(condition), Group(self._epochs(), self._beam(), self._events(EVENTS)))
+            return Group(*_cut(top, width), columns)
         more, table = [*self._truth_lines(), *self._fault_lines()], len(self._running.ziy.links) + 3
         tall = height >= len(top) + table + LAST_EVENTS + len(more)
         lines = top if tall else [*top, *ranger_lines(condition, width)]
-        left = height - len(lines) - table * tall - LAST_EVENTS
-        lines = [*lines, *more[: max(left, 0)]]
-        events = self._event_lines(LAST_EVENTS + max(min(left - len(more), EVENTS - LAST_EVENTS), 0))
+        free = height - len(lines) - table * tall - LAST_EVENTS
+        lines = [*lines, *more[: max(free, 0)]]
+        events = self._event_lines(LAST_EVENTS + max(min(free - len(more), EVENTS - LAST_EVENTS), 0))
         parts: list[RenderableType] = [*_cut(lines, width)]
         return Group(*parts, *([self._rangers(condition)] if tall else []), *_cut(events, width))
 
     def _head(self, condition: SiteCondition) -> "list[Text]":
-        """Site, time, telescope; then the site's state in a word."""
+        """Site, time, telescope; then the site's state."""
         from rich.text import Text
 
         assert self._book is not None
@@ -183,22 +185,22 @@ class ScreenView(SilentView):
             azimuth, elevation = book.posture.azimuth / DEGREE, book.posture.elevation / DEGREE
             first.append(f"  telescope {azimuth:.4f}° {elevation:.4f}°", style="not bold")
         second = Text(f" {condition.word.upper()} ", style=WORDS[condition.word])
-        asked = len(ziy.links) - len(ziy.firing.dropped)
+        active = len(ziy.links) - len(ziy.firing.dropped)
         second.append(
-            f"  {ziy.mode}, round {ziy.round_number}, {condition.measuring} of {asked} rangers measure, "
+            f"  {ziy.mode}, round {ziy.round_number}, {condition.measuring} of {active} rangers measure, "
             f"{book.acknowledged} shots",
             style="not bold default on default",
         )
         return [first, second]
 
     def _state_lines(self, condition: SiteCondition, width: int) -> "list[Text]":
-        """Last epoch, and what everything hangs on."""
+        """Last epoch; clock, disk, journal and lease."""
         from rich.text import Text
 
         verdict = condition.verdict
         good = verdict is None or verdict.word == "good"
-        told = "none yet" if verdict is None else f"{condition.epoch} {verdict.word}" + f": {verdict.why}" * good
-        epoch = Text(f"epoch    {one_line(told)}", style="" if good else "yellow")
+        summary = "none yet" if verdict is None else f"{condition.epoch} {verdict.word}" + f": {verdict.why}" * good
+        epoch = Text(f"epoch    {one_line(summary)}", style="" if good else "yellow")
         parts = (("clock", condition.clock), ("disk", condition.disk), ("journal", condition.journal))
         line = Text()
         for name, text in (*parts, ("lease", condition.holder)):
@@ -208,7 +210,7 @@ class ScreenView(SilentView):
         return [epoch, line]
 
     def _truth_lines(self) -> "list[Text]":
-        """The last epoch beside a simulation's truth, and the beam."""
+        """The last epoch and beam beside a simulation's truth."""
         from rich.text import Text
 
         latest = None if self._book is None else self._book.latest
@@ -222,18 +224,19 @@ class ScreenView(SilentView):
         return [Text(text, style="" if latest.chi2 <= high else "red"), *(Text(line) for line in beam_lines(latest))]
 
     def _fault_lines(self) -> "list[Text]":
-        """Faults on command, and what named them."""
+        """Injected faults and their detection."""
         from rich.text import Text
 
         if self._book is None:
             return []
-        now = self._book.ticks
+        ticks = self._book.ticks
         return [
-            Text(one_line(each.line(now)), style="" if each.by is not None else "yellow") for each in self._book.faults
+            Text(one_line(fault.line(ticks)), style="" if fault.by is not None else "yellow")
+            for fault in self._book.faults
         ]
 
     def _event_lines(self, count: int) -> "list[Text]":
-        """The last events that are no routine."""
+        """The last events except routine."""
         from rich.text import Text
 
         return [
@@ -264,18 +267,18 @@ class ScreenView(SilentView):
     def _epochs(self) -> "Table":
         table = _table(">epoch", ">points", ">off rms", "worst", ">off", ">u (mm)", ">chi²", "99 %")
         if self._book is not None:
-            for each in list(self._book.comparisons.values())[-EPOCHS:]:
-                low, high = each.band
+            for comparison in list(self._book.comparisons.values())[-EPOCHS:]:
+                low, high = comparison.band
                 table.add_row(
-                    str(each.number),
-                    str(each.points),
-                    f"{each.rms_mm:.3f}",
-                    each.worst,
-                    f"{each.worst_mm:.2f}",
-                    f"{each.mean_u_mm:.3f}",
-                    f"{each.chi2:.2f}",
+                    str(comparison.number),
+                    str(comparison.points),
+                    f"{comparison.rms_mm:.3f}",
+                    comparison.worst,
+                    f"{comparison.worst_mm:.2f}",
+                    f"{comparison.mean_u_mm:.3f}",
+                    f"{comparison.chi2:.2f}",
                     f"{low:.2f}-{high:.2f}",
-                    style="" if each.chi2 <= high else "red",
+                    style="" if comparison.chi2 <= high else "red",
                 )
         return table
 
@@ -284,7 +287,7 @@ class ScreenView(SilentView):
 
         latest = None if self._book is None else self._book.latest
         lines = [] if latest is None else list(beam_lines(latest))
-        return Text("\n".join(lines) or "beam: known after the reference epoch", style="" if lines else "dim")
+        return Text("\n".join(lines) or "beam: unknown before the reference epoch", style="" if lines else "dim")
 
     def _events(self, count: int) -> "RenderableType":
         from rich.text import Text
@@ -294,7 +297,7 @@ class ScreenView(SilentView):
 
 
 def _problem_lines(condition: SiteCondition) -> "list[Text]":
-    """Lines of the problems, alarms first; the first of many, and the number of the rest."""
+    """Problems, alarms first; at most four lines."""
     from rich.text import Text
 
     lines = [
@@ -302,13 +305,13 @@ def _problem_lines(condition: SiteCondition) -> "list[Text]":
         for problem in condition.problems
     ]
     if len(lines) > MOST_PROBLEMS:
-        rest = len(lines) - MOST_PROBLEMS + 1
-        lines = [*lines[: MOST_PROBLEMS - 1], Text(f"{'':<8} and {rest} more (ask STATUS)", style="yellow")]
-    return lines or [Text("nothing is wrong", style="dim")]
+        remainder = len(lines) - MOST_PROBLEMS + 1
+        lines = [*lines[: MOST_PROBLEMS - 1], Text(f"{'':<8} and {remainder} more (see STATUS)", style="yellow")]
+    return lines or [Text("no problems", style="dim")]
 
 
 def ranger_lines(condition: SiteCondition, width: int) -> "list[Text]":
-    """All rangers, a character each behind their names, and what the characters mean that are there."""
+    """Rangers with a status character each, and a legend."""
     from rich.text import Text
 
     longest = max((len(name) for name in condition.rangers), default=0)
@@ -321,12 +324,12 @@ def ranger_lines(condition: SiteCondition, width: int) -> "list[Text]":
             style = "" if word not in WRONG else ("bold red" if WRONG[word] == "alarm" else "yellow")
             line.append(f"{name:<{longest}} {SIGNS[word]} ", style=style)
         lines.append(line)
-    there = [word for word in SIGNS if word in condition.rangers.values()]
-    return [*lines, Text("   ".join(f"{SIGNS[word]} {word}" for word in there), style="dim")]
+    present = [word for word in SIGNS if word in condition.rangers.values()]
+    return [*lines, Text("   ".join(f"{SIGNS[word]} {word}" for word in present), style="dim")]
 
 
 def _cut(lines: "list[Text]", width: int) -> "list[Text]":
-    """Each line no longer than the console is wide."""
+    """Lines truncated to the console's width."""
     for line in lines:
         line.no_wrap, line.overflow = True, "ellipsis"
         line.truncate(width, overflow="ellipsis")
@@ -334,7 +337,7 @@ def _cut(lines: "list[Text]", width: int) -> "list[Text]":
 
 
 def _table(*columns: str) -> "Table":
-    """With a ">" before those that stand to the right."""
+    """Table of columns; ">" aligns a column right."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
@@ -345,6 +348,6 @@ def _table(*columns: str) -> "Table":
 
 
 def _show_cursor() -> None:
-    """Where the picture is cut off by force."""
+    """Show the cursor again after a forced exit."""
     with suppress(OSError, ValueError, AttributeError):
         os.write(sys.stderr.fileno(), b"\x1b[?25h")

@@ -1,4 +1,4 @@
-"""A whole site, simulated: the twin beside, the coordinator here, and each epoch held against the truth."""
+"""Simulated site: twin and coordinator, epochs compared with the truth."""
 
 import asyncio
 import json
@@ -23,40 +23,40 @@ from catseye.service.warm import WarmingClock
 from catseye.service.world import TwinWords, twin_heads
 from catseye.simulator.clock.virtual_time import MemoryNetwork, VirtualClock
 
-LONGEST_QUIET = 120.0  # s until the first round: rangers that were not warmed take half a minute
+LONGEST_QUIET = 120.0  # s until the first round: cold rangers take half a minute
 LOOK = 0.1  # s
 
 
 class View(Protocol):
-    """What somebody sees of it."""
+    """Display of a simulation."""
 
     def tell(self, text: str) -> None:
-        """How the start goes, in a word."""
+        """Show a message during the start."""
         ...
 
     def begin(self, book: LiveBook, running: LiveCoordinator) -> None:
-        """The coordinator is there."""
+        """Begin to show a coordinator."""
         ...
 
     def entry(self, entry: Any) -> None:
-        """Something was made durable; the book has it."""
+        """Show a durable entry that the book has."""
         ...
 
     def end(self) -> None:
-        """Note that nothing more comes."""
+        """Stop: no more entries will come."""
         ...
 
 
 @dataclass
 class Simulation:
-    """One run; what it came to is in `book`, `seconds`, `told`, `journal` afterwards.
+    """One simulation; afterwards results are in `book`, `seconds`, `told`, `head`.
 
-    site, name   its records, and what the user called it
+    site, name   its records, and the user's name of it
     world        of the twin
     orders       of the coordinator
     minutes      of measuring; 0: for ever
     port_base    of rangers and feed; 0: any free ports
-    warm         the rangers are initialised and homed before anybody connects
+    warm         True to initialise and home the rangers before anybody connects
     """
 
     site: SiteFolder
@@ -68,7 +68,7 @@ class Simulation:
     port_base: int = PORT_BASE
     warm: bool = True
     seconds: float = 0.0
-    told: int = 0  # shots that rangers told of, durable or not
+    told: int = 0  # shots reported by rangers, durable or not
     head: Head | None = None  # of the journal's chain, at the end
 
     def __post_init__(self) -> None:
@@ -77,35 +77,35 @@ class Simulation:
 
     @property
     def totals(self) -> dict[str, Any]:
-        """Seconds measured, rangers that were not left out, shots told of: what a summary needs beside the book."""
+        """Seconds, rangers, shots and journal head for a summary."""
         rangers = set(self.site.rangers) - set(self.orders.drop)
         return {"seconds": self.seconds, "rangers": len(rangers), "told": self.told, "head": self.head}
 
     async def run(self) -> None:
-        """In real time, the twin in a process of its own; until the minutes are over, or cancelled.
+        """Run in real time, the twin in its own process, until finished or cancelled.
 
-        Raises InputError: a port or a journal that cannot be had.
+        Raises InputError if a port or a journal is not available.
         """
-        heard: asyncio.Queue[Listening] = asyncio.Queue()
+        addresses: asyncio.Queue[Listening] = asyncio.Queue()
         child = LiveChild(
             "twin",
             [*twin_arguments(self.name, self.world, self.port_base), *([] if self.warm else ["--cold"])],
-            said=lambda line: heard.put_nowait(listening_of(line)),
+            said=lambda line: addresses.put_nowait(listening_of(line)),
             warned=lambda line: self.view.tell(f"twin: {line}"),
         )
         self.view.tell("starting the twin")
         twin = asyncio.create_task(child.keep())
         try:
-            at = await _first(heard.get(), twin)
+            at = await _first(addresses.get(), twin)
             self.view.tell("starting the coordinator")
             await self._measure(peers_of(at), self.world.clock(), None, twin)
         finally:
-            await _ended(twin)
+            await _cancelled(twin)
 
     async def run_fast(self) -> None:
-        """In virtual time, all in this process: the loop must be a `FastLoop`.
+        """Run in virtual time, all in this process; needs a `FastLoop`.
 
-        Raises InputError: a journal that cannot be had.
+        Raises InputError if a journal is not available.
         """
         loop = asyncio.get_running_loop()
         if not isinstance(loop, FastLoop):
@@ -113,7 +113,7 @@ class Simulation:
         clock, network = VirtualClock(loop, self.world.start_mjd), MemoryNetwork()
         warming = WarmingClock(clock)
         names = self.site.rangers
-        heard: asyncio.Queue[Listening] = asyncio.Queue()
+        addresses: asyncio.Queue[Listening] = asyncio.Queue()
         self.view.tell("starting the twin")
         served = RangersServed(
             self.site,
@@ -123,13 +123,13 @@ class Simulation:
             network=network,
             warming=warming if self.warm else None,
         )
-        twin = asyncio.create_task(served.serve(heard.put_nowait))
+        twin = asyncio.create_task(served.serve(addresses.put_nowait))
         try:
-            at = await _first(heard.get(), twin)
+            at = await _first(addresses.get(), twin)
             self.view.tell("starting the coordinator")
             await self._measure(peers_of(at), clock, network, twin)
         finally:
-            await _ended(twin)
+            await _cancelled(twin)
 
     async def _measure(
         self,
@@ -157,25 +157,25 @@ class Simulation:
         try:
             await _first(self._time(running), twin, coordinator)
         finally:
-            await _ended(coordinator)
+            await _cancelled(coordinator)
             self.told = running.ziy.intake.numbered
             self.head = running.journal_head
             self.view.end()
 
     async def _time(self, running: LiveCoordinator) -> None:
-        """Until the minutes are over, counted from the first round on."""
+        """Wait until the minutes are over, counted from the first round."""
         loop = asyncio.get_running_loop()
-        began = loop.time()
+        start = loop.time()
         while not running.ziy.round_number and running.orders.mode == "active":
-            if loop.time() - began > LONGEST_QUIET:
-                raise InputError(f"no round could be planned for {LONGEST_QUIET:g} s (see what the rangers say)")
+            if loop.time() - start > LONGEST_QUIET:
+                raise InputError(f"no round could be planned for {LONGEST_QUIET:g} s (see the rangers' messages)")
             await asyncio.sleep(LOOK)
-        began = loop.time()
+        start = loop.time()
         try:
-            while not self.minutes or loop.time() - began < 60.0 * self.minutes:
+            while not self.minutes or loop.time() - start < 60.0 * self.minutes:
                 await asyncio.sleep(LOOK)
         finally:
-            self.seconds = loop.time() - began
+            self.seconds = loop.time() - start
 
     def _entry(self, entry: Any) -> None:
         self.book.entry(entry)
@@ -183,42 +183,48 @@ class Simulation:
 
 
 def twin_arguments(name: str, world: TwinWords, port_base: int) -> list[str]:
-    """Of `catseye`, for a child that serves all rangers of a twin and says where in one JSON line."""
+    """Arguments of `catseye` for a child that serves a twin's rangers.
+
+    It reports its addresses in one JSON line.
+    """
     return ["zy", name, *world.options(), f"--port-base={port_base}", "--json", "--leave-with-stdin"]
 
 
 def listening_of(line: str) -> Listening:
-    """Where a child says that it listens. Raises InputError for any other line."""
+    """Addresses in a child's first line.
+
+    Raises InputError for any other line.
+    """
     try:
         stored = json.loads(line)
         rangers = {str(name): (str(host), int(a), int(b)) for name, (host, a, b) in stored["rangers"].items()}
         feed = None if stored["feed"] is None else (str(stored["feed"][0]), int(stored["feed"][1]))
     except (ValueError, KeyError, TypeError) as problem:
-        raise InputError(f"the twin said {line[:80]!a} (expected where it listens)") from problem
+        raise InputError(f"the twin printed {line[:80]!a} (expected its addresses)") from problem
     return Listening(rangers, feed)
 
 
 def peers_of(at: Listening) -> Peers:
-    """Whom a coordinator connects to: rangers as they listen, and the feed."""
+    """Peers of a coordinator: the rangers and the feed."""
     return Peers({name: Address(host, (first, second)) for name, (host, first, second) in at.rangers.items()}, at.feed)
 
 
-async def _first(work: Coroutine[Any, Any, Any], *others: "asyncio.Task[Any]") -> Any:
-    """What a coroutine gives, unless one of some tasks ends before: then its exception."""
+async def _first(work: Coroutine[Any, Any, Any], *tasks: "asyncio.Task[Any]") -> Any:
+    """Result of a coroutine, or the exception of a task that ends first."""
     task = asyncio.ensure_future(work)
     try:
-        await asyncio.wait([task, *others], return_when=asyncio.FIRST_COMPLETED)
-        for other in others:
-            if other.done():
-                other.result()
-                raise InputError("a part of the site ended by itself (see what it said)")
+        await asyncio.wait([task, *tasks], return_when=asyncio.FIRST_COMPLETED)
+        for ended_task in tasks:
+            if ended_task.done():
+                ended_task.result()
+                raise InputError("a process of the site ended unexpectedly (see its messages)")
         return task.result()
     finally:
-        await _ended(task)
+        await _cancelled(task)
 
 
-async def _ended(task: "asyncio.Task[Any]") -> None:
-    """Cancelled, and over; what it raised has been seen, or is seen by who waits for it."""
+async def _cancelled(task: "asyncio.Task[Any]") -> None:
+    """Cancel a task and wait for it; its exceptions are handled elsewhere."""
     task.cancel()
     with suppress(asyncio.CancelledError, InputError):
         await task

@@ -1,7 +1,7 @@
-"""Epochs solved in a process beside: a second of algebra must not hold up a loop that hears eighteen rangers.
+"""Solve epochs in a separate process, so that the event loop stays responsive.
 
-The process has the site from the start, and is sent what differs. It leaves when its pipe ends, whatever became of us,
-and gives way to everything else (`nice`). Should it die, the epoch is solved here, and it is started again.
+The process gets the site at its start, and then only differences. It exits when its pipe ends, however this process
+ends, and runs at low priority (`nice`). If it dies, the epoch is solved here, and it is restarted.
 """
 
 import asyncio
@@ -27,49 +27,52 @@ LENGTH = 8  # bytes before each message
 
 
 class SolverProcess:
-    """One process for one site; `solve` is what an `Intake` wants.
+    """Solver process of one site; `solve` is for an `Intake`.
 
-    site   the very object that jobs carry: `Live.site`
+    site   the object that jobs refer to: `Live.site`
     """
 
     def __init__(self, site: SiteFolder):
         self._site = site
         self._process: subprocess.Popen[bytes] | None = None
         self._changing, self._ended = threading.Lock(), False
-        self._asking = ThreadPoolExecutor(1, "solver")  # one: each thread would keep the largest answer's memory
+        self._executor = ThreadPoolExecutor(1, "solver")  # one thread: each would hold the largest answer's memory
 
     @property
     def pid(self) -> int | None:
-        """Of the process that runs."""
+        """Process id of the running solver."""
         return None if self._process is None else self._process.pid
 
     def start(self) -> None:
-        """Begin it, if it does not run, and give it the site: some 0.1 s; what it needs it loads by itself."""
+        """Start it if needed, and send it the site.
+
+        That takes 0.1 s; it loads everything else by itself.
+        """
         with self._changing:
             if self._process is not None or self._ended:
                 return
             self._process = subprocess.Popen(
                 PROGRAM, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
-            )  # its own session: Ctrl-C is for us, who end it in our turn
-            with suppress(OSError):  # whoever asks it first finds out that it died
+            )  # its own session: Ctrl-C is for this process, which then stops the child
+            with suppress(OSError):  # the first request will notice that it died
                 _send(self._process.stdin, dumped(self._site, None))
 
     async def solve(self, job: EpochJob) -> Any:
-        """What `job.solve()` gives, from the process; where that died, from here."""
+        """Result of `job.solve()`, from the process, or from here if it died."""
         loop = asyncio.get_running_loop()
         try:
-            return await loop.run_in_executor(self._asking, partial(self._asked, job))
+            return await loop.run_in_executor(self._executor, partial(self._remote_solve, job))
         except (EOFError, OSError):
             self._discard()
             await loop.run_in_executor(None, self.start)
         return await loop.run_in_executor(None, job.solve)
 
     def stop(self) -> None:
-        """End it, whatever it does, for good."""
+        """Kill the process for good."""
         with self._changing:
             self._ended = True
         self._discard()
-        self._asking.shutdown(wait=False, cancel_futures=True)
+        self._executor.shutdown(wait=False, cancel_futures=True)
 
     def _discard(self) -> None:
         process, self._process = self._process, None
@@ -82,7 +85,7 @@ class SolverProcess:
                 if pipe is not None:
                     pipe.close()
 
-    def _asked(self, job: EpochJob) -> Any:
+    def _remote_solve(self, job: EpochJob) -> Any:
         process = self._process
         if process is None:
             raise EOFError("no process")
@@ -103,20 +106,20 @@ class _Unpickler(pickle.Unpickler):
         if (module, name) != (__name__, _the_site.__name__):
             return super().find_class(module, name)
         if self._site is None:
-            raise pickle.UnpicklingError("a site is meant that nobody gave")
+            raise pickle.UnpicklingError("message refers to a site before one was sent")
         return lambda: self._site
 
 
 def _the_site() -> SiteFolder:
-    """What stands for the site in a message; each side has its own."""
+    """Placeholder of the site in a message; each side has its own."""
     raise NotImplementedError
 
 
 def dumped(what: Any, site: SiteFolder | None) -> bytes:
-    """A message; the site itself does not travel.
+    """A pickled message, without the site itself.
 
-    Only sites are asked whether they are it: a `persistent_id` is called for each of 20 000 objects, 30 ms of a thread
-    that the loop's has to wait for.
+    Only sites are compared: a `persistent_id` would be called for each of 20 000 objects, 30 ms of a thread during
+    which the event loop waits.
     """
     file = io.BytesIO()
     pickler = pickle.Pickler(file, protocol=pickle.HIGHEST_PROTOCOL)
@@ -128,23 +131,23 @@ def dumped(what: Any, site: SiteFolder | None) -> bytes:
 
 
 def loaded(message: bytes, site: SiteFolder | None) -> Any:
-    """What `dumped` was given, with this site in it."""
+    """Object in a message of `dumped`, with this site in it."""
     return _Unpickler(io.BytesIO(message), site).load()
 
 
 def serve() -> None:
-    """The process: a site, then one job after another, until its standard input ends."""
+    """Serve jobs for one site until standard input ends."""
     with suppress(OSError):
         os.nice(NICE)
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # whatever prints must not stand between answers
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # printed text must not come between answers
     try:
         site = loaded(_received(sys.stdin.buffer), None)
         while True:
             message = _received(sys.stdin.buffer)
             try:
                 answer = loaded(message, site).solve()
-            except Exception as problem:  # noqa: BLE001 - a mistake of ours: the coordinator's to raise
+            except Exception as problem:  # noqa: BLE001 - a bug: raised in the coordinator
                 answer = problem
             _send(answers, dumped(answer, site))
             del message, answer
@@ -159,7 +162,10 @@ def _send(pipe: Any, message: bytes) -> None:
 
 
 def _received(pipe: Any) -> bytes:
-    """One message. Raises EOFError: there is no more, or only a part."""
+    """One message.
+
+    Raises EOFError if there is none, or only a part.
+    """
     length = int.from_bytes(_exactly(pipe, LENGTH), "big")
     return _exactly(pipe, length)
 

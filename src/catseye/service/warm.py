@@ -1,7 +1,7 @@
-"""A twin that has been running: its rangers are initialised and homed before anybody connects, in no time at all.
+"""Warm up a twin: rangers initialised and homed before anybody connects.
 
-A power-up takes a ranger half a minute: thousands of lines, and the search for two indices. A simulation that starts
-with it shows little else in its first minute, so the head's clock runs through it as fast as the work is done.
+A power-up takes a ranger half a minute: thousands of lines, and the search for two indices. A simulation starting
+with it would show little else in its first minute, so the head's clock is advanced as fast as the work is done.
 """
 
 import asyncio
@@ -22,10 +22,10 @@ from catseye.records.site.folder import SiteFolder
 from catseye.reduction.site.places import places_of
 
 BEFORE = 300.0  # s before the start, when the rangers are powered on
-STEP = 0.05  # s between two looks at a ranger that is busy
+STEP = 0.05  # s between two polls of a busy ranger
 HOMING_TIMEOUT = 35.0  # s an axis: a ZY gives up after 30
-LEAVING = 20.0  # s: a quarter turn of either axis, and the look at the Sun behind it
-HOMING = (  # amplifiers, then the indices with the laser off, then the laser, to see whether it may shine
+LEAVING = 20.0  # s: a quarter turn of either axis, and the next check of the Sun
+HOMING = (  # amplifiers, then the indices with the laser off, then the laser, to test if it is allowed
     *(
         ("LEASE", "warm-up"),
         ("AXIS", "0", "1"),
@@ -40,9 +40,9 @@ CLIENT = 0
 
 
 class WarmingClock:
-    """Time that is moved by hand from a while before a clock's, and then is that clock's.
+    """Clock advanced by hand until it joins another clock.
 
-    clock   that counts once `release` was called
+    clock   used after `release`
     """
 
     def __init__(self, clock: Clock, before: float = BEFORE):
@@ -54,17 +54,20 @@ class WarmingClock:
         return self._clock.now_ns() if self._now is None else self._now
 
     def advance(self, seconds: float) -> None:
-        """Let time pass, but never past the other clock."""
+        """Advance the time, but never past the other clock."""
         if self._now is not None:
             self._now = min(self._now + round(seconds * PER_SECOND), self._clock.now_ns())
 
     def release(self) -> None:
-        """From now on it is the other clock's time."""
+        """Follow the other clock from now on."""
         self._now = None
 
 
 def initialising_commands(site: SiteFolder) -> Callable[[str], list[Request]]:
-    """`ranger.initialisation.commands_of_ranger` for many rangers of a site, whose places are worked out once."""
+    """Function from a ranger to its initialisation commands.
+
+    As `ranger.initialisation.commands_of_ranger`, with the site's positions computed once.
+    """
     places = places_of(site)
 
     def commands(ranger: str) -> list[Request]:
@@ -77,51 +80,51 @@ def initialising_commands(site: SiteFolder) -> Callable[[str], list[Request]]:
 async def warm(
     site: SiteFolder, rangers: Mapping[str, Ranger], clock: WarmingClock, *, posture: Callable[[int], LivePosture]
 ) -> list[str]:
-    """Make rangers that nobody is connected to ready, as a coordinator would that left a moment ago.
+    """Make unconnected rangers ready, as a coordinator would have left them.
 
     clock     of their heads; released at the end
-    posture   what the telescope tells at ticks: with it each ranger is told where the Sun is
+    posture   telescope position at ticks: with it each ranger gets the Sun's direction
 
-    One that cannot be made ready is left dark, and said here in a line each: its mirror looks at the Sun and no way out
-    is free, or an index is not found. The others serve; whoever commands it makes it ready when that can be.
+    A ranger that cannot be made ready is left dark and reported here in a line: its mirror looks at the Sun and no way
+    out is free, or an index is not found. The others serve; a client can make it ready later.
 
     Raises InputError: a command of the records is refused.
     """
     commands, guard = initialising_commands(site), SafetyGuard(site)
-    left: list[str] = []
+    problems: list[str] = []
     for name, ranger in rangers.items():
         for request in Preparation.of(commands(name)).requests:
             answer = ranger.work_of(CLIENT, request)
             if not isinstance(answer, tuple):
-                raise InputError(f"{name}: {request.command} takes time (expected what is done at once)")
+                raise InputError(f"{name}: {request.command} takes time (expected a command that completes at once)")
         _tell_sun(guard, name, ranger, clock, posture)
         problem = await _homed_and_lit(name, ranger, clock)
         if problem is not None or not ranger.laser_at_boot:
-            ranger.work_of(CLIENT, Request("PS", ("0",)))  # dark until who has the lease lights it
+            ranger.work_of(CLIENT, Request("PS", ("0",)))  # dark until the holder of the lease switches it on
         if problem is not None:
-            left.append(problem)
+            problems.append(problem)
         ranger.disconnect(CLIENT)
         await asyncio.sleep(0.0)
     clock.release()
     for name, ranger in rangers.items():
         _tell_sun(guard, name, ranger, clock, posture)
-    return left
+    return problems
 
 
 def _tell_sun(
     guard: SafetyGuard, name: str, ranger: Ranger, clock: WarmingClock, posture: Callable[[int], LivePosture]
 ) -> None:
-    now = nanoseconds_to_ticks(clock.now_ns())
-    guard.telescope(posture(now))
-    ranger.work_of(CLIENT, Request("SUN", tuple(f"{v:.7f}" for v in guard.sun_vector(name, now))))
+    ticks = nanoseconds_to_ticks(clock.now_ns())
+    guard.telescope(posture(ticks))
+    ranger.work_of(CLIENT, Request("SUN", tuple(f"{v:.7f}" for v in guard.sun_vector(name, ticks))))
 
 
 async def _homed_and_lit(name: str, ranger: Ranger, clock: WarmingClock) -> str | None:
-    """Both indices found, and the laser on; why not, in a line.
+    """Home both axes and switch the laser on; the reason if that fails.
 
-    An index may look at the Sun: a ranger leaves it by itself, and is lit when it has left.
+    If an index looks at the Sun, the ranger moves away by itself, and is lit afterwards.
     """
-    ask = _Asked(ranger, clock)
+    ask = _LocalClient(ranger, clock)
     for command, *parameters in HOMING:
         reply = await ask.reply(Request(command, tuple(parameters)), HOMING_TIMEOUT)
         if reply.ok is not True and command == "PS" and ranger.in_sun:
@@ -134,21 +137,24 @@ async def _homed_and_lit(name: str, ranger: Ranger, clock: WarmingClock) -> str 
 
 
 def _lit_from(ranger: Ranger) -> str:
-    """When a ranger whose beam rests in the Sun can be lit, as far as it knows."""
+    """Time at which the Sun leaves a ranger's parked beam, in words."""
     if not ranger.in_sun or ranger.sun is None:
         return ""
     mjd = sun_leaves(ranger.cubes.station, ranger.here, ranger.sun, ranger.now_ns() / PER_DAY)
     return "; the Sun does not leave it within a day" if mjd is None else f"; the Sun leaves it at {utc_text(mjd)}"
 
 
-class _Asked:
-    """A ranger that is asked without a connection."""
+class _LocalClient:
+    """A ranger commanded without a connection."""
 
     def __init__(self, ranger: Ranger, clock: WarmingClock):
         self._ranger, self._clock, self._tid = ranger, clock, FIRST_CLIENT_TID
 
     async def reply(self, request: Request, timeout: float) -> Reply:
-        """What it answers; f = 0 where it does not within s of its own time."""
+        """Reply to a request; f = 0 without one in time.
+
+        timeout   s of the ranger's time
+        """
         self._tid += 1
         until = self._clock.now_ns() + round(timeout * PER_SECOND)
         replies = self._ranger.receive(CLIENT, format_request(replace(request, tid=self._tid)))
@@ -162,10 +168,13 @@ class _Asked:
             if not replies:
                 self._clock.advance(STEP)
 
-    async def until(self, done: Callable[[], bool], timeout: float) -> None:
-        """Let it work by itself until something is so, or for s of its own time."""
+    async def until(self, condition: Callable[[], bool], timeout: float) -> None:
+        """Run the ranger until a condition holds.
+
+        timeout   s of the ranger's time
+        """
         for _ in range(round(timeout / STEP)):
-            if done():
+            if condition():
                 return
             self._ranger.turn()
             self._clock.advance(STEP)

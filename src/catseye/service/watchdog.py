@@ -1,4 +1,4 @@
-"""What systemd is told of a service: that it is ready, and again and again that it lives (Type=notify, WatchdogSec)."""
+"""systemd notification: readiness and watchdog (Type=notify, WatchdogSec)."""
 
 import asyncio
 import os
@@ -6,13 +6,13 @@ import socket
 from collections.abc import Mapping
 from contextlib import suppress
 
-SHARE = 0.3  # of the watchdog's time between two signs of life
+SHARE = 0.3  # of the watchdog's timeout between two signals
 
 
 def notify(text: str, environment: Mapping[str, str] = os.environ) -> bool:
-    """Tell the service manager, as sd_notify(3) has it; whether it was told.
+    """Notify the service manager as sd_notify(3) does; True if sent.
 
-    One that does not read its socket is not waited for: the loop has other things to do.
+    It does not wait for a manager that does not read its socket.
 
     text   "READY=1", "WATCHDOG=1", "STOPPING=1"
     """
@@ -28,7 +28,7 @@ def notify(text: str, environment: Mapping[str, str] = os.environ) -> bool:
 
 
 def watchdog_seconds(environment: Mapping[str, str] = os.environ) -> float | None:
-    """s within which the manager wants a sign of life of this process; None where it wants none."""
+    """Watchdog timeout of this process, s; None if there is none."""
     if environment.get("WATCHDOG_PID", str(os.getpid())) != str(os.getpid()):
         return None
     text = environment.get("WATCHDOG_USEC", "")
@@ -36,13 +36,16 @@ def watchdog_seconds(environment: Mapping[str, str] = os.environ) -> float | Non
 
 
 async def live(environment: Mapping[str, str] = os.environ) -> None:
-    """Signs of life from the event loop until cancelled: one that hangs gives none, and is started again."""
+    """Send watchdog signals from the event loop until cancelled.
+
+    A loop that hangs sends none, and the process is restarted.
+    """
     notify("READY=1", environment)
-    every = watchdog_seconds(environment)
+    timeout = watchdog_seconds(environment)
     try:
-        while every is not None:
+        while timeout is not None:
             notify("WATCHDOG=1", environment)
-            await asyncio.sleep(SHARE * every)
+            await asyncio.sleep(SHARE * timeout)
         await asyncio.Event().wait()
     finally:
         notify("STOPPING=1", environment)

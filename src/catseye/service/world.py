@@ -1,4 +1,4 @@
-"""What makes a twin: two processes that are given the same make the same truth, and read the same time."""
+"""Options of a twin: equal options make equal truth and time."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,16 +20,16 @@ MOTION = "track 145.3 45"
 
 @dataclass(frozen=True)
 class TwinWords:
-    """A twin in words.
+    """Options of a twin, as text.
 
     start_mjd    UTC, where its seconds begin
-    seed         of every draw
+    seed         of every random draw
     offset       s, of its time against this machine's UTC
-    motion       of the telescope, as people type it
+    motion       of the telescope, as typed
     conditions   name of the weather: night, windy-day, dewy-night
-    faults       as people type them: KIND WHOM [START [END [SIZE]]]
+    faults       as typed: KIND WHOM [START [END [SIZE]]]
 
-    Raises InputError: a motion, weather or fault that there is not.
+    Raises InputError: an unknown motion, weather or fault.
     """
 
     start_mjd: float
@@ -48,11 +48,14 @@ class TwinWords:
 
     @staticmethod
     def starting_now(start_mjd: float, **others: Any) -> "TwinWords":
-        """One whose time is `start_mjd` at this moment."""
+        """Options of a twin whose time is `start_mjd` now."""
         return TwinWords(start_mjd, offset=SystemClock.starting_at(start_mjd).offset, **others)
 
     def late(self, seconds: float) -> "TwinWords":
-        """The same, its time so much earlier: what is made ready until then is ready at the start."""
+        """The same with its time set earlier.
+
+        What is made ready until then is ready at the start.
+        """
         return replace(self, offset=self.offset - seconds)
 
     def clock(self) -> SystemClock:
@@ -60,7 +63,10 @@ class TwinWords:
         return SystemClock(self.offset)
 
     def twin(self, site: SiteFolder) -> Twin:
-        """The truth. Raises InputError: faults on what the site does not have, a motion that it cannot have."""
+        """The twin.
+
+        Raises InputError: faults on devices that the site does not have, an impossible motion.
+        """
         faults = [Fault.parse(text) for text in self.faults]
         for fault in faults:
             _refuse_stranger(fault, site)
@@ -81,7 +87,10 @@ class TwinWords:
 
 
 def twin_heads(twin: Twin, rangers: tuple[str, ...], clock: Clock) -> dict[str, TwinHead]:
-    """A head for each of some rangers; its tracks go as fast as its mirror's record, or a ZY's boot, lets moves go."""
+    """Simulated heads by ranger.
+
+    Their tracks are as fast as the mirror's record, or a ZY's default, permits moves.
+    """
     heads = {}
     for name in rangers:
         mirror = twin.site.mirror_of(name)
@@ -94,20 +103,22 @@ def twin_heads(twin: Twin, rangers: tuple[str, ...], clock: Clock) -> dict[str, 
 
 
 def _refuse_stranger(fault: Fault, site: SiteFolder) -> None:
-    """A fault on nobody would do nothing, and nobody would know."""
+    """Refuse a fault on an unknown device: it would have no effect."""
     whom, _, part = fault.whom.partition(":")
     if fault.kind in ("lying-station", "silent-station"):
-        known, what = [s.name for s in site.site.weather_station], "weather station"
+        names, what = [s.name for s in site.site.weather_station], "weather station"
     elif fault.kind == "silent-telescope":
-        known, what = ["telescope"], "telescope"
+        names, what = ["telescope"], "telescope"
     elif fault.kind == "dew":
-        known, what = list(site.target_names), "target"
+        names, what = list(site.target_names), "target"
     else:
-        known, what = list(site.rangers), "ranger"
-    if whom != "*" and whom not in known:
-        few = f"{', '.join(known[:3])}{', ...' if len(known) > 3 else ''}"
-        raise InputError(f"fault {fault.kind} {fault.whom}: {whom} is no {what} of the site (expected {few} or *)")
+        names, what = list(site.rangers), "ranger"
+    if whom != "*" and whom not in names:
+        few = f"{', '.join(names[:3])}{', ...' if len(names) > 3 else ''}"
+        raise InputError(f"fault {fault.kind} {fault.whom}: unknown {what} {whom} (expected {few} or *)")
     if part and fault.kind in ("stuck-axis", "lost-index") and part not in ("0", "1"):
-        raise InputError(f"fault {fault.kind} {fault.whom}: {part} is no axis (expected 0 azimuth or 1 elevation)")
+        raise InputError(
+            f"fault {fault.kind} {fault.whom}: {part} is not an axis (expected 0 for azimuth or 1 for elevation)"
+        )
     if part and fault.kind in ("blocked-beam", "wrong-target") and part not in site.target_names:
-        raise InputError(f"fault {fault.kind} {fault.whom}: {part} is no target of the site")
+        raise InputError(f"fault {fault.kind} {fault.whom}: unknown target {part}")

@@ -44,8 +44,8 @@ def test_another_version_says_how_far_it_moves_the_answers(catseye, tmp_path):
     status, out, _ = catseye("replay", journal)
     words = " ".join(out.split())
     assert status == 1
-    assert "this version moves the run's answers: points by up to 0.250 mm" in words
-    assert "so it is the software" in words
+    assert "this version changes the run's answers: points by up to 0.250 mm" in words
+    assert "so the software differs" in words
     assert "in stored u" in words
     status, out, _ = catseye("replay", journal, "--json")
     told = json.loads(out)
@@ -84,7 +84,7 @@ def test_a_journal_that_was_changed_is_found_out(catseye, tmp_path):
     connection.close()
     status, out, _ = catseye("replay", journal)
     assert status == 1
-    assert "the first that differs is epoch 1" in " ".join(out.split())
+    assert "the first difference is epoch 1" in " ".join(out.split())
     assert json.loads(catseye("replay", journal, "--json")[1])["cause"] == "journal"
 
 
@@ -92,7 +92,7 @@ def test_a_journal_that_was_changed_is_found_out(catseye, tmp_path):
     ("words", "said"),
     [
         (["none.db"], "none.db"),
-        ([__file__], "no journal"),
+        ([__file__], "is not a journal"),
         (["JOURNAL", "--run", "7"], "run 7 names 0 runs"),
         (["JOURNAL", "--calibrations", "nowhere"], "nowhere"),
     ],

@@ -48,7 +48,7 @@ def test_a_twin_that_dies_comes_back_and_the_end_is_clean(tmp_path, number, stat
         children = [pid for pid in processes_with("--leave-with-stdin") if parent_of(pid) == process.pid]
         assert len(children) == 1
         os.kill(children[0], signal.SIGKILL)
-        assert "started again" in read_until(process, "child")["text"]
+        assert "restarting" in read_until(process, "child")["text"]
         read_until(process, "lost")
         read_until(process, "epoch")
         code, out, _ = ended(process, number)

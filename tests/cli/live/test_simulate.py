@@ -58,10 +58,10 @@ def test_unless_told_otherwise_it_begins_at_night_at_green_bank():
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--fault", "dead-ranger ZY999"], "ZY999 is no ranger of the site"),
-        (["--drop", "ZY999"], "--drop ZY999: no such ranger here"),
+        (["--fault", "dead-ranger ZY999"], "unknown ranger ZY999"),
+        (["--drop", "ZY999"], "--drop ZY999: unknown ranger"),
         (["--journal", "/nowhere/x.db"], "directory /nowhere is missing"),
-        (["--journal", __file__], "no journal"),
+        (["--journal", __file__], "is not a journal"),
     ],
 )
 def test_what_cannot_be_done_is_one_line_and_leaves_nothing(catseye, words, said):

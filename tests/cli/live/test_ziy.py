@@ -31,10 +31,10 @@ def test_what_cannot_be_meant_is_wrong_usage(catseye, words, said):
     ("words", "said"),
     [
         (["--addresses", "none.toml"], "none.toml"),
-        (["--motion-script", "walk"], "is no file that can be read"),
-        (["--drop", "ZY999"], "--drop ZY999: no such ranger here"),
+        (["--motion-script", "walk"], "is not a readable file"),
+        (["--drop", "ZY999"], "--drop ZY999: unknown ranger"),
         (["--keep-out", "none.toml"], "none.toml"),
-        (["--journal", "mysql://there/db"], "cannot be used"),
+        (["--journal", "mysql://there/db"], "is unusable"),
     ],
 )
 def test_what_cannot_be_done_is_one_line_and_status_1(catseye, words, said):
@@ -50,7 +50,7 @@ def test_a_port_that_is_taken_is_named(catseye, tmp_path):
         words = ["--port", str(port), "--motion-script", "fixed 145.3 30", "--mode", "hold", "--quiet"]
         status, _, err = catseye("ziy", small_site(), *words, "--journal", tmp_path / "j.db")
     assert status == 1
-    assert f"ZIY: 127.0.0.1 port {port} cannot be had" in err
+    assert f"ZIY: 127.0.0.1 port {port} is not available" in err
     assert [path.name for path in tmp_path.iterdir()] == ["j.db"]  # no lock of a writer is left
 
 

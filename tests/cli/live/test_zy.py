@@ -54,11 +54,11 @@ def test_what_cannot_be_meant_is_wrong_usage(catseye, words, said):
         (["nowhere", "--twin"], "nowhere"),
         (["SITE", "ZY999", "--twin"], "ZY999 is no ranger of the site"),
         (["SITE", "--twin", "--ports", "0,0"], "18 rangers cannot share two ports"),
-        (["SITE", "--twin", "--fault", "dead-ranger ZY999"], "ZY999 is no ranger of the site"),
+        (["SITE", "--twin", "--fault", "dead-ranger ZY999"], "unknown ranger ZY999"),
         (["SITE", "ZY101", "--head", "nothing_there:card"], "No module named 'nothing_there'"),
         (["SITE", "ZY101", "--head", "nothing"], "expected package.module:factory"),
         (["SITE", "ZY101", "--head", "heads_of_ours:none"], "has no attribute 'none'"),
-        (["SITE", "ZY101", "--head", "heads_of_ours:five"], "five cannot be called"),
+        (["SITE", "ZY101", "--head", "heads_of_ours:five"], "five is not callable"),
         (["SITE", "ZY101", "--head", "heads_of_ours:other"], "(expected a Head)"),
         (["SITE", "ZY101", "ZY102", "--head", "heads_of_ours:card"], "no head for ZY102: no card in the slot"),
     ],
@@ -77,7 +77,7 @@ def test_a_port_that_is_taken_is_named(catseye):
         port = taken.getsockname()[1]
         status, _, err = catseye("zy", small_site(), "ZY101", "--twin", "--cold", "--ports", f"{port},0")
     assert status == 1
-    assert f"ZY101: 127.0.0.1 port {port} cannot be had" in err
+    assert f"ZY101: 127.0.0.1 port {port} is not available" in err
 
 
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 0), (signal.SIGINT, 130)])

@@ -1,4 +1,4 @@
-"""Who comes in at the coordinator's port, and how long answers are given: places, keys, first bytes, idle, slices."""
+"""Access to the coordinator's port: places, keys, first bytes, idle, partial answers."""
 
 import asyncio
 import logging
@@ -34,7 +34,7 @@ def words(raw):
     return [line.split("\t")[-1].split()[0] for line in raw.got.decode().splitlines() if line]
 
 
-def test_peers_without_the_key_take_no_place_and_are_few():
+def test_unauthenticated_peers_are_few_and_occupy_no_place():
     """Attack: 64 sockets that never gave the key kept everybody out."""
 
     async def story():
@@ -77,7 +77,7 @@ def test_clients_that_never_say_a_line_keep_nobody_out():
 
 
 @pytest.mark.parametrize("right", [True, False])
-def test_a_key_is_proved_not_sent_and_a_wrong_one_is_answered_late(right, caplog):
+def test_key_is_proved_not_sent_and_a_wrong_one_is_answered_late(right, caplog):
     async def story():
         async with Locked() as site:
             raw = await site.raw()
@@ -103,7 +103,7 @@ def test_a_key_is_proved_not_sent_and_a_wrong_one_is_answered_late(right, caplog
     ("first", "answered"),
     [(b"\x00\x01\x00\x08\x21\x12\xa4\x42", False), (b"\x16\x03\x01", False), (b"EHLO mail\nMODE active\n", True)],
 )
-def test_what_is_no_command_of_the_port_is_closed_at_once_and_logged(first, answered, caplog):
+def test_connection_with_a_foreign_first_line_is_closed_and_logged(first, answered, caplog):
     caplog.set_level(logging.WARNING)
 
     async def story():
@@ -120,7 +120,7 @@ def test_what_is_no_command_of_the_port_is_closed_at_once_and_logged(first, answ
     run(story)
 
 
-def test_a_client_that_says_nothing_for_long_is_closed_and_one_that_keeps_alive_is_not():
+def test_silent_client_is_closed_and_one_with_keep_alives_is_not():
     async def story():
         async with Locked(idle=300.0) as site:
             mute, alive = await site.client(key=KEY), await site.client(key=KEY)
@@ -134,7 +134,7 @@ def test_a_client_that_says_nothing_for_long_is_closed_and_one_that_keeps_alive_
     run(story, 600.0)
 
 
-def test_a_long_answer_comes_in_slices_and_keeps_nobody_waiting():
+def test_long_answer_is_sent_in_parts_without_delaying_others():
     async def story():
         async with Served(mode="hold", ready=False) as site:
             for k in range(2000):
@@ -153,7 +153,7 @@ def test_a_long_answer_comes_in_slices_and_keeps_nobody_waiting():
     run(story)
 
 
-def test_a_client_that_leaves_amid_its_answer_costs_nothing():
+def test_client_may_disconnect_during_its_answer():
     async def story():
         async with Served(mode="hold", ready=False) as site:
             for k in range(2000):
@@ -169,7 +169,7 @@ def test_a_client_that_leaves_amid_its_answer_costs_nothing():
     run(story)
 
 
-def test_a_lease_is_a_connections_with_its_token():
+def test_lease_belongs_to_a_connection_with_its_token():
     async def story():
         async with Served(mode="hold", ready=False) as site:
             anna, other, ben = await site.client(), await site.client(), await site.client()

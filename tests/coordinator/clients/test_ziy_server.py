@@ -1,4 +1,4 @@
-"""The coordinator's port: what a person, a display and M&C get, and what a bad client costs."""
+"""The coordinator's port for people, displays and M&C, and cost of bad clients."""
 
 import asyncio
 import random
@@ -6,7 +6,7 @@ import random
 import pytest
 
 from catseye.coordinator.clients.board import HELP
-from catseye.coordinator.clients.samplers import COLUMNS, KEPT, Samplers
+from catseye.coordinator.clients.samplers import COLUMNS, RING_LENGTH, Samplers
 from catseye.coordinator.clients.server import KINDS, MOST_CLIENTS, MOST_UNSENT, ZiyServer
 from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
 from catseye.errors import InputError
@@ -65,7 +65,7 @@ def shot(number, ranger="ZY101", status="used"):
     )
 
 
-def test_a_person_on_nc_can_ask_and_is_answered_in_lines():
+def test_port_can_be_used_from_nc():
     async def story():
         async with Served(mode="hold", ready=False) as site:
             nc = await site.raw()
@@ -76,7 +76,7 @@ def test_a_person_on_nc_can_ask_and_is_answered_in_lines():
             assert bodies[1] == f"CONNECT 1, {site.server.port}"
             assert bodies[2] == (
                 "STATUS 1, hold, 0 of 2, 0, 0, 0, known, well, stopped, none, well, none, nobody, "
-                "mode hold: nothing is fired"
+                "mode hold: no shots are taken"
             )
             assert bodies[3].removeprefix("HLP 1, ").split() == list(HELP)
             assert bodies[4].startswith("HLP 1, SAMPLER name | SAMPLER name; n, ")
@@ -89,7 +89,7 @@ def test_a_person_on_nc_can_ask_and_is_answered_in_lines():
     run(story)
 
 
-def test_rangers_and_status_say_how_things_stand():
+def test_rangers_and_status_report_the_condition():
     async def story():
         async with Served() as site:
             await until(lambda: site.live.epochs >= 2)
@@ -111,7 +111,7 @@ def test_rangers_and_status_say_how_things_stand():
     run(story)
 
 
-def test_a_display_is_pushed_what_it_subscribed_and_no_more():
+def test_subscriber_receives_only_its_kinds():
     async def story():
         async with Served() as site:
             shots, events, nothing = [], [], []
@@ -144,7 +144,7 @@ def test_a_display_is_pushed_what_it_subscribed_and_no_more():
     run(story)
 
 
-def test_kinds_are_subscribed_with_blanks_between_as_with_commas():
+def test_kinds_may_be_separated_by_blanks_or_commas():
     async def story():
         async with Served() as site:
             one = await site.client()
@@ -157,7 +157,7 @@ def test_kinds_are_subscribed_with_blanks_between_as_with_commas():
     run(story)
 
 
-def test_only_what_is_durable_is_pushed():
+def test_only_durable_entries_are_pushed():
     async def story():
         async with Served() as site:
             heard = []
@@ -225,7 +225,7 @@ def test_commands_of_the_coordinator_itself():
     run(story)
 
 
-def test_who_has_no_lease_asks_and_does_not_command():
+def test_client_without_the_lease_may_only_query():
     async def story():
         async with Served() as site:
             heard = []
@@ -259,7 +259,7 @@ def test_who_has_no_lease_asks_and_does_not_command():
     run(story)
 
 
-def test_a_key_is_asked_for_first():
+def test_key_is_required_first():
     async def story():
         async with Served() as site:
             await site.server.stop()
@@ -283,7 +283,7 @@ def test_a_key_is_asked_for_first():
 
 
 def test_samplers_keep_the_last_values_with_their_times():
-    samplers = Samplers(kept=5)
+    samplers = Samplers(length=5)
     for number in range(12):
         samplers.add(shot(number))
     assert [row[1] for row in samplers.last("RANGES", 3)] == ["9", "10", "11"]
@@ -313,13 +313,13 @@ def test_samplers_answer_over_the_port():
             assert [r.values[0] for r in rows] == ["RANGES"] * 3
             numbers = [int(r.values[2]) for r in rows]
             assert numbers == sorted(numbers)
-            for wrong in (("x",), ("RANGES", 0), ("RANGES", KEPT + 1), ("RANGES", "-1")):
+            for wrong in (("x",), ("RANGES", 0), ("RANGES", RING_LENGTH + 1), ("RANGES", "-1")):
                 assert (await client.ask("SAMPLER", *wrong)).ok is False
 
     run(story)
 
 
-def test_a_slow_client_is_cut_off_and_costs_the_others_nothing():
+def test_slow_client_is_cut_off_without_cost_to_others():
     async def story():
         async with Served(mode="hold", ready=False) as site:
             slow, quick = await site.raw(), await site.raw()
@@ -339,7 +339,7 @@ def test_a_slow_client_is_cut_off_and_costs_the_others_nothing():
     run(story)
 
 
-def test_lines_too_long_too_many_and_clients_too_many_are_bounded():
+def test_line_length_line_rate_and_clients_are_limited():
     async def story():
         async with Served(mode="hold", ready=False) as site:
             long = await site.raw()
@@ -360,7 +360,7 @@ def test_lines_too_long_too_many_and_clients_too_many_are_bounded():
     run(story)
 
 
-def test_keep_alives_come_every_minute():
+def test_keep_alives_are_sent_every_minute():
     async def story():
         async with Served(mode="hold", ready=False) as site:
             nc = await site.raw()
@@ -413,18 +413,18 @@ def test_random_lines_from_clients_do_no_harm():
 
 
 @pytest.mark.slow
-def test_a_hundred_thousand_random_lines_from_clients_do_no_harm():
+def test_100000_random_lines_from_clients_do_no_harm():
     babble(100_000, 4)
 
 
-def test_a_real_socket_is_served_and_a_port_that_is_taken_is_refused_in_one_line():
+def test_real_socket_works_and_an_occupied_port_is_refused_in_one_line():
     from catseye.errors import InputError
 
     async def story():
         async with Site(mode="hold", ready=False) as site:
             server = ZiyServer(site.ziy, port=0)
             await server.start()
-            with pytest.raises(InputError, match="cannot be had"):
+            with pytest.raises(InputError, match="is not available"):
                 await ZiyServer(site.ziy, port=server.port).start()
             client = await ZyClient.connect(LOOPBACK, server.port)
             assert (await client.ask("MODE")).text == "hold"

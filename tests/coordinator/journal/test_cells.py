@@ -1,4 +1,4 @@
-"""A journal with bytes that are no text in any column: one line that names the file, from every reader of it."""
+"""Journals with bytes in text columns: one line with the file, from every reader."""
 
 import shutil
 import sqlite3
@@ -112,7 +112,7 @@ def refused_or_read(action, path):
 
 
 @pytest.mark.parametrize("how", BYTES)
-def test_bytes_in_a_column_that_is_read_are_refused_with_the_file(whole, tmp_path, how):
+def test_bytes_in_a_text_column_are_refused_with_the_file(whole, tmp_path, how):
     tried = 0
     for table, column in COLUMNS:
         path = damaged(whole, tmp_path, table, column, how)

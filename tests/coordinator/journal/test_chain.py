@@ -1,4 +1,4 @@
-"""A journal as evidence: what was changed, taken out, put in or cut is found, and what is whole is not lost."""
+"""Verification of journals: altered, removed, inserted or cut entries are detected."""
 
 import shutil
 import sqlite3
@@ -53,7 +53,7 @@ def night(tmp_path_factory):
     return path, entries, written(path, entries)
 
 
-def test_what_was_not_touched_checks_with_all_its_heads(night):
+def test_unaltered_journal_verifies_with_all_its_heads(night):
     path, entries, heads = night
     report = report_of(path, heads)
     assert report.intact
@@ -68,34 +68,38 @@ def test_what_was_not_touched_checks_with_all_its_heads(night):
 @pytest.mark.parametrize(
     ("script", "first", "words"),
     [
-        ("UPDATE shots SET phase_rad = phase_rad + 1e-15 WHERE seq = 9", 9, "event 9 is not what was written"),
-        ("UPDATE postures SET elevation_rate_rad_s = 0.0 WHERE seq = 8", 8, "event 8 is not"),  # it was -0.0
-        ("UPDATE weather SET pressure_hpa = NULL WHERE seq = 3", 3, "event 3 is not"),
-        ("UPDATE weather SET humidity_percent = '70.4' WHERE seq = 3", 3, "event 3 is not"),
-        ("UPDATE commands SET ok = 1 WHERE seq = 6", 6, "event 6 is not"),
-        ("UPDATE commands SET ok = NULL WHERE seq = 6", 6, "event 6 is not"),
-        ("UPDATE solutions SET answer = answer || ' ' WHERE seq = 4", 4, "event 4 is not"),
-        ("UPDATE solutions SET covariance = NULL WHERE seq = 4", 4, "event 4 is not"),
-        ("UPDATE buffers SET samples = zeroblob(128) WHERE seq = 2", 2, "event 2 is not"),
-        ("UPDATE buffers SET crc32 = 0 WHERE seq = 2", 2, "event 2 is not"),
-        ("DELETE FROM buffers WHERE seq = 2", 2, "event 2 is not"),
+        ("UPDATE shots SET phase_rad = phase_rad + 1e-15 WHERE seq = 9", 9, "event 9 or its link was altered"),
+        (
+            "UPDATE postures SET elevation_rate_rad_s = 0.0 WHERE seq = 8",
+            8,
+            "event 8 or its link was altered",
+        ),  # it was -0.0
+        ("UPDATE weather SET pressure_hpa = NULL WHERE seq = 3", 3, "event 3 or its link was altered"),
+        ("UPDATE weather SET humidity_percent = '70.4' WHERE seq = 3", 3, "event 3 or its link was altered"),
+        ("UPDATE commands SET ok = 1 WHERE seq = 6", 6, "event 6 or its link was altered"),
+        ("UPDATE commands SET ok = NULL WHERE seq = 6", 6, "event 6 or its link was altered"),
+        ("UPDATE solutions SET answer = answer || ' ' WHERE seq = 4", 4, "event 4 or its link was altered"),
+        ("UPDATE solutions SET covariance = NULL WHERE seq = 4", 4, "event 4 or its link was altered"),
+        ("UPDATE buffers SET samples = zeroblob(128) WHERE seq = 2", 2, "event 2 or its link was altered"),
+        ("UPDATE buffers SET crc32 = 0 WHERE seq = 2", 2, "event 2 or its link was altered"),
+        ("DELETE FROM buffers WHERE seq = 2", 2, "event 2 or its link was altered"),
         ("DELETE FROM weather WHERE seq = 3", 3, "event 3 is missing"),
         ("DELETE FROM weather WHERE seq = 3; DELETE FROM chain WHERE seq = 3", 3, "event 3 is missing"),
         ("DELETE FROM chain WHERE seq BETWEEN 20 AND 29", 20, "event 20 has no link"),
-        ("UPDATE chain SET link = zeroblob(32) WHERE seq = 12", 12, "event 12 is not what was written, or its link"),
-        ("UPDATE chain SET kind = 'refused' WHERE seq = 12", 12, "event 12 was refused, and is there"),
+        ("UPDATE chain SET link = zeroblob(32) WHERE seq = 12", 12, "event 12 or its link was altered"),
+        ("UPDATE chain SET kind = 'refused' WHERE seq = 12", 12, "event 12 was refused, but exists"),
         ("UPDATE chain SET kind = 'else' WHERE seq = 12", 12, "event 12"),
         ("INSERT INTO postures VALUES (1, 900, 1, 1.0, 1.0, 1.0, 1.0)", 166, "are missing"),
-        ("INSERT INTO postures VALUES (1, 9, 1, 1.0, 1.0, 1.0, 1.0)", 9, "event 9 is not"),
-        ("UPDATE runs SET seed = 9", 0, "the run's own record"),
-        ("UPDATE runs SET ended_ticks = ended_ticks + 1", 165, "the end is not what was written"),
-        ("UPDATE texts SET text = text || ' ' WHERE text LIKE '%monument%'", 0, "is not what was written"),
+        ("INSERT INTO postures VALUES (1, 9, 1, 1.0, 1.0, 1.0, 1.0)", 9, "event 9 or its link was altered"),
+        ("UPDATE runs SET seed = 9", 0, "the run's record"),
+        ("UPDATE runs SET ended_ticks = ended_ticks + 1", 165, "the end or its link was altered"),
+        ("UPDATE texts SET text = text || ' ' WHERE text LIKE '%monument%'", 0, "of the run was altered"),
         ("DELETE FROM run_files WHERE path = 'site.toml'", 0, "the list of its files"),
         ("DELETE FROM chain WHERE kind = 'end'", 165, "its chain stops at event"),
         ("DELETE FROM chain WHERE seq = 0", 0, "first link is missing"),
     ],
 )
-def test_each_alteration_is_named_with_the_event_from_which_on(night, tmp_path, script, first, words):
+def test_alterations_are_reported_with_their_first_event(night, tmp_path, script, first, words):
     path, entries, _ = night
     assert len(entries) == 164  # the numbers above
     report = report_of(altered(path, tmp_path / "altered.db", script))
@@ -104,7 +108,7 @@ def test_each_alteration_is_named_with_the_event_from_which_on(night, tmp_path, 
     assert any(words in problem for problem in report.problems)
 
 
-def test_a_history_written_anew_is_found_by_the_heads_that_were_told(night, tmp_path):
+def test_rewritten_history_is_detected_from_published_heads(night, tmp_path):
     """Whole in itself: only what was kept elsewhere tells."""
     path, entries, heads = night
     other = tmp_path / "other.db"
@@ -120,7 +124,7 @@ def test_a_history_written_anew_is_found_by_the_heads_that_were_told(night, tmp_
         parted(one, two, one.run().uuid)
 
 
-def test_two_copies_that_went_different_ways_part_where_they_did(night, tmp_path):
+def test_first_difference_of_two_copies_is_located(night, tmp_path):
     """A forger who makes the links again from event 60 on: the copy tells where."""
     from catseye.coordinator.journal.chain import LinkKind, event_cells, link_of
     from catseye.coordinator.journal.check import _piece
@@ -144,7 +148,7 @@ def test_two_copies_that_went_different_ways_part_where_they_did(night, tmp_path
     assert 60 < parting[0]["parts_at_event"] < 64
 
 
-def test_a_journal_cut_behind_a_head_that_was_told_is_found(night, tmp_path):
+def test_truncation_is_detected_from_a_published_head(night, tmp_path):
     path, _entries, heads = night
     script = "UPDATE runs SET ended_ticks = NULL;" + "".join(f"DELETE FROM {t} WHERE seq > 100;" for t in TABLES)
     cut = altered(path, tmp_path / "cut.db", script)
@@ -156,7 +160,7 @@ def test_a_journal_cut_behind_a_head_that_was_told_is_found(night, tmp_path):
     assert "a head of event" in report.problems[-1]
 
 
-def test_a_refused_entry_has_a_link_that_says_so(tmp_path):
+def test_refused_entry_has_a_link_of_its_kind(tmp_path):
     path = tmp_path / "j.db"
     with Journal.open(path, run=scene_run(), clock=ManualClock(START / 1e8)) as journal:
         journal.append(scene_answer(1)).result(MOST_WAIT)
@@ -171,7 +175,7 @@ def test_a_refused_entry_has_a_link_that_says_so(tmp_path):
     assert report_of(forged).problems == ["event 2 is missing"]
 
 
-def test_a_killed_run_has_no_end_and_the_next_one_hangs_on_it(tmp_path, night):
+def test_killed_run_has_no_end_and_is_linked_to_the_next(tmp_path, night):
     path = tmp_path / "two.db"
     shutil.copy(night[0], path)
     written(path, scene_entries(5, seed=3))
@@ -186,7 +190,7 @@ def test_a_killed_run_has_no_end_and_the_next_one_hangs_on_it(tmp_path, night):
     assert report_of(gone, run=2).first == 0  # the run before it is missing
 
 
-def test_an_old_journal_opens_and_says_that_it_has_no_chain(tmp_path):
+def test_old_journal_is_reported_as_unchained(tmp_path):
     old = tmp_path / "old.db"
     shutil.copy(TESTS / "vectors" / "formats" / "journal-1.db", old)
     assert (report_of(old).chained, report_of(old).count) == (False, 0)
@@ -196,7 +200,7 @@ def test_an_old_journal_opens_and_says_that_it_has_no_chain(tmp_path):
     assert report_of(old, run=3).chained
 
 
-def test_the_chain_of_version_2_always_checks():
+def test_chain_of_version_2_verifies():
     """Its links were made by the release that made the version."""
     frozen = TESTS / "vectors" / "formats" / "journal-2.db"
     for run, head in ((1, "51:b85e04bef69ad5b2"), (2, "51:094912ae5c0d374b")):
@@ -205,7 +209,7 @@ def test_the_chain_of_version_2_always_checks():
         assert report.heads == 1
 
 
-def test_heads_are_read_as_they_are_told():
+def test_heads_survive_the_round_trip_through_text():
     assert Head.parse(" 12:5F0C3B1E9A7D2C44 ") == Head(12, "5f0c3b1e9a7d2c44")
     for text in ("12", "x:5f0c3b1e", "12:5f0", "12:5f0c3b1g", ":5f0c3b1e"):
         with pytest.raises(InputError, match="expected EVENT:HASH"):
@@ -253,7 +257,7 @@ def damage(kind, path, other, rng):
 
 
 @pytest.mark.parametrize("count", [40, pytest.param(200, marks=pytest.mark.slow)])
-def test_every_damage_that_alters_a_number_is_found_and_what_is_whole_is_not_lost(night, tmp_path, count):
+def test_altered_numbers_are_detected_and_intact_events_kept(night, tmp_path, count):
     path, entries, heads = night
     other = tmp_path / "other.db"
     written(other, scene_entries(40, seed=9))
@@ -299,7 +303,7 @@ def rotated(tmp_path_factory):
     return folder, entries, heads
 
 
-def test_a_run_in_several_files_is_one(rotated):
+def test_rotated_run_is_read_as_one(rotated):
     folder, entries, heads = rotated
     files = sorted(folder.glob("site*.db"))
     assert len(files) > 3
@@ -314,7 +318,7 @@ def test_a_run_in_several_files_is_one(rotated):
             assert (report.events, report.heads) == (len(entries), len(heads))
 
 
-def test_a_file_of_a_run_that_was_changed_swapped_or_is_missing_is_told(rotated, tmp_path):
+def test_altered_swapped_or_missing_files_of_a_run_are_reported(rotated, tmp_path):
     folder, _entries, heads = rotated
     for name in ("changed", "swapped", "missing"):
         shutil.copytree(folder, tmp_path / name)
@@ -331,13 +335,13 @@ def test_a_file_of_a_run_that_was_changed_swapped_or_is_missing_is_told(rotated,
     written(tmp_path / "else" / "site.db", scene_entries(60, seed=4), together=20, rotate_bytes=400_000)
     patch.undo()
     shutil.copy(tmp_path / "else" / "site-3.db", tmp_path / "swapped" / "site-3.db")
-    assert "does not go on where" in " ".join(report_of(tmp_path / "swapped" / "site.db").problems)
+    assert "does not continue where" in " ".join(report_of(tmp_path / "swapped" / "site.db").problems)
     (tmp_path / "missing" / "site-3.db").unlink()
     with JournalReader(tmp_path / "missing" / "site.db") as reader, pytest.raises(InputError, match=r"site-3\.db"):
         list(reader.events(1))
 
 
-def test_where_no_other_file_can_be_had_the_run_goes_on_in_its_own(tmp_path, monkeypatch):
+def test_failed_rotation_continues_in_the_same_file(tmp_path, monkeypatch):
     monkeypatch.setattr(journal_writer, "LOOK", 0.0)
 
     def none(*_, **__):
@@ -351,12 +355,12 @@ def test_where_no_other_file_can_be_had_the_run_goes_on_in_its_own(tmp_path, mon
             journal.append(entry).result(MOST_WAIT)
         assert journal.trouble is None
     assert len(said) == 1
-    assert "goes on in" in said[0]
+    assert "continues in" in said[0]
     assert [path.name for path in tmp_path.iterdir()] == ["j.db"]
     assert report_of(tmp_path / "j.db").events == len(entries)
 
 
-def test_at_noon_the_night_is_over(tmp_path, monkeypatch):
+def test_nightly_rotation_is_at_noon(tmp_path, monkeypatch):
     monkeypatch.setattr(journal_writer, "LOOK", 0.0)
     clock = ManualClock(61000.49)
     more = {"settings": JournalSettings(rotate_nightly=True)}
@@ -370,7 +374,7 @@ def test_at_noon_the_night_is_over(tmp_path, monkeypatch):
     assert report_of(tmp_path / "j.db").intact
 
 
-def test_a_copy_made_while_it_is_written_is_whole(tmp_path):
+def test_copy_made_during_writing_verifies(tmp_path):
     path, copy = tmp_path / "j.db", tmp_path / "copy.db"
     with Journal.open(path, run=scene_run(), clock=ManualClock(START / 1e8)) as journal:
         journal.append(*scene_entries(30)).result(MOST_WAIT)
@@ -381,6 +385,6 @@ def test_a_copy_made_while_it_is_written_is_whole(tmp_path):
     assert report.head.seq == report.events
     with JournalReader(copy) as one, JournalReader(path) as two:
         assert parted(one, two, one.run().uuid) == (None, report.head.seq)
-    with pytest.raises(InputError, match="is there already"):
+    with pytest.raises(InputError, match="already exists"):
         copied(str(path), copy, progress=lambda *a: None)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["copy.db", "j.db"]

@@ -1,4 +1,4 @@
-"""The disk under a journal: foretold, warned of, stopped for in order, and gone on with."""
+"""Watch of the journal's disk: prediction, warnings, stop and resumption."""
 
 from pathlib import Path
 
@@ -32,7 +32,7 @@ class Disk:
         return [(what.kind, what.severity) for what in self.said]
 
 
-def test_a_disk_that_does_not_fill_is_nothing_to_tell():
+def test_disk_that_does_not_fill_is_not_reported():
     disk = Disk(5 * GB)
     assert disk.run(600, 0.0).seconds == float("inf")
     assert disk.run(600, -1e6).seconds == float("inf")
@@ -40,7 +40,7 @@ def test_a_disk_that_does_not_fill_is_nothing_to_tell():
     assert disk.held == []
 
 
-def test_the_end_is_foretold_from_the_rate_of_the_last_minutes():
+def test_full_disk_is_predicted_from_the_recent_rate():
     disk = Disk(101 * GB)
     state = disk.run(600, 2e6)
     assert state.rate == pytest.approx(2e6)
@@ -49,7 +49,7 @@ def test_the_end_is_foretold_from_the_rate_of_the_last_minutes():
     assert "measuring stops in 13.9 h" in disk.said[0].text
 
 
-def test_it_is_told_a_day_and_an_hour_before_then_firing_stops_then_goes_on():
+def test_warnings_a_day_and_an_hour_before_then_stop_and_resume():
     disk = Disk(20 * GB)
     disk.run(600, 1e5)  # two days
     assert disk.kinds == []
@@ -61,7 +61,7 @@ def test_it_is_told_a_day_and_an_hour_before_then_firing_stops_then_goes_on():
     disk.run(2000, 1e7)
     assert disk.kinds[-1] == ("disk-full", "alarm")
     assert len(disk.held) == 1
-    assert "expected 1000 MB at least" in disk.held[0]
+    assert "expected at least 1000 MB" in disk.held[0]
     disk.free = 1.2 * GB  # a little room is not yet enough
     disk.run(10, 0.0)
     assert len(disk.held) == 1
@@ -71,7 +71,7 @@ def test_it_is_told_a_day_and_an_hour_before_then_firing_stops_then_goes_on():
     assert disk.kinds[-1] == ("disk-full-over", "note")
 
 
-def test_a_journal_that_is_held_asks_for_no_shots_and_writes_what_comes(tmp_path):
+def test_held_journal_refuses_shots_but_writes_entries(tmp_path):
     with Journal.open(tmp_path / "j.db", run=scene_run(), clock=ManualClock(START / 1e8)) as journal:
         journal.hold("the disk is nearly full")
         assert journal.trouble == "the disk is nearly full"

@@ -1,4 +1,4 @@
-"""Movement of answers, worked on paper: sizes in their unit and in stored u, and of what in which epoch."""
+"""Differences of answers, worked by hand: in their units, in stored u, by epoch."""
 
 import math
 
@@ -21,7 +21,7 @@ def moved(*pairs, stations=("WX1",), moves=()):
     return movements.found
 
 
-def test_points_move_in_metres_and_in_u():
+def test_point_differences_in_metres_and_in_u():
     """A by (3, 4, 0) mm where u is 1, 8 and 0 mm; B not at all, u 1 mm: 5 mm at most, 3 u, of which no u 0 is."""
     covariance = np.diag(np.array([1e-3, 8e-3, 0.0, 1e-3, 1e-3, 1e-3]) ** 2)
     stored = solution(4, [[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]], covariance)
@@ -34,7 +34,7 @@ def test_points_move_in_metres_and_in_u():
     assert found.rms_u == pytest.approx(math.sqrt((3.0**2 + 0.5**2) / 5.0), rel=1e-12)
 
 
-def test_the_epoch_that_moves_furthest_is_named_and_all_count():
+def test_largest_difference_names_its_epoch():
     still = [[0.0] * 3] * 2
     shifts = {1: 0.5, 2: -2.0, 3: 1.0}
     pairs = [
@@ -46,20 +46,20 @@ def test_the_epoch_that_moves_furthest_is_named_and_all_count():
     assert found.rms == pytest.approx(math.sqrt((0.25 + 4.0 + 1.0) / 6.0), rel=1e-12)
 
 
-def test_without_a_stored_covariance_nothing_is_said_in_u():
+def test_without_a_stored_covariance_there_is_no_ratio_to_u():
     stored, new = solution(1, [[0.0] * 3] * 2, None), solution(1, [[1.0, 0.0, 0.0], [0.0] * 3], None)
     found = moved((stored, new))[Moving.POINTS]
     assert (found.largest.size, found.largest_u, found.normalised) == (1.0, None, 0)
     assert math.isnan(found.rms_u)
 
 
-def test_a_point_that_one_of_them_lacks_or_that_is_no_number_is_not_compared():
+def test_missing_or_nonfinite_points_are_not_compared():
     stored = EpochSolution(1, {"number": 1, "names": ["A", "C"], "x": [[0.0] * 3] * 2}, np.eye(6))
     new = solution(1, [[None, 0.0, 0.0], [9.0] * 3], None)
     assert moved((stored, new)) == {}
 
 
-def test_thermometers_zeros_beam_focus_and_ranges_have_their_own():
+def test_thermometers_zeros_beam_focus_and_ranges_are_compared():
     """WX1 by 0.02 of u 0.1, "bend" is no thermometer; a zero by 1e-5 of u 2e-5; the beam by 1e-6 of 2e-6 rad."""
     x, pose = [[0.0] * 3] * 2, {"covariance": np.diag([4e-12, 4e-12, 1e-8]).tolist()}
     before = {"air": {"WX1": [0.5, 0.1], "bend": [0.0, 1.0]}, "zeros": {"ZY1": [0.0, 2e-5]}}
@@ -78,7 +78,7 @@ def test_thermometers_zeros_beam_focus_and_ranges_have_their_own():
     assert list(found) == list(Moving)
 
 
-def test_a_pose_that_is_not_known_is_not_compared():
+def test_unknown_pose_is_not_compared():
     unknown = {"covariance": [[None] * 3] * 3, "offset": [None] * 3}
     stored = solution(1, [[0.0] * 3] * 2, None, pose=unknown)
     assert Moving.BEAM not in moved((stored, stored))

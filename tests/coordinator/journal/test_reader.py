@@ -1,4 +1,4 @@
-"""The journal read: whole or not, while it is written, after a crash, damaged, foreign."""
+"""Journal reader: during writing, after a crash, damaged or foreign files."""
 
 import os
 import shutil
@@ -40,7 +40,7 @@ def test_journals_of_all_versions_always_load(frozen):
 
 
 @pytest.mark.parametrize("piece", [1, 3, 7, 512])
-def test_the_size_of_the_pieces_changes_nothing(tmp_path, monkeypatch, piece):
+def test_piece_size_does_not_matter(tmp_path, monkeypatch, piece):
     entries = scene_entries(12)
     written(tmp_path / "j.db", entries)
     monkeypatch.setattr(journal_reader, "PIECE", piece)
@@ -51,7 +51,7 @@ def test_the_size_of_the_pieces_changes_nothing(tmp_path, monkeypatch, piece):
             assert found == list(range(after + 1, (until or len(entries)) + 1))
 
 
-def test_kinds_are_chosen(tmp_path):
+def test_kinds_can_be_selected(tmp_path):
     entries = scene_entries(12)
     written(tmp_path / "j.db", entries)
     with JournalReader(tmp_path / "j.db") as reader:
@@ -72,7 +72,7 @@ def test_kinds_are_chosen(tmp_path):
         assert all(shot.shot.samples is None for _, shot in reader.shots(1, buffers=False))
 
 
-def test_a_killed_writers_journal_is_read_without_a_writer(tmp_path):
+def test_journal_of_a_killed_writer_is_readable(tmp_path):
     """Its log was never folded in; a reader must not need to write it."""
     code = (
         "import os, sys\nfrom journal_scene import scene_entries, scene_run, START\n"
@@ -97,7 +97,7 @@ def test_a_killed_writers_journal_is_read_without_a_writer(tmp_path):
         assert len(found) < len(entries)
 
 
-def test_a_torn_file_gives_what_is_whole_and_then_one_line(tmp_path):
+def test_torn_file_gives_intact_events_then_one_line(tmp_path):
     whole = written(tmp_path / "whole.db", scene_entries(400), settings=JournalSettings(keep_buffers=False))
     size, told = whole.stat().st_size, []
     for part in (0.03, 0.2, 0.4, 0.6, 0.8, 0.97):
@@ -115,7 +115,7 @@ def test_a_torn_file_gives_what_is_whole_and_then_one_line(tmp_path):
     assert set(told) <= {"database disk image is malformed", "disk I/O error", "file is not a database"}
 
 
-def test_samples_that_changed_on_the_disk_are_told(tmp_path):
+def test_altered_samples_are_reported(tmp_path):
     path = written(tmp_path / "j.db", [scene_answer(k) for k in range(5)])
     packed = written(tmp_path / "p.db", [scene_answer(k) for k in range(5)], settings=JournalSettings(compress=True))
     for where in (path, packed):
@@ -131,7 +131,7 @@ def test_samples_that_changed_on_the_disk_are_told(tmp_path):
             list(reader.events(1))
 
 
-def test_what_is_no_journal_is_refused_in_one_line(tmp_path):
+def test_other_files_are_refused_in_one_line(tmp_path):
     (tmp_path / "empty.db").touch()
     (tmp_path / "text.db").write_text("hello\n")
     sqlite3.connect(tmp_path / "none.db").execute("CREATE TABLE notes (a)").connection.close()
@@ -141,8 +141,8 @@ def test_what_is_no_journal_is_refused_in_one_line(tmp_path):
     connection.close()
     cases = {
         "empty.db": "starts with b''",
-        "text.db": r"starts with b'hello\\n': no journal",
-        "none.db": "holds other tables, such as 'notes'",
+        "text.db": r"is not a journal: it starts with b'hello\\n'",
+        "none.db": "it has other tables, such as 'notes'",
         "newer.db": "version 9 is newer than 2",
         "missing.db": "file is missing",
         ".": "is not a file",
@@ -153,7 +153,7 @@ def test_what_is_no_journal_is_refused_in_one_line(tmp_path):
     assert not (tmp_path / "missing.db").exists()
 
 
-def test_a_file_name_with_signs_of_a_url_is_a_file_name(tmp_path):
+def test_file_name_with_url_characters_is_a_file_name(tmp_path):
     path = tmp_path / "night 7?mode=ro&x=%41#1.db"
     written(path, scene_entries(2))
     with JournalReader(path) as reader:
@@ -161,7 +161,7 @@ def test_a_file_name_with_signs_of_a_url_is_a_file_name(tmp_path):
     assert [found.name for found in tmp_path.iterdir()] == [path.name]
 
 
-def test_a_site_file_outside_its_folder_is_refused(tmp_path):
+def test_site_file_outside_its_folder_is_refused(tmp_path):
     written(tmp_path / "j.db", [], run=scene_run(extra={"../../escaped.txt": "x"}))
     with JournalReader(tmp_path / "j.db") as reader, pytest.raises(InputError, match="outside its site"):
         reader.site(1)

@@ -1,4 +1,4 @@
-"""A journal that SQLite cannot read any more: what is there is read page by page, and nothing else."""
+"""Recovery of journals that SQLite cannot read, page by page."""
 
 import shutil
 import sqlite3
@@ -65,7 +65,7 @@ def read(path):
         return {seq: plainly(entry) for seq, entry in reader.events(1)}, check_whole(reader, 1)
 
 
-def test_of_a_whole_journal_every_row_is_read_to_the_last_bit(whole, tmp_path):
+def test_intact_journal_is_recovered_to_the_last_bit(whole, tmp_path):
     path, entries = whole
     recovery = recover(path, tmp_path / "new.db")
     assert (recovery.lost, recovery.missing) == (0, 0)
@@ -76,7 +76,7 @@ def test_of_a_whole_journal_every_row_is_read_to_the_last_bit(whole, tmp_path):
 
 
 @pytest.mark.parametrize("size", [512, 1024, 4096, 65536])
-def test_pages_of_every_size_are_read(whole, tmp_path, size):
+def test_pages_of_all_sizes_are_read(whole, tmp_path, size):
     path = tmp_path / "other.db"
     shutil.copy(whole[0], path)
     with sqlite3.connect(path) as connection:
@@ -87,7 +87,7 @@ def test_pages_of_every_size_are_read(whole, tmp_path, size):
     assert stored(tmp_path / "new.db") == stored(whole[0])
 
 
-def test_what_only_the_log_of_a_killed_writer_holds_is_read(whole, tmp_path):
+def test_rows_only_in_the_log_are_recovered(whole, tmp_path):
     """The file and its log as they lie on the disk while it is written; a torn end of the log counts not."""
     path, entries = tmp_path / "j.db", scene_entries(30)
     with Journal.open(path, run=scene_run(), clock=ManualClock(START / 1e8)) as journal:
@@ -112,7 +112,7 @@ def test_what_only_the_log_of_a_killed_writer_holds_is_read(whole, tmp_path):
 
 
 @pytest.mark.parametrize("tenth", range(1, 11))
-def test_a_cut_at_ten_places_leaves_what_stood_before_it(whole, tmp_path, tenth):
+def test_truncated_journal_keeps_earlier_rows(whole, tmp_path, tenth):
     """Nothing is read that was not written, and of the pages that are there nothing is lost."""
     path, entries = whole
     raw = path.read_bytes()
@@ -130,7 +130,7 @@ def test_a_cut_at_ten_places_leaves_what_stood_before_it(whole, tmp_path, tenth)
             assert new.execute(f"SELECT count(*) FROM {table}").fetchone() == (there,), table
 
 
-def test_what_hangs_on_a_lost_page_is_found_by_its_shape(whole, tmp_path):
+def test_rows_behind_a_lost_page_are_recognised_by_their_cells(whole, tmp_path):
     """Each interior page is lost, so that no way leads from a root to any row: all rows are still there."""
     path, entries = whole
     raw, lost = bytearray(path.read_bytes()), 0
@@ -150,7 +150,7 @@ def test_what_hangs_on_a_lost_page_is_found_by_its_shape(whole, tmp_path):
     assert report.count
 
 
-def test_without_its_first_page_rows_are_told_by_their_shape(whole, tmp_path):
+def test_rows_are_recognised_without_the_first_page(whole, tmp_path):
     path, entries = whole
     hurt = tmp_path / "hurt.db"
     raw = bytearray(path.read_bytes())
@@ -164,7 +164,7 @@ def test_without_its_first_page_rows_are_told_by_their_shape(whole, tmp_path):
     assert read(tmp_path / "again.db")[0] == entries
 
 
-def test_a_lost_record_of_a_run_costs_no_event(whole, tmp_path):
+def test_lost_run_record_costs_no_event(whole, tmp_path):
     path, entries = whole
     hurt = tmp_path / "hurt.db"
     shutil.copy(path, hurt)
@@ -180,7 +180,7 @@ def test_a_lost_record_of_a_run_costs_no_event(whole, tmp_path):
         assert reader.run().started <= START
 
 
-def test_an_old_journal_stays_one(tmp_path):
+def test_old_journal_keeps_its_version(tmp_path):
     recover(OLD, tmp_path / "new.db")
     with (
         JournalReader(tmp_path / "new.db") as new,
@@ -194,15 +194,15 @@ def test_an_old_journal_stays_one(tmp_path):
 
 
 @pytest.mark.parametrize("raw", [b"SQLite format 3\0", b"SQLite format 3\0" + bytes(20_000), bytes(range(256)) * 64])
-def test_where_not_a_row_is_there_one_line_says_so(tmp_path, raw):
+def test_journal_without_readable_rows_is_refused_in_one_line(tmp_path, raw):
     (tmp_path / "hurt.db").write_bytes(raw)
-    with pytest.raises(InputError, match="not a row can be read") as caught:
+    with pytest.raises(InputError, match="no readable row") as caught:
         recover(tmp_path / "hurt.db", tmp_path / "new.db")
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("count", [60, pytest.param(1500, marks=pytest.mark.slow)])
-def test_bytes_changed_anywhere_are_read_or_lost_and_never_end_it(whole, tmp_path, count):
+def test_random_damage_never_stops_the_recovery(whole, tmp_path, count):
     """Twenty bytes at random places of each file, many of them lengths and page numbers: chains that never end, too."""
     path, _ = whole
     clean, rng = path.read_bytes(), np.random.default_rng(8)
@@ -222,7 +222,7 @@ def test_bytes_changed_anywhere_are_read_or_lost_and_never_end_it(whole, tmp_pat
         new.unlink()
 
 
-def test_rotated_parts_are_read_each_by_itself(tmp_path, monkeypatch):
+def test_rotated_parts_are_recovered_separately(tmp_path, monkeypatch):
     from catseye.coordinator.journal import writer as journal_writer
 
     monkeypatch.setattr(journal_writer, "LOOK", 0.0)

@@ -1,4 +1,4 @@
-"""Replay: a run is fed again in its order, and held against what was said then: numbers bit for bit, texts apart."""
+"""Replay of runs: numbers bit for bit, texts separately."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -67,7 +67,7 @@ class OrderedLive:
     def begin(self, ticks):
         return SimpleNamespace(solve=partial(self.solve, ticks))
 
-    def take_in(self, job, found):
+    def accept(self, job, found):
         return found
 
     def place(self, name, mjd):
@@ -101,7 +101,7 @@ def again(path, gain=1.1, **more):
         return list(replay(reader, 1, lambda site, run: OrderedLive(site, gain), **more))
 
 
-def test_the_same_reduction_says_the_same_to_the_last_bit(tmp_path):
+def test_same_reduction_gives_the_same_bits(tmp_path):
     found = again(recorded(tmp_path / "j.db"))
     assert [replayed.sameness for replayed in found] == [Sameness.IDENTICAL] * 6
     assert [replayed.shots.count for replayed in found] == [7] * 6
@@ -110,14 +110,14 @@ def test_the_same_reduction_says_the_same_to_the_last_bit(tmp_path):
     assert len(set(states)) == 6
 
 
-def test_another_reduction_is_told_with_the_shots_that_differ(tmp_path):
+def test_differing_shots_of_another_reduction_are_reported(tmp_path):
     found = again(recorded(tmp_path / "j.db"), gain=1.1 + 1e-12)
     assert not found[0].same
     assert found[0].shots.differing
     assert found[0].stored.answer["points"] != found[0].new.answer["points"]
 
 
-def test_a_reduction_that_finds_nothing_is_told(tmp_path):
+def test_reduction_without_solution_is_reported(tmp_path):
     class Mute(OrderedLive):
         def solve(self, ticks):
             return None
@@ -127,7 +127,7 @@ def test_a_reduction_that_finds_nothing_is_told(tmp_path):
     assert [(replayed.new.answer, replayed.same) for replayed in found] == [({}, False)] * 6
 
 
-def test_a_solve_that_gave_nothing_is_fed_again_too(tmp_path):
+def test_failed_solution_is_replayed_too(tmp_path):
     """It used up its shots: without it all that follows would differ."""
 
     class Failing(OrderedLive):
@@ -164,7 +164,7 @@ def test_a_solve_that_gave_nothing_is_fed_again_too(tmp_path):
     assert {bool(replayed.new.answer) for replayed in found} == {True, False}
 
 
-def test_it_ends_where_it_is_told_to(tmp_path):
+def test_replay_ends_at_the_given_event(tmp_path):
     path = recorded(tmp_path / "j.db")
     whole = again(path)
     for until in (whole[2].seq, whole[3].seq - 1):
@@ -172,7 +172,7 @@ def test_it_ends_where_it_is_told_to(tmp_path):
         assert found == [replayed.seq for replayed in whole[:3]]
 
 
-def test_the_factory_gets_the_runs_site_and_settings(tmp_path):
+def test_factory_gets_the_runs_site_and_settings(tmp_path):
     def made(site, run):
         assert (len(site.rangers), run.settings["solve_every"], run.seed) == (18, 0.5, 5)
         return OrderedLive(site, 1.1)
@@ -181,7 +181,7 @@ def test_the_factory_gets_the_runs_site_and_settings(tmp_path):
         assert len(list(replay(reader, 1, made))) == 1
 
 
-def test_shots_that_came_while_an_epoch_was_solved_belong_to_the_next(tmp_path):
+def test_shots_during_a_solution_belong_to_the_next_epoch(tmp_path):
     """An epoch is taken out, solved beside the loop, and taken in: what is fed between changes neither."""
 
     class Beside(OrderedLive):
@@ -189,7 +189,7 @@ def test_shots_that_came_while_an_epoch_was_solved_belong_to_the_next(tmp_path):
             taken, self.shots = self.shots, 0
             return SimpleNamespace(solve=lambda: (ticks, taken))
 
-        def take_in(self, job, found):
+        def accept(self, job, found):
             _, taken = found
             self.state = np.sin(self.state + taken)
             return Epoch({"ZEG": np.array([self.state])}, np.eye(2) * self.state, taken)
@@ -203,7 +203,7 @@ def test_shots_that_came_while_an_epoch_was_solved_belong_to_the_next(tmp_path):
                 journal.append(Document(shot.ticks, EPOCH_BEGUN, ""))
             journal.append(AnsweredShot.of(shot, live.shot(shot)))
             if k % 10 == 8:
-                journal.append(EpochSolution.of(shot.ticks, live.take_in(job, job.solve())))
+                journal.append(EpochSolution.of(shot.ticks, live.accept(job, job.solve())))
     with JournalReader(tmp_path / "j.db") as reader:
         found = list(replay(reader, 1, lambda site, run: Beside(site, 1.1)))
     *found, rest = found
@@ -212,7 +212,7 @@ def test_shots_that_came_while_an_epoch_was_solved_belong_to_the_next(tmp_path):
     assert [replayed.new.answer["shots"] for replayed in found] == [5, 10, 10]
 
 
-def test_a_correction_of_the_clock_is_fed_again_where_it_stood_and_ends_the_epoch_under_way(tmp_path):
+def test_clock_correction_is_replayed_and_discards_the_epoch_under_way(tmp_path):
     class Set(OrderedLive):
         def clock_corrected(self, ticks):
             self._fed(float(ticks % 1000))
@@ -236,7 +236,7 @@ def test_a_correction_of_the_clock_is_fed_again_where_it_stood_and_ends_the_epoc
     assert found[1].new.answer == {}
 
 
-def test_shots_behind_the_last_epoch_are_compared_and_those_without_an_answer_told(tmp_path):
+def test_shots_after_the_last_epoch_are_compared_and_unanswered_ones_counted(tmp_path):
     live = OrderedLive(scene_run().site, 1.1)
     with Journal.open(tmp_path / "j.db", run=scene_run(), clock=ManualClock(START / 1e8)) as journal:
         for k in range(6):
@@ -257,7 +257,7 @@ def test_shots_behind_the_last_epoch_are_compared_and_those_without_an_answer_to
     assert not rest.same
 
 
-def test_a_reduction_that_words_its_answers_otherwise_has_the_same_numbers(tmp_path):
+def test_reworded_answers_have_the_same_numbers(tmp_path):
     class Wordy(OrderedLive):
         def shot(self, shot):
             return replace(super().shot(shot), text="in other words")
@@ -269,7 +269,7 @@ def test_a_reduction_that_words_its_answers_otherwise_has_the_same_numbers(tmp_p
     assert all(replayed.same and not replayed.shots.differing for replayed in found)
 
 
-def test_a_journal_of_version_1_is_fed_again():
+def test_journal_of_version_1_is_replayed():
     """Its twelve shots were answered by hand and differ; its solutions have no beginning: none is lost."""
     with JournalReader(TESTS / "vectors" / "formats" / "journal-1.db") as reader:
         found = list(replay(reader, 1, lambda site, run: OrderedLive(site, 1.1)))

@@ -1,4 +1,4 @@
-"""Sameness of two answers: numbers to the last bit, reason codes and statuses; texts for people apart."""
+"""Sameness of answers: numbers to the last bit, codes and statuses; texts apart."""
 
 import math
 from dataclasses import replace
@@ -37,7 +37,7 @@ def up(number):
     return math.nextafter(number, math.inf)
 
 
-def test_a_solution_is_identical_to_itself_in_any_order_of_keys():
+def test_solution_is_identical_in_any_order_of_keys():
     again = EpochSolution(5, dict(reversed(ANSWER.items())), COVARIANCE.T.copy())
     assert compare_solutions(STORED, again) == SolutionComparison(Sameness.IDENTICAL)
 
@@ -52,7 +52,7 @@ def test_a_solution_is_identical_to_itself_in_any_order_of_keys():
     ],
     ids=["notes", "reason", "live reason", "missing"],
 )
-def test_texts_do_not_count(changed):
+def test_texts_are_not_compared(changed):
     other = with_answer(**changed)
     assert compare_solutions(STORED, other) == SolutionComparison(Sameness.TEXTS)
     assert compare_solutions(other, STORED) == SolutionComparison(Sameness.TEXTS)
@@ -76,23 +76,23 @@ def test_texts_do_not_count(changed):
         ("solved or not", EpochSolution(5, {})),
     ],
 )
-def test_numbers_codes_and_statuses_count_and_the_part_is_named(part, other):
+def test_differing_numbers_codes_and_statuses_are_named(part, other):
     assert compare_solutions(STORED, other) == SolutionComparison(Sameness.DIFFERENT, (part,))
     assert compare_solutions(other, STORED) == SolutionComparison(Sameness.DIFFERENT, (part,))
 
 
-def test_two_that_gave_nothing_are_identical():
+def test_two_failed_solutions_are_identical():
     assert compare_solutions(EpochSolution(5, {}), EpochSolution(5, {})).sameness is Sameness.IDENTICAL
 
 
-def test_what_an_older_version_did_not_store_is_not_compared_but_named():
+def test_keys_not_stored_by_an_older_version_are_named_not_compared():
     other = with_answer(tilts=[0.5], pose=ANSWER["pose"] | {"dish": {"chi2": 1.5, "bending": 0.2}})
     assert compare_solutions(STORED, other) == SolutionComparison(
         Sameness.TEXTS, unstored=("tilts", "pose.dish.bending")
     )
 
 
-def test_what_a_version_no_longer_says_differs():
+def test_missing_key_in_the_new_answer_differs():
     found = compare_solutions(with_answer(tilts=[0.5]), STORED)
     assert found == SolutionComparison(Sameness.DIFFERENT, ("tilts",))
 
@@ -112,11 +112,11 @@ def answered(**changed):
         ({"misfit": 0.0}, Sameness.DIFFERENT),
     ],
 )
-def test_a_shots_status_and_numbers_count_and_its_text_does_not(changed, sameness):
+def test_shots_are_compared_by_status_and_numbers_not_text(changed, sameness):
     assert compare_shots(answered(), answered(**changed)) is sameness
 
 
-def test_the_worst_of_several_is_what_counts():
+def test_least_same_is_the_worst_of_several():
     assert least_same(Sameness) is Sameness.DIFFERENT
     assert least_same([Sameness.TEXTS, Sameness.IDENTICAL]) is Sameness.TEXTS
     assert least_same([]) is Sameness.IDENTICAL

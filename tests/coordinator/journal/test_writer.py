@@ -1,4 +1,4 @@
-"""The journal's writer: what it keeps, in which order, what it refuses."""
+"""Journal writer: content, order, refusals."""
 
 import asyncio
 import os
@@ -62,7 +62,7 @@ def stored(place, run=None, **more):
 
 
 @pytest.mark.parametrize("compress", [False, True])
-def test_everything_comes_back_in_order_and_to_the_last_bit(place, compress):
+def test_entries_survive_the_round_trip_in_order_to_the_last_bit(place, compress):
     entries = scene_entries(40)
     with opened(place, settings=JournalSettings(compress=compress)) as journal:
         futures = [journal.append(entry) for entry in entries]
@@ -72,7 +72,7 @@ def test_everything_comes_back_in_order_and_to_the_last_bit(place, compress):
     assert [plainly(entry) for _, entry in found] == [plainly(entry) for entry in entries]
 
 
-def test_numbers_that_databases_stumble_over_come_back(place):
+def test_special_numbers_survive_the_round_trip(place):
     weather = [
         LiveWeather("WX1", START, -0.0, 5e-324, 1e308),
         LiveWeather("WX1", START + 1, float("nan"), float("inf"), float("-inf")),
@@ -91,7 +91,7 @@ def test_numbers_that_databases_stumble_over_come_back(place):
     assert nulls == 1
 
 
-def test_the_run_says_what_it_started_from(place):
+def test_run_record_has_its_start(place):
     clock = ManualClock(START / 1e8)
     journal = opened(place, run=scene_run(seed=7, extra={"plan.txt": "no\r\nplan\n"}), clock=clock)
     clock.advance(86.4)
@@ -112,7 +112,7 @@ def test_the_run_says_what_it_started_from(place):
         assert again.rangers == site.rangers
 
 
-def test_a_site_changed_on_disk_is_kept_as_it_was_read(tmp_path):
+def test_site_changed_on_disk_is_stored_as_read(tmp_path):
     import shutil
 
     from catseye.coordinator.journal.entries import Run
@@ -130,7 +130,7 @@ def test_a_site_changed_on_disk_is_kept_as_it_was_read(tmp_path):
         assert reader.site(1).site.campaign.azimuth_deg == 145.3
 
 
-def test_a_second_run_goes_into_the_same_journal(place):
+def test_second_run_is_added_to_the_journal(place):
     for number in (1, 2, 3):
         with opened(place) as journal:
             assert journal.run == number
@@ -141,7 +141,7 @@ def test_a_second_run_goes_into_the_same_journal(place):
         assert len(reader.files(3)) == len(reader.files(1))
         assert reader.run(reader.runs()[1].uuid[:20]).run == 2
         for missing in (0, 4, "no such"):
-            with pytest.raises(InputError, match=r"names 0 runs \(it holds runs 1 to 3\)"):
+            with pytest.raises(InputError, match=r"names 0 runs \(it contains runs 1 to 3\)"):
                 reader.run(missing)
 
 
@@ -154,7 +154,7 @@ def test_samples_can_be_left_out(tmp_path):
         assert reader.run().buffers is False
 
 
-def test_what_came_from_many_threads_is_one_order_and_appends_are_not_torn(place):
+def test_appends_from_many_threads_are_ordered_and_not_torn(place):
     """Each thread's appends stay in its order; the pair of one append has neighbouring numbers."""
     taken, futures = {}, []
 
@@ -186,14 +186,14 @@ def test_what_came_from_many_threads_is_one_order_and_appends_are_not_torn(place
         assert own == sorted(own)
 
 
-def test_an_append_of_nothing_waits_for_all_before(tmp_path):
+def test_empty_append_waits_for_all_before(tmp_path):
     with opened(tmp_path / "j.db") as journal:
         first = [journal.append(entry) for entry in scene_entries(30)]
         journal.append().result(MOST_WAIT)
         assert all(future.done() for future in first)
 
 
-def test_what_comes_together_is_committed_together(tmp_path):
+def test_entries_arriving_together_share_a_commit(tmp_path):
     """150 appends at once in at most a few transactions, not 150: the group waits a second, or until it is full."""
     commits = []
     with opened(tmp_path / "j.db", settings=JournalSettings(group=0.2, keep_buffers=False)) as journal:
@@ -203,7 +203,7 @@ def test_what_comes_together_is_committed_together(tmp_path):
     assert 1 <= together <= 3
 
 
-def test_durable_is_for_coroutines(tmp_path):
+def test_durable_can_be_awaited(tmp_path):
     async def fed(journal):
         await asyncio.gather(*(journal.durable(scene_shot(k)) for k in range(5)))
 
@@ -212,7 +212,7 @@ def test_durable_is_for_coroutines(tmp_path):
         assert sorted(entry.shot.number for _, entry in stored(tmp_path / "j.db")) == list(range(5))
 
 
-def test_it_is_read_while_it_is_written(place):
+def test_journal_is_readable_while_written(place):
     with opened(place) as journal, JournalReader(place) as reader:
         for k in range(30):
             seq = journal.append(scene_answer(k)).result(MOST_WAIT)
@@ -221,20 +221,20 @@ def test_it_is_read_while_it_is_written(place):
             assert entry.shot.number == k
 
 
-def test_a_shot_that_is_there_already_is_refused_and_costs_the_others_nothing(place):
+def test_duplicate_shot_is_refused_without_cost_to_others(place):
     """The same ranger, time and target twice, in the middle of a group that is written at once."""
     with opened(place, settings=JournalSettings(group=0.2)) as journal:
         futures = [journal.append(scene_shot(k)) for k in range(5)]
         twice = journal.append(scene_shot(2, seed=1))
         futures += [journal.append(scene_shot(k)) for k in range(5, 10)]
-        with pytest.raises(InputError, match="expected each shot once"):
+        with pytest.raises(InputError, match="expected unique shots"):
             twice.result(MOST_WAIT)
         assert [future.result(MOST_WAIT) for future in futures] == [1, 2, 3, 4, 5, 7, 8, 9, 10, 11]
         assert journal.trouble is None
     assert [plainly(entry) for _, entry in stored(place)] == [plainly(scene_shot(k)) for k in range(10)]
 
 
-def test_a_commit_whose_reply_was_lost_is_kept_once(place, monkeypatch):
+def test_commit_with_a_lost_reply_is_stored_once(place, monkeypatch):
     """The database has it, we do not know: it is sent again, with what came meanwhile."""
     store, lost = Journal._store, []
 
@@ -253,7 +253,7 @@ def test_a_commit_whose_reply_was_lost_is_kept_once(place, monkeypatch):
     assert [plainly(entry) for _, entry in stored(place)] == [plainly(entry) for entry in entries]
 
 
-def test_what_no_journal_holds_is_refused_at_once(tmp_path):
+def test_invalid_entries_are_refused_at_once(tmp_path):
     with opened(tmp_path / "j.db") as journal:
         for bad, text in (
             ("a shot", "a str cannot be journalled"),
@@ -266,14 +266,14 @@ def test_what_no_journal_holds_is_refused_at_once(tmp_path):
     assert len(stored(tmp_path / "j.db")) == 1
 
 
-def test_a_full_line_refuses_and_recovers(tmp_path):
+def test_full_queue_refuses_and_recovers(tmp_path):
     """While another process holds the file, nothing is written; the line is bounded, and what it took is kept."""
     with opened(tmp_path / "j.db", settings=JournalSettings(patience=MOST_WAIT)) as journal:
         other = sqlite3.connect(tmp_path / "j.db", isolation_level=None)
         other.execute("BEGIN EXCLUSIVE")
         reads = [LiveWeather("WX1", START + k, 1.0, 2.0, 3.0) for k in range(1000)]
         took = [journal.append(*reads) for _ in range(MOST_WAITING // 1000)]
-        with pytest.raises(InputError, match=f"{MOST_WAITING} rows wait for the journal"):
+        with pytest.raises(InputError, match=f"{MOST_WAITING} rows are queued for the journal"):
             journal.append(scene_shot(1))
         other.rollback()
         other.close()
@@ -283,7 +283,7 @@ def test_a_full_line_refuses_and_recovers(tmp_path):
         assert reader.last(1) == MOST_WAITING + 1
 
 
-def test_a_closed_journal_takes_nothing_more_and_is_one_file(tmp_path):
+def test_closed_journal_refuses_entries_and_is_one_file(tmp_path):
     journal = opened(tmp_path / "j.db")
     late = [journal.append(entry) for entry in scene_entries(20)]
     journal.close()
@@ -297,16 +297,16 @@ def test_a_closed_journal_takes_nothing_more_and_is_one_file(tmp_path):
 @pytest.mark.parametrize(
     ("url", "text"),
     [
-        ("mysql://u:secret@h/db", r"journal mysql://.*cannot be used \(expected a file's name"),
-        ("sqlite://", "cannot be used"),
-        ("sqlite:///:memory:", "cannot be used"),
-        ("postgresql://u:secret@h/", "cannot be used"),
-        ("://", "is no URL"),
-        ("postgresql://u:secret@[::1/db", "is no URL"),
+        ("mysql://u:secret@h/db", r"journal mysql://.*is unusable \(expected a file's name"),
+        ("sqlite://", "is unusable"),
+        ("sqlite:///:memory:", "is unusable"),
+        ("postgresql://u:secret@h/", "is unusable"),
+        ("://", "is not a URL"),
+        ("postgresql://u:secret@[::1/db", "is not a URL"),
         ("postgresql://u:secret@127.0.0.1:1/db", "journal postgresql://u:.*@127.0.0.1:1/db: .*refused"),
     ],
 )
-def test_a_bad_url_is_refused_in_one_line_without_its_password(url, text):
+def test_invalid_url_is_refused_in_one_line_without_its_password(url, text):
     with pytest.raises(InputError, match=text) as caught:
         opened(url)
     assert "secret" not in str(caught.value)
@@ -321,7 +321,7 @@ def made_by_others(path, *statements):
     connection.close()
 
 
-def test_other_peoples_files_are_refused_and_left_alone(tmp_path):
+def test_foreign_files_are_refused_and_unchanged(tmp_path):
     (tmp_path / "text.db").write_text("shot,mjd_utc\n1,2\n")
     made_by_others(tmp_path / "other.db", "CREATE TABLE shots (a)", "INSERT INTO shots VALUES (1)")
     made_by_others(tmp_path / "alike.db", "CREATE TABLE journal (format TEXT, words TEXT)")
@@ -332,9 +332,9 @@ def test_other_peoples_files_are_refused_and_left_alone(tmp_path):
     )
     (tmp_path / "folder.db").mkdir()
     cases = {
-        "text.db": "starts with b'shot,mjd_utc",
-        "other.db": "holds other tables, such as 'shots'",
-        "alike.db": "holds other tables, such as 'journal'",
+        "text.db": "it starts with b'shot,mjd_utc",
+        "other.db": "it has other tables, such as 'shots'",
+        "alike.db": "it has other tables, such as 'journal'",
         "newer.db": "version 3 is newer than 2",
         "folder.db": "is not a file",
         "no/such.db": "directory .*no is missing",
@@ -348,13 +348,13 @@ def test_other_peoples_files_are_refused_and_left_alone(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {*cases} - {"no/such.db"}
 
 
-def test_a_database_with_other_tables_is_refused(server):
+def test_database_with_other_tables_is_refused(server):
     import psycopg
 
     url = server.database("others")
     with psycopg.connect(url, autocommit=True) as connection:
         connection.execute("CREATE TABLE shots (a int)")
-    with pytest.raises(InputError, match="holds other tables, such as 'shots'"):
+    with pytest.raises(InputError, match="it has other tables, such as 'shots'"):
         opened(url)
 
 
@@ -371,7 +371,7 @@ def test_a_file_with_triggers_is_refused(tmp_path, does):
         opened(tmp_path / "j.db")
 
 
-def test_an_older_journal_is_carried_to_this_version(tmp_path, monkeypatch):
+def test_older_journal_is_converted(tmp_path, monkeypatch):
     from catseye.coordinator.journal import tables as journal_tables
 
     with opened(tmp_path / "j.db") as journal:
@@ -402,7 +402,7 @@ def test_a_second_writer_is_refused_and_names_the_first(tmp_path):
         assert journal.run == 2
 
 
-def test_a_dead_writers_lock_does_not_stay(tmp_path):
+def test_lock_of_a_dead_writer_is_released(tmp_path):
     code = (
         "import os, sys\nfrom journal_scene import scene_run\nfrom catseye.coordinator.journal.writer import Journal\n"
         "from catseye.simulator.clock.world_clock import ManualClock\n"
@@ -417,7 +417,7 @@ def test_a_dead_writers_lock_does_not_stay(tmp_path):
 
 
 @pytest.mark.skipif(os.getuid() != 0, reason="needs root to become somebody who may not write")
-def test_a_file_that_cannot_be_written_is_refused_in_one_line(tmp_path):
+def test_unwritable_file_is_refused_in_one_line(tmp_path):
     """By a child that gave its rights away: root may write anything."""
     import tempfile
 
@@ -438,7 +438,7 @@ def test_a_file_that_cannot_be_written_is_refused_in_one_line(tmp_path):
     assert done.stdout == f"journal {folder}/j.db: cannot be written: Permission denied\n"
 
 
-def test_a_server_without_its_driver_says_which_extra(monkeypatch):
+def test_missing_server_driver_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "psycopg", None)
     with pytest.raises(InputError, match=r"psycopg is not installed \(expected the extra catseye\[postgresql\]\)"):
         opened("postgresql://u@h/db")

@@ -1,4 +1,4 @@
-"""A ranger's clock, judged from the stamp of a reply and how long it took."""
+"""A ranger's clock, judged by stamps and round trips."""
 
 import pytest
 
@@ -20,7 +20,7 @@ def stamp(clock, seconds):
     return ticks_now(clock) + round(seconds * TICKS_PER_SECOND)
 
 
-def test_what_it_is_set_to_is_right_when_it_arrives(watched):
+def test_clock_is_set_allowing_for_link_delay(watched):
     """Half a round trip from now: the command is as long on its way as the reply was."""
     watch, clock, happenings = watched
     trip = 0.05
@@ -32,7 +32,7 @@ def test_what_it_is_set_to_is_right_when_it_arrives(watched):
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_an_offset_that_the_way_may_have_made_is_none(watched, sign):
+def test_offset_within_link_delay_is_ignored(watched, sign):
     watch, clock, happenings = watched
     trip = 0.05
     unsure = LIMIT + 0.5 * trip + 0.5 / TICKS_PER_SECOND
@@ -42,7 +42,7 @@ def test_an_offset_that_the_way_may_have_made_is_none(watched, sign):
     assert [each.kind for each in happenings] == ["clock-off", "clock-jump"]  # it was right at the same instant
 
 
-def test_a_clock_that_gains_is_told_with_its_rate(watched):
+def test_drift_is_reported_with_its_rate(watched):
     watch, clock, happenings = watched
     watch.look(stamp(clock, 0.0432), 0.0)  # 50 ticks
     clock.advance(43.2)
@@ -53,7 +53,7 @@ def test_a_clock_that_gains_is_told_with_its_rate(watched):
 
 @pytest.mark.parametrize("trip", [0.01, 0.3, 3.0])
 @pytest.mark.parametrize("jump", [10.0, -10.0, 3600.0, -3600.0])
-def test_a_jump_is_no_drift_and_is_seen_over_a_slow_way_too(watched, jump, trip):
+def test_jump_is_not_drift_and_is_detected_over_a_slow_link(watched, jump, trip):
     watch, clock, happenings = watched
     for _ in range(3):
         assert watch.look(stamp(clock, -0.5 * trip), trip) is None
@@ -66,7 +66,7 @@ def test_a_jump_is_no_drift_and_is_seen_over_a_slow_way_too(watched, jump, trip)
 
 
 @pytest.mark.parametrize("jump", [0.1, -0.1])
-def test_a_jump_of_a_tenth_of_a_second_is_told(watched, jump):
+def test_jump_of_a_tenth_of_a_second_is_reported(watched, jump):
     watch, clock, happenings = watched
     assert watch.look(stamp(clock, 0.0), 0.001) is None
     clock.advance(2.0)
@@ -75,7 +75,7 @@ def test_a_jump_of_a_tenth_of_a_second_is_told(watched, jump):
     assert [each.kind for each in happenings] == ["clock-off", "clock-jump"]
 
 
-def test_a_clock_that_is_not_to_be_set_by_ours_is_left(watched):
+def test_clock_is_not_set_without_permission(watched):
     _, clock, happenings = watched
     watch = ClockWatch(clock, EventLog("ZY101", clock, happenings.append), LIMIT, lambda: False)
     assert watch.look(stamp(clock, 10.0), 0.001) is None
@@ -84,7 +84,7 @@ def test_a_clock_that_is_not_to_be_set_by_ours_is_left(watched):
 
 
 @pytest.mark.parametrize("jitter", [0.0, 1.0])
-def test_long_ways_of_a_busy_machine_hide_nothing_and_set_nothing(watched, jitter):
+def test_long_round_trips_hide_nothing_and_set_nothing(watched, jitter):
     """One short way among seven long ones says where the clock is; the long ones never say otherwise."""
     watch, clock, happenings = watched
     for k in range(64):
@@ -101,14 +101,14 @@ def test_long_ways_of_a_busy_machine_hide_nothing_and_set_nothing(watched, jitte
     assert [each.kind for each in happenings] == ["clock-off", "clock-jump"]
 
 
-def test_without_a_short_way_the_offset_is_as_unsure_as_the_way_is_long(watched):
+def test_offset_error_is_the_shortest_round_trip(watched):
     watch, clock, _ = watched
     watch.look(stamp(clock, -0.9), 1.0)
     assert watch.offset == pytest.approx(-0.4, abs=1e-3)
     assert watch.error == pytest.approx(0.5, abs=1e-3)
 
 
-def test_after_our_own_clock_was_corrected_all_is_heard_anew(watched):
+def test_samples_are_cleared_after_a_correction_of_our_clock(watched):
     watch, clock, happenings = watched
     for _ in range(3):
         assert watch.look(stamp(clock, 0.0), 0.002) is None

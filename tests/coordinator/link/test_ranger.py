@@ -1,4 +1,4 @@
-"""A link to a real server whose head is scripted; time jumps, nothing sleeps. One story goes over real sockets."""
+"""A link to a real server with a scripted head, in virtual time; once over real sockets."""
 
 import asyncio
 import random
@@ -18,7 +18,7 @@ from catseye.ranger.status import StatusWord
 from coordinator.link_scene import COMMANDS, LATENCY, Free, Linked, LoopClock, Served, network, planned, run, until
 
 
-def test_a_cold_ranger_is_made_ready_and_its_shot_comes_whole():
+def test_cold_ranger_is_made_ready_and_its_shot_is_complete():
     async def story():
         async with Linked() as (served, link):
             assert served.ranger.initialised
@@ -50,7 +50,7 @@ def test_only_failures_in_a_row_count():
     run(story)
 
 
-def test_the_same_over_real_sockets_in_real_time():
+def test_link_works_over_real_sockets_in_real_time():
     async def story():
         async with Linked() as (served, link):
             assert network() is None
@@ -60,7 +60,7 @@ def test_the_same_over_real_sockets_in_real_time():
     asyncio.run(asyncio.wait_for(story(), 60.0))
 
 
-def test_a_moving_target_is_followed_and_fired_at_its_time():
+def test_moving_target_is_tracked_and_shot_at_its_time():
     async def story():
         async with Linked() as (served, link):
             shot_at = planned("ZG11", fixed=False, rate=(0.5, 0.0, 0.0), ahead=0.4)
@@ -75,7 +75,7 @@ def test_a_moving_target_is_followed_and_fired_at_its_time():
     run(story)
 
 
-def test_a_shot_whose_turn_comes_late_slides_along_its_line_and_is_given_up_when_too_late():
+def test_late_shot_moves_along_its_track_and_is_dropped_when_too_late():
     async def story():
         guard = Free()
         async with Linked(guard=guard) as (served, link):
@@ -90,7 +90,7 @@ def test_a_shot_whose_turn_comes_late_slides_along_its_line_and_is_given_up_when
 
 
 @pytest.mark.parametrize(("knows_streams", "longest_gap"), [(True, 0.004), (False, 0.004)])
-def test_a_stream_points_once_and_wastes_little_between_its_buffers(knows_streams, longest_gap):
+def test_stream_points_once_with_short_gaps(knows_streams, longest_gap):
     async def story():
         guard, shots = Free(), []
         async with Linked(guard=guard) as (served, link):
@@ -117,7 +117,7 @@ def test_a_stream_points_once_and_wastes_little_between_its_buffers(knows_stream
     run(story)
 
 
-def test_a_stream_that_is_given_up_is_stopped_at_the_ranger():
+def test_cancelled_stream_is_stopped_at_the_ranger():
     async def story():
         async with Linked() as (served, link):
             shots = []
@@ -133,7 +133,7 @@ def test_a_stream_that_is_given_up_is_stopped_at_the_ranger():
     run(story)
 
 
-def test_a_stream_that_falls_silent_or_brings_nonsense_ends_and_is_told(monkeypatch):
+def test_silent_or_invalid_stream_ends_and_is_reported(monkeypatch):
     async def story():
         async with Linked() as (served, link):
             shots = []
@@ -156,7 +156,7 @@ def test_a_stream_that_falls_silent_or_brings_nonsense_ends_and_is_told(monkeypa
     run(story)
 
 
-def test_what_the_guard_refuses_is_never_sent_and_the_next_shot_goes_on():
+def test_refused_command_is_never_sent_and_the_next_shot_works():
     async def story():
         guard = Free()
         async with Linked(guard=guard) as (served, link):
@@ -175,7 +175,7 @@ def test_what_the_guard_refuses_is_never_sent_and_the_next_shot_goes_on():
     run(story)
 
 
-def test_a_reconnect_within_two_seconds_needs_nothing_sent_again():
+def test_quick_reconnection_needs_no_initialisation():
     async def story():
         guard = Free()
         async with Linked(guard=guard) as (served, link):
@@ -189,19 +189,19 @@ def test_a_reconnect_within_two_seconds_needs_nothing_sent_again():
             await until(lambda: link.ready)
             assert asyncio.get_running_loop().time() - began < 2.0
             assert not {"FHM", "AXIS"} & {r.command for r in guard.asked}
-            assert "was ready still" in served.happenings[-1].text
+            assert "was still ready" in served.happenings[-1].text
             assert "lost-over" in served.kinds()
             assert await link.fire(planned("ZG11")) is not None
 
     run(story)
 
 
-def test_another_coordinator_takes_a_ranger_over_as_it_is_and_one_with_other_records_does_not():
+def test_prepared_ranger_is_taken_over_only_with_the_same_records():
     async def story():
         async with Linked() as (served, first):
             first.wanted = "hold"
             for commands, text in (
-                (COMMANDS, "was ready still"),
+                (COMMANDS, "was still ready"),
                 ([*COMMANDS, Request("KND", ("1", "S", "-30"))], "made"),
             ):
                 other = served.link(commands=commands)
@@ -216,7 +216,7 @@ def test_another_coordinator_takes_a_ranger_over_as_it_is_and_one_with_other_rec
 
 
 @pytest.mark.parametrize("changed", ["BP 0, 0, 1", "AZM 0, -901", "INI 4"])
-def test_a_ranger_that_was_changed_by_hand_is_told_everything_again(changed):
+def test_ranger_changed_by_hand_is_initialised_again(changed):
     async def story():
         async with Linked() as (served, link):
             served.by_hand(changed)
@@ -232,7 +232,7 @@ def test_a_ranger_that_was_changed_by_hand_is_told_everything_again(changed):
     run(story)
 
 
-def test_a_ranger_that_restarts_under_a_standing_connection_is_noticed_and_made_ready():
+def test_ranger_restarted_behind_a_connection_is_made_ready_again():
     async def story():
         async with Linked() as (served, link):
             served.by_hand("RST")
@@ -245,7 +245,7 @@ def test_a_ranger_that_restarts_under_a_standing_connection_is_noticed_and_made_
     run(story)
 
 
-def test_a_ranger_that_answers_nothing_is_hung_within_seconds_and_found_again():
+def test_unresponsive_ranger_is_detected_within_seconds_and_reconnected():
     async def story():
         async with Linked() as (served, link):
             send, served.server.send = served.server.send, lambda told: None
@@ -263,7 +263,7 @@ def test_a_ranger_that_answers_nothing_is_hung_within_seconds_and_found_again():
     run(story)
 
 
-def test_an_idle_ranger_that_hangs_is_noticed_by_the_probe():
+def test_hung_idle_ranger_is_detected_by_the_probe():
     async def story():
         async with Linked() as (served, link):
             served.server.send = lambda told: None
@@ -274,7 +274,7 @@ def test_an_idle_ranger_that_hangs_is_noticed_by_the_probe():
     run(story)
 
 
-def test_waits_between_attempts_grow_by_a_third_to_thirty_seconds():
+def test_back_off_grows_by_a_third_to_thirty_seconds():
     async def story():
         served = await Served().start()
         await served.stop()
@@ -298,7 +298,7 @@ def test_waits_between_attempts_grow_by_a_third_to_thirty_seconds():
     run(story)
 
 
-def test_a_clock_that_is_off_is_set_and_one_that_runs_away_is_named():
+def test_wrong_clock_is_set_and_drift_is_reported():
     async def story():
         async with Linked() as (served, link):
             served.head.offset = 0.5
@@ -315,7 +315,7 @@ def test_a_clock_that_is_off_is_set_and_one_that_runs_away_is_named():
     run(story)
 
 
-def test_a_right_clock_is_left_alone():
+def test_correct_clock_is_left_alone():
     async def story():
         guard = Free()
         async with Linked(guard=guard):
@@ -325,7 +325,7 @@ def test_a_right_clock_is_left_alone():
     run(story)
 
 
-def test_a_slow_line_is_told_when_it_begins_and_when_it_ends():
+def test_slow_link_is_reported_at_start_and_end():
     async def story():
         async with Linked() as (served, link):
             send = served.server.send
@@ -343,7 +343,7 @@ def test_a_slow_line_is_told_when_it_begins_and_when_it_ends():
     run(story)
 
 
-def test_a_stuck_axis_and_a_missing_index_have_their_names():
+def test_stuck_axis_and_missing_index_are_reported():
     async def story():
         async with Linked() as (served, link):
             served.head.inner.stuck = True
@@ -376,7 +376,7 @@ def test_a_stuck_axis_and_a_missing_index_have_their_names():
         (lambda v: v[:6], "values"),
     ],
 )
-def test_a_damaged_buffer_is_told_and_not_used(damage, word, monkeypatch):
+def test_damaged_buffer_is_reported_and_not_used(damage, word, monkeypatch):
     async def story():
         async with Linked() as (served, link):
             whole = served.ranger._handlers["BUF"]
@@ -390,7 +390,7 @@ def test_a_damaged_buffer_is_told_and_not_used(damage, word, monkeypatch):
     run(story)
 
 
-def test_a_buffer_that_another_client_took_meanwhile_is_not_this_shots():
+def test_buffer_of_another_client_is_rejected():
     async def story():
         async with Linked() as (served, link):
             send = served.server.send
@@ -407,7 +407,7 @@ def test_a_buffer_that_another_client_took_meanwhile_is_not_this_shots():
     run(story)
 
 
-def test_the_laser_is_off_while_the_indices_are_searched():
+def test_laser_is_off_during_homing():
     async def story():
         guard = Free()
         async with Linked(guard=guard) as (served, _):
@@ -421,7 +421,7 @@ def test_the_laser_is_off_while_the_indices_are_searched():
     run(story)
 
 
-def test_where_the_buffer_is_refused_the_rangers_own_amplitude_and_phase_count(monkeypatch):
+def test_refused_buffer_falls_back_to_amplitude_and_phase(monkeypatch):
     async def story():
         async with Linked() as (served, link):
 
@@ -440,7 +440,7 @@ def test_where_the_buffer_is_refused_the_rangers_own_amplitude_and_phase_count(m
     run(story)
 
 
-def test_another_rangers_greeting_is_an_alarm_and_a_taken_port_is_left_for_the_second():
+def test_wrong_ranger_is_an_alarm_and_an_occupied_port_is_skipped():
     async def story():
         served = await Served("ZY102").start()
         link = served.link()
@@ -462,7 +462,7 @@ def test_another_rangers_greeting_is_an_alarm_and_a_taken_port_is_left_for_the_s
     run(story)
 
 
-def test_a_listening_link_hears_another_clients_shots_and_sends_nothing_that_changes_the_ranger():
+def test_listening_link_receives_other_clients_shots_and_changes_nothing():
     async def story():
         async with Linked() as (served, link):
             heard, guard = [], Free()
@@ -481,7 +481,7 @@ def test_a_listening_link_hears_another_clients_shots_and_sends_nothing_that_cha
     run(story)
 
 
-def test_leaving_switches_off_a_laser_that_was_switched_on_here_and_no_other():
+def test_leaving_switches_off_only_lasers_switched_on_here():
     async def story(dark):
         served = await Served().start()
         if not dark:  # as another left it that was killed a moment ago
@@ -582,7 +582,7 @@ def test_random_bytes_from_a_ranger_do_no_harm():
 
 
 @pytest.mark.slow
-def test_a_hundred_thousand_random_lines_from_a_ranger_do_no_harm():
+def test_100000_random_lines_from_a_ranger_do_no_harm():
     babble(100_000, 9)
 
 
@@ -601,7 +601,7 @@ async def person(served, **options):
     )
 
 
-def test_the_coordinator_has_the_lease_of_a_ranger_that_it_measures_with():
+def test_coordinator_holds_the_lease_of_its_rangers():
     async def story():
         async with Linked() as (served, link):
             assert served.ranger.lease[:2] == (0, HOLDER)
@@ -617,7 +617,7 @@ def test_the_coordinator_has_the_lease_of_a_ranger_that_it_measures_with():
     run(story)
 
 
-def test_a_second_program_that_says_the_same_name_is_not_the_holder():
+def test_same_name_does_not_make_a_holder():
     """Attack: both called themselves by the same process number, and both commanded."""
 
     async def story():
@@ -629,14 +629,14 @@ def test_a_second_program_that_says_the_same_name_is_not_the_holder():
             assert not other.ready
             assert link.ready
             assert served.ranger.lease[:2] == (0, HOLDER)
-            assert any("memory port 0 commands it" in h.text for h in served.happenings)
+            assert any("memory port 0 holds the lease" in h.text for h in served.happenings)
             task.cancel()
             await asyncio.gather(task, return_exceptions=True)
 
     run(story)
 
 
-def test_the_lease_goes_along_where_the_ranger_has_not_noticed_the_cut():
+def test_lease_survives_a_cut_unnoticed_by_the_ranger():
     async def story():
         async with Linked() as (served, link):
             token = served.ranger.lease.token
@@ -650,7 +650,7 @@ def test_the_lease_goes_along_where_the_ranger_has_not_noticed_the_cut():
     run(story)
 
 
-def test_a_coordinator_that_waits_renews_the_lease():
+def test_waiting_coordinator_renews_the_lease():
     """Attack: a homing of 35 s, or a move that hangs, was longer than the dead man's time."""
 
     async def story():
@@ -666,7 +666,7 @@ def test_a_coordinator_that_waits_renews_the_lease():
     run(story)
 
 
-def test_a_dark_order_of_another_is_journalled_with_its_peer_and_obeyed_until_it_is_cleared():
+def test_latched_stop_is_journalled_with_its_peer_and_obeyed_until_cleared():
     async def story():
         async with Linked() as (served, link):
             anna = await person(served)
@@ -688,7 +688,7 @@ def test_a_dark_order_of_another_is_journalled_with_its_peer_and_obeyed_until_it
     run(story)
 
 
-def test_who_leaves_lights_nothing_again():
+def test_leaving_link_lights_nothing_again():
     """Attack: the probe that saw the laser off, by the coordinator's own leaving, switched it on again."""
 
     async def story():
@@ -706,7 +706,7 @@ def test_who_leaves_lights_nothing_again():
     run(story)
 
 
-def test_who_has_lost_the_lease_darkens_nobody():
+def test_link_without_the_lease_sends_no_stop():
     async def story():
         async with Linked() as (served, link):
             anna = await person(served)
@@ -720,14 +720,14 @@ def test_who_has_lost_the_lease_darkens_nobody():
     run(story)
 
 
-def test_who_takes_the_lease_has_the_ranger_until_it_is_given_back():
+def test_new_holder_keeps_the_ranger_until_the_lease_is_free():
     async def story():
         async with Linked() as (served, link):
             anna = await person(served)
             token = (await anna.ask("LEASE", "anna")).values[-1]
             await until(lambda: not link.ready)
             assert "leased" in link.troubles
-            said = "ZY101: anna at memory port 0 took the lease: nothing is sent that it needs"  # with her address
+            said = "ZY101: anna at memory port 0 holds the lease; commands are paused"  # with her address
             assert said in [h.text for h in served.happenings]
             for _ in range(20):  # a person who goes on keeps it
                 await asyncio.sleep(5.0)
@@ -743,7 +743,7 @@ def test_who_takes_the_lease_has_the_ranger_until_it_is_given_back():
     run(story)
 
 
-def test_a_person_who_leaves_or_falls_silent_loses_the_lease():
+def test_disconnected_or_silent_holder_loses_the_lease():
     async def story():
         async with Linked() as (served, link):
             for leaves in (True, False):
@@ -760,7 +760,7 @@ def test_a_person_who_leaves_or_falls_silent_loses_the_lease():
     run(story)
 
 
-def test_a_ranger_that_knows_no_lease_is_commanded_as_ever():
+def test_ranger_without_leases_is_commanded_directly():
     async def story():
         served = await Served().start()
         served.server.door = Door(lease=False)
@@ -785,7 +785,7 @@ def test_a_ranger_that_knows_no_lease_is_commanded_as_ever():
     run(story)
 
 
-def test_an_interlock_that_opens_stops_a_ranger_until_it_closes():
+def test_open_interlock_stops_a_ranger_until_it_closes():
     async def story():
         async with Linked() as (served, link):
             pulled = ["the door"]
@@ -806,7 +806,7 @@ def test_an_interlock_that_opens_stops_a_ranger_until_it_closes():
     run(story)
 
 
-def test_a_coordinator_that_is_cut_off_for_an_hour_leaves_no_laser_on():
+def test_coordinator_cut_off_for_an_hour_leaves_no_laser_on():
     """Nobody tells the ranger that the lines are cut: its own clock does."""
 
     async def story():

@@ -43,7 +43,7 @@ def shooters(planned):
     return found
 
 
-def test_every_ranger_shoots_its_reference_first_and_then_as_the_axes_allow(first):
+def test_rangers_shoot_the_reference_first_at_feasible_times(first):
     told = state(NIGHT)
     s = RoundSettings()
     assert set(first.shots) == set(gbt().rangers)
@@ -60,7 +60,7 @@ def test_every_ranger_shoots_its_reference_first_and_then_as_the_axes_allow(firs
         assert shots[0].begin_ticks >= NIGHT + s.lead / TICK_SECONDS
 
 
-def test_a_shot_says_where_its_target_will_be_in_the_rangers_own_frame():
+def test_shots_have_predicted_positions_in_the_rangers_frame():
     own = LivePosture(NIGHT, 2.5, 0.6, 0.25 * DEGREE, 0.1 * DEGREE)
     planned = RoundPlanner(few_prisms()).round(state(NIGHT, own))
     place = placed(own)
@@ -80,7 +80,7 @@ def test_a_shot_says_where_its_target_will_be_in_the_rangers_own_frame():
             assert shot.fixed is (stands()[name].frame == retro.frame), (name, shot.target)
 
 
-def test_every_target_that_three_rangers_see_gets_three_well_spread_ones(first):
+def test_targets_seen_by_three_rangers_get_three_well_spread_ones(first):
     seen = {}
     for (ranger, target), why in first.unseen.items():
         seen.setdefault(target, set()).add((ranger, why))
@@ -103,7 +103,7 @@ def test_every_target_that_three_rangers_see_gets_three_well_spread_ones(first):
         assert weakest > best / 3, name
 
 
-def test_what_is_known_well_already_waits_for_what_is_not(first):
+def test_uncertain_points_come_before_well_determined_ones(first):
     known = {n: (5e-6) ** 2 * np.eye(3) for n, r in targets().items() if r.kind == "ball" and n != "TR05-B"}
     planner = RoundPlanner(few_prisms(), targets=[n for n, r in targets().items() if r.kind == "ball"])
     counts = {n: [s.target for s in shots[1:]] for n, shots in planner.round(state(NIGHT, u=known)).shots.items()}
@@ -113,7 +113,7 @@ def test_what_is_known_well_already_waits_for_what_is_not(first):
     assert len(before) >= 3
 
 
-def test_a_ranger_whose_own_place_is_poor_is_worth_less():
+def test_ranger_with_an_uncertain_position_has_less_value():
     """ZY105 is known to a metre: what it says of a point is worth nothing beside the others, so they look elsewhere no
     sooner than without it."""
     poor = {"ZY105": np.eye(3)}
@@ -126,7 +126,7 @@ def test_a_ranger_whose_own_place_is_poor_is_worth_less():
             assert [s.target for s in with_it.shots[name]][:4] == [s.target for s in without.shots[name]][:4]
 
 
-def test_a_range_is_worth_what_its_own_noise_and_the_rangers_place_leave_of_it():
+def test_value_of_a_range_includes_noise_and_ranger_position():
     """Of a point known to p in each direction, along any line: p - p^2 / 3 (p + sigma^2 + u^2) is left of its mean."""
     u = 0.5e-3
     known = {n: (0.3e-3) ** 2 * np.eye(3) for n, r in targets().items() if r.kind == "ball"}
@@ -140,7 +140,7 @@ def test_a_range_is_worth_what_its_own_noise_and_the_rangers_place_leave_of_it()
         assert after == pytest.approx(np.sqrt(before**2 - before**4 / (3.0 * total)), abs=1e-7)
 
 
-def test_references_and_benchmarks_come_in_their_time():
+def test_references_and_benchmarks_are_shot_when_due():
     planner = RoundPlanner(few_prisms())
     bench = {b.ranger: b.target for b in gbt().benchmarks}
     shot = {name: [] for name in gbt().rangers}
@@ -169,7 +169,7 @@ def test_references_and_benchmarks_come_in_their_time():
             assert not any(t.startswith("ZBM") for names in rounds for t in names)
 
 
-def test_all_2209_prisms_of_the_dish_are_visited_in_turn():
+def test_all_2209_dish_prisms_are_visited():
     planner = RoundPlanner(gbt(), settings=RoundSettings(dish_share=0.9, period=20.0))
     dish = {n for n, r in targets().items() if r.part == "dish"}
     assert len(dish) == 2209
@@ -190,19 +190,19 @@ def test_all_2209_prisms_of_the_dish_are_visited_in_turn():
     assert sum(s.target in dish for shots in planner.round(told).shots.values() for s in shots) > 100  # another lap
 
 
-def test_pairs_that_failed_and_rangers_that_are_not_ready_are_left_alone():
+def test_suspended_lines_and_rangers_not_ready_are_skipped():
     suspended = frozenset({("ZY101", "ZEG41040L"), ("ZY101", "ZRG"), ("ZY113", "TR05-L")})
     ready = ("ZY101", "ZY113", "ZY104")
     planned = RoundPlanner(few_prisms()).round(state(NIGHT, suspended=suspended, ready=ready))
     assert set(planned.shots) == set(ready)
     for pair in suspended:
         assert pair[1] not in [s.target for s in planned.shots[pair[0]]]
-        assert "failed" in planned.unseen[pair]
+        assert "suspended" in planned.unseen[pair]
     with pytest.raises(InputError, match="ZY999"):
         RoundPlanner(few_prisms()).round(state(NIGHT, ready=("ZY999",)))
 
 
-def test_what_is_not_seen_is_told_why():
+def test_invisible_pairs_have_reasons():
     solids = read_record(ROOT / "examples" / "solids.toml", Solids)
     planner = RoundPlanner(few_prisms(), solids=solids)
     planned = planner.round(state(NIGHT))
@@ -212,7 +212,7 @@ def test_what_is_not_seen_is_told_why():
         assert pair[1] not in [s.target for s in planned.shots[pair[0]]]
 
 
-def test_a_target_before_the_sun_is_left_out_by_day_and_not_by_night():
+def test_target_in_front_of_the_sun_is_skipped_only_by_day():
     clear = KeepClear(gbt())
     sun = clear.sun(MORNING)
     place = placed(posture())
@@ -230,7 +230,7 @@ def test_a_target_before_the_sun_is_left_out_by_day_and_not_by_night():
     assert ("ZY104", name) not in dark.unseen
 
 
-def test_a_mirror_goes_round_the_sun_by_a_corner():
+def test_mirror_moves_around_the_sun_by_a_corner():
     """From one side of the Sun to the other: a halt on the way, and both legs free."""
     sun = KeepClear(gbt()).sun(MORNING)
     v = stands()["ZY104"]
@@ -262,7 +262,7 @@ def _beam(name, counts):
     return beams(name, np.array(counts), posture(), np.array(MORNING))
 
 
-def test_the_same_states_give_the_same_rounds():
+def test_same_states_give_the_same_rounds():
     def all_of(planned):
         return {
             n: [(s.target, s.begin_ticks, s.at_begin.tolist(), s.reason) for s in shots]
@@ -276,7 +276,7 @@ def test_the_same_states_give_the_same_rounds():
     assert rounds[0] == rounds[1]
 
 
-def test_a_round_of_the_whole_site_takes_some_sixty_thousand_calls():
+def test_round_of_the_full_site_takes_about_60000_calls():
     """A round lasts 10 s and its plan 0.05 s on a free core; calls, which no other load changes, are counted."""
     import cProfile
 
@@ -289,7 +289,7 @@ def test_a_round_of_the_whole_site_takes_some_sixty_thousand_calls():
     assert sum(each.callcount for each in calls.getstats()) < 120_000  # 59 000; three times the time, as before
 
 
-def test_a_telescope_that_slews_is_looked_at_again_every_half_degree():
+def test_visibility_is_updated_every_half_degree_of_a_slew():
     planner = RoundPlanner(few_prisms())
     low, high = (planner.round(state(NIGHT, posture(NIGHT, az, 30.0))) for az in (145.3, 325.3))
     assert {k for k, v in low.unseen.items() if "incidence" in v} != {
@@ -298,7 +298,7 @@ def test_a_telescope_that_slews_is_looked_at_again_every_half_degree():
     assert nominal_posture(gbt()).azimuth == pytest.approx(145.3 * DEGREE)
 
 
-def test_a_polynomial_through_five_nodes_follows_a_slewing_telescope():
+def test_polynomial_of_five_nodes_follows_a_slewing_telescope():
     t = np.linspace(0, 10, 5)
     at = np.linspace(0, 10.5, 50)
     turn = 0.0103 * at  # 35.2 degrees a minute

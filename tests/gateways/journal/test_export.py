@@ -420,7 +420,7 @@ def test_live_rejections_are_exported(tmp_path):
     assert rows[0] == "what,name,mjd_utc,why"
     lies = [row.split(",")[:3] for row in rows[1:-1]]
     assert lies == [["weather", "WX2", stamp(START + SECOND * k)] for k in range(20, 30)]
-    assert "WX2 reads 15.4 C, +5.0 C off its last five minutes while the others changed by +0.0 C" in rows[1]
+    assert "WX2 reads 15.4 C, +5.0 C from its last five minutes while the others changed by +0.0 C" in rows[1]
     assert rows[-1] == f"shot,3,{stamp(START + SECOND * 3)},reflected: range 3.000 mm too long"
     assert campaign.doubted == {3: "reflected: range 3.000 mm too long"}
     assert len(campaign.weather) == 70

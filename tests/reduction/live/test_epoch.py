@@ -1,4 +1,4 @@
-"""One epoch: what becomes a campaign, what stays in the state, and that shots only ever add to what was known."""
+"""One epoch: its campaign, the parameters in the state, information only added."""
 
 import copy
 from dataclasses import replace
@@ -9,7 +9,7 @@ import pytest
 from catseye.errors import InputError
 from catseye.records.night.live import TICKS_PER_DAY, LiveWeather
 from catseye.reduction.epoch.parameter import ParameterKind, point_parameters
-from catseye.reduction.live.epoch import _lasts, observed_site
+from catseye.reduction.live.epoch import _persists, observed_site
 from catseye.reduction.site.motion import ground_from
 from live_scene import START, begun, site
 from parameter_scene import parameter, parameters
@@ -33,11 +33,11 @@ def second_epoch():
 
 
 def test_without_weather_there_is_no_campaign():
-    with pytest.raises(InputError, match="no weather station has spoken"):
+    with pytest.raises(InputError, match="no weather reading received"):
         observed_site(site(), [], [], **POSTURE)
 
 
-def test_only_stations_that_speak_take_part():
+def test_silent_stations_are_left_out():
     campaign = observed_site(site(), [], [weather("WX2"), weather("WX2", 10.0)], **POSTURE)
     assert [s.name for s in campaign.site.weather_station] == ["WX2"]
     assert campaign.weather.station == ("WX2", "WX2")
@@ -65,16 +65,16 @@ def test_only_stations_that_speak_take_part():
         ("body dish x", False),
     ],
 )
-def test_what_lasts_is_known_by_its_name(name, stays):
-    assert _lasts(parameter(name), ("ZY101", "ZY113", "TR01-L", "TR01-R", "TR01-B"), site().triplets) is stays
+def test_persistent_parameters_are_recognised_by_name(name, stays):
+    assert _persists(parameter(name), ("ZY101", "ZY113", "TR01-L", "TR01-R", "TR01-B"), site().triplets) is stays
 
 
-def test_shots_only_add_to_what_was_known(second_epoch):
+def test_shots_only_reduce_uncertainty(second_epoch):
     live = copy.deepcopy(second_epoch[0])
     live.set_reference()
     job = live.begin(second_epoch[1])
     epoch = job.solve()
-    before, after = job.carried, epoch.carried
+    before, after = job.state, epoch.state
     shared = [p for p in before.parameters if p in set(after.parameters)]
     p, q = (s.covariance[np.ix_(s.columns(shared), s.columns(shared))] for s in (before, after))
     size = np.sqrt(np.diag(p))
@@ -86,11 +86,11 @@ def test_shots_only_add_to_what_was_known(second_epoch):
     assert "ZY113@0 x" in after.names
 
 
-def test_what_the_records_say_is_counted_once(second_epoch):
+def test_record_priors_are_used_once(second_epoch):
     """A ranger without shots is held by survey and sheet; the second epoch must not hear them a second time."""
     live = copy.deepcopy(second_epoch[0])
     job = live.begin(second_epoch[1])
-    before, after = job.carried, job.solve().carried
+    before, after = job.state, job.solve().state
     mirror = np.zeros((3, len(before.names)))  # scan point less fixed point: the sheet's mirror offset
     for i, axis in enumerate("xyz"):
         mirror[i, before.columns(parameters([f"ZY101 {axis}", f"ZY101-F {axis}"]))] = 1.0, -1.0
@@ -102,16 +102,16 @@ def test_what_the_records_say_is_counted_once(second_epoch):
     assert now[zero, zero] == pytest.approx(before.covariance[zero, zero], rel=1e-3)
 
 
-def test_an_epoch_is_carried_in_the_frames_of_its_points(second_epoch):
+def test_state_is_in_the_frames_of_its_points(second_epoch):
     live = copy.deepcopy(second_epoch[0])
     found = live.solve(second_epoch[1])
-    assert live.carried.ticks == found.ticks == second_epoch[1]
+    assert live.state.ticks == found.ticks == second_epoch[1]
     for name in ("ZY102", "ZY113", "TR05-B", "ZEG41040L"):
         ground, covariance = found.point(name)
         np.testing.assert_allclose(live.place(name, found.ticks / TICKS_PER_DAY), ground, rtol=0, atol=1e-9)
-        at = live.carried.columns(point_parameters(ParameterKind.POINT, [name]))
-        own, own_covariance = live.carried.x[at], live.carried.covariance[np.ix_(at, at)]
-        # what is considered (`epoch.common_errors`) stays in every epoch's own answer, and is not carried on
+        at = live.state.columns(point_parameters(ParameterKind.POINT, [name]))
+        own, own_covariance = live.state.x[at], live.state.covariance[np.ix_(at, at)]
+        # what is considered (`epoch.common_errors`) stays in every epoch's own answer, and not in the state
         assert 0.99 * np.trace(covariance) < np.trace(own_covariance) < np.trace(covariance)
         moves = live.frames[name] != "ground"
         assert (np.linalg.norm(own - ground) > 1.0) == moves
@@ -121,7 +121,7 @@ def test_an_epoch_is_carried_in_the_frames_of_its_points(second_epoch):
         np.testing.assert_allclose(live.uncertainty()[name], turned, rtol=1e-9, atol=1e-18)
 
 
-def test_rangers_that_were_dead_from_the_start_stay_known(second_epoch):
+def test_rangers_without_shots_stay_in_the_state(second_epoch):
     live = copy.deepcopy(second_epoch[0])
     found = live.solve(second_epoch[1])
     assert found.shots[found.names.index("ZY101")] == 0
@@ -130,17 +130,17 @@ def test_rangers_that_were_dead_from_the_start_stay_known(second_epoch):
     assert 0.0 < u.max() < 1e-3 * (sheet.u_offset_mm + 1.0)  # its survey holds it
 
 
-def test_an_epoch_solved_elsewhere_is_the_same(second_epoch):
+def test_epoch_solved_on_a_copy_is_the_same(second_epoch):
     here, there = (copy.deepcopy(second_epoch[0]) for _ in range(2))
     first = here.solve(second_epoch[1])
     job = there.begin(second_epoch[1])
-    again = there.take_in(job, copy.deepcopy(job).solve())
+    again = there.accept(job, copy.deepcopy(job).solve())
     np.testing.assert_array_equal(first.x, again.x)
     np.testing.assert_array_equal(first.covariance, again.covariance)
     assert first.used == again.used
 
 
-def test_an_epoch_with_states_says_what_a_dense_one_says_and_carries_on_none(second_epoch):
+def test_epoch_with_states_agrees_with_a_dense_one_and_keeps_no_states(second_epoch):
     """The next one has other states: their numbers are its own."""
     live = copy.deepcopy(second_epoch[0])
     job = live.begin(second_epoch[1])
@@ -149,7 +149,7 @@ def test_an_epoch_with_states_says_what_a_dense_one_says_and_carries_on_none(sec
     u = np.where(dense.coordinates.u > 0.0, dense.coordinates.u, 1.0)
     assert np.abs((states.coordinates.x - dense.coordinates.x) / u).max() < 1e-3
     np.testing.assert_allclose(states.coordinates.u, dense.coordinates.u, rtol=5e-3, atol=1e-12)
-    assert states.carried.parameters == dense.carried.parameters
-    own = np.sqrt(np.diag(dense.carried.covariance))
-    gap = (states.carried.covariance - dense.carried.covariance) / np.outer(own, own)
+    assert states.state.parameters == dense.state.parameters
+    own = np.sqrt(np.diag(dense.state.covariance))
+    gap = (states.state.covariance - dense.state.covariance) / np.outer(own, own)
     assert np.abs(gap).max() < 2e-2

@@ -1,4 +1,4 @@
-"""How much bodies shake, learnt from ranges whose scatter is known."""
+"""Jitter of bodies, learnt from ranges of known scatter."""
 
 from types import SimpleNamespace
 
@@ -36,7 +36,7 @@ PAIRS = [("A", "G")] * 40 + [("G", "D")] * 40 + [("A", "B")] * 10 + [("G", "H")]
 
 
 @pytest.mark.parametrize("true", [{"arm": 0.05, "dish": 0.1}, {"arm": 0.4, "dish": 0.02}])
-def test_it_learns_what_the_bodies_do(true):
+def test_jitter_of_each_body_is_recovered(true):
     rng, jitter = np.random.default_rng(1), Jitter({"arm": 0.2, "dish": 0.05})
     for _ in range(60):
         jitter.learn(ranges(rng, PAIRS, shake=true, jitter=jitter), BODIES)
@@ -45,14 +45,14 @@ def test_it_learns_what_the_bodies_do(true):
     assert jitter.mm["dish"] == pytest.approx(true["dish"], rel=0.3)
 
 
-def test_a_state_that_is_off_as_it_claims_makes_it_careful_by_no_more_than_it_says():
+def test_state_error_as_claimed_biases_jitter_within_the_stated_bound():
     rng, jitter = np.random.default_rng(6), Jitter({"arm": 0.2, "dish": 0.0})
     for _ in range(60):
         jitter.learn(ranges(rng, PAIRS, shake={"arm": 0.3, "dish": 0.0}, jitter=jitter, state=1.0), BODIES)
     assert 0.3 < jitter.mm["arm"] < 1.15 * 0.3 / np.sqrt(0.6)
 
 
-def test_weak_returns_do_not_speak_of_small_shaking():
+def test_weak_returns_say_nothing_about_small_jitter():
     rng, jitter = np.random.default_rng(7), Jitter({"arm": 0.2})
     found = []
     for _ in range(40):
@@ -66,14 +66,14 @@ def test_weak_returns_do_not_speak_of_small_shaking():
     assert np.all(np.abs(np.array(found[10:]) / 0.1 - 1.0) < 0.35)
 
 
-def test_a_lucky_epoch_is_no_calm():
+def test_jitter_has_a_floor_after_a_quiet_epoch():
     rng, jitter = np.random.default_rng(8), Jitter({"arm": 0.2})
     for _ in range(100):
         jitter.learn(ranges(rng, [("A", "G")] * 200, shake={"arm": 0.0}, jitter=jitter, noise=0.0), BODIES)
     assert jitter.mm["arm"] == pytest.approx(0.05, rel=1e-12)
 
 
-def test_where_nothing_is_seen_the_usual_comes_back():
+def test_without_shots_jitter_returns_to_the_usual_value():
     rng, jitter = np.random.default_rng(2), Jitter({"arm": 0.2})
     for _ in range(30):
         jitter.learn(ranges(rng, [("A", "G")] * 40, shake={"arm": 1.0}, jitter=jitter), BODIES)
@@ -84,7 +84,7 @@ def test_where_nothing_is_seen_the_usual_comes_back():
     assert jitter.mm["arm"] == pytest.approx(0.2, rel=0.05)
 
 
-def test_ranges_within_a_body_on_the_ground_or_left_out_teach_nothing():
+def test_ranges_within_a_body_on_the_ground_or_rejected_are_ignored():
     rng, jitter = np.random.default_rng(3), Jitter({"arm": 0.2})
     wild = ranges(rng, [("A", "B")] * 30 + [("G", "H")] * 30, shake={"arm": 5.0}, jitter=jitter)
     wild.residual = wild.residual + 1.0
@@ -95,7 +95,7 @@ def test_ranges_within_a_body_on_the_ground_or_left_out_teach_nothing():
     assert jitter.mm["arm"] == pytest.approx(0.2, rel=1e-12)
 
 
-def test_between_two_bodies_the_one_that_shakes_more_is_taught():
+def test_range_between_two_bodies_updates_the_one_with_more_jitter():
     rng, jitter = np.random.default_rng(4), Jitter({"arm": 0.2, "dish": 0.03})
     for _ in range(40):
         jitter.learn(ranges(rng, [("A", "D")] * 40, shake={"arm": 0.5, "dish": 0.03}, jitter=jitter), BODIES)
@@ -103,7 +103,7 @@ def test_between_two_bodies_the_one_that_shakes_more_is_taught():
     assert jitter.mm["dish"] == pytest.approx(0.03, rel=1e-6)
 
 
-def test_it_never_falls_to_nothing_and_without_bodies_there_is_none():
+def test_jitter_stays_above_zero_and_needs_a_body():
     jitter = Jitter({"arm": 0.2})
     quiet = SimpleNamespace(
         ranger=["A"] * 500, target=["G"] * 500, used=np.ones(500, dtype=bool), residual=np.zeros(500),
@@ -116,7 +116,7 @@ def test_it_never_falls_to_nothing_and_without_bodies_there_is_none():
     assert none.mm == {}
 
 
-def test_what_was_learnt_is_forgotten_by_a_tenth_an_epoch():
+def test_learnt_jitter_decays_by_a_tenth_an_epoch():
     jitter, sums, weight = Jitter({"arm": 0.2}), PRIOR_DEGREES * 0.04, PRIOR_DEGREES
     for shaken in (0.5, 0.1, 0.3):  # mm, of fifty shots that are all redundancy and nothing else
         one = SimpleNamespace(

@@ -1,4 +1,4 @@
-"""The live reduction: as a campaign where it can be compared, against the twin's truth where nothing else can."""
+"""Live reduction against a campaign's answer and the twin's truth."""
 
 import copy
 from dataclasses import replace
@@ -17,8 +17,8 @@ from catseye.simulator.twin.conditions import STILL
 from live_scene import DISH, Feed, Night, begun, deviations, lasting, sights, site, twin
 
 # as the files say it, seen through calm air: no drift, no bending, nothing typed wrongly
-KEPT = ("noise", "h_corr", "obliquity", "leakage", "mirror_offset", "stratification")
-PLAIN = replace(STILL, ignore=[effect for effect in STILL.ignore if effect not in KEPT])
+EFFECTS = ("noise", "h_corr", "obliquity", "leakage", "mirror_offset", "stratification")
+PLAIN = replace(STILL, ignore=[effect for effect in STILL.ignore if effect not in EFFECTS])
 FEW = ("ZY102", "ZY105", "ZY108", "ZY110", "ZY113", "ZY116")
 MANY = (*FEW, "ZY101", "ZY103", "ZY107", "ZY114", "ZY117", "ZY118")
 
@@ -49,7 +49,7 @@ def only(feed, keep):
 # Against the campaign -------------------------------------------------------------------------------------------------
 
 
-def test_a_night_fed_shot_by_shot_is_the_campaigns_answer(night_01, monkeypatch):
+def test_night_fed_shot_by_shot_gives_the_campaigns_answer(night_01, monkeypatch):
     """Of a telescope that does not expand: a campaign has that as parameters, a living site as motions."""
     monkeypatch.setattr(TelescopeKnots, "of", staticmethod(lambda span, places: None))
     expected = reduce_epoch(night_01)
@@ -82,7 +82,7 @@ def test_a_night_fed_shot_by_shot_is_the_campaigns_answer(night_01, monkeypatch)
 # Order and repetition -------------------------------------------------------------------------------------------------
 
 
-def test_two_lives_fed_alike_answer_alike_bit_for_bit_whatever_the_order_of_equal_times():
+def test_same_input_gives_the_same_bits_in_any_order_of_equal_times():
     night, answers = Night(twin(seed=5), 5), []
     seen = sights(night.world, 5.0, rangers=FEW)
     asked = [(r, n) for r in FEW for n in [REFERENCE, *seen[r][:7]]]
@@ -108,14 +108,14 @@ def test_two_lives_fed_alike_answer_alike_bit_for_bit_whatever_the_order_of_equa
         )
 
 
-def test_shots_that_come_while_an_epoch_is_solved_belong_to_the_next(settled):
+def test_shots_during_a_solution_belong_to_the_next_epoch(settled):
     night, live, feed = settled
     late = feed.shots[-40:]
     only(feed, lambda s: s.number not in {x.number for x in late}).into(live)
     job = live.begin(night.ticks(3))
     for shot in late:
         live.shot(shot)
-    answer = live.take_in(job, job.solve())
+    answer = live.accept(job, job.solve())
     spoken = set(answer.used) | set(answer.rejected)
     assert not spoken & {s.number for s in late}
     after = live.solve(night.ticks(4))
@@ -124,23 +124,23 @@ def test_shots_that_come_while_an_epoch_is_solved_belong_to_the_next(settled):
     assert not (set(after.used) & set(answer.used))
 
 
-def test_solving_a_second_time_finds_nothing_new(settled):
+def test_solving_again_without_shots_fails(settled):
     night, live, feed = settled
     feed.into(live)
     assert live.solve(night.ticks(3)) is not None
-    before = live.carried.x.copy()
+    before = live.state.x.copy()
     assert live.solve(night.ticks(3)) is None
-    assert live.failed == "no shot since the last epoch can be used"
-    np.testing.assert_array_equal(live.carried.x, before)
+    assert live.failed == "no usable shot since the last epoch"
+    np.testing.assert_array_equal(live.state.x, before)
 
 
-def test_an_epoch_that_failed_leaves_the_state_alone(settled):
+def test_failed_epoch_leaves_the_state_unchanged(settled):
     night, live, feed = settled
     feed.into(live)
-    job, before = live.begin(night.ticks(3)), live.carried
-    assert live.take_in(job, "somebody said no") is None
+    job, before = live.begin(night.ticks(3)), live.state
+    assert live.accept(job, "somebody said no") is None
     assert live.failed == "somebody said no"
-    assert live.carried is before
+    assert live.state is before
     assert live.number == 3
 
 
@@ -151,7 +151,7 @@ def good_shot(feed, *, reference=False):
     return next(s for s in feed.shots if (s.target == REFERENCE) == reference)
 
 
-def test_good_shots_say_a_range_with_a_small_misfit(settled):
+def test_good_shots_give_a_range_with_a_small_misfit(settled):
     _, live, feed = settled
     said = list(zip(feed.into(live), feed.shots, strict=True))
     assert all(a.status == ("reference" if s.target == REFERENCE else "used") for a, s in said)
@@ -182,7 +182,7 @@ def spoilt(shot, what):
 
 
 @pytest.mark.parametrize("what", ["blocked", "clipped", "stuck", "dropout"])
-def test_a_bad_buffer_says_what_is_wrong_and_takes_no_part(settled, what):
+def test_bad_buffer_is_rejected_with_its_reason(settled, what):
     night, live, feed = settled
     victim = max((s for s in feed.shots if s.target != REFERENCE), key=lambda s: np.std(s.samples.astype(float)))
     feed = Feed(tuple(spoilt(i, what) if i is victim else i for i in feed.items))
@@ -195,7 +195,7 @@ def test_a_bad_buffer_says_what_is_wrong_and_takes_no_part(settled, what):
     assert victim.number not in answer.used
 
 
-def test_a_buffer_that_came_in_part_is_refused(settled):
+def test_incomplete_buffer_is_rejected(settled):
     _, live, feed = settled
     shot = good_shot(feed)
     for samples in (shot.samples[:-64], shot.samples[:-1], shot.samples[:0], np.tile(shot.samples, 2)):
@@ -204,7 +204,7 @@ def test_a_buffer_that_came_in_part_is_refused(settled):
         assert f"{len(samples)} samples" in said.text
 
 
-def test_strangers_are_named_and_break_nothing(settled):
+def test_unknown_rangers_and_targets_are_reported_without_harm(settled):
     night, live, feed = settled
     shot = good_shot(feed)
     said = live.shot(replace(shot, target="NOBODY"))
@@ -217,7 +217,7 @@ def test_strangers_are_named_and_break_nothing(settled):
     assert live.solve(night.ticks(3)) is not None
 
 
-def test_an_epoch_is_judged_as_a_campaign_and_what_is_allowed_for_is_told_and_covered(settled, monkeypatch):
+def test_epoch_allowances_are_reported_and_covered_as_in_a_campaign(settled, monkeypatch):
     """An error of 0.3 mm that shots of one length share, as the self-check would find it."""
     night, live, feed = settled
     feed.into(live)
@@ -229,11 +229,11 @@ def test_an_epoch_is_judged_as_a_campaign_and_what_is_allowed_for_is_told_and_co
     assert "the ranges err in common by length" in covered.notes
     assert "the ranges err in common by length" not in plain.notes
     variance = np.diag(covered.covariance) / np.diag(plain.covariance).clip(1e-14)
-    assert np.median(variance) > 1.001  # shots and what was carried know most of it
+    assert np.median(variance) > 1.001  # shots and the state determine most of it
     assert np.max(variance) > 1.02
 
 
-def test_without_its_samples_a_shot_counts_with_what_the_ranger_made_of_it(settled):
+def test_shot_without_samples_uses_the_rangers_amplitude_and_phase(settled):
     night, live, feed = settled
     other = copy.deepcopy(live)
 
@@ -257,14 +257,14 @@ def test_without_its_samples_a_shot_counts_with_what_the_ranger_made_of_it(settl
     assert np.abs((without.x - with_.x).ravel()[free] / u[free]).max() < 2.0
 
 
-def test_a_shot_of_which_nothing_came_is_refused(settled):
+def test_shot_without_samples_or_phase_is_rejected(settled):
     _, live, feed = settled
     for nothing in ({}, {"amplitude": 1.0}, {"phase": 0.3}):
         said = live.shot(replace(good_shot(feed), samples=None, **{"amplitude": np.nan, "phase": np.nan, **nothing}))
         assert said.status == "no samples"
 
 
-def test_a_reference_with_something_else_in_it_is_not_followed(settled):
+def test_reference_with_a_stray_reflection_is_rejected(settled):
     _, live, feed = settled
     shot = good_shot(feed, reference=True)
     before = len(live.rangers[shot.ranger].references)
@@ -303,7 +303,7 @@ def test_the_uncertainty_of_one_range_is_the_scatter_of_many():
 
 
 @pytest.mark.parametrize("left", [("ZY103", "ZY107", "ZY114"), ("ZY105",), ()])
-def test_losing_rangers_makes_no_jump_that_the_uncertainty_does_not_cover(settled, left):
+def test_losing_rangers_changes_points_within_their_uncertainty(settled, left):
     night, live, feed = settled
     other = copy.deepcopy(live)
     feed.into(live)
@@ -328,7 +328,7 @@ def test_losing_rangers_makes_no_jump_that_the_uncertainty_does_not_cover(settle
     assert max(chi2) < 25.0
 
 
-def test_a_dead_feed_arm_leaves_the_ground_as_good_as_it_was(settled):
+def test_loss_of_the_feed_arm_leaves_ground_points_as_good(settled):
     night, live, feed = settled
     only(feed, lambda s: s.ranger in live.site.monuments).into(live)
     answer = live.solve(night.ticks(3))
@@ -336,7 +336,7 @@ def test_a_dead_feed_arm_leaves_the_ground_as_good_as_it_was(settled):
     assert 0.2 < np.mean(z**2) < 1.6
 
 
-def test_a_return_from_elsewhere_is_rejected_and_moves_nothing(settled):
+def test_stray_reflection_is_rejected_and_changes_nothing(settled):
     night, live, feed = settled
     honest = copy.deepcopy(live)
     victim = next(s for s in feed.shots if s.ranger == "ZY105" and s.target.startswith("ZEG"))
@@ -352,7 +352,7 @@ def test_a_return_from_elsewhere_is_rejected_and_moves_nothing(settled):
     assert np.abs((found.x - expected.x).ravel() / np.maximum(u, 1e-6)).max() < 1.0  # one shot's worth of 160
 
 
-def test_repeats_that_were_joined_are_told_one_by_one(settled):
+def test_joined_repeats_are_listed_one_by_one(settled):
     """Two lines shot five times in a second: one clean, one whose light comes from elsewhere."""
     _, live, feed = settled
     bad = next(s for s in feed.shots if s.ranger == "ZY105" and s.target.startswith("ZEG"))
@@ -375,7 +375,7 @@ def test_repeats_that_were_joined_are_told_one_by_one(settled):
     assert not (first | second) & (set(answer.used) & answer.rejected.keys())
 
 
-def test_without_posture_or_weather_it_waits_and_keeps_the_shots():
+def test_without_posture_or_weather_shots_wait():
     world = twin("fixed 145.3 30", seed=1)
     night, live = Night(world), Live(world.site)
     feed = night.round(0, rangers=FEW)
@@ -390,19 +390,19 @@ def test_without_posture_or_weather_it_waits_and_keeps_the_shots():
     ]
     assert ground, "there are lines on the ground"
     assert live.solve(night.ticks(0)) is None
-    assert live.failed == "the telescope has told no posture"
+    assert live.failed == "no telescope position received"
     for read in told:
         live.posture(read)
     assert live.solve(night.ticks(0)) is None
-    assert live.failed == "no weather station has spoken"
+    assert live.failed == "no weather reading received"
     night.before().into(live)
     answer = live.solve(night.ticks(0))
     assert answer is not None, live.failed
     assert set(answer.used) == {s.number for s in ground}
-    assert "told no posture" in next(iter(answer.rejected.values()))
+    assert "no telescope position received" in next(iter(answer.rejected.values()))
 
 
-def test_shots_at_a_telescope_that_has_fallen_silent_are_left_out(settled):
+def test_shots_without_a_recent_posture_are_rejected(settled):
     night, live, feed = settled
     items, since = [], feed.shots[0].ticks + night.world.ticks(5.0) - night.world.ticks(0.0)
     for item in feed.items:
@@ -421,7 +421,7 @@ def test_shots_at_a_telescope_that_has_fallen_silent_are_left_out(settled):
 
 
 @pytest.mark.parametrize("motion", ["slew 100 40 160 60", "track 180 80"])
-def test_ranges_to_a_moving_telescope_are_the_true_ones(motion):
+def test_ranges_to_a_moving_telescope_are_correct(motion):
     """Nothing but geometry, glass, air and noise: in a slew a range runs by up to half a metre a second."""
     world = twin(motion, seed=6, planted=PLAIN)
     night, live = Night(world, 6), Live(site())
@@ -451,7 +451,7 @@ def test_ranges_to_a_moving_telescope_are_the_true_ones(motion):
     )
 
 
-def test_points_are_predicted_where_the_telescope_carries_them(track):
+def test_telescope_points_are_predicted_for_its_posture(track):
     night, live, answers, _ = track
     later = night.world.ticks(29.5) / TICKS_PER_DAY
     for name in ("ZY113", "TR05-B", "ZEG41040L"):
@@ -463,7 +463,7 @@ def test_points_are_predicted_where_the_telescope_carries_them(track):
         live.place("NOBODY", 60635.0)
 
 
-def test_errors_of_three_epochs_are_what_is_claimed(track):
+def test_errors_of_three_epochs_agree_with_their_claim(track):
     night, live, answers, _ = track
     squares = []
     for k, answer in enumerate(answers):
@@ -478,7 +478,7 @@ def test_errors_of_three_epochs_are_what_is_claimed(track):
     assert np.all(np.abs(answers[2].pose.offset) < 6.0 * np.sqrt(np.diag(answers[2].pose.covariance)))
 
 
-def test_prisms_of_the_dish_are_solved_but_not_carried(settled):
+def test_dish_prisms_are_solved_but_not_in_the_state(settled):
     night, live, feed = settled
     ranger = next(
         r for r in live.site.feedarm.ranger
@@ -489,11 +489,11 @@ def test_prisms_of_the_dish_are_solved_but_not_carried(settled):
     feed.into(live)
     answer = live.solve(night.ticks(3))
     assert "DP20C" in answer.names
-    assert "DP20C" not in live.carried.points()
+    assert "DP20C" not in live.state.points()
     assert "DP20C" not in live.uncertainty()
 
 
-def test_both_stations_may_come_and_go():
+def test_stations_may_appear_and_disappear():
     """A site that begins with one station and hears the other later, then loses the first."""
     night, live = Night(twin(seed=7, faults=("silent-station WX2 0 12",)), 7), Live(site())
     for item in night.before().items:
@@ -513,8 +513,8 @@ def later(item, seconds):
     return replace(item, ticks=item.ticks + round(seconds * TICKS_PER_DAY / 86400.0))
 
 
-def test_what_was_fed_by_a_clock_an_hour_ahead_leaves_no_trace_when_it_is_set_back(settled):
-    """The same answer, to the last bit but for the carried age, as of a reduction that was never fed with it."""
+def test_input_stamped_an_hour_ahead_leaves_no_trace_after_the_clock_is_set_back(settled):
+    """The same answer, to the last bit but for the state's age, as without that input."""
     night, live, feed = settled
     never = copy.deepcopy(live)
     wrong = Feed(tuple(later(item, 3600.0) for item in feed.items if not isinstance(item, LiveShot)))
@@ -527,15 +527,15 @@ def test_what_was_fed_by_a_clock_an_hour_ahead_leaves_no_trace_when_it_is_set_ba
     np.testing.assert_array_equal(answers[0].covariance, answers[1].covariance)
 
 
-def test_shots_of_a_clock_ahead_are_not_in_the_next_epoch_and_what_is_carried_counts_from_now(settled):
+def test_shots_of_a_clock_ahead_are_dropped_and_the_state_counts_from_now(settled):
     night, live, feed = settled
     shots = [later(shot, 3600.0) for shot in feed.shots]
     Feed(tuple(later(item, 3600.0) if not isinstance(item, LiveShot) else item for item in feed.items)).into(live)
     for shot in shots[:20]:
         live.shot(replace(shot, number=shot.number + 10_000))
-    live.carried = replace(live.carried, ticks=night.ticks(2) + 10**7)
+    live.state = replace(live.state, ticks=night.ticks(2) + 10**7)
     live.clock_corrected(night.ticks(2))
-    assert live.carried.ticks == night.ticks(2)
+    assert live.state.ticks == night.ticks(2)
     assert all(row.shot.ticks <= night.ticks(2) for row in live._pending)
     assert all(row.shot.ticks <= night.ticks(2) for now in live.rangers.values() for row in now.references)
     assert live.track.latest.ticks <= night.ticks(2)

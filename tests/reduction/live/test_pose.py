@@ -53,7 +53,7 @@ def moved(dish=STAYS, feed=STAYS, *, covariance=None, only=None):
 
 @settings(max_examples=60)
 @given(v=st.lists(small, min_size=12, max_size=12), azimuth=st.floats(0.0, 6.2), elevation=st.floats(0.1, 1.4))
-def test_the_beam_goes_where_the_rays_go(v, azimuth, elevation):
+def test_beam_follows_the_traced_rays(v, azimuth, elevation):
     v = np.array(v)
     turn, shift, feed_turn, feed_shift = 5e-6 * v[:3], 2e-4 * v[3:6], 1e-5 * v[6:9], 4e-4 * v[9:]
     pose = live_pose(moved((turn, shift), (feed_turn, feed_shift)), BODIES, site())
@@ -75,7 +75,7 @@ def test_the_beam_goes_where_the_rays_go(v, azimuth, elevation):
         ((0, 1e-5, 0), (0, 1e-5, 0), 1, 0),  # about y, z goes to x, to the right, clockwise
     ],
 )
-def test_a_telescope_that_turns_as_a_whole_takes_its_beam_along(dish, feed, azimuth_up, elevation_up):
+def test_beam_turns_with_the_whole_telescope(dish, feed, azimuth_up, elevation_up):
     dish = np.array(dish, dtype=float)
     pose = live_pose(moved((dish, np.zeros(3)), (dish, np.cross(dish, FOCUS))), BODIES, site())
     np.testing.assert_allclose(
@@ -91,7 +91,7 @@ def test_a_telescope_that_turns_as_a_whole_takes_its_beam_along(dish, feed, azim
         ((0, 0, 1e-3), (0, 1, 1)),  # the feed away from the dish: an offset section's beam goes up, too
     ],
 )
-def test_a_feed_that_moves_sends_the_beam_the_other_way(shift, signs):
+def test_feed_shift_turns_the_beam_the_other_way(shift, signs):
     still = np.zeros(3), np.zeros(3)
     pose = live_pose(moved(still, (np.zeros(3), np.array(shift))), BODIES, site())
     assert tuple(np.sign(np.round(pose.offset, 8)).tolist()) == signs
@@ -106,7 +106,7 @@ def test_the_beam_deviates_less_than_the_plate_scale():
 
 @settings(max_examples=30)
 @given(seed=st.integers(0, 10**6))
-def test_rigid_motions_are_found_as_planted(seed):
+def test_planted_rigid_motions_are_recovered(seed):
     rng = np.random.default_rng(seed)
     n = 6 * (len(DISH) + len(ARM))
     a = rng.normal(size=(n, 2 * n))
@@ -123,7 +123,7 @@ def test_rigid_motions_are_found_as_planted(seed):
 
 
 @draws(3000, name="count")
-def test_claimed_covariances_are_those_of_many_draws(count):
+def test_claimed_covariances_agree_with_scatter(count):
     rng = np.random.default_rng(11)
     n = 6 * (len(DISH) + len(ARM))
     a = rng.normal(size=(n, n + 5))
@@ -156,7 +156,7 @@ def test_points_that_no_longer_fit_a_rigid_body_show_in_chi2():
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_in_the_reference_epoch_nothing_has_moved_and_no_variance_is_negative(seed):
+def test_reference_epoch_has_no_motion_and_no_negative_variance(seed):
     rng = np.random.default_rng(seed)
     names = point_parameters(ParameterKind.POINT, (*DISH, *ARM))
     a = rng.normal(size=(len(names), len(names) + 3))
@@ -172,15 +172,15 @@ def test_in_the_reference_epoch_nothing_has_moved_and_no_variance_is_negative(se
         assert np.diag(covariance).max() < 1e-16
 
 
-def test_with_too_few_points_it_says_of_which_body():
+def test_body_with_too_few_points_is_named():
     pose = live_pose(moved(only={*DISH, "A0", "A1"}), BODIES, site())
-    assert pose.missing == "arm has 2 points with a reference (expected 3 or more)"
+    assert pose.missing == "arm has 2 points with a reference position (expected 3 or more)"
     assert np.isnan(pose.offset).all()
     assert pose.dish is None
     assert pose.feed is None
 
 
-def test_points_on_a_line_do_not_hold_a_turn():
+def test_points_on_a_line_do_not_determine_a_rotation():
     state, x = moved(), moved().x.copy()
     for k in range(4):
         for kind in (ParameterKind.POINT, ParameterKind.REFERENCE_PLACE):
@@ -190,7 +190,7 @@ def test_points_on_a_line_do_not_hold_a_turn():
     assert "line" in pose.missing
 
 
-def test_only_points_with_a_reference_count():
+def test_points_without_a_reference_position_are_ignored():
     state = moved()
     bodies = {**BODIES, "NEW": "dish"}
     names = (*state.parameters, *point_parameters(ParameterKind.POINT, ["NEW"]))
@@ -201,7 +201,7 @@ def test_only_points_with_a_reference_count():
     assert live_pose(more, bodies, site()).dish.points == len(DISH)
 
 
-def test_the_focal_length_is_the_sites():
+def test_focal_length_comes_from_the_site():
     """And a small dish about the vertex has the plate scale of geometry, 1/f."""
     small_dish = SimpleNamespace(focal_length_mm=120_000.0, aperture_centre_mm=(0.0, 0.0), aperture_radius_mm=500.0)
     still = np.zeros(3), np.zeros(3)
@@ -210,7 +210,7 @@ def test_the_focal_length_is_the_sites():
     assert pose.offset[0] == pytest.approx(-1e-3 / 120.0, rel=2e-5)  # (r/2f)^2 = 4e-6
 
 
-def test_a_body_that_bends_claims_no_more_than_its_points_show():
+def test_bending_body_has_a_covariance_that_covers_its_scatter():
     """Each point goes its own 0.3 mm beside a rigid motion, measured to 10 um: the motion scatters as claimed."""
     rng, found = np.random.default_rng(9), []
     places = {f"D{k}": rng.uniform([-50, 4, 0], [50, 104, 40]) for k in range(20)}

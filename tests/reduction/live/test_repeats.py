@@ -38,7 +38,7 @@ def phase_of(row, distance):
     return abs(np.angle(row.phase.phasor * np.exp(2j * math.pi * INDEX * distance / HALF)))
 
 
-def test_a_stream_on_a_moving_target_is_one_shot_at_its_middle():
+def test_stream_on_a_moving_target_becomes_one_shot_at_its_middle():
     def length(t):
         return 123.456 + 2.2e-3 * t + 1e-4 * t**2
 
@@ -56,7 +56,7 @@ def test_a_stream_on_a_moving_target_is_one_shot_at_its_middle():
     assert one.phase.harmonics[0] == pytest.approx(0.0065)
 
 
-def test_claimed_noise_is_the_scatter_of_the_mean():
+def test_claimed_noise_agrees_with_the_scatter_of_the_mean():
     rng, found = np.random.default_rng(2), []
     for _ in range(400):
         rows = [taken(k, 0.13 * k, 50.0) for k in range(16)]
@@ -66,7 +66,7 @@ def test_claimed_noise_is_the_scatter_of_the_mean():
     assert np.mean(np.abs(found) ** 2) / 2 == pytest.approx(1.0, abs=4 / math.sqrt(800))
 
 
-def test_a_repeat_of_something_else_stays_by_itself():
+def test_outlying_repeat_stays_separate():
     rows = [taken(k, 0.13 * k, 50.0 if k != 5 else 50.0 + 4e-3) for k in range(12)]
     first, second = sorted(joined(rows, lambda *a: np.full(12, 50.0)), key=lambda r: len(r.numbers))
     assert first.numbers == (5,)
@@ -77,7 +77,7 @@ def test_a_repeat_of_something_else_stays_by_itself():
     assert len(one.numbers) == 12
 
 
-def test_windows():
+def test_repeats_are_joined_within_time_and_distance_limits():
     resting = [taken(k, 0.5 * k + 1e-3, 50.0) for k in range(41)]  # 20 s
     assert [len(r.numbers) for r in joined(resting, lambda *a: np.full(41, 50.0))] == [21, 20]
     moving = [taken(k, 0.5 * k, 50.0 + 1e-4 * k) for k in range(9)]  # 0.2 mm/s for 4 s
@@ -86,7 +86,7 @@ def test_windows():
     assert [len(r.numbers) for r in joined(fast, lambda a, b, mjd: 50.0 + 4e-3 * np.arange(6))] == [2, 2, 2]
 
 
-def test_what_is_not_joined():
+def test_rejected_and_reference_shots_are_not_joined():
     rows = [
         taken(1, 0.0, 50.0),
         taken(2, 0.1, 50.0, reason=Reason(ShotStatus.BLOCKED, "by a test")),

@@ -1,4 +1,4 @@
-"""The carried state against plain matrices: Kalman's update in full, walks written out, what returns to its prior."""
+"""Filter state against plain matrices: full Kalman update, explicit random walks."""
 
 import numpy as np
 import pytest
@@ -8,15 +8,15 @@ from hypothesis import strategies as st
 from catseye.geometry.frames.frame import Transform
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.live.state import (
-    USUAL,
+    DEFAULT_NOISE,
     Carried,
-    carried_on,
     from_ground,
+    marginal,
+    predict,
     to_ground,
+    update_correlated,
     with_reference,
-    with_unseen,
     with_velocities,
-    without,
 )
 from parameter_scene import parameter, parameters
 
@@ -49,7 +49,7 @@ def state(seed=0, names=NAMES):
 
 @settings(max_examples=60)
 @given(seed=seeds, shared=st.integers(1, 5), outside=st.integers(1, 5), new=st.integers(0, 4))
-def test_what_an_epoch_does_not_see_is_updated_as_kalman_would(seed, shared, outside, new):
+def test_unobserved_states_follow_the_full_kalman_update(seed, shared, outside, new):
     rng = np.random.default_rng(seed)
     old = tuple(zero(f"s{k}") for k in rng.permutation(shared + outside))
     before = Carried(old, rng.normal(size=len(old)), spd(rng, len(old)), 0, 0.1)
@@ -70,7 +70,7 @@ def test_what_an_epoch_does_not_see_is_updated_as_kalman_would(seed, shared, out
 
     whole_x, whole_p = updated(x, p, h)
     part_x, part_p = updated(x[at], p[np.ix_(at, at)], h[:, at])
-    after = with_unseen(before, Carried(seen, part_x, part_p, 5, 0.2))
+    after = update_correlated(before, Carried(seen, part_x, part_p, 5, 0.2))
     order = [after.parameters.index(name) for name in names]
     np.testing.assert_allclose(after.x[order], whole_x, rtol=0, atol=1e-8)
     np.testing.assert_allclose(after.covariance[np.ix_(order, order)], whole_p, rtol=0, atol=1e-8)
@@ -78,15 +78,15 @@ def test_what_an_epoch_does_not_see_is_updated_as_kalman_would(seed, shared, out
     assert (after.ticks, after.elevation) == (5, 0.2)
 
 
-def test_a_seen_state_stands_as_it_was_found():
+def test_observed_states_are_replaced_by_their_estimate():
     before, seen = state(1, ("zero a", "zero b", "zero c")), state(2, ("zero c", "zero b"))
-    after = with_unseen(before, seen)
+    after = update_correlated(before, seen)
     np.testing.assert_array_equal(after.covariance[:2, :2], seen.covariance)
     np.testing.assert_array_equal(after.x[:2], seen.x)
-    assert with_unseen(seen, before) is before, "everything was seen"
+    assert update_correlated(seen, before) is before, "everything was seen"
 
 
-def test_the_reference_epoch_is_a_fully_correlated_copy_that_later_replaces_itself():
+def test_reference_positions_are_fully_correlated_copies_and_replaceable():
     first = with_reference(state(3), ["A", "D"])
     now, then = (first.columns(parameters(t)) for t in (["A x", "D z"], ["A@0 x", "D@0 z"]))
     np.testing.assert_array_equal(first.x[now], first.x[then])
@@ -100,17 +100,17 @@ def test_the_reference_epoch_is_a_fully_correlated_copy_that_later_replaces_itse
     np.testing.assert_array_equal(again.x[then], again.x[now])
 
 
-def test_a_marginal_leaves_the_rest_alone():
+def test_marginal_leaves_other_parameters_unchanged():
     whole = state(4)
-    left = without(whole, set(parameters(["A x", "zero ZY1"])))
+    left = marginal(whole, set(parameters(["A x", "zero ZY1"])))
     at = [i for i, name in enumerate(whole.names) if name not in {"A x", "zero ZY1"}]
     np.testing.assert_array_equal(left.x, whole.x[at])
     np.testing.assert_array_equal(left.covariance, whole.covariance[np.ix_(at, at)])
 
 
 def test_velocities_are_added_once_and_are_uncorrelated():
-    one = with_velocities(state(5), ["A", "D"], USUAL)
-    assert with_velocities(one, ["A", "D"], USUAL).names == one.names
+    one = with_velocities(state(5), ["A", "D"], DEFAULT_NOISE)
+    assert with_velocities(one, ["A", "D"], DEFAULT_NOISE).names == one.names
     rate = one.columns(parameters(f"{p} rate {a}" for p in "AD" for a in "xyz"))
     np.testing.assert_allclose(one.covariance[np.ix_(rate, rate)], (0.02e-3) ** 2 * np.eye(6), rtol=1e-12, atol=0)
     rest = np.setdiff1d(np.arange(len(one.x)), rate)
@@ -123,10 +123,10 @@ def cross(w):
 
 
 @pytest.mark.parametrize(("seconds", "degrees"), [(0.0, 0.0), (10.0, 0.0), (1800.0, -7.0), (-5.0, 1.0)])
-def test_a_walk_is_that_of_matrices_written_out(seconds, degrees):
-    before = with_velocities(with_reference(state(6), ["A"]), ["B", "E"], USUAL)
+def test_process_noise_agrees_with_explicit_matrices(seconds, degrees):
+    before = with_velocities(with_reference(state(6), ["A"]), ["B", "E"], DEFAULT_NOISE)
     elevation = 0.7 + np.radians(degrees)
-    after = carried_on(before, 2000, seconds, elevation=elevation, bodies=BODIES, rule=USUAL, profile_sigma=0.5)
+    after = predict(before, 2000, seconds, elevation=elevation, bodies=BODIES, noise=DEFAULT_NOISE, profile_sigma=0.5)
     t, n = max(seconds, 0.0), len(before.x)
     column = {name: i for i, name in enumerate(before.names)}
     f, q = np.eye(n), np.zeros((n, n))
@@ -146,10 +146,10 @@ def test_a_walk_is_that_of_matrices_written_out(seconds, degrees):
     for body in ("arm", "dish", "alidade"):
         mine = [p for p in BODIES if BODIES[p] == body]
         places = np.array([[x[column[f"{p} {a}"]] for a in "xyz"] for p in mine])
-        shift = np.hypot(USUAL.body_mm[body], 2.0 * far) * 1e-3
-        turn = np.hypot(USUAL.body_rad[body], 5e-5 * far)
+        shift = np.hypot(DEFAULT_NOISE.body_mm[body], 2.0 * far) * 1e-3
+        turn = np.hypot(DEFAULT_NOISE.body_rad[body], 5e-5 * far)
         design = np.vstack([np.hstack([np.eye(3), -cross(p - places.mean(axis=0))]) for p in places])  # w x r = -r x w
-        own = (USUAL.point_mm[body] ** 2 + (0.5 * far) ** 2 + 0.3**2 * hours) * 1e-6
+        own = (DEFAULT_NOISE.point_mm[body] ** 2 + (0.5 * far) ** 2 + 0.3**2 * hours) * 1e-6
         at = np.array([column[f"{p} {a}"] for p in mine for a in "xyz"])
         q[np.ix_(at, at)] += design @ np.diag([shift**2] * 3 + [turn**2] * 3) @ design.T + own * np.eye(len(at))
     for axis in "xyz":
@@ -162,12 +162,14 @@ def test_a_walk_is_that_of_matrices_written_out(seconds, degrees):
     np.testing.assert_allclose(after.x, x, rtol=0, atol=1e-12)
     np.testing.assert_allclose(after.covariance, f @ before.covariance @ f.T + q, rtol=1e-12, atol=1e-18)
     assert (after.ticks, after.elevation) == (2000, elevation)
-    np.testing.assert_array_equal(before.x, with_velocities(with_reference(state(6), ["A"]), ["B", "E"], USUAL).x)
+    np.testing.assert_array_equal(
+        before.x, with_velocities(with_reference(state(6), ["A"]), ["B", "E"], DEFAULT_NOISE).x
+    )
 
 
-def test_the_profile_returns_to_its_prior_and_the_reference_stands():
+def test_profile_returns_to_its_prior_and_reference_positions_stay():
     before = with_reference(state(7), ["A", "D"])
-    after = carried_on(before, 0, 24 * 3600.0, elevation=0.7, bodies=BODIES, rule=USUAL, profile_sigma=0.4)
+    after = predict(before, 0, 24 * 3600.0, elevation=0.7, bodies=BODIES, noise=DEFAULT_NOISE, profile_sigma=0.4)
     bend = after.columns([parameter("the air bend")])[0]
     assert after.x[bend] == pytest.approx(0.0, abs=1e-12)
     assert after.covariance[bend, bend] == pytest.approx(0.16, rel=1e-9)
@@ -178,7 +180,7 @@ def test_the_profile_returns_to_its_prior_and_the_reference_stands():
 
 @settings(max_examples=40)
 @given(seed=seeds)
-def test_there_and_back_through_the_ground_is_where_it_was(seed):
+def test_state_survives_the_round_trip_through_the_ground_frame(seed):
     rng = np.random.default_rng(seed)
     before = state(seed)
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
@@ -192,20 +194,22 @@ def test_there_and_back_through_the_ground_is_where_it_was(seed):
 
 
 @pytest.mark.parametrize("velocities", [False, True])
-def test_over_five_hundred_epochs_it_stays_symmetric_positive_and_bounded(velocities):
+def test_covariance_stays_symmetric_positive_and_bounded_over_500_epochs(velocities):
     rng, now = np.random.default_rng(9), with_reference(state(8), ["A", "B", "C", "D"])
     if velocities:
-        now = with_velocities(now, list("ABCDE"), USUAL)
+        now = with_velocities(now, list("ABCDE"), DEFAULT_NOISE)
     seen_names = [n for n in NAMES if not n.startswith("E ")]
     r = 1e-8
     for epoch in range(500):
-        now = carried_on(now, epoch, 10.0, elevation=0.7 + 1e-4 * epoch, bodies=BODIES, rule=USUAL, profile_sigma=0.4)
+        now = predict(
+            now, epoch, 10.0, elevation=0.7 + 1e-4 * epoch, bodies=BODIES, noise=DEFAULT_NOISE, profile_sigma=0.4
+        )
         at = now.columns(parameters(seen_names))
         p, h = now.covariance[np.ix_(at, at)], rng.normal(size=(40, len(at)))
         gain = np.linalg.solve(h @ p @ h.T + r * np.eye(40), h @ p).T
         after = p - gain @ h @ p
         x = now.x[at] + gain @ rng.normal(0.0, 1e-4, 40)
-        now = with_unseen(now, Carried(parameters(seen_names), x, 0.5 * (after + after.T), epoch, now.elevation))
+        now = update_correlated(now, Carried(parameters(seen_names), x, 0.5 * (after + after.T), epoch, now.elevation))
         np.testing.assert_allclose(now.covariance, now.covariance.T, rtol=0, atol=1e-20)
     size = np.sqrt(np.diag(now.covariance))
     low = np.linalg.eigvalsh(now.covariance / np.outer(size, size))[0]
@@ -216,7 +220,7 @@ def test_over_five_hundred_epochs_it_stays_symmetric_positive_and_bounded(veloci
     assert size[points].max() < 2e-3
 
 
-def test_points_are_found_by_name():
+def test_points_are_indexed_by_name():
     one = state(2)
     assert one.points() == {"A": 0, "B": 3, "C": 6, "D": 9, "E": 12, "ZY1": 15}
     assert one.points(ParameterKind.FIXED_POINT) == {"ZY1": 18}
@@ -224,11 +228,13 @@ def test_points_are_found_by_name():
         one.columns([parameter("nobody x")])
 
 
-def test_what_lasts_of_a_path_returns_to_its_prior():
+def test_path_index_returns_to_its_prior():
     """Half an hour takes e^-1 of it and gives 1 - e^-2 of its variance back."""
     path = parameters(["path ZY1 A", "normal A 1"])
     before = Carried(path, np.array([0.1, 2.0]), np.array([[4e-4, 1e-4], [1e-4, 1.0]]), 0, 0.5)
-    after = carried_on(before, 1, 1800.0, elevation=0.5, bodies={}, rule=USUAL, profile_sigma=0.5, path_sigma_ppm=0.105)
+    after = predict(
+        before, 1, 1800.0, elevation=0.5, bodies={}, noise=DEFAULT_NOISE, profile_sigma=0.5, path_sigma_ppm=0.105
+    )
     kept = np.exp(-1.0)
     np.testing.assert_allclose(after.x, [0.1 * kept, 2.0], rtol=1e-12)
     expected = [[4e-4 * kept**2 + (1 - kept**2) * 0.105**2, 1e-4 * kept], [1e-4 * kept, 1.0]]

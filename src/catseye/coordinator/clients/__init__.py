@@ -1,1 +1,1 @@
-"""Who asks the coordinator: its port, the board of what is known, samplers, parameters."""
+"""Clients of the coordinator: port, commands, samplers, parameters."""

@@ -1,9 +1,9 @@
-"""What the coordinator's clients can ask and set: a function for each command, rows of plain values back."""
+"""Commands of the coordinator's clients: functions that return rows."""
 
 from collections.abc import Callable, Iterable
 
 from catseye.coordinator.clients.parameters import ClientParameter, Parameters
-from catseye.coordinator.clients.samplers import COLUMNS, KEPT, Samplers, plain
+from catseye.coordinator.clients.samplers import COLUMNS, RING_LENGTH, Samplers, plain
 from catseye.coordinator.modes import mode_of
 from catseye.coordinator.ziy import Coordinator
 from catseye.errors import InputError
@@ -15,26 +15,26 @@ HELP = {
     "STATUS": (
         "STATUS",
         "mode; rangers ready; shots numbered; shots acknowledged; round; telescope; journal; site; last epoch; clock; "
-        "disk; holder of the lease; what is wrong",
+        "disk; holder of the lease; problems",
     ),
     "RANGERS": ("RANGERS", "a line each: name; state; shots; failures in a row; target streamed; last status; trouble"),
     "PARAMETERS": ("PARAMETERS", "a line each: name; value; value that waits; legal values"),
-    "SET": ("SET name, value", "check a parameter's value and keep it until START"),
+    "SET": ("SET name, value", "check a parameter's value and store it until START"),
     "PREPARE": ("PREPARE", "check all values that wait"),
-    "START": ("START", "make the prepared values count"),
+    "START": ("START", "activate the prepared values"),
     "SAMPLERS": ("SAMPLERS", "a line each: name; values kept; what a value holds"),
     "SAMPLER": ("SAMPLER name | SAMPLER name, n", "the last n values, a line each, oldest first"),
     "SUBSCRIBE": ("SUBSCRIBE | SUBSCRIBE kind, ...", "push SHOT EPOCH EVENT POSTURE WEATHER; NONE ends it"),
     "MODE": ("MODE | MODE mode", "active, passive, hold"),
     "DROP": ("DROP ranger", "leave a ranger out; it stays connected"),
     "TAKE": ("TAKE ranger", "use a ranger again"),
-    "STREAM": ("STREAM ranger, target | STREAM ranger", "one target again and again; without a target it ends"),
+    "STREAM": ("STREAM ranger, target | STREAM ranger", "one target repeatedly; without a target it ends"),
     "CLOCK": (
         "CLOCK | CLOCK ACCEPT",
-        "s that its machine's UTC is ahead; kernel's word; trouble; ACCEPT believes it",
+        "s that its machine's UTC is ahead; kernel's state; trouble; ACCEPT adopts it",
     ),
-    "LEASE": ("LEASE | LEASE name | LEASE none", "who may command here; take it by a name; give it back"),
-    "VER": ("VER", "name and version; sent behind a command of many lines it ends them"),
+    "LEASE": ("LEASE | LEASE name | LEASE none", "ask the holder; take it by a name; give it back"),
+    "VER": ("VER", "name and version; sent after a command of many lines it marks their end"),
     "HLP": ("HLP | HLP command", "commands, or one command's forms; HELP is the same"),
     "BYE": ("BYE", "close this connection"),
 }
@@ -47,7 +47,7 @@ class Board:
     def __init__(self, coordinator: Coordinator, parameters: tuple[ClientParameter, ...] = ()):
         self._ziy = coordinator
         self.samplers = Samplers()
-        self.parameters = Parameters((*_own(coordinator), *parameters))
+        self.parameters = Parameters((*_coordinator_parameters(coordinator), *parameters))
         self._commands: dict[str, tuple[tuple[int, ...], Callable[[tuple[str, ...]], Rows]]] = {
             "STATUS": ((0,), lambda _: self._status()),
             "RANGERS": ((0,), lambda _: self._rangers()),
@@ -58,8 +58,8 @@ class Board:
             "SAMPLERS": ((0,), lambda _: self._samplers()),
             "SAMPLER": ((1, 2), lambda words: self._sampler(*words)),
             "MODE": ((0, 1), lambda words: self._mode(*words)),
-            "DROP": ((1,), lambda words: self._done(coordinator.drop, *words)),
-            "TAKE": ((1,), lambda words: self._done(coordinator.take, *words)),
+            "DROP": ((1,), lambda words: self._applied(coordinator.drop, *words)),
+            "TAKE": ((1,), lambda words: self._applied(coordinator.take, *words)),
             "STREAM": ((1, 2), lambda words: self._stream(*words)),
             "CLOCK": ((0, 1), lambda words: self._clock(*words)),
             "VER": ((0,), lambda _: [("ZIY", VERSION)]),
@@ -67,9 +67,9 @@ class Board:
         }
 
     def rows(self, request: Request) -> Rows | None:
-        """The rows that answer a request; None for a command that is not known.
+        """Rows of the answer to a request; None for an unknown command.
 
-        Raises InputError: parameters that do not fit, or what was asked cannot be.
+        Raises InputError: wrong parameters, or an impossible request.
         """
         name = ALIASES.get(request.command, request.command)
         command = self._commands.get(name)
@@ -85,12 +85,12 @@ class Board:
         ready = sum(link.state == "ready" for link in z.links.values())
         telescope = "known" if z.telescope_known else "silent"
         journal = plain(z.intake.trouble or "well")
-        asked = len(z.links) - len(z.firing.dropped)
-        counts = (f"{ready} of {asked}", str(z.intake.numbered), str(z.intake.acknowledged), str(z.round_number))
-        now = z.condition.now()
-        epoch = "none" if now.verdict is None else f"{now.epoch} {now.verdict.word}"
-        wrong = "; ".join(problem.text for problem in now.problems) or "nothing"
-        site = (now.word, epoch, now.clock, now.disk, now.holder, plain(wrong))
+        active = len(z.links) - len(z.firing.dropped)
+        counts = (f"{ready} of {active}", str(z.intake.numbered), str(z.intake.acknowledged), str(z.round_number))
+        condition = z.condition.now()
+        epoch = "none" if condition.verdict is None else f"{condition.epoch} {condition.verdict.word}"
+        wrong = "; ".join(problem.text for problem in condition.problems) or "nothing"
+        site = (condition.word, epoch, condition.clock, condition.disk, condition.holder, plain(wrong))
         return [(z.mode, *counts, telescope, journal, *site)]
 
     def _rangers(self) -> Rows:
@@ -113,9 +113,9 @@ class Board:
 
     def _sampler(self, name: str, count: str = "1") -> Rows:
         if name.upper() not in COLUMNS:
-            raise InputError(f"{name[:20]!a} is no sampler (expected one of {' '.join(COLUMNS)})")
-        if not count.isdecimal() or not 1 <= int(count[:9]) <= KEPT:
-            raise InputError(f"n {count[:20]!a} is not 1 to {KEPT}")
+            raise InputError(f"{name[:20]!a} is not a sampler (expected one of {' '.join(COLUMNS)})")
+        if not count.isdecimal() or not 1 <= int(count[:9]) <= RING_LENGTH:
+            raise InputError(f"n {count[:20]!a} is not 1 to {RING_LENGTH}")
         return [(name.upper(), *row) for row in self.samplers.last(name.upper(), int(count))]
 
     def _mode(self, text: str | None = None) -> Rows:
@@ -139,24 +139,24 @@ class Board:
     def _help(self, name: str | None = None) -> Rows:
         if name is None:
             return [(" ".join(HELP),)]
-        known = ALIASES.get(name.upper(), name.upper())
-        if known not in HELP:
-            raise InputError(f"{name[:20]!a} is no command (expected one that HLP lists)")
-        return [tuple(plain(word) for word in HELP[known])]
+        command = ALIASES.get(name.upper(), name.upper())
+        if command not in HELP:
+            raise InputError(f"{name[:20]!a} is not a command (expected one listed by HLP)")
+        return [tuple(plain(word) for word in HELP[command])]
 
-    def _done(self, action: Callable[[str], None], ranger: str) -> Rows:
+    def _applied(self, action: Callable[[str], None], ranger: str) -> Rows:
         action(ranger.upper())
         return [(ranger.upper(),)]
 
 
-def _own(z: Coordinator) -> tuple[ClientParameter, ...]:
-    """The coordinator's own parameters."""
+def _coordinator_parameters(z: Coordinator) -> tuple[ClientParameter, ...]:
+    """Parameters of the coordinator itself."""
 
     def dropped(text: str) -> str:
         names = [] if text.lower() == "none" else text.upper().split()
         strange = [name for name in names if name not in z.links]
         if strange:
-            raise InputError(f"{strange[0][:20]!a} is no ranger here (expected names with blanks between, or none)")
+            raise InputError(f"{strange[0][:20]!a} is not a ranger here (expected names with blanks between, or none)")
         return " ".join(sorted(set(names))) or "none"
 
     def drop(text: str) -> None:

@@ -1,22 +1,22 @@
-"""M&C's parameters: checked for legality one by one and together, then activated by PREPARE and START."""
+"""Client parameters: checked singly and together, activated by PREPARE and START."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from catseye.errors import InputError
 
-Check = Callable[[str], str]  # the text as it is kept, or InputError
+Check = Callable[[str], str]  # the normalised text, or InputError
 
 
 @dataclass(frozen=True)
 class ClientParameter:
     """One parameter.
 
-    name    as it is set
-    help    one line, its legal values in it
-    now     its value that counts now
-    check   a text as it will be kept; raises InputError where it is not legal
-    apply   make it count
+    name    of the parameter
+    help    one line, including its legal values
+    now     its current value
+    check   normalise a text; raises InputError if it is not legal
+    apply   activate it
     """
 
     name: str
@@ -27,7 +27,7 @@ class ClientParameter:
 
 
 class Parameters:
-    """All of them; what was set waits until `start`, which wants a `prepare` after the last change."""
+    """All parameters; values wait until `start`, after a `prepare`."""
 
     def __init__(self, parameters: tuple[ClientParameter, ...]):
         self._all = {p.name: p for p in parameters}
@@ -35,23 +35,29 @@ class Parameters:
         self._prepared = False
 
     def set(self, name: str, text: str) -> str:
-        """Keep a value; what is kept. Raises InputError: no such parameter, not legal."""
+        """Store a value; the normalised text.
+
+        Raises InputError: no such parameter, not legal.
+        """
         parameter = self._all.get(name.lower())
         if parameter is None:
-            raise InputError(f"{name[:20]!a} is no parameter (expected one of {' '.join(self._all)})")
-        kept = parameter.check(text)
-        self._set[parameter.name], self._prepared = kept, False
-        return kept
+            raise InputError(f"{name[:20]!a} is not a parameter (expected one of {' '.join(self._all)})")
+        normalised = parameter.check(text)
+        self._set[parameter.name], self._prepared = normalised, False
+        return normalised
 
     def prepare(self) -> int:
-        """Look at all that waits once more, together with what else counts; how many they are."""
+        """Check all waiting values together; their number."""
         for name, text in self._set.items():
             self._all[name].check(text)
         self._prepared = True
         return len(self._set)
 
     def start(self) -> int:
-        """Make all that was prepared count. Raises InputError: not prepared since the last change."""
+        """Activate all prepared values; their number.
+
+        Raises InputError: not prepared since the last change.
+        """
         if not self._prepared:
             raise InputError("nothing is prepared (expected SET, then PREPARE, first)")
         waiting, self._set, self._prepared = self._set, {}, False
@@ -60,5 +66,5 @@ class Parameters:
         return len(waiting)
 
     def rows(self) -> list[tuple[str, str, str, str]]:
-        """Name, value now, value that waits or none, help."""
+        """Name, current value, waiting value or none, help."""
         return [(p.name, p.now(), self._set.get(p.name, "none"), p.help) for p in self._all.values()]

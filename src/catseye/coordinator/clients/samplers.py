@@ -1,4 +1,7 @@
-"""Samplers: the last values of each kind, with their times, in rings of bounded length. M&C's archivist reads them."""
+"""Samplers: the last values of each kind, with times, in bounded rings.
+
+M&C's archivist reads them.
+"""
 
 from collections import deque
 from collections.abc import Iterable
@@ -7,8 +10,8 @@ from catseye.coordinator.journal.entries import AnsweredShot, Entry, EpochSoluti
 from catseye.ranger.line import stamp_text
 from catseye.records.night.live import Happening, LivePosture, LiveWeather
 
-KEPT = 4096  # values of each sampler
-Row = tuple[str, ...]  # a stamp, then values as they travel
+RING_LENGTH = 4096  # values of each sampler
+Row = tuple[str, ...]  # a stamp, then values as sent
 COLUMNS = {
     "RANGES": ("number", "ranger", "target", "status", "range_m", "u_range_m", "misfit_m"),
     "EPOCHS": ("epoch", "points", "shots", "rejected", "variance_factor", "degrees_of_freedom", "refractivity_ppm"),
@@ -20,30 +23,30 @@ COLUMNS = {
 
 
 class Samplers:
-    """Rings by name: `COLUMNS` says what each holds."""
+    """Rings by name, with the columns of `COLUMNS`."""
 
-    def __init__(self, kept: int = KEPT):
-        self._rings: dict[str, deque[Row]] = {name: deque(maxlen=kept) for name in COLUMNS}
+    def __init__(self, length: int = RING_LENGTH):
+        self._rings: dict[str, deque[Row]] = {name: deque(maxlen=length) for name in COLUMNS}
 
     def add(self, entry: Entry) -> list[tuple[str, Row]]:
-        """The rows of an entry, by sampler; they are kept."""
+        """Store the rows of an entry; the rows by sampler."""
         rows = list(rows_of(entry))
         for name, row in rows:
             self._rings[name].append(row)
         return rows
 
     def last(self, name: str, count: int) -> list[Row]:
-        """The last so many rows of a sampler, oldest first."""
+        """Last rows of a sampler, oldest first."""
         ring = self._rings[name]
         return [ring[k] for k in range(max(0, len(ring) - count), len(ring))]
 
     def lengths(self) -> dict[str, int]:
-        """How many values each sampler holds."""
+        """Number of values in each sampler."""
         return {name: len(ring) for name, ring in self._rings.items()}
 
 
 def rows_of(entry: Entry) -> Iterable[tuple[str, Row]]:
-    """What an entry of the journal means for the samplers."""
+    """Rows of a journal entry, by sampler."""
     if isinstance(entry, AnsweredShot):
         shot = entry.shot
         values = (_number(v) for v in (entry.range_, entry.u_range, entry.misfit))
@@ -61,20 +64,20 @@ def rows_of(entry: Entry) -> Iterable[tuple[str, Row]]:
 
 
 def _of_solution(entry: EpochSolution) -> Iterable[tuple[str, Row]]:
-    """The rows of an epoch's answer; what it does not have is `none`."""
+    """Rows of an epoch's answer; missing values are `none`."""
     answer, stamp = entry.answer, _stamp(entry.ticks)
     names, places = answer.get("names") or [], answer.get("x") or []
     epoch = _number(answer.get("number"))
     lists = (answer.get("names"), answer.get("used"), answer.get("rejected"))
-    counted = ["none" if each is None else _number(len(each)) for each in lists]
-    rest = [_number(answer.get(key)) for key in COLUMNS["EPOCHS"][4:]]
-    yield "EPOCHS", (stamp, epoch, *counted, *rest)
+    counted = ["none" if values is None else _number(len(values)) for values in lists]
+    statistics = [_number(answer.get(key)) for key in COLUMNS["EPOCHS"][4:]]
+    yield "EPOCHS", (stamp, epoch, *counted, *statistics)
     for name, place in zip(names, places, strict=False):
         yield "POINTS", (stamp, epoch, plain(str(name)), *(_number(v) for v in place))
 
 
 def plain(text: str) -> str:
-    """As a value of a line: printable ASCII without a comma."""
+    """Text as a value of a line: printable ASCII without a comma."""
     return "".join(c if " " <= c <= "~" else "?" for c in text.replace(",", ";"))[:300].strip(" ")
 
 

@@ -1,9 +1,9 @@
-"""The last word between every plan and every ranger: what may not be sent, and which beam must move, or go dark, when.
+"""Safety checks on every command to a ranger, and of parked beams.
 
-It believes nobody: its Sun is its own, and where a command leads it works out from what the ranger was told. Of a move
-the whole rectangle of counts between where the mirror may be and where it goes is asked
-(`coordinator.visibility.sweep`), so it does not matter how the axes run. It must be told what rangers answer (`heard`)
-and how the telescope stands (`telescope`).
+It trusts no input it can compute itself: the Sun is its own, and a command's destination follows from what the ranger
+was sent. A move is checked for the whole rectangle of counts between where the mirror may be and where it goes
+(`coordinator.visibility.sweep`), so it does not matter how the axes run. It needs the rangers' replies (`heard`) and
+the telescope's posture (`telescope`).
 """
 
 from collections.abc import Mapping
@@ -40,14 +40,14 @@ HARMLESS = frozenset(
         *("ABP", "ABV", "ABA", "COO", "INI", "BP", "ALPHA", "BETA", "MO", "EZ", "AZM", "ELV", "ORD", "NUM"),
     ]
 )
-BLOCK_TICKS = round(10.0 / TICK_SECONDS)  # for which the surroundings of a ranger on the ground are kept
+BLOCK_TICKS = round(10.0 / TICK_SECONDS)  # for which the surroundings of a ranger on the ground are cached
 LOOK = 2.0  # s: a short move, its settling and its shot
-SHOT = 1.0  # s: settling and a shot, behind a long move
+SHOT = 1.0  # s: settling and a shot, after a long move
 ACTS: tuple[Act, ...] = ("shine", "move")
-ARRIVED = 1.0  # s after its profile's end, when a mirror is taken to stand where it was sent
+ARRIVED = 1.0  # s after its profile's end, when a mirror is assumed to be at its goal
 OLD_POSTURE = 10.0  # s
-FARTHEST_STAMP = 5.0  # s: what moves later than that is asked for when it is due
-LIE = 1.0 * DEGREE  # of a vector to the Sun
+FARTHEST_STAMP = 5.0  # s: later moves must be requested when due
+SUN_TOLERANCE = 1.0 * DEGREE  # tolerance of a vector to the Sun
 WRONG_CLOCK = 1.0  # s
 LONGEST_SCAN = 600.0  # s
 A_SHOT = 2.0  # s of a scan
@@ -56,11 +56,11 @@ ALONG_THE_BEAM = (0.0, 0.0, 1.0)
 
 
 class SafetyGuard:
-    """The guard of all rangers of a site.
+    """Safety guard of all rangers of a site.
 
     site         its records
     keep_clear   Sun and boxes; the site's Sun without boxes if None
-    interlocks   when what is forbidden; nothing if None
+    interlocks   times and contacts that forbid; none if None
 
     Raises InputError: an interlock for a ranger that the site does not have.
     """
@@ -69,48 +69,54 @@ class SafetyGuard:
         self.site, self.keep_clear = site, keep_clear or KeepClear(site)
         self.interlocks = (interlocks or Interlocks()).interlock
         self.vantages = vantages_of(site)
-        for each in self.interlocks:
-            for name in each.rangers:
+        for interlock in self.interlocks:
+            for name in interlock.rangers:
                 if name not in self.vantages:
-                    raise InputError(f"interlock {each.name!r}: ranger {name!r} is not in the site")
-        self.opened = {each.name for each in self.interlocks if each.switch}
+                    raise InputError(f"interlock {interlock.name!r}: ranger {name!r} is not in the site")
+        self.opened = {interlock.name for interlock in self.interlocks if interlock.switch}
         self._memory = {name: Memory(v) for name, v in self.vantages.items()}
         self._posture: LivePosture | None = None
-        self._kept: dict[str, tuple[int, Surroundings]] = {}
+        self._surroundings: dict[str, tuple[int, Surroundings]] = {}
         self._suns: tuple[int, int, Array] | None = None
 
-    # What it must be told --------------------------------------------------------------------------------------------
+    # Input --------------------------------------------------------------------------------------------
 
     def telescope(self, posture: LivePosture) -> None:
-        """How the telescope stands; rangers on its arm move with it."""
+        """Set the telescope's posture; rangers on its arm move with it."""
         self._posture = posture
 
     def heard(self, ranger: str, reply: Reply) -> None:
-        """A reply of a ranger: ACP, CIL, CMEAS, FHM, TRK, WAI and STW say where its mirror is; others nothing."""
+        """Take in a reply of a ranger.
+
+        ACP, CIL, CMEAS, FHM, TRK, WAI and STW state the mirror's position; others nothing.
+        """
         if ranger in self._memory:
             self._memory[ranger].hear(reply.command, reply.ok, reply.values)
 
     def stands(self, ranger: str, counts: tuple[float, float]) -> None:
-        """Where a mirror rests, counts."""
+        """Set the position of a parked mirror, counts."""
         for axis in (0, 1):
             self._memory[ranger].stand.rest(axis, counts[axis])
 
     def switch(self, name: str, *, is_open: bool) -> None:
-        """A contact of the interlocks: open forbids. Raises InputError: there is no such switch."""
-        if name not in {each.name for each in self.interlocks if each.switch}:
-            raise InputError(f"{name!r} is no switch of the interlocks")
+        """Set a contact of the interlocks: open forbids.
+
+        Raises InputError: no such switch.
+        """
+        if name not in {interlock.name for interlock in self.interlocks if interlock.switch}:
+            raise InputError(f"{name!r} is not a switch of the interlocks")
         (self.opened.add if is_open else self.opened.discard)(name)
 
-    # What it says ----------------------------------------------------------------------------------------------------
+    # Checks ----------------------------------------------------------------------------------------------------
 
     def refusal(self, ranger: str, request: Request, now_ticks: int) -> str | None:
-        """Why a request must not be sent to a ranger, in one line; None where it may, and then it counts as sent."""
+        """Reason why a request must not be sent; None if it may, and is sent."""
         if ranger not in self._memory:
             return f"ranger {ranger!r} is not in the site (expected one of {len(self._memory)} of its records)"
         memory = self._memory[ranger]
         memory.stand.settle(now_ticks)
         try:
-            if request.command == "COO" and len(request.parameters) >= 4:  # thousands of them
+            if request.command == "COO" and len(request.parameters) >= 4:  # thousands of these
                 memory.take(request, ())
                 return None
             reason, values = self._judged(memory, request, now_ticks)
@@ -121,12 +127,12 @@ class SafetyGuard:
         return reason
 
     def sun_vector(self, ranger: str, now_ticks: int) -> tuple[float, float, float]:
-        """What SUN should tell a ranger: the unit vector to the Sun in its own frame.
+        """Unit vector to the Sun in a ranger's frame, for SUN.
 
-        While it is set, where no beam goes: straight down, and for the feed arm, which looks down at the dish, the
-        other way along the telescope's beam. A ranger knows no horizon, and a vector cannot be taken back.
+        While it is set, a direction where no beam goes: straight down, and for the feed arm, which looks down at the
+        dish, backwards along the telescope's beam. A ranger knows no horizon, and a vector cannot be withdrawn.
 
-        Raises InputError: a ranger on the feed arm, and no posture, or an old one.
+        Raises InputError: a ranger on the feed arm without a recent posture.
         """
         vantage = self.vantages[ranger]
         sun = self._suns_between(now_ticks, now_ticks)[0]
@@ -139,40 +145,43 @@ class SafetyGuard:
         return float(sun[0]), float(sun[1]), float(sun[2])
 
     def watch(self, now_ticks: int, counts: Mapping[str, tuple[float, float]]) -> list[Alarm]:
-        """Which beams at rest at counts the Sun, a box or an interlock comes to within ten minutes; soonest first.
+        """Hazards of beams parked at counts within ten minutes, soonest first.
 
-        Of a beam on the feed arm the Sun and boxes are looked for within a minute.
+        They are the Sun, a box or an interlock. For a beam on the feed arm the Sun and boxes are predicted for one
+        minute.
 
-        A ranger on the arm whose posture is not known is left out: nothing may move it either.
+        A ranger on the arm without a known posture is left out: nothing may move it either.
         """
         alarms: list[Alarm] = []
         for name in sorted(counts):
             alarms += parked_alarms(
-                self.keep_clear, self.vantages[name], counts[name], now=now_ticks, posture=self._posture
+                self.keep_clear, self.vantages[name], counts[name], now_ticks=now_ticks, posture=self._posture
             )
-            for each in self.interlocks:
-                within = self._opens(each, name, now_ticks, AHEAD)
-                if within is not None and "shine" in each.forbids and self._memory[name].shining:
-                    text = f"{name}: interlock {each.name} ({each.why}) {in_words(within)}: switch its laser off"
+            for interlock in self.interlocks:
+                within = self._opens(interlock, name, now_ticks, AHEAD)
+                if within is not None and "shine" in interlock.forbids and self._memory[name].shining:
+                    text = (
+                        f"{name}: interlock {interlock.name} ({interlock.why}) {in_words(within)}: switch its laser off"
+                    )
                     alarms.append(Alarm(name, within, "interlock", "dark", text))
         return sorted(alarms, key=lambda alarm: (alarm.within, alarm.ranger))
 
     # Inside ----------------------------------------------------------------------------------------------------------
 
-    def _judged(self, memory: Memory, request: Request, now: int) -> tuple[str | None, tuple[Value, ...]]:
+    def _judged(self, memory: Memory, request: Request, now_ticks: int) -> tuple[str | None, tuple[Value, ...]]:
         name = request.command
         if name == "AT":
-            return self._scheduled(memory, request, now), ()
+            return self._scheduled(memory, request, now_ticks), ()
         if name not in COMMANDS:
-            return f"{name} is no command of a ranger", ()
+            return f"{name} is not a command of a ranger", ()
         values = COMMANDS[name].read(request)
         if COMMANDS[name].only_asks(request):
             return None, values
         if name == "INITZY":
-            return "files cannot be looked into from here (expected their commands instead)", values
+            return "files cannot be checked from here (expected their commands instead)", values
         if name == "SUN":
-            return self._lie(memory.vantage, values, now), values
-        if name == "STI" and abs(seconds_between(now, int(values[0]))) > WRONG_CLOCK:
+            return self._wrong_sun(memory.vantage, values, now_ticks), values
+        if name == "STI" and abs(seconds_between(now_ticks, int(values[0]))) > WRONG_CLOCK:
             return (
                 f"clock {stamp_text(int(values[0]))} is more than {WRONG_CLOCK:g} s off: its Sun would be wrong",
                 values,
@@ -180,16 +189,16 @@ class SafetyGuard:
         moves = name in MOVES and not (name == "CMEAS" and values[0] == 2) and not (name == "SCN" and values[0] == 0)
         shines = name in SHINES and values[:1] != (0,)
         if not moves and not shines and name not in HARMLESS and name not in ("PS", "SCN"):
-            return f"{name} is not known to the safety guard (expected another command)", values
-        since = max(now, request.ticks or now)
+            return f"{name} is unknown to the safety guard (expected another command)", values
+        since = max(now_ticks, request.ticks or now_ticks)
         until = later(since, LOOK) if name != "TRK" else max(later(since, LOOK), int(values[5]))
         reason = self._interlocked(memory.vantage.name, since, until, moves=moves, shines=shines)
         if reason is None and name == "PS" and shines:
             reason = self._lights(memory, since, until)
         if reason is None and moves:
-            if since > later(now, FARTHEST_STAMP):
+            if since > later(now_ticks, FARTHEST_STAMP):
                 return (
-                    f"its start is {seconds_between(now, since):.0f} s away (expected at most {FARTHEST_STAMP:g})",
+                    f"its start is {seconds_between(now_ticks, since):.0f} s away (limit {FARTHEST_STAMP:g} s)",
                     values,
                 )
             reason = (
@@ -199,67 +208,70 @@ class SafetyGuard:
                 memory.stand.lose(int(values[0]))
         return reason, values
 
-    def _scheduled(self, memory: Memory, request: Request, now: int) -> str | None:
+    def _scheduled(self, memory: Memory, request: Request, now_ticks: int) -> str | None:
         start, repeats, interval, inner = schedule_of(request.parameters)
         if COMMANDS[inner.command].only_asks(inner):
             return None
         firing = inner.command in ("TRG", "MPC") or (inner.command == "CMEAS" and inner.parameters[:1] == ("2",))
         if not firing:
-            return f"{inner.command} at another time cannot be judged now (expected it when it is due)"
-        since = max(now, start)
+            return f"{inner.command} cannot be checked in advance (expected it when it is due)"
+        since = max(now_ticks, start)
         last = later(since, LOOK + (repeats - 1) * interval)
         return self._interlocked(memory.vantage.name, since, last, moves=False, shines=True)
 
     def _interlocked(self, ranger: str, since: int, until: int, *, moves: bool, shines: bool) -> str | None:
-        """The first interlock that forbids it, in words; None where none does."""
-        asked: list[Act] = [act for act, on in zip(ACTS, (shines, moves), strict=True) if on]
-        for each in self.interlocks:
-            acts = [act for act in asked if act in each.forbids]
-            if not acts or self._opens(each, ranger, since, seconds_between(since, until)) is None:
+        """First interlock that forbids it, in words; else None."""
+        acts_checked: list[Act] = [act for act, on in zip(ACTS, (shines, moves), strict=True) if on]
+        for interlock in self.interlocks:
+            acts = [act for act in acts_checked if act in interlock.forbids]
+            if not acts or self._opens(interlock, ranger, since, seconds_between(since, until)) is None:
                 continue
             ends = "until its switch closes"
-            if not each.switch:
+            if not interlock.switch:
                 begin = since / TICKS_PER_DAY
-                last = each.spans(begin, begin + 1.0)[0][1]
+                last = interlock.spans(begin, begin + 1.0)[0][1]
                 ends = f"until {utc_text(last)}" if last < begin + 1.0 else "for a day and more"
-            return f"interlock {each.name} ({each.why}) forbids to {' and '.join(acts)} {ends}"
+            return f"interlock {interlock.name} ({interlock.why}) forbids to {' and '.join(acts)} {ends}"
         return None
 
-    def _opens(self, each: Interlock, ranger: str, since: int, seconds: float) -> float | None:
-        """s from a time until an interlock holds a ranger, within some s; None where it does not."""
-        if not each.concerns(ranger):
+    def _opens(self, interlock: Interlock, ranger: str, since: int, seconds: float) -> float | None:
+        """Time until an interlock applies, s; None if not within `seconds`."""
+        if not interlock.concerns(ranger):
             return None
-        if each.switch:
-            return 0.0 if each.name in self.opened else None
+        if interlock.switch:
+            return 0.0 if interlock.name in self.opened else None
         begin = since / TICKS_PER_DAY
-        spans = each.spans(begin, begin + seconds / SECONDS_PER_DAY)
+        spans = interlock.spans(begin, begin + seconds / SECONDS_PER_DAY)
         return None if not spans else max(0.0, (spans[0][0] - begin) * SECONDS_PER_DAY)
 
-    def _lie(self, vantage: Vantage, values: tuple[Value, ...], now: int) -> str | None:
-        """Why a vector told as the Sun's is wrong; None where it is right, or no Sun counts."""
-        if not self.keep_clear.counts_at(self.keep_clear.sun(now)):
+    def _wrong_sun(self, vantage: Vantage, values: tuple[Value, ...], now_ticks: int) -> str | None:
+        """Reason why a given Sun vector is wrong; else None."""
+        if not self.keep_clear.counts_at(self.keep_clear.sun(now_ticks)):
             return None
         vector = np.array([float(v) for v in values])
         size = float(np.linalg.norm(vector))
-        true = np.array(self.sun_vector(vantage.name, now))
+        true = np.array(self.sun_vector(vantage.name, now_ticks))
         off = float(np.arctan2(np.linalg.norm(np.cross(vector, true)), vector @ true)) if size > 0.0 else np.pi
-        if off <= LIE:
+        if off <= SUN_TOLERANCE:
             return None
-        return f"that is {off / DEGREE:.1f} deg from the Sun (limit {LIE / DEGREE:g}): ask the guard for its vector"
+        return f"the vector is {off / DEGREE:.1f} deg from the Sun (limit {SUN_TOLERANCE / DEGREE:g}): use the guard's"
 
     def _lights(self, memory: Memory, since: int, until: int) -> str | None:
-        """Why a laser may not be switched on, as onto a box; None where it may."""
+        """Reason why a laser may not be switched on; else None."""
         if not self.keep_clear.boxes:
             return None
         if not memory.stand.known:
-            return "where the mirror stands is not known (expected ACP 0 and ACP 1 first)"
+            return "the mirror's position is unknown (expected ACP 0 and ACP 1 first)"
         around = self._around(memory, since, until)
         low, high = memory.stand.low, memory.stand.high
         box = around.box_in(low, high) if bool(around.near_boxes(low, high)) else None
-        return None if box is None else f"the beam may be on {box} (expected the mirror elsewhere first)"
+        return None if box is None else f"the beam may be on {box} (expected a move away first)"
 
     def _homing(self, memory: Memory, since: int, until: int) -> str | None:
-        """Why an index may not be searched for, which sweeps the beam anywhere; None where it may."""
+        """Reason why the index search is not allowed; else None.
+
+        It sweeps the beam anywhere.
+        """
         if memory.laser_off:
             return None
         up = self.keep_clear.counts_at(self.keep_clear.sun(instants(since, until)))
@@ -268,20 +280,20 @@ class SafetyGuard:
         return "the search for an index sweeps the beam anywhere (expected PS 0 first)"
 
     def _move(self, memory: Memory, name: str, values: tuple[Value, ...], since: int, until: int) -> str | None:
-        """Why the mirror may not go where a command leads it; None where it may, and then it is under way."""
+        """Reason why a move is not allowed; None if it is, and under way."""
         if not memory.stand.known:
-            return "where the mirror stands is not known (expected ACP 0 and ACP 1 first)"
+            return "the mirror's position is unknown (expected ACP 0 and ACP 1 first)"
         goals = self._goals(memory, name, values)
         low, high = goals.min(axis=0), goals.max(axis=0)
         stops = memory.vantage.stops
         if not np.all(within([low[0], high[0]], *stops)):
-            return f"azimuth {low[0]:.0f} to {high[0]:.0f} counts leaves the stops {stops[0]:g} to {stops[1]:g}"
+            return f"azimuth {low[0]:.0f} to {high[0]:.0f} counts is outside the stops {stops[0]:g} to {stops[1]:g}"
         if name == "SCN":
             rounds = int(values[2]) if len(values) > 2 else 0
             takes = rounds * len(memory.order) * A_SHOT
             start = max(since, int(values[1]) if len(values) > 1 else 0)
             if not 0.0 < takes <= LONGEST_SCAN or start > later(since, FARTHEST_STAMP):
-                return f"a scan must say its rounds, and end within {LONGEST_SCAN:g} s (expected SCN 1, 0, rounds)"
+                return f"a scan needs its number of rounds, and must end within {LONGEST_SCAN:g} s (SCN 1, 0, rounds)"
             until = later(start, takes)
         longest = trapezoid(np.stack([memory.stand.low, memory.stand.high]), np.stack([high, low]), memory.pace)
         seconds = float(np.max(longest.total)) + ARRIVED
@@ -293,7 +305,10 @@ class SafetyGuard:
         return reason
 
     def _goals(self, memory: Memory, name: str, values: tuple[Value, ...]) -> Array:
-        """Counts (k, 2) to which a command leads. Raises InputError: it cannot be told."""
+        """Destinations of a command, counts (k, 2).
+
+        Raises InputError if unknown.
+        """
         if name == "STT":
             axis = int(values[0])
             low, high = memory.stand.low.copy(), memory.stand.high.copy()
@@ -316,7 +331,7 @@ class SafetyGuard:
         return memory.counts(values[1] if name == "CMEAS" else values[0])[None]
 
     def _swept(self, memory: Memory, name: str, goal: tuple[Array, Array], since: int, until: int) -> str | None:
-        """Sun and boxes on the way from where the mirror may be to a rectangle of counts."""
+        """Sun or box between the mirror and a rectangle of counts."""
         stand = memory.stand
         low, high = np.minimum(stand.low, goal[0]), np.maximum(stand.high, goal[1])
         around = self._around(memory, since, until)
@@ -324,20 +339,23 @@ class SafetyGuard:
         if code == SUN:
             if np.array_equal(stand.low, stand.high) and bool(leaves(around, stand.low, *(g[None] for g in goal))[0]):
                 return None
-            left = float(around.from_sun(low, high)) + around.sun_limit
+            nearest = float(around.from_sun(low, high)) + around.sun_limit
             return (
-                f"the beam could come within {max(left, 0.0) / DEGREE:.1f} deg of the Sun "
-                f"(expected at least {around.sun_limit / DEGREE:.1f}): choose another way, or wait"
+                f"the beam could come within {max(nearest, 0.0) / DEGREE:.1f} deg of the Sun "
+                f"(expected at least {around.sun_limit / DEGREE:.1f}): choose another path, or wait"
             )
         if code != PERHAPS:
             return None
         box = self._box(memory, name, goal, around, (low, high))
-        return None if box is None else f"the beam could come to {box}: choose another way or target"
+        return None if box is None else f"the beam could come to {box}: choose another path or target"
 
     def _box(
         self, memory: Memory, name: str, goal: tuple[Array, Array], around: Surroundings, swept: tuple[Array, Array]
     ) -> str | None:
-        """The box to which a move may come: along the axes' profiles where start, end and start together are known."""
+        """Box that a move may come to; else None.
+
+        Along the axes' profiles if start, end and simultaneous start are known.
+        """
         together = name in ("CIL", "CMEAS", "TRK") and np.array_equal(memory.stand.low, memory.stand.high)
         spread = float(np.hypot(*((goal[1] - goal[0]) * BEAM_PER_COUNT)))
         if not together or spread > DEGREE:
@@ -348,7 +366,7 @@ class SafetyGuard:
         return paced.box_entered(memory.stand.low, goal[0])
 
     def _around(self, memory: Memory, since: int, until: int) -> Surroundings:
-        """What a ranger must keep out of; of one on the ground kept for ten seconds."""
+        """Zones of a ranger; on the ground cached for ten seconds."""
         vantage = memory.vantage
         if vantage.frame == "reflector":
             posture = self._fresh_posture(vantage, since)
@@ -359,14 +377,17 @@ class SafetyGuard:
         end = (block + 2) * BLOCK_TICKS
         if until > end:
             return self.keep_clear.around(vantage, since, until, posture=None)
-        kept = self._kept.get(vantage.name)
-        if kept is None or kept[0] != block:
-            kept = block, self.keep_clear.around(vantage, block * BLOCK_TICKS, end, posture=None)
-            self._kept[vantage.name] = kept
-        return kept[1]
+        cached = self._surroundings.get(vantage.name)
+        if cached is None or cached[0] != block:
+            cached = block, self.keep_clear.around(vantage, block * BLOCK_TICKS, end, posture=None)
+            self._surroundings[vantage.name] = cached
+        return cached[1]
 
     def _suns_between(self, since: int, until: int) -> Array:
-        """(NODES, 3) of `instants`, straight between two 40 s apart: 1e-6 rad off, 4e-5 where refraction bends most."""
+        """Directions (NODES, 3) of the Sun at `instants`, interpolated linearly.
+
+        Between two 40 s apart: 1e-6 rad off, 4e-5 where refraction bends most.
+        """
         if self._suns is None or not self._suns[0] <= since <= until <= self._suns[1]:
             first, last = since, max(until, since + 4 * BLOCK_TICKS)
             self._suns = first, last, self.keep_clear.sun([first, last])
@@ -378,7 +399,7 @@ class SafetyGuard:
     def _fresh_posture(self, vantage: Vantage, ticks: int) -> LivePosture:
         posture = self._posture
         if posture is None:
-            raise InputError(f"{vantage.name} rides on the telescope, whose posture is not known (expected one first)")
+            raise InputError(f"{vantage.name} is on the telescope, whose posture is unknown (expected one first)")
         age = seconds_between(posture.ticks, ticks)
         if not -1.0 <= age <= OLD_POSTURE:
             raise InputError(f"{vantage.name}: the telescope's posture is {age:.1f} s old (limit {OLD_POSTURE:g} s)")
@@ -386,6 +407,6 @@ class SafetyGuard:
 
 
 def _unforeseen(seconds: float) -> float:
-    """Angle, rad, by which the telescope may turn otherwise than its rates say, some s after they were told."""
+    """Possible deviation of the telescope from its rates after a time, rad."""
     ramp = 0.5 * SLEW_ACCELERATION * seconds**2
     return float(np.hypot(min(ramp, 2.0 * AZIMUTH_SLEW * seconds), min(ramp, 2.0 * ELEVATION_SLEW * seconds)))

@@ -1,6 +1,6 @@
-"""What one ranger was told, as far as it decides where its mirror goes: cubes, geometry, targets of axes, the laser.
+"""State of one ranger as known to the guard: cubes, geometry, axes, laser.
 
-A guard keeps it from the requests that it let pass, and from the replies that it hears.
+A guard updates it from the requests that it let pass, and from the replies.
 """
 
 from dataclasses import dataclass, field
@@ -26,11 +26,13 @@ GEOMETRY = ("BP", "ALPHA", "BETA", "MO", "EZ")
 
 @dataclass
 class Stand:
-    """Where a mirror may be: counts (2,) from low to high; NaN of an axis of which nothing is known.
+    """Possible position of a mirror: counts (2,) from low to high.
 
-    arrives   ticks from which on it is taken to rest at `goal` (low, high), unless a failure was heard
+    NaN for an axis whose position is unknown.
+
+    arrives   ticks from which it is assumed to be at `goal` (low, high), unless a failure was reported
     by        the command that moves it
-    way       what `low` and `high` were on the last way
+    path      `low` and `high` during the last move
     """
 
     low: Array = field(default_factory=lambda: np.full(2, np.nan))
@@ -38,51 +40,54 @@ class Stand:
     goal: tuple[Array, Array] | None = None
     arrives: int | None = None
     by: str = ""
-    way: tuple[Array, Array] | None = None
+    path: tuple[Array, Array] | None = None
 
     @property
     def known(self) -> bool:
-        """Whether both axes' counts are known."""
+        """True if both axes' counts are known."""
         return bool(np.isfinite(self.low).all())
 
     def settle(self, now_ticks: int) -> None:
-        """Note that the mirror stands at its goal, if it is time."""
+        """Set the mirror at its goal, if it is time."""
         if self.goal is not None and self.arrives is not None and now_ticks >= self.arrives:
             self.arrive()
 
     def arrive(self) -> None:
-        """Note that the mirror stands at its goal."""
+        """Set the mirror at its goal."""
         if self.goal is not None:
             self.low, self.high = self.goal
             self.goal = self.arrives = None
 
     def go(self, low: Array, high: Array, arrives: int, by: str) -> None:
-        """Under way from wherever it is to a rectangle of counts."""
+        """Start a move from anywhere to a rectangle of counts."""
         self.goal, self.arrives, self.by = (low, high), arrives, by
         self.low, self.high = np.minimum(self.low, low), np.maximum(self.high, high)
-        self.way = self.low, self.high
+        self.path = self.low, self.high
 
     def rest(self, axis: int, counts: float) -> None:
-        """One axis is known to stand at counts."""
+        """Set the known position of one axis, counts."""
         self.low, self.high = self.low.copy(), self.high.copy()
         self.low[axis] = self.high[axis] = counts
-        self.goal = self.arrives = self.way = None
+        self.goal = self.arrives = self.path = None
 
     def failed(self) -> None:
-        """The last move may have stopped anywhere on its way: it is there until counts are heard, or another ends."""
+        """Note that the last move may have stopped anywhere on its path.
+
+        That holds until counts are reported, or another move ends.
+        """
         self.goal = self.arrives = None
-        if self.way is not None:
-            self.low, self.high = self.way
+        if self.path is not None:
+            self.low, self.high = self.path
 
     def lose(self, axis: int) -> None:
-        """Nothing is known of an axis: it looks for its index."""
+        """Forget an axis's position: it searches for its index."""
         self.low, self.high = self.low.copy(), self.high.copy()
         self.low[axis] = self.high[axis] = np.nan
-        self.goal = self.arrives = self.way = None
+        self.goal = self.arrives = self.path = None
 
 
 class Memory:
-    """The memory of one ranger.
+    """Guard's state of one ranger.
 
     vantage   by the records, for its stops
     """
@@ -94,7 +99,7 @@ class Memory:
         self.forget()
 
     def forget(self) -> None:
-        """As when its power comes on."""
+        """Reset to the state at power-on."""
         self._table = Cubes(self.vantage.stops)
         self._places: dict[int, tuple[float, ...]] = {}
         self._numbers: dict[str, int] = {REFERENCE: 0}
@@ -103,8 +108,8 @@ class Memory:
         self.order: list[int] = []
 
     @property
-    def believed(self) -> MirrorStation:
-        """The mirror as the ranger was told that it stands."""
+    def station(self) -> MirrorStation:
+        """The mirror by the geometry sent to the ranger."""
         return self._table.station
 
     @property
@@ -117,28 +122,37 @@ class Memory:
         return Pace(velocity, acceleration)
 
     def number(self, cube: Value) -> int:
-        """The number of a cube, by number or name. Raises InputError: it was not told."""
+        """Number of a cube, by number or name.
+
+        Raises InputError: not sent to the ranger.
+        """
         number = cube if isinstance(cube, int) else self._numbers.get(str(cube).upper())
         if number is None or (number != 0 and number not in self._places):
-            raise InputError(f"cube {cube} was not told to {self.vantage.name} (expected COO first)")
+            raise InputError(f"cube {cube} was not sent to {self.vantage.name} (expected COO first)")
         return number
 
     def counts(self, cube: Value) -> Array:
-        """Counts (2,) to which CIL or CMEAS of a cube leads. Raises InputError: unknown, out of reach, ZRG not set."""
+        """Destination of CIL or CMEAS of a cube, counts (2,).
+
+        Raises InputError: unknown, out of reach, ZRG not set.
+        """
         number = self.number(cube)
-        kept = self._counts.get(number, [None, None])
-        looked = self.look(self._places[number]) if None in kept and number else np.full(2, np.nan)
-        counts = np.array([v if k is None else k for k, v in zip(kept, looked, strict=True)], dtype=float)
+        cached = self._counts.get(number, [None, None])
+        computed = self.look(self._places[number]) if None in cached and number else np.full(2, np.nan)
+        counts = np.array([v if k is None else k for k, v in zip(cached, computed, strict=True)], dtype=float)
         if not np.isfinite(counts).all():
-            raise InputError(f"counts of ZRG were not told to {self.vantage.name} (expected AZM 0, c and ELV 0, c)")
+            raise InputError(f"counts of ZRG were not sent to {self.vantage.name} (expected AZM 0, c and ELV 0, c)")
         return counts
 
     def look(self, place_mm: tuple[float, ...]) -> Array:
-        """Counts (2,) to which a point (mm, the ranger's own frame) leads. Raises InputError: beyond the stops."""
+        """Destination for a point (mm, the ranger's own frame), counts (2,).
+
+        Raises InputError: beyond the stops.
+        """
         return self._table.look(place_mm)
 
     def take(self, request: Request, values: tuple[Value, ...]) -> None:
-        """A request that was let pass, and its values where they were read."""
+        """Take in a request let pass, with its values if parsed."""
         name = request.command
         if name == "COO" and len(request.parameters) >= 4:
             self._place(request.parameters)
@@ -166,14 +180,14 @@ class Memory:
             self.stand = Stand()
 
     def hear(self, command: str, ok: bool | None, values: tuple[str, ...]) -> None:
-        """What a reply says of where the mirror stands and of the laser; what cannot be read says nothing."""
+        """Update position and laser from a reply; ignore unreadable ones."""
         try:
             if command == "STW" and ok:
                 self._status(StatusWord(int(values[0], 16)))
             elif command in (self.stand.by, "WAI") and ok is False:
                 self.stand.failed()
             elif command in ("ACP", "WAI") and ok:
-                if self.stand.goal is None:  # else it is under way to there
+                if self.stand.goal is None:  # else it is still moving
                     self.stand.rest(int(values[0]), float(values[1]))
             elif command == self.stand.by and ok and (command == "CIL" or (command == "CMEAS" and values[0] == "1")):
                 self.stand.arrive()
@@ -191,7 +205,7 @@ class Memory:
                 self.stand.lose(axis)
 
     def _place(self, parameters: tuple[str, ...]) -> None:
-        """COO n, x, y, z[, name]; thousands of them are told, so they are read here."""
+        """Take in COO n, x, y, z[, name], fast since there are thousands."""
         key, place = parameters[0], tuple(float(p) for p in parameters[1:4])
         number = int(key) if key.isdecimal() else self.number(key)
         self._places[number] = place

@@ -1,4 +1,4 @@
-"""Beams at rest: when the Sun or a box comes to them."""
+"""Parked beams: time until the Sun or a box comes to them."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -10,17 +10,17 @@ from catseye.coordinator.visibility.surroundings import KeepClear, later
 from catseye.coordinator.visibility.vantage import Vantage, seconds_between
 from catseye.records.night.live import LivePosture
 
-AHEAD = 600.0  # s that are looked ahead
-AHEAD_RIDING = 60.0  # s, of a beam that the telescope carries: longer its rates do not hold
+AHEAD = 600.0  # s, prediction time
+AHEAD_RIDING = 60.0  # s, of a beam on the telescope: its rates are constant for no longer
 FINEST = 2.0  # s
 
 
 @dataclass(frozen=True)
 class Alarm:
-    """Something that a ranger must do in time.
+    """A hazard that a ranger must avoid in time.
 
     ranger   name
-    within   s from now; 0: it should have been done
+    within   s from now; 0: overdue
     cause    "sun", "box" or "interlock"
     remedy   "move": take the mirror away; "dark": switch the laser off (PS 0)
     text     one line for people
@@ -34,23 +34,25 @@ class Alarm:
 
 
 def parked_alarms(
-    keep_clear: KeepClear, vantage: Vantage, counts: tuple[float, float], *, now: int, posture: LivePosture | None
+    keep_clear: KeepClear, vantage: Vantage, counts: tuple[float, float], *, now_ticks: int, posture: LivePosture | None
 ) -> list[Alarm]:
-    """Alarms of a beam that rests at counts, from a time (ticks) on; none of a carried one without a posture.
+    """Alarms of a beam parked at counts, from now (ticks) on.
 
-    posture   of the telescope; its rates are held
+    None for a ranger on the telescope without a posture.
+
+    posture   of the telescope; its rates are assumed constant
     """
     if vantage.frame == "reflector" and posture is None:
         return []
     alarms: list[Alarm] = []
-    end = later(now, AHEAD if vantage.frame == "ground" else AHEAD_RIDING)
+    end = later(now_ticks, AHEAD if vantage.frame == "ground" else AHEAD_RIDING)
     at = f"at counts {counts[0]:.0f}, {counts[1]:.0f}"
-    sun = _comes(keep_clear, vantage, counts, (now, end), posture=posture, box=False)
+    sun = _comes(keep_clear, vantage, counts, (now_ticks, end), posture=posture, box=False)
     if sun is not None:
         text = f"{vantage.name}: the Sun comes to its beam {at} {in_words(sun[0])}: move it"
         alarms.append(Alarm(vantage.name, sun[0], "sun", "move", text))
     if keep_clear.boxes:
-        box = _comes(keep_clear, vantage, counts, (now, end), posture=posture, box=True)
+        box = _comes(keep_clear, vantage, counts, (now_ticks, end), posture=posture, box=True)
         if box is not None:
             text = f"{vantage.name}: its beam {at} is on {box[1]} {in_words(box[0])}: move it"
             alarms.append(Alarm(vantage.name, box[0], "box", "move", text))
@@ -58,7 +60,7 @@ def parked_alarms(
 
 
 def in_words(seconds: float) -> str:
-    """When a zone comes to the beam: now, or in so many seconds."""
+    """Time until a hazard, in words."""
     return "now" if seconds <= 0.0 else f"in {seconds:.0f} s"
 
 
@@ -71,9 +73,9 @@ def _comes(
     posture: LivePosture | None,
     box: bool,
 ) -> tuple[float, str] | None:
-    """s until the Sun or a box comes to a beam at rest, and which, early by 2 s at most; None if not in the span.
+    """Time, s, until the Sun or a box comes to a parked beam, and which.
 
-    A span that is free as a whole is left; one that is not is halved.
+    Early by 2 s at most; None if not in the span. A span that is free as a whole is skipped; one that is not is halved.
     """
     n: NDArray[np.float64] = np.array(counts)
     spans = [span]

@@ -1,1 +1,1 @@
-"""What is kept of a night, durable before it is acknowledged, and its replay."""
+"""Durable storage of a night before acknowledgement, and its replay."""

@@ -1,4 +1,7 @@
-"""Check that a stored cell is what its column holds: SQLite keeps bytes in a column of text without a word."""
+"""Type check of stored cells.
+
+SQLite silently keeps bytes in a column of text.
+"""
 
 import json
 from collections.abc import Sequence
@@ -15,7 +18,7 @@ REMEDY = "the journal is damaged; restore it from a copy"
 
 @cache
 def cell_kinds(table: JournalTable) -> tuple[tuple[type, ...], ...]:
-    """Python's types that each column may hold; a number's column takes a whole number, too."""
+    """Python types allowed in each column; a float column allows int, too."""
     kinds = []
     for column in table.columns:
         kind = column.type.python_type
@@ -25,9 +28,9 @@ def cell_kinds(table: JournalTable) -> tuple[tuple[type, ...], ...]:
 
 
 def check_cells(table: JournalTable, row: "sqlalchemy.Row[tuple[object, ...]]", place: str) -> None:
-    """Raise InputError naming the first cell of a whole row that its column cannot hold.
+    """Raise InputError for the first cell of a wrong type.
 
-    place   for the refusal: journal, run and event
+    place   for the message: journal, run and event
     """
     kinds = cell_kinds(table)
     if all(map(isinstance, row, kinds)):
@@ -35,23 +38,28 @@ def check_cells(table: JournalTable, row: "sqlalchemy.Row[tuple[object, ...]]", 
     at = next(k for k, (cell, kind) in enumerate(zip(row, kinds, strict=True)) if not isinstance(cell, kind))
     column = table.columns.values()[at]
     expected = WORDS[column.type.python_type]
-    raise damaged(f"{place}: column {column.name!r} of {table.name!r}", f"{_shown(row[at])} (expected {expected})")
+    raise damaged(
+        f"{place}: column {column.name!r} of {table.name!r}", f"{_abbreviated(row[at])} (expected {expected})"
+    )
 
 
-def json_object(text: str):  # what a key holds is the caller's to know
-    """The JSON object of a cell. Raises ValueError: it holds something else."""
-    found = json.loads(text)
-    if not isinstance(found, dict):
+def json_object(text: str):  # the caller knows the types of its values
+    """JSON object of a cell.
+
+    Raises ValueError: anything else.
+    """
+    content = json.loads(text)
+    if not isinstance(content, dict):
         raise ValueError("no JSON object")
-    return found
+    return content
 
 
 def damaged(place: str, what: str) -> InputError:
-    """The refusal of a journal that holds what was never written."""
-    return InputError(f"{place} holds {what}: {REMEDY}")
+    """Error for a journal with content that was never written."""
+    return InputError(f"{place} contains {what}: {REMEDY}")
 
 
-def _shown(cell: object) -> str:
+def _abbreviated(cell: object) -> str:
     if isinstance(cell, Sequence) and len(cell) > 12:
         return f"{cell[:12]!r}..."
     return repr(cell)

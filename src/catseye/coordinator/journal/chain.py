@@ -1,12 +1,14 @@
-"""The chain that makes a journal evidence: each event has a link, a SHA-256 over all that is stored of it and the link
-before, so that whoever knows a late link (a head, told to the log at each epoch) knows all that stood before it.
+"""Hash chain that makes a journal tamper-evident.
+
+Each event has a link, a SHA-256 over all that is stored of it and the link before, so that a copy of a late link (a
+head, logged at each epoch) authenticates everything before it.
 
     link = SHA-256(link before | kind | seq | cells)
 
 Seq 0 is the run's own record, with its files' hashes and the first link of the run before in the journal; a number that
-was refused has a link that says so; the end's link has the time and the number after the last event's. A run that goes
-on in another file takes its last link with it. Cells are told
-apart by type and length, numbers by their bits; nothing of what SQLite or PostgreSQL makes of a row is in it.
+was refused has a link of that kind; the end's link has the time and the number after the last event's. A run that
+continues in another file takes its last link with it. Cells are separated by type and length, numbers by their bits;
+nothing of what SQLite or PostgreSQL makes of a row is in it.
 """
 
 import struct
@@ -20,24 +22,26 @@ from sqlalchemy import Connection, select
 from catseye.coordinator.journal.tables import CHAIN, RUN_FILES, RUNS, JournalTable
 from catseye.errors import InputError
 
-NOTHING = bytes(32)  # before the first
-SHOWN = 16  # hexadecimal digits of a head, as people write it down
-LEAST_SHOWN = 8
+ZERO_LINK = bytes(32)  # before the first link
+HEAD_DIGITS = 16  # hexadecimal digits of a head, as published
+FEWEST_DIGITS = 8
 
 
 class LinkKind(Enum):
-    """What a link of the chain stands for."""
+    """Meaning of a link of the chain."""
 
     RUN = "run"
     EVENT = "event"
     REFUSED = "refused"
-    PART = "part"  # the last link of the file before, with which the next one begins
+    PART = "part"  # the last link of the previous file, with which the next one begins
     END = "end"
 
 
 @dataclass(frozen=True)
 class Head:
-    """A link as it is told: the event's seq, and the hash in hexadecimal digits, or the first 8 or more of them.
+    """A published link: the event's seq, and the hash in hexadecimal digits.
+
+    The first 8 digits or more.
 
     >>> str(Head.parse("120:5f0c3b1e9a7d2c44"))
     '120:5f0c3b1e9a7d2c44'
@@ -48,14 +52,17 @@ class Head:
 
     @staticmethod
     def of(seq: int, link: bytes) -> "Head":
-        """The head of a chain that ends at a link."""
-        return Head(seq, link.hex()[:SHOWN])
+        """Head of a chain that ends at a link."""
+        return Head(seq, link.hex()[:HEAD_DIGITS])
 
     @staticmethod
     def parse(text: str) -> "Head":
-        """A head as people type it. Raises InputError: not SEQ:HASH."""
+        """Head from text.
+
+        Raises InputError: not SEQ:HASH.
+        """
         seq, _, digits = text.strip().lower().partition(":")
-        if not seq.isdecimal() or len(digits) < LEAST_SHOWN or set(digits) - set("0123456789abcdef"):
+        if not seq.isdecimal() or len(digits) < FEWEST_DIGITS or set(digits) - set("0123456789abcdef"):
             raise InputError(f"head {text[:40]!r} (expected EVENT:HASH, such as 120:5f0c3b1e9a7d2c44)")
         return Head(int(seq), digits[:64])
 
@@ -63,16 +70,16 @@ class Head:
         return f"{self.seq}:{self.digits}"
 
     def fits(self, link: bytes) -> bool:
-        """Whether a link is the one that was told."""
+        """True if a link is the published one."""
         return link.hex().startswith(self.digits)
 
 
 def link_of(before: bytes, kind: LinkKind, seq: int, cells: Iterable[object] = ()) -> bytes:
-    """The link (32 bytes) behind another one.
+    """Link (32 bytes) after another one.
 
-    cells   what it vouches for, in order
+    cells   its content, in order
 
-    Raises TypeError: a cell that no column holds.
+    Raises TypeError: a cell of a type that no column has.
     """
     link = sha256(before)
     link.update(_cell(kind.value))
@@ -83,9 +90,9 @@ def link_of(before: bytes, kind: LinkKind, seq: int, cells: Iterable[object] = (
 
 
 def event_cells(rows: Iterable[tuple[JournalTable, Mapping[str, object]]]) -> list[object]:
-    """All that is stored of an event: each row's table and columns, the tables by name; not the run's number.
+    """Cells of an event: each row's table and columns, by table name.
 
-    Where a run's number were in it, a run could not be taken into another journal.
+    The run's number is left out, so that a run can be copied to another journal.
     """
     cells: list[object] = []
     for table, row in sorted(rows, key=lambda pair: pair[0].name):
@@ -95,7 +102,10 @@ def event_cells(rows: Iterable[tuple[JournalTable, Mapping[str, object]]]) -> li
 
 
 def run_link(connection: Connection, run: int) -> bytes:
-    """The first link of a run, of what is stored of it. Raises InputError: there is no such run."""
+    """First link of a run, computed from its stored record.
+
+    Raises InputError: no such run.
+    """
     row = connection.execute(select(RUNS).where(RUNS.c.run == run)).mappings().first()
     if row is None:
         raise InputError(f"run {run} is not in the journal")
@@ -106,13 +116,13 @@ def run_link(connection: Connection, run: int) -> bytes:
     cells: list[object] = [row[column.name] for column in RUNS.columns if column.name not in ("run", "ended_ticks")]
     for path, digest in sorted((file.path, file.sha256) for file in connection.execute(files)):
         cells += [path, digest]
-    return link_of(before if isinstance(before, bytes) else NOTHING, LinkKind.RUN, 0, cells)
+    return link_of(before if isinstance(before, bytes) else ZERO_LINK, LinkKind.RUN, 0, cells)
 
 
 def _cell(value: object) -> bytes:
     if value is None:
         return b"n"
-    if isinstance(value, int):  # of a bool, too
+    if isinstance(value, int):  # includes bool
         text = str(int(value)).encode()
         return b"i%d:%s" % (len(text), text)
     if isinstance(value, float):

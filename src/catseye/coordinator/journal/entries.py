@@ -1,4 +1,4 @@
-"""What a journal holds: the run, and in one order all that happened in it. No database here."""
+"""Entries of a journal: the run, and its events in order. No database here."""
 
 import hashlib
 import json
@@ -19,20 +19,20 @@ if TYPE_CHECKING:
     from catseye.reduction.live.shots import ShotAnswer
 
 NAN = float("nan")
-EPOCH_BEGUN = "epoch-begun"  # name of the document that says when an epoch's shots were taken out
-CLOCK_CORRECTED = "clock-corrected"  # of the one that says when the count of UTC was corrected, and by how much
+EPOCH_BEGUN = "epoch-begun"  # name of the document that marks when an epoch's shots were taken out
+CLOCK_CORRECTED = "clock-corrected"  # of the one that marks a correction of the count of UTC, and its size
 
 
-# JSON's own types; what is no finite number is None
+# JSON's types; a non-finite number is None
 Json = None | bool | int | float | str | list["Json"] | dict[str, "Json"]
 
 
 @dataclass(frozen=True, eq=False)
 class AnsweredShot:
-    """A shot and what the reduction said of it.
+    """A shot and the reduction's answer.
 
-    status, text    "used", "reference", "blocked" ... and why; empty where it was not asked
-    range_, u_range, misfit   m, NaN where it gave none
+    status, text    "used", "reference", "blocked" ... and the reason; empty if not reduced
+    range_, u_range, misfit   m, NaN if there is none
     """
 
     shot: LiveShot
@@ -44,15 +44,17 @@ class AnsweredShot:
 
     @classmethod
     def of(cls, shot: LiveShot, answer: "ShotAnswer") -> "AnsweredShot":
-        """The shot with the answer that `Live.shot` gave."""
+        """The shot with an answer of `Live.shot`."""
         return cls(shot, str(answer.status), answer.text, answer.range_, answer.u_range, answer.misfit)
 
 
 @dataclass(frozen=True)
 class SentCommand:
-    """A line sent to a ranger and its first reply; a reply that never came is empty and `ok` None.
+    """A line sent to a ranger and its first reply.
 
-    ticks   of the reply, or of now where none came
+    Without a reply it is empty and `ok` None.
+
+    ticks   of the reply, or of the present if there is none
     reply   its values, 200 characters of them; none of a buffer's
     """
 
@@ -65,9 +67,9 @@ class SentCommand:
 
 
 class StoredAnswer(TypedDict, total=False):
-    """An epoch's answer as a journal holds it: `EpochAnswer` without its covariance, in JSON's types.
+    """Stored answer of an epoch: `EpochAnswer` without covariance, JSON types.
 
-    Empty where nothing was solved. What was no finite number is None; keys of dictionaries are text.
+    Empty if nothing was solved. Non-finite numbers are None; keys of dictionaries are text.
     """
 
     number: int
@@ -94,10 +96,12 @@ class StoredAnswer(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False)
 class EpochSolution:
-    """What an epoch's solving gave, as plain values; one that gave nothing is kept too, since it used up its shots.
+    """Result of an epoch's solution, as plain values.
 
-    ticks        the time that `Live.begin` was asked for
-    answer       empty where nothing was solved
+    A failed one is stored too, since it used up its shots.
+
+    ticks        argument of `Live.begin`
+    answer       empty if nothing was solved
     covariance   (n, n), in the answer's units, or None
     """
 
@@ -107,7 +111,9 @@ class EpochSolution:
 
     @classmethod
     def of(cls, ticks: int, answer: object) -> "EpochSolution":
-        """An epoch answer, any dataclass or mapping, or None; its matrix `covariance` is kept apart, bit for bit.
+        """Solution from an epoch answer: any dataclass or mapping, or None.
+
+        Its matrix `covariance` is stored separately, bit for bit.
 
         Raises InputError for a value that JSON cannot hold.
         """
@@ -124,13 +130,13 @@ class EpochSolution:
 
     @property
     def text(self) -> str:
-        """The answer as JSON, keys sorted: two answers are the same to the last bit where this is."""
+        """The answer as JSON, keys sorted; equal texts are equal bits."""
         return json.dumps(self.answer, sort_keys=True, allow_nan=False, ensure_ascii=False)
 
 
 @dataclass(frozen=True)
 class Document:
-    """A text that belongs to the run: a plan, a setting changed under way, a certificate."""
+    """A text of the run: a plan, a changed setting, a certificate."""
 
     ticks: int
     name: str
@@ -143,13 +149,13 @@ Item = Entry | LiveShot  # a bare shot is one without an answer
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What a run of the coordinator starts from.
+    """Start of a run of the coordinator.
 
-    site       what stands there
-    settings   of everything that decides an answer, in JSON's own types
+    site       its records
+    settings   that affect an answer, in JSON's types
     seed       of a simulated site; None at a real one
-    extra      further files, text by relative path, kept beside the site's
-    uuid       the run's own name in the world
+    extra      further files, text by relative path, stored with the site's
+    uuid       of the run
     """
 
     site: SiteFolder
@@ -159,7 +165,7 @@ class Run:
     uuid: str = field(default_factory=lambda: str(uuid.uuid4()))
 
     def files(self) -> dict[str, str]:
-        """The site's files by relative path, each as it was read; one that has changed since is written anew."""
+        """The site's files by relative path, unchanged, or rewritten if changed since."""
         return {path: self._as_read(path) or text for path, text in site_files(self.site).items()} | dict(self.extra)
 
     def _as_read(self, path: str) -> str | None:
@@ -171,16 +177,16 @@ class Run:
 
 
 def named_fields(value: object) -> dict[str, object]:
-    """The fields of a dataclass by name, not copied."""
+    """Fields of a dataclass by name, not copied."""
     if not is_dataclass(value) or isinstance(value, type):
         raise InputError(f"solution of type {type(value).__name__} (expected a dataclass or a mapping)")
-    return {each.name: getattr(value, each.name) for each in fields(value)}
+    return {item.name: getattr(value, item.name) for item in fields(value)}
 
 
 def plain(value: object, place: str) -> Json:
-    """A value in JSON's own types; what is no finite number becomes None.
+    """A value in JSON types; non-finite numbers become None.
 
-    place   its name, for the refusal
+    place   its name, for messages
 
     >>> plain({"x": np.array([1.0, np.nan]), "n": (np.int64(3),)}, "answer")
     {'x': [1.0, None], 'n': [3]}

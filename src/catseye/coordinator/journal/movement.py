@@ -1,4 +1,4 @@
-"""Distance of new answers from the stored ones, in their unit and in their stored standard uncertainties."""
+"""Differences of a replay's answers from the stored ones, also in u."""
 
 import math
 from collections import defaultdict
@@ -13,11 +13,11 @@ from catseye.coordinator.journal.entries import EpochSolution, Json
 from catseye.coordinator.journal.replay import Replayed
 
 Array = NDArray[np.float64]
-LEAST_U = 1e-15  # m, rad, °C: a smaller stored u is the rounding of what has none, of a pose at its own reference
+LEAST_U = 1e-15  # m, rad, °C: a smaller stored u is rounding of zero, as of a pose at its own reference
 
 
 class Moving(Enum):
-    """A kind of quantity that may move; its value is its name in JSON."""
+    """Kind of quantity compared; its value is its name in JSON."""
 
     POINTS = "points"  # places, m
     RANGES = "ranges"  # of single shots, m
@@ -40,10 +40,10 @@ class Furthest:
 class Movement:
     """Differences of one kind, new less stored, over all epochs.
 
-    count         compared: points, stations, ... of each epoch
+    count         number compared: points, stations, ... of each epoch
     rms           of their sizes, a point's being the length of its difference; m, rad, °C
     largest       of the sizes
-    normalised    coordinates that have a stored u above zero
+    normalised    number of coordinates with a stored u above zero
     rms_u         of the coordinates' differences, each over its u; NaN without any
     largest_u     of those, None without any
     """
@@ -58,7 +58,7 @@ class Movement:
 
 @dataclass
 class _Sum:
-    """Sums of one kind of movement, which grow entry by entry."""
+    """Running sums of one kind of movement."""
 
     count: int = 0
     squares: float = 0.0
@@ -96,24 +96,24 @@ class _Sum:
 
 @dataclass
 class Movements:
-    """All that a replay moves, taken in solution by solution.
+    """Differences of a replay, accumulated solution by solution.
 
-    stations   names of the thermometers among what an answer says of the air
+    stations   names of the thermometers among an answer's air parameters
     """
 
     stations: Collection[str] = ()
     _sums: dict[Moving, _Sum] = field(default_factory=lambda: defaultdict(_Sum))
 
-    def add(self, each: Replayed) -> None:
-        """Take in one solution and the shots before it."""
-        number = None if each.stored is None else each.stored.answer.get("number")
-        for move in each.shots.moves:
+    def add(self, replayed: Replayed) -> None:
+        """Add one solution and the shots before it."""
+        number = None if replayed.stored is None else replayed.stored.answer.get("number")
+        for move in replayed.shots.moves:
             self._add(Moving.RANGES, f"{move.ranger} to {move.target}", number, move.change, move.u)
-        if each.stored is None or each.new is None:
+        if replayed.stored is None or replayed.new is None:
             return
-        for name, change, u in point_moves(each.stored, each.new):
+        for name, change, u in point_moves(replayed.stored, replayed.new):
             self._add(Moving.POINTS, name, number, change, u)
-        before, after = each.stored.answer, each.new.answer
+        before, after = replayed.stored.answer, replayed.new.answer
         for name, shift, u_shift in _scalar_moves(before.get("air"), after.get("air")):
             if name in self.stations:
                 self._add(Moving.THERMOMETERS, name, number, shift, u_shift)
@@ -127,23 +127,26 @@ class Movements:
 
     @property
     def found(self) -> dict[Moving, Movement]:
-        """By kind, those of which there is something to compare."""
+        """Differences by kind, if there is something to compare."""
         sums = ((moving, self._sums[moving]) for moving in Moving if moving in self._sums)
-        return {moving: each.movement(each.largest) for moving, each in sums if each.largest is not None}
+        return {moving: total.movement(total.largest) for moving, total in sums if total.largest is not None}
 
 
 def in_u(change: Array, u: Array) -> Array:
-    """Changes over their u, of those that have a u above rounding.
+    """Changes over their u, of those with a u above rounding.
 
     >>> in_u(np.array([3.0, 1.0]), np.array([2.0, 0.0])).tolist()
     [1.5]
     """
-    known = np.isfinite(u) & (u > LEAST_U)
-    return change[known] / u[known]
+    significant = np.isfinite(u) & (u > LEAST_U)
+    return change[significant] / u[significant]
 
 
 def point_moves(stored: EpochSolution, new: EpochSolution) -> Iterator[tuple[str, Array, Array]]:
-    """Name, difference (3,) and stored u (3,), m, of each point of both; u is NaN where no covariance was stored."""
+    """Name, difference (3,) and stored u (3,), m, of each common point.
+
+    u is NaN if no covariance was stored.
+    """
     before, after = places(stored), places(new)
     u = np.full((len(before), 3), np.nan)
     if stored.covariance is not None and stored.covariance.shape == (u.size, u.size):
@@ -154,23 +157,23 @@ def point_moves(stored: EpochSolution, new: EpochSolution) -> Iterator[tuple[str
 
 
 def places(solution: EpochSolution) -> dict[str, Array]:
-    """Places (3,) of a solution's points, m."""
+    """Positions (3,) of a solution's points, m."""
     names, x = solution.answer.get("names") or [], solution.answer.get("x") or []
     return {name: _numbers(place) for name, place in zip(names, x, strict=False)}
 
 
 def _scalar_moves(before: object, after: object) -> Iterator[tuple[str, float, float]]:
-    """Name, difference and stored u of what both answers have as name: (estimate, u)."""
+    """Name, difference and stored u of values (estimate, u) in both answers."""
     if not (isinstance(before, Mapping) and isinstance(after, Mapping)):
         return
     for name in before:
         if name in after:
-            (value, u), (again, _) = _numbers(before[name]), _numbers(after[name])
-            yield name, float(again - value), float(u)
+            (value, u), (new_value, _) = _numbers(before[name]), _numbers(after[name])
+            yield name, float(new_value - value), float(u)
 
 
 def _pose_moves(before: object, after: object) -> Iterator[tuple[str, Moving, float, float]]:
-    """Name, kind, difference and stored u of the beam's two angles and the focus."""
+    """Name, kind, difference and stored u of beam angles and focus."""
     if not (isinstance(before, Mapping) and isinstance(after, Mapping)):
         return
     change = _numbers(after["offset"]) - _numbers(before["offset"])

@@ -1,4 +1,4 @@
-"""Where a journal is: a file (SQLite) or a PostgreSQL database; connections to it, and the lock of a file's writer."""
+"""Location of a journal: file or PostgreSQL; connections, writer's lock."""
 
 import json
 import os
@@ -19,14 +19,17 @@ from catseye.errors import InputError
 
 EXPECTED = "expected a file's name, sqlite:///FILE or postgresql://USER@HOST/DATABASE"
 SIGNATURE = b"SQLite format 3\0"
-BUSY = 5.0  # s that a statement waits for another process's lock
+BUSY = 5.0  # s, timeout of a statement for another process's lock
 CONNECT = 5  # s
-CHECKPOINT_PAGES = 512  # 4 MB: a checkpoint holds a commit up, for 4 ms; one of 32 MB, eight times rarer, for 25 ms
+CHECKPOINT_PAGES = 512  # 4 MB: a checkpoint delays a commit by 4 ms; one of 32 MB, eight times rarer, by 25 ms
 
 
 @dataclass(frozen=True)
 class JournalAddress:
-    """A journal's place: `path` of a file, or `url` of a server; `shown` for people, without a password."""
+    """Location of a journal: `path` of a file, or `url` of a server.
+
+    shown   for people, without a password
+    """
 
     shown: str
     path: Path | None = None
@@ -34,29 +37,35 @@ class JournalAddress:
 
 
 def place_of(url: str | Path) -> JournalAddress:
-    """The place that a URL or a file's name means; InputError for any other text."""
+    """Location from a URL or a file's name.
+
+    Raises InputError for any other text.
+    """
     if isinstance(url, Path) or "://" not in url:
         return JournalAddress(str(url), path=_real(Path(url)))
     try:
         parsed = make_url(url)
         backend = parsed.get_backend_name()
     except (ArgumentError, ValueError):
-        raise InputError(f"journal {url.partition('://')[0]}://...: is no URL ({EXPECTED})") from None
+        raise InputError(f"journal {url.partition('://')[0]}://...: is not a URL ({EXPECTED})") from None
     if backend == "sqlite" and parsed.database and not parsed.host and parsed.database != ":memory:":
         return JournalAddress(parsed.database, path=_real(Path(parsed.database)))
     if backend in ("postgresql", "postgres") and parsed.database:
         shown = parsed.set(drivername="postgresql").render_as_string(hide_password=True)
         return JournalAddress(shown, url=parsed.set(drivername="postgresql+psycopg"))
-    raise InputError(f"journal {parsed.render_as_string(hide_password=True)}: cannot be used ({EXPECTED})")
+    raise InputError(f"journal {parsed.render_as_string(hide_password=True)}: is unusable ({EXPECTED})")
 
 
 def _real(path: Path) -> Path:
-    """The file that a link names: its log, its lock and its neighbours stand beside it, not beside the link."""
+    """Target of a link: log, lock and other parts are beside it."""
     return Path(os.path.realpath(path)) if path.is_symlink() else path
 
 
 def refuse_foreign(place: JournalAddress, *, fresh: bool) -> None:
-    """A file that is there is an SQLite file; with `fresh` it need not be there, but its directory."""
+    """Refuse a file that is not SQLite.
+
+    fresh   True if it need not exist, but its directory
+    """
     if place.path is None:
         return
     try:
@@ -70,15 +79,17 @@ def refuse_foreign(place: JournalAddress, *, fresh: bool) -> None:
         with place.path.open("rb") as stream:
             opening = stream.read(len(SIGNATURE))
     except (OSError, ValueError) as problem:
-        raise InputError(f"journal {place.shown}: cannot be read: {getattr(problem, 'strerror', problem)}") from problem
+        raise InputError(f"journal {place.shown}: is unreadable: {getattr(problem, 'strerror', problem)}") from problem
     if opening != SIGNATURE and not (fresh and not opening):
-        raise InputError(f"journal {place.shown}: starts with {opening!r}: no journal (expected a file of catseye)")
+        raise InputError(
+            f"journal {place.shown}: is not a journal: it starts with {opening!r} (expected a file of catseye)"
+        )
 
 
 def writing_engine(place: JournalAddress, *, create: bool = False) -> Engine:
-    """Connections that write, durable against power loss when a commit returns; one each time it is asked.
+    """Connections for writing, durable against power loss after each commit.
 
-    create   whether a file may be made
+    create   True if a file may be created
     """
     if place.url is not None:
         return _server_engine(place.url)
@@ -100,12 +111,12 @@ def writing_engine(place: JournalAddress, *, create: bool = False) -> Engine:
 
 
 def reading_engine(place: JournalAddress) -> Engine:
-    """Connections that only read, each transaction one state of the journal."""
+    """Read-only connections, each transaction a snapshot."""
     if place.url is not None:
         return _server_engine(place.url).execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
     path = Path(str(place.path))
-    whole = not Path(f"{path}-wal").exists() and not os.access(path.absolute().parent, os.W_OK)
-    engine = _file_engine(place, "mode=ro&immutable=1" if whole else "mode=ro", text=_text_or_bytes)
+    immutable = not Path(f"{path}-wal").exists() and not os.access(path.absolute().parent, os.W_OK)
+    engine = _file_engine(place, "mode=ro&immutable=1" if immutable else "mode=ro", text=_text_or_bytes)
 
     @event.listens_for(engine, "begin")
     def begin(connection: Connection) -> None:
@@ -127,7 +138,7 @@ def _file_engine(place: JournalAddress, options: str, text: Callable[[bytes], st
 
 
 def _text_or_bytes(raw: bytes) -> str | bytes:
-    """A cell of text; its bytes where they are no UTF-8, which is damage that the reader names."""
+    """Text of a cell; its bytes if invalid UTF-8, reported by the reader."""
     try:
         return raw.decode("utf-8")
     except UnicodeDecodeError:
@@ -159,18 +170,21 @@ def _server_engine(url: URL) -> Engine:
 
 
 def identity(place: JournalAddress) -> tuple[int, int] | None:
-    """Device and inode of a journal's file; (0, 0) where it is not there, None for a server."""
+    """Device and inode of a file; (0, 0) if missing, None for a server."""
     if place.path is None:
         return None
     try:
-        there = os.stat(place.path)
+        status = os.stat(place.path)
     except OSError:
         return (0, 0)
-    return there.st_dev, there.st_ino
+    return status.st_dev, status.st_ino
 
 
 def fold(place: JournalAddress, connection: Connection) -> None:
-    """A file's log goes into the file, where nobody else has it open: a journal that was closed is one file."""
+    """Checkpoint a file's log into it, if nobody else has it open.
+
+    A closed journal is one file.
+    """
     raw = connection.connection.driver_connection
     if place.path is not None and raw is not None:
         with suppress(sqlite3.Error):
@@ -179,13 +193,13 @@ def fold(place: JournalAddress, connection: Connection) -> None:
 
 
 def refused(place: JournalAddress, problem: SQLAlchemyError) -> InputError:
-    """A database's complaint in one line."""
+    """Error of a database in one line."""
     why = str(problem.orig if isinstance(problem, DBAPIError) and problem.orig else problem).strip()
     return InputError(f"journal {place.shown}: {' '.join(why.split())[:300]}")
 
 
 class WriterLock:
-    """One writer a file: a lock that the system takes back when its process dies, however it does.
+    """Lock of a file's only writer, released by the system if it dies.
 
     Raises InputError, naming the writer that has it.
     """
@@ -199,8 +213,8 @@ class WriterLock:
         names = place.path.stat().st_nlink if place.path.exists() else 1
         if names > 1:
             raise InputError(
-                f"journal {place.shown}: its file has {names} names (hard links), and a writer by one of them does not "
-                "see a writer by another (expected one name: write to a copy, or to another file)"
+                f"journal {place.shown}: its file has {names} names (hard links), whose writers do not see each "
+                "other (expected one name: write to a copy, or to another file)"
             )
         self._path = Path(f"{place.path}.writer")
         while self._file is None:
@@ -220,13 +234,13 @@ class WriterLock:
                 ) from problem
             if _same_file(file, self._path):
                 self._file = file
-            else:  # the last writer removed it between our opening and our locking
+            else:  # removed by the last writer between opening and locking
                 os.close(file)
         os.ftruncate(self._file, 0)
         os.write(self._file, json.dumps({"host": socket.gethostname(), "pid": os.getpid()}).encode())
 
     def release(self) -> None:
-        """Give the lock back, so that others may write."""
+        """Release the lock for other writers."""
         if self._file is not None:
             self._path.unlink(missing_ok=True)
             os.close(self._file)
@@ -243,15 +257,15 @@ def _holder(raw: bytes) -> str:
 
 def _same_file(file: int, path: Path) -> bool:
     try:
-        there = os.stat(path)
+        current = os.stat(path)
     except FileNotFoundError:
         return False
     ours = os.fstat(file)
-    return (ours.st_dev, ours.st_ino) == (there.st_dev, there.st_ino)
+    return (ours.st_dev, ours.st_ino) == (current.st_dev, current.st_ino)
 
 
 def bytes_of(place: JournalAddress) -> int:
-    """Size of a journal's file with its log; 0 of a server's."""
+    """Size of a journal's file with its log; 0 for a server."""
     if place.path is None:
         return 0
     size = 0
@@ -262,9 +276,12 @@ def bytes_of(place: JournalAddress) -> int:
 
 
 def next_place(place: JournalAddress) -> JournalAddress:
-    """The first name beside a file that is free: site.db, site-2.db, site-3.db ...; InputError of a server's."""
+    """First free name beside a file: site.db, site-2.db, site-3.db ...
+
+    Raises InputError for a server.
+    """
     if place.path is None:
-        raise InputError(f"journal {place.shown}: is a server's (expected a file, where journals shall rotate)")
+        raise InputError(f"journal {place.shown}: is on a server (expected a file for rotation)")
     stem, suffix = place.path.stem, place.path.suffix
     base, _, number = stem.rpartition("-")
     first = 2
@@ -274,4 +291,4 @@ def next_place(place: JournalAddress) -> JournalAddress:
         path = place.path.with_name(f"{stem}-{k}{suffix}")
         if not path.exists():
             return JournalAddress(str(path), path=path)
-    raise InputError(f"journal {place.shown}: no name is free beside it (expected fewer files)")
+    raise InputError(f"journal {place.shown}: no free name beside it (expected fewer files)")

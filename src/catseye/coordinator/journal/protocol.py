@@ -1,4 +1,4 @@
-"""What the coordinator needs of a journal, whoever writes it."""
+"""Interface of a journal's writer."""
 
 from concurrent.futures import Future
 from typing import Protocol
@@ -8,15 +8,18 @@ from catseye.errors import InputError
 
 
 class NotDurable(InputError):
-    """Entries that are not on the disk yet: they stay in line, and are written when that is possible."""
+    """Entries that are not on disk yet; they stay queued."""
 
 
 class JournalWriter(Protocol):
-    """What was given is durable when its future is done, in the order given; a full queue raises InputError."""
+    """A journal's writer: a future is done when its entries are durable.
+
+    Entries are written in the order appended; a full queue raises InputError.
+    """
 
     @property
     def trouble(self) -> str | None:
-        """Why nothing is durable at present; None where all is well."""
+        """Reason why writing fails at present; else None."""
         ...
 
     def append(self, *items: Entry) -> "Future[int]": ...

@@ -1,4 +1,4 @@
-"""A journal read: its runs, and what happened in each, in order, a piece at a time; nothing is ever written."""
+"""Journal reader: runs and their events, in order, read-only."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -13,7 +13,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from catseye.coordinator.journal.cells import check_cells, damaged, json_object
 from catseye.coordinator.journal.entries import AnsweredShot, Entry, EpochSolution
 from catseye.coordinator.journal.place import bytes_of, place_of, reading_engine, refuse_foreign, refused
-from catseye.coordinator.journal.rows import MOST_WHOLE, StoredRow, entry_of, unpack
+from catseye.coordinator.journal.rows import LARGEST_INTEGER, StoredRow, entry_of, unpack
 from catseye.coordinator.journal.tables import (
     BUFFERS,
     EVENTS,
@@ -28,20 +28,20 @@ from catseye.coordinator.journal.tables import (
 from catseye.errors import InputError
 from catseye.records.site.folder import SiteFolder, read_site
 
-LINK_BYTES = 40  # at least, of a row of the chain
-PIECE = 512  # events read at once: 8 MB where each is a buffer
+LINK_BYTES = 40  # minimum of a row of the chain
+PIECE = 512  # events read at once: 8 MB if each is a buffer
 Kind = Literal["shots", "weather", "postures", "commands", "happenings", "solutions", "documents"]
 
 
 @dataclass(frozen=True, eq=False)
 class StoredRun:
-    """What a journal says of one run.
+    """Record of one run.
 
     run          its number in the journal, from 1
-    started, ended   ticks; `ended` None while it lasts, and for ever where it was killed
-    settings     as the coordinator stated them
+    started, ended   ticks; `ended` None while it runs, and for ever if it was killed
+    settings     of the coordinator
     versions     of catseye, python, numpy
-    buffers      whether samples were kept
+    buffers      True if samples were stored
     hashes       SHA-256 of its files by relative path
     """
 
@@ -60,11 +60,11 @@ class StoredRun:
 
 
 class JournalReader:
-    """A journal at a place, while it is written or after.
+    """Reader of a journal, also while it is written.
 
     url   a file, or postgresql://USER@HOST/DATABASE
 
-    Raises InputError: no journal there, a newer one, one that cannot be read.
+    Raises InputError: no journal there, a newer one, an unreadable one.
     """
 
     def __init__(self, url: str | Path):
@@ -73,14 +73,14 @@ class JournalReader:
         refuse_foreign(self._where, fresh=False)
         self._engine: Engine = reading_engine(self._where)
         self._folders: list[TemporaryDirectory[str]] = []
-        self._others: dict[str, JournalReader] = {}
-        self.left_out: Mapping[int, Collection[int]] = {}  # by run: events passed over, as they do not check
-        self.alone = False  # whether files before and behind this one are passed over
+        self._other_parts: dict[str, JournalReader] = {}
+        self.left_out: Mapping[int, Collection[int]] = {}  # by run: events skipped because they fail verification
+        self.alone = False  # True to ignore files before and after this one
         with self.reading() as connection:
             self.version = version_of(connection, self.place)
             self.tables = frozenset(inspect(connection).get_table_names())
             if self.version == 0:
-                raise InputError(f"journal {self.place}: holds no tables: it is no journal (expected one)")
+                raise InputError(f"journal {self.place}: is not a journal: it has no tables (expected one)")
 
     def __repr__(self) -> str:
         return f"<Journal {self.place}: {len(self.runs())} runs>"
@@ -101,13 +101,13 @@ class JournalReader:
     def run(self, which: int | str | None = None) -> StoredRun:
         """One run: by number, by its uuid or the beginning of it, or the last.
 
-        Raises InputError where there is none, or are two.
+        Raises InputError if there is none, or more than one.
         """
         runs = self.runs()
         matching = runs[-1:] if which is None else tuple(run for run in runs if _is(run, which))
         if len(matching) != 1:
-            held = f"runs 1 to {runs[-1].run}" if runs else "no runs"
-            raise InputError(f"journal {self.place}: run {which!r} names {len(matching)} runs (it holds {held})")
+            contents = f"runs 1 to {runs[-1].run}" if runs else "no runs"
+            raise InputError(f"journal {self.place}: run {which!r} names {len(matching)} runs (it contains {contents})")
         return matching[0]
 
     def events(
@@ -119,25 +119,25 @@ class JournalReader:
         kinds: Sequence[Kind] | None = None,
         buffers: bool = True,
     ) -> Iterator[tuple[int, Entry]]:
-        """What happened in a run, (seq, entry), in the order in which it was given to the reduction.
+        """Events of a run, (seq, entry), in the order of the reduction's input.
 
-        after     seq: those behind it
+        after     seq: those after it
         until     seq: those up to it
         kinds     tables wanted; all
-        buffers   whether shots come with their samples, where they were kept
+        buffers   True for shots with their samples, if stored
 
-        Raises InputError where the journal is damaged, once all before the damage was given.
+        Raises InputError for a damaged journal, after all events before the damage.
         """
         for part in self.parts(run):
             part.left_out = self.left_out
-            yield from part._own_events(run, after, until, kinds=kinds, buffers=buffers)
+            yield from part._local_events(run, after, until, kinds=kinds, buffers=buffers)
 
-    def _own_events(
+    def _local_events(
         self, run: int, after: int, until: int | None, *, kinds: Sequence[Kind] | None, buffers: bool
     ) -> Iterator[tuple[int, Entry]]:
-        """`events`, of those in this file alone."""
+        """`events` of this file only."""
         tables = [table for table in EVENTS if kinds is None or table.name in kinds]
-        last = self._own_last(run) if until is None else min(until, self._own_last(run))
+        last = self._local_last(run) if until is None else min(until, self._local_last(run))
         stops = [seq for seq in sorted(self.left_out.get(run, ())) if after < seq <= last]
         for stop in (*stops, last + 1):
             while after < stop - 1:
@@ -145,52 +145,55 @@ class JournalReader:
                 piece = self._piece(run, after, upto, tables, buffers)
                 yield from piece
                 after = upto
-                if not piece:  # a number may be far above the others
+                if not piece:  # there may be a large gap of numbers
                     with self.reading() as connection:
                         after = min(stop - 1, next_seq(connection, tables, run, upto) - 1)
             after = stop
 
     def shots(self, run: int, *, buffers: bool = True) -> Iterator[tuple[int, AnsweredShot]]:
-        """The shots of a run, with their seq."""
+        """Shots of a run, with their seq."""
         for seq, entry in self.events(run, kinds=["shots"], buffers=buffers):
             if isinstance(entry, AnsweredShot):
                 yield seq, entry
 
     def solutions(self, run: int) -> Iterator[tuple[int, EpochSolution]]:
-        """The solutions of a run, with their seq."""
+        """Solutions of a run, with their seq."""
         for seq, entry in self.events(run, kinds=["solutions"]):
             if isinstance(entry, EpochSolution):
                 yield seq, entry
 
     def last(self, run: int) -> int:
-        """The seq of a run's last event; 0 of none."""
-        return max(part._own_last(run) for part in self.parts(run))
+        """Seq of a run's last event; 0 if none."""
+        return max(part._local_last(run) for part in self.parts(run))
 
     @property
     def most_events(self) -> int:
-        """Largest number of events that this file can hold: each has a link of 32 bytes and its row's header."""
-        return MOST_WHOLE if self._where.path is None else bytes_of(self._where) // LINK_BYTES
+        """Largest number of events that this file can hold.
 
-    def _own_last(self, run: int) -> int:
+        Each has a link of 32 bytes and its row's header.
+        """
+        return LARGEST_INTEGER if self._where.path is None else bytes_of(self._where) // LINK_BYTES
+
+    def _local_last(self, run: int) -> int:
         with self.reading() as connection:
             return _last(connection, run)
 
     def parts(self, run: int) -> "tuple[JournalReader, ...]":
-        """The files of a run, in order: this one, and those before and behind it into which the run was rotated.
+        """Files of a rotated run, in order.
 
         Raises InputError: one of them is missing, or is named twice.
         """
         if self.alone or self._where.path is None:
             return (self,)
         parts, names = [self], {self._where.path.name}
-        while (name := parts[0]._beside(run, "follows", names)) is not None:
+        while (name := parts[0]._adjacent(run, "follows", names)) is not None:
             parts.insert(0, self._part(name))
-        while (name := parts[-1]._beside(run, "followed_by", names)) is not None:
+        while (name := parts[-1]._adjacent(run, "followed_by", names)) is not None:
             parts.append(self._part(name))
         return tuple(parts)
 
-    def _beside(self, run: int, which: str, names: set[str]) -> str | None:
-        """The name of the file before or behind this one, None of none; noted among `names`."""
+    def _adjacent(self, run: int, which: str, names: set[str]) -> str | None:
+        """Name of the previous or next file, added to `names`; None if none."""
         if PARTS.name not in self.tables:
             return None
         with self.reading() as connection:
@@ -198,27 +201,27 @@ class JournalReader:
         if name is None:
             return None
         if not isinstance(name, str) or not name or Path(name).name != name:
-            raise InputError(f"journal {self.place}: run {run} goes on in {name!r} (expected a file beside it)")
+            raise InputError(f"journal {self.place}: run {run} continues in {name!r} (expected a file beside it)")
         if name in names:
-            raise damaged(f"journal {self.place}: the table 'parts' of run {run}", f"{name!r} once more, a circle")
+            raise damaged(f"journal {self.place}: the table 'parts' of run {run}", f"{name!r} twice, a circle")
         names.add(name)
         return name
 
     def _part(self, name: str) -> "JournalReader":
-        if name not in self._others:
-            self._others[name] = JournalReader(Path(str(self._where.path)).with_name(name))
-        return self._others[name]
+        if name not in self._other_parts:
+            self._other_parts[name] = JournalReader(Path(str(self._where.path)).with_name(name))
+        return self._other_parts[name]
 
     def files(self, run: int) -> dict[str, str]:
-        """The texts of a run's files by relative path."""
-        wanted = (
+        """Texts of a run's files by relative path."""
+        query = (
             select(RUN_FILES.c.path, TEXTS.c.text)
             .join(TEXTS, RUN_FILES.c.sha256 == TEXTS.c.sha256, isouter=True)
             .where(RUN_FILES.c.run == run)
             .order_by(RUN_FILES.c.path)
         )
         with self.reading() as connection:
-            texts = {row.path: row.text for row in connection.execute(wanted)}
+            texts = {row.path: row.text for row in connection.execute(query)}
         for path, text in texts.items():
             if not isinstance(text, str):
                 what = "no text" if text is None else "bytes (expected text)"
@@ -226,7 +229,7 @@ class JournalReader:
         return texts
 
     def site(self, run: int) -> SiteFolder:
-        """The site of a run, from its files, in a temporary directory that lasts as long as this reader."""
+        """Site of a run, in a temporary directory that the reader removes."""
         folder = TemporaryDirectory(prefix="catseye-site-")
         self._folders.append(folder)
         root = Path(folder.name)
@@ -242,8 +245,8 @@ class JournalReader:
 
     def close(self) -> None:
         """Remove the temporary directories."""
-        for other in self._others.values():
-            other.close()
+        for reader in self._other_parts.values():
+            reader.close()
         while self._folders:
             self._folders.pop().cleanup()
 
@@ -255,7 +258,10 @@ class JournalReader:
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
-        """A connection in a transaction, one state of the journal. Raises InputError: what the database refuses."""
+        """Connection in a transaction, a snapshot of the journal.
+
+        Raises InputError: an error of the database.
+        """
         try:
             with self._engine.connect() as connection, connection.begin():
                 yield connection
@@ -265,7 +271,7 @@ class JournalReader:
     def _piece(
         self, run: int, after: int, upto: int, tables: Sequence[JournalTable], buffers: bool
     ) -> list[tuple[int, Entry]]:
-        """The events after a seq and up to another, one state of the journal."""
+        """Events after a seq and up to another, in one snapshot."""
         events: list[tuple[int, Entry]] = []
         with self.reading() as connection:
             samples: dict[int, StoredRow] = {}
@@ -282,10 +288,8 @@ class JournalReader:
                         unpacked = unpack(buffer, max(1, row.samples_per_cycle), place)
                     try:
                         events.append((row.seq, entry_of(table.name, row, unpacked)))
-                    except (ValueError, RecursionError) as problem:  # JSON that is none, a covariance of another size
-                        raise damaged(
-                            f"{place}: a row of {table.name!r}", f"what no catseye wrote ({problem})"
-                        ) from None
+                    except (ValueError, RecursionError) as problem:  # invalid JSON, a covariance of another size
+                        raise damaged(f"{place}: a row of {table.name!r}", f"invalid content ({problem})") from None
         events.sort(key=lambda pair: pair[0])
         return events
 
@@ -299,24 +303,30 @@ def _last(connection: Connection, run: int) -> int:
 
 
 def highest_seq(connection: Connection, table: JournalTable, run: int) -> int:
-    """The highest number of a run's rows in a table; 0 of none. Text and bytes, damage, sort above all numbers."""
+    """Highest number of a run's rows in a table; 0 if none.
+
+    Damaged ones, text and bytes, sort above all numbers.
+    """
     seq = table.c.seq
     highest: object = connection.scalar(
-        select(seq).where(table.c.run == run, seq <= MOST_WHOLE).order_by(seq.desc()).limit(1)
+        select(seq).where(table.c.run == run, seq <= LARGEST_INTEGER).order_by(seq.desc()).limit(1)
     )
     return int(highest) if isinstance(highest, int | float) else 0
 
 
 def next_seq(connection: Connection, tables: Sequence[JournalTable], run: int, after: int) -> int:
-    """The lowest number above one that a run's rows in some tables have; above all of them where there is none."""
-    found = []
+    """Lowest number above another of a run's rows in some tables.
+
+    Above all of them if there is none.
+    """
+    numbers = []
     for table in tables:
         seq = table.c.seq
         lowest: object = connection.scalar(
-            select(seq).where(table.c.run == run, seq > after, seq <= MOST_WHOLE).order_by(seq).limit(1)
+            select(seq).where(table.c.run == run, seq > after, seq <= LARGEST_INTEGER).order_by(seq).limit(1)
         )
-        found.append(int(lowest) if isinstance(lowest, int | float) else MOST_WHOLE)
-    return max(after + 1, min(found, default=MOST_WHOLE))
+        numbers.append(int(lowest) if isinstance(lowest, int | float) else LARGEST_INTEGER)
+    return max(after + 1, min(numbers, default=LARGEST_INTEGER))
 
 
 def _is(run: StoredRun, which: int | str) -> bool:

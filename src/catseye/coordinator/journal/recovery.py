@@ -1,8 +1,8 @@
-"""What can be read of a damaged SQLite journal, page by page, into a new one.
+"""Recover readable rows of a damaged SQLite journal into a new one.
 
-SQLite reads a table by its tree from the root: where a page is gone, all behind it is. Here each page that is there is
-read by itself. A page that belongs to a table's tree has that table's rows; of a page whose way from the root is lost,
-rows are told by their number of cells and the kind of each. Nothing is believed for it: what was recovered is held
+SQLite reads a table by its tree from the root: if a page is missing, all behind it is. Here each existing page is read
+by itself. A page of a table's tree has that table's rows; on a page whose path from the root is lost, rows are
+recognised by their number of cells and the type of each. Recovered rows are not trusted for that: they are verified
 against the chain like any journal.
 
 Source: [SQLITE24] secs. 1.3, 1.6, 2.1, 4.1: pages, cells, records, the log.
@@ -34,22 +34,22 @@ from catseye.coordinator.journal.tables import (
 )
 from catseye.errors import InputError
 
-USUAL_PAGE = 8192  # bytes, of a journal that catseye made
+USUAL_PAGE = 8192  # bytes, in a journal made by catseye
 SIZES = tuple(2**k for k in range(9, 17))
 MAGIC = b"SQLite format 3\0"
 HEADER = 100  # bytes before the first page's tree
 INTERIOR_INDEX, INTERIOR_TABLE, LEAF_INDEX, LEAF_TABLE = 2, 5, 10, 13  # a page's first byte
 LOG_HEADER, FRAME_HEADER = 32, 24  # bytes of a log
-LOG_MAGIC = (0x377F0682, 0x377F0683)  # checksums of little-endian words, of big-endian ones
-WIDTHS = {1: 1, 2: 2, 3: 3, 4: 4, 5: 6, 6: 8}  # bytes of a whole number by its serial type
+LOG_MAGIC = (0x377F0682, 0x377F0683)  # checksums of little-endian words, and of big-endian ones
+WIDTHS = {1: 1, 2: 2, 3: 3, 4: 4, 5: 6, 6: 8}  # bytes of an integer by its serial type
 MOST_CELL = 2**30  # bytes of one record, SQLite's own limit
-OF_CHAINS = (CHAIN, PARTS)  # that a journal of before has not
+OF_CHAINS = (CHAIN, PARTS)  # missing in a journal of version 1
 TOGETHER = 256  # rows written at once
 Record = tuple[object, ...]
 
 
 class _Damaged(Exception):
-    """A cell that cannot be read."""
+    """A cell that is unreadable."""
 
 
 @dataclass
@@ -57,8 +57,8 @@ class Recovery:
     """Contents recovered from a damaged journal.
 
     rows    by table
-    lost    cells that could not be read, or belong to no table
-    pages, missing   that were looked at; that a table's tree names and that are not there
+    lost    cells that are unreadable, or belong to no table
+    pages, missing   pages read; pages named by a table's tree but missing
     """
 
     rows: dict[str, int] = field(default_factory=dict)
@@ -68,22 +68,22 @@ class Recovery:
 
     def __str__(self) -> str:
         events = sum(self.rows.values())
-        return f"{events} rows of {self.pages} pages were read; {self.lost} cells and {self.missing} pages were not"
+        return f"{events} rows recovered from {self.pages} pages; {self.lost} cells and {self.missing} pages lost"
 
 
 def recover(damaged: Path, new: Path) -> Recovery:
-    """Read all that can be read of a journal into a new one.
+    """Recover all readable rows of a journal into a new one.
 
     damaged   file, with its log beside it
     new       file to write
 
-    Raises InputError: not a row could be read; a disk that cannot take it.
+    Raises InputError: no readable row; a full disk.
     """
     recovery = Recovery()
     try:
         with _pages(damaged) as pages, closing(sqlite3.connect(new, isolation_level=None)) as target:
             _create(target)
-            for table, rows in _found(pages, recovery):
+            for table, rows in _recovered_rows(pages, recovery):
                 _write(target, table, rows, recovery)
             _name_runs(target)
             target.execute("INSERT OR IGNORE INTO journal VALUES (?, ?)", (FORMAT, VERSION))
@@ -91,9 +91,11 @@ def recover(damaged: Path, new: Path) -> Recovery:
             if version < FIRST_CHAINED:
                 target.executescript("".join(f"DROP TABLE {table.name};" for table in OF_CHAINS))
     except (OSError, ValueError, sqlite3.Error) as problem:
-        raise InputError(f"journal {damaged}: cannot be recovered: {problem} (expected room beside --out)") from problem
+        raise InputError(
+            f"journal {damaged}: cannot be recovered: {problem} (expected disk space beside --out)"
+        ) from problem
     if not recovery.rows:
-        raise InputError(f"journal {damaged}: not a row can be read of it ({recovery.pages} pages; take its backup)")
+        raise InputError(f"journal {damaged}: no readable row in {recovery.pages} pages (use its backup)")
     return recovery
 
 
@@ -102,13 +104,13 @@ def recover(damaged: Path, new: Path) -> Recovery:
 
 def _create(target: sqlite3.Connection) -> None:
     target.execute(f"PRAGMA application_id = {APPLICATION_ID}")
-    target.execute("PRAGMA synchronous = OFF")  # it lasts as long as the export
+    target.execute("PRAGMA synchronous = OFF")  # temporary, for the export only
     for table in METADATA.sorted_tables:
         target.execute(str(CreateTable(table).compile(dialect=dialect.dialect())))
 
 
 def _write(target: sqlite3.Connection, table: JournalTable, rows: Sequence[Record], recovery: Recovery) -> None:
-    """Rows into their table; one that is there already stays, since rows of a table's tree come first."""
+    """Insert rows; existing ones stay, since a table's own tree comes first."""
     places = ", ".join("?" * len(table.columns))
     target.execute("BEGIN")
     before = target.total_changes
@@ -118,11 +120,11 @@ def _write(target: sqlite3.Connection, table: JournalTable, rows: Sequence[Recor
 
 
 def _name_runs(target: sqlite3.Connection) -> None:
-    """A record for each run whose own is lost, with what its shots and readings tell of it."""
+    """Add a substitute record for each run whose own is lost."""
     events = " UNION ALL ".join(f"SELECT run, ticks FROM {table.name}" for table in EVENTS)
-    lost = f"SELECT run, min(ticks) FROM ({events}) WHERE run NOT IN (SELECT run FROM runs) GROUP BY run"
+    query = f"SELECT run, min(ticks) FROM ({events}) WHERE run NOT IN (SELECT run FROM runs) GROUP BY run"
     blank = {column.name: "" for column in RUNS.columns} | {"ended_ticks": None, "seed": None, "settings": "{}"}
-    for run, ticks in target.execute(lost).fetchall():
+    for run, ticks in target.execute(query).fetchall():
         record = blank | {"run": run, "uuid": f"lost-{run}", "started_ticks": ticks, "pid": 0, "buffers": 1}
         places = ", ".join("?" * len(record))
         target.execute(f"INSERT INTO runs VALUES ({places})", tuple(record.values()))
@@ -131,18 +133,18 @@ def _name_runs(target: sqlite3.Connection) -> None:
 # Tables --------------------------------------------------------------------------------------------------------------
 
 
-def _found(pages: "_Pages", recovery: Recovery) -> "Iterator[tuple[JournalTable, list[Record]]]":
-    """Rows by table: first of the pages of each table's tree, then of those whose way from a root is lost."""
-    seen: set[int] = set()
+def _recovered_rows(pages: "_Pages", recovery: Recovery) -> "Iterator[tuple[JournalTable, list[Record]]]":
+    """Rows by table: first from the tables' trees, then from other pages."""
+    visited: set[int] = set()
     gathered: dict[str, list[Record]] = {}
     roots = _roots(pages, recovery)
     trees = [(METADATA.tables.get(name), root) for name, root in roots]
     for table, root in sorted(trees, key=lambda tree: tree[0] is None):
-        for number in _tree(pages, root, seen, recovery):
+        for number in _tree(pages, root, visited, recovery):
             if table is not None:
                 yield from _rows(pages, number, [table], gathered, recovery)
     for number in range(2, pages.count + 1):
-        if number not in seen:
+        if number not in visited:
             yield from _rows(pages, number, list(METADATA.tables.values()), gathered, recovery)
     recovery.pages = pages.count
     for name, rows in gathered.items():
@@ -153,7 +155,7 @@ def _found(pages: "_Pages", recovery: Recovery) -> "Iterator[tuple[JournalTable,
 def _rows(
     pages: "_Pages", number: int, tables: "list[JournalTable]", gathered: dict[str, list[Record]], recovery: Recovery
 ) -> "Iterator[tuple[JournalTable, list[Record]]]":
-    """A page's rows, added to what is gathered; a table's, when there are many."""
+    """Collect a page's rows; yield a table's when there are many."""
     alone = len(tables) == 1
     for kind, rowid, record in pages.records(number, recovery if alone else None):
         table, row = _fitting(tables, kind, rowid, record)
@@ -168,12 +170,12 @@ def _rows(
 def _fitting(
     tables: "list[JournalTable]", kind: int, rowid: int | None, record: Record
 ) -> "tuple[JournalTable | None, Record]":
-    """The table whose columns hold a record's cells, and its row; None where none does."""
+    """Table whose columns match a record's cells, and its row; else None."""
     for table in tables:
         if (kind == LEAF_TABLE) != _has_rowid(table) or len(record) != len(table.columns):
             continue
         row = record
-        if rowid is not None and record[:1] == (None,):  # a whole primary key is the row's number itself
+        if rowid is not None and record[:1] == (None,):  # an integer primary key is the row's number itself
             row = (rowid, *record[1:])
         if all(isinstance(cell, kinds) for cell, kinds in zip(row, cell_kinds(table), strict=True)):
             return table, row
@@ -185,7 +187,7 @@ def _has_rowid(table: JournalTable) -> bool:
 
 
 def _roots(pages: "_Pages", recovery: Recovery) -> list[tuple[str, int]]:
-    """Table or index and root page of each tree, by the schema; what cannot be read is left out."""
+    """Name and root page of each tree in the schema, if readable."""
     roots = []
     for number in _tree(pages, 1, set(), recovery):
         for kind, _, record in pages.records(number, recovery):
@@ -194,14 +196,14 @@ def _roots(pages: "_Pages", recovery: Recovery) -> list[tuple[str, int]]:
     return roots
 
 
-def _tree(pages: "_Pages", root: int, seen: set[int], recovery: Recovery) -> Iterator[int]:
-    """The pages of a tree that are there, each once."""
+def _tree(pages: "_Pages", root: int, visited: set[int], recovery: Recovery) -> Iterator[int]:
+    """Existing pages of a tree, each once."""
     ahead = [root]
     while ahead:
         number = ahead.pop()
-        if number in seen:
+        if number in visited:
             continue
-        seen.add(number)
+        visited.add(number)
         if not pages.has(number):
             recovery.missing += 1
             continue
@@ -214,7 +216,7 @@ def _tree(pages: "_Pages", root: int, seen: set[int], recovery: Recovery) -> Ite
 
 @contextmanager
 def _pages(path: Path) -> "Iterator[_Pages]":
-    """A file's pages, with those that its log has."""
+    """Pages of a file, with those in its log."""
     log = Path(f"{path}-wal")
     with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as raw:
         if log.exists() and log.stat().st_size > LOG_HEADER:
@@ -225,16 +227,16 @@ def _pages(path: Path) -> "Iterator[_Pages]":
 
 
 class _Pages:
-    """Pages by number, from 1; one that is cut is not there."""
+    """Pages by number, from 1; a cut page is missing."""
 
     def __init__(self, raw: mmap.mmap, log: mmap.mmap | None):
         size = 0
         if len(raw) >= HEADER and raw[: len(MAGIC)] == MAGIC:
             (size,) = struct.unpack(">H", raw[16:18])
         size = 65_536 if size == 1 else size
-        whole = size in SIZES
-        self.size = size if whole else USUAL_PAGE
-        self.usable = self.size - (raw[20] if whole and raw[20] <= 32 else 0)
+        valid = size in SIZES
+        self.size = size if valid else USUAL_PAGE
+        self.usable = self.size - (raw[20] if valid and raw[20] <= 32 else 0)
         self._raw, self._log = raw, log
         self._logged = {} if log is None else _logged(log, self.size)
         self.count = max(len(raw) // self.size, max(self._logged, default=0))
@@ -251,7 +253,7 @@ class _Pages:
         return self._raw[(number - 1) * self.size : number * self.size]
 
     def children(self, number: int) -> list[int]:
-        """The pages below an interior one."""
+        """Pages below an interior one."""
         page, at = self.page(number), HEADER * (number == 1)
         if page[at] not in (INTERIOR_INDEX, INTERIOR_TABLE):
             return []
@@ -259,7 +261,7 @@ class _Pages:
         return [_u32(page, cell) for cell in cells] + [_u32(page, at + 8)]
 
     def records(self, number: int, recovery: Recovery | None) -> Iterator[tuple[int, int | None, Record]]:
-        """Kind of page, row's number where there is one, and cells of each record on a page."""
+        """Records on a page: kind of page, row's number if any, cells."""
         if not self.has(number):
             return
         page, at = self.page(number), HEADER * (number == 1)
@@ -285,35 +287,38 @@ class _Pages:
         return rowid, _cells(self._payload(page, at, size, kind))
 
     def _payload(self, page: bytes, at: int, size: int, kind: int) -> bytes:
-        """A record's bytes, those on overflow pages too."""
+        """Bytes of a record, including overflow pages."""
         most = self.usable - 35 if kind == LEAF_TABLE else (self.usable - 12) * 64 // 255 - 23
         if size <= most:
             return _cut(page, at, size)
         least = (self.usable - 12) * 32 // 255 - 23
         local = least + (size - least) % (self.usable - 4)
         local = local if local <= most else least
-        parts, left = [_cut(page, at, local)], size - local
+        parts, remaining = [_cut(page, at, local)], size - local
         following, visited = _u32(page, at + local), set[int]()
-        while left > 0:
+        while remaining > 0:
             if following in visited or not self.has(following):
                 raise _Damaged
             visited.add(following)
             more = self.page(following)
-            parts.append(_cut(more, 4, min(left, self.usable - 4)))
-            left -= len(parts[-1])
+            parts.append(_cut(more, 4, min(remaining, self.usable - 4)))
+            remaining -= len(parts[-1])
             following = _u32(more, 0)
         return b"".join(parts)
 
 
 def _pointers(page: bytes, at: int) -> list[int]:
-    """Where a page's cells begin."""
+    """Offsets of a page's cells."""
     first = at + (12 if page[at] in (INTERIOR_INDEX, INTERIOR_TABLE) else 8)
     count = min(struct.unpack_from(">H", page, at + 3)[0], (len(page) - first) // 2)
     return [cell for cell in struct.unpack_from(f">{count}H", page, first) if first <= cell < len(page)]
 
 
 def _cells(payload: bytes) -> Record:
-    """The cells of a record. Raises _Damaged, UnicodeDecodeError."""
+    """Cells of a record.
+
+    Raises _Damaged, UnicodeDecodeError.
+    """
     size, at = _varint(payload, 0)
     kinds = []
     while at < size:
@@ -358,7 +363,7 @@ def _u32(raw: bytes, at: int) -> int:
 
 
 def _varint(raw: bytes, at: int) -> tuple[int, int]:
-    """A number of one to nine bytes, and where the next begins."""
+    """A number of one to nine bytes, and the offset after it."""
     value = 0
     for k in range(8):
         byte = raw[at + k]
@@ -373,7 +378,10 @@ def _varint(raw: bytes, at: int) -> tuple[int, int]:
 
 
 def _logged(log: mmap.mmap, size: int) -> dict[int, int]:
-    """Where each page lies in a log, as its last whole transaction has it; a frame that does not check ends it."""
+    """Offset of each page in a log, by its last complete transaction.
+
+    An invalid frame ends the log.
+    """
     magic, _, page_size, _, *salts = struct.unpack_from(">6I", log, 0)
     if magic not in LOG_MAGIC or page_size != size:
         return {}
@@ -397,7 +405,7 @@ def _logged(log: mmap.mmap, size: int) -> dict[int, int]:
 
 
 def _sums(words: str, raw: bytes, sums: tuple[int, int]) -> tuple[int, int]:
-    """The log's running checksum."""
+    """Running checksum of the log."""
     one, two = sums
     for a, b in struct.iter_unpack(f"{words}2I", raw):
         one = (one + a + two) & 0xFFFFFFFF

@@ -1,4 +1,4 @@
-"""A run fed to the reduction again, in the order in which it was fed then, and held against what it said then."""
+"""Replay of a run: reduced again in order, compared with its answers."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -24,7 +24,7 @@ LiveFactory = Callable[[SiteFolder, StoredRun], Live]
 
 @dataclass(frozen=True)
 class RangeMove:
-    """A shot's range made again, less the stored one, and its stored u: m."""
+    """New range of a shot less the stored one, and its stored u: m."""
 
     ranger: str
     target: str
@@ -34,13 +34,13 @@ class RangeMove:
 
 @dataclass
 class ShotComparisons:
-    """Shots fed since the solution before, their answers beside the stored ones.
+    """Shots since the previous solution, new answers beside the stored ones.
 
     count       of all
     differing   seqs of those with another number or status
     reworded    seqs of those with the same numbers and status but another text
-    unasked     seqs of those with which no answer is stored: nothing to compare
-    moves       of those that have a range both times
+    unasked     seqs of those without a stored answer: nothing to compare
+    moves       of those with a range both times
     """
 
     count: int = 0
@@ -55,10 +55,10 @@ class ShotComparisons:
         if not stored.status:
             self.unasked.append(seq)
             return
-        found = compare_shots(stored, new)
-        if found is Sameness.DIFFERENT:
+        sameness = compare_shots(stored, new)
+        if sameness is Sameness.DIFFERENT:
             self.differing.append(seq)
-        elif found is Sameness.TEXTS:
+        elif sameness is Sameness.TEXTS:
             self.reworded.append(seq)
         change = new.range_ - stored.range_
         if math.isfinite(change):
@@ -74,13 +74,13 @@ class ShotComparisons:
 
 @dataclass(frozen=True, eq=False)
 class Replayed:
-    """One solution, stored and made again; or at the end the shots that no solution is stored for.
+    """One solution, stored and new; or at the end the remaining shots.
 
     seq        in its run
     stored     None at the end
-    new        its answer is empty where nothing could be solved this time; None at the end
-    shots      fed since the solution before
-    solution   stored and new compared
+    new        its answer is empty if nothing was solved this time; None at the end
+    shots      since the previous solution
+    solution   comparison of stored and new
     """
 
     seq: int
@@ -96,20 +96,21 @@ class Replayed:
 
     @property
     def same(self) -> bool:
-        """True where all numbers, reason codes and statuses are unchanged to the last bit; texts apart."""
+        """True if numbers, codes and statuses agree to the last bit; texts apart."""
         return self.sameness is not Sameness.DIFFERENT
 
 
 def replay(
     reader: JournalReader, run: int, live_factory: LiveFactory, *, until: int | None = None
 ) -> Iterator[Replayed]:
-    """Each stored solution of a run beside the one that the same shots, weather and posture give now; then, where shots
-    came behind the last one, those.
+    """Replay a run: each stored solution beside the new one.
 
-    live_factory   makes the reduction of a run, with the settings that the run states
+    The shots after the last one follow at the end.
+
+    live_factory   makes the reduction of a run, with the run's settings
     until          seq of the last event fed
 
-    Without stored samples the reduction sees what the rangers made of them, and answers differ.
+    Without stored samples the reduction uses the rangers' own amplitudes and phases, and answers differ.
     """
     live = live_factory(reader.site(run), reader.run(run))
     shots, last = ShotComparisons(), 0
@@ -118,7 +119,7 @@ def replay(
     for seq, entry in reader.events(run, until=until, kinds=kinds):
         if isinstance(entry, AnsweredShot):
             last = seq
-            shots.add(seq, entry, _asked(live, entry.shot))
+            shots.add(seq, entry, _answered(live, entry.shot))
         elif isinstance(entry, LiveWeather):
             live.weather(entry)
         elif isinstance(entry, LivePosture):
@@ -127,17 +128,17 @@ def replay(
             job = live.begin(entry.ticks)
         elif isinstance(entry, Document) and entry.name == CLOCK_CORRECTED:
             live.clock_corrected(entry.ticks)
-            job = None  # what was being solved then was not taken in
+            job = None  # the solution under way was discarded
         elif isinstance(entry, EpochSolution):
-            new = EpochSolution.of(entry.ticks, None if job is None else live.take_in(job, job.solve()))
+            new = EpochSolution.of(entry.ticks, None if job is None else live.accept(job, job.solve()))
             yield Replayed(seq, entry, new, shots, compare_solutions(entry, new))
             shots, job = ShotComparisons(), None
     if shots.count:
         yield Replayed(last, None, None, shots)
 
 
-def _asked(live: Live, shot: LiveShot) -> AnsweredShot:
-    """As the coordinator asks: a shot that the reduction refuses has the refusal for its answer."""
+def _answered(live: Live, shot: LiveShot) -> AnsweredShot:
+    """Answer as in the coordinator: a refused shot has the refusal."""
     try:
         return AnsweredShot.of(shot, live.shot(shot))
     except CatseyeError as problem:

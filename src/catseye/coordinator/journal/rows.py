@@ -1,4 +1,4 @@
-"""Entries to rows of the journal's tables and back; a buffer's samples to bytes and back."""
+"""Conversion of entries to table rows, and of samples to bytes."""
 
 import json
 import zlib
@@ -14,18 +14,18 @@ from catseye.errors import InputError
 from catseye.records.night.live import Happening, LivePosture, LiveShot, LiveWeather
 
 RAW, PACKED = 0, 1  # int16 little-endian as taken; or the differences from a cycle earlier, in two planes, deflated
-MOST_WHOLE = 2**63 - 1
+LARGEST_INTEGER = 2**63 - 1
 Samples = NDArray[np.int16]
 Cell = None | bool | int | float | str | bytes | Samples
-Row = dict[str, Cell]  # by column, to be written
-StoredRow = sqlalchemy.Row[tuple[object, ...]]  # as it was read, with the table's columns as attributes
+Row = dict[str, Cell]  # by column, for writing
+StoredRow = sqlalchemy.Row[tuple[object, ...]]  # as read, with the table's columns as attributes
 Rows = list[tuple[str, Row]]  # table's name, row without run and seq
 
 
 def rows_of(item: Item, buffers: bool) -> Rows:
-    """The rows of an entry; a shot's samples as they are: `pack` makes bytes of them.
+    """Rows of an entry; `pack` makes bytes of a shot's samples.
 
-    buffers   whether samples are kept
+    buffers   True to store samples
 
     Raises InputError: not an entry, or a value that no column holds.
     """
@@ -39,7 +39,10 @@ def rows_of(item: Item, buffers: bool) -> Rows:
 
 
 def _row(item: object) -> tuple[str, Row]:
-    """Table and row of an entry, without a shot's samples. Raises InputError: not an entry."""
+    """Table and row of an entry, without a shot's samples.
+
+    Raises InputError: not an entry.
+    """
     if isinstance(item, AnsweredShot):
         return _shot(item)
     if isinstance(item, LiveWeather):
@@ -60,13 +63,13 @@ def _row(item: object) -> tuple[str, Row]:
 def _shot(item: AnsweredShot) -> tuple[str, Row]:
     shot = item.shot
     return "shots", {
-        "number": _whole("shot number", shot.number),
+        "number": _integer("shot number", shot.number),
         "ranger": _text(shot.ranger),
         "target": _text(shot.target),
-        "ticks": _whole("shot ticks", shot.ticks),
-        "cycles": _whole("cycles", shot.cycles),
-        "samples_per_cycle": _whole("samples_per_cycle", shot.samples_per_cycle),
-        "if_hz": _whole("if_hz", shot.if_hz),
+        "ticks": _integer("shot ticks", shot.ticks),
+        "cycles": _integer("cycles", shot.cycles),
+        "samples_per_cycle": _integer("samples_per_cycle", shot.samples_per_cycle),
+        "if_hz": _integer("if_hz", shot.if_hz),
         "volts_per_code": _number(shot.volts_per_code),
         "amplitude_v": _number(shot.amplitude),
         "phase_rad": _number(shot.phase),
@@ -81,7 +84,7 @@ def _shot(item: AnsweredShot) -> tuple[str, Row]:
 def _weather(item: LiveWeather) -> tuple[str, Row]:
     return "weather", {
         "station": _text(item.station),
-        "ticks": _whole("weather ticks", item.ticks),
+        "ticks": _integer("weather ticks", item.ticks),
         "temperature_c": _number(item.temperature_c),
         "pressure_hpa": _number(item.pressure_hpa),
         "humidity_percent": _number(item.humidity_percent),
@@ -90,7 +93,7 @@ def _weather(item: LiveWeather) -> tuple[str, Row]:
 
 def _posture(item: LivePosture) -> tuple[str, Row]:
     return "postures", {
-        "ticks": _whole("posture ticks", item.ticks),
+        "ticks": _integer("posture ticks", item.ticks),
         "azimuth_rad": _number(item.azimuth),
         "elevation_rad": _number(item.elevation),
         "azimuth_rate_rad_s": _number(item.azimuth_rate),
@@ -100,9 +103,9 @@ def _posture(item: LivePosture) -> tuple[str, Row]:
 
 def _command(item: SentCommand) -> tuple[str, Row]:
     return "commands", {
-        "ticks": _whole("command ticks", item.ticks),
+        "ticks": _integer("command ticks", item.ticks),
         "ranger": _text(item.ranger),
-        "tid": _whole("TID", item.tid),
+        "tid": _integer("TID", item.tid),
         "line": _text(item.line),
         "reply": _text(item.reply),
         "ok": None if item.ok is None else bool(item.ok),
@@ -115,7 +118,7 @@ def _happening(item: Happening) -> tuple[str, Row]:
     except TypeError as problem:
         raise InputError(f"happening {item.kind!r} has a detail that JSON cannot hold: {problem}") from problem
     return "happenings", {
-        "ticks": _whole("happening ticks", item.ticks),
+        "ticks": _integer("happening ticks", item.ticks),
         "who": _text(item.who),
         "kind": _text(item.kind),
         "severity": _text(item.severity),
@@ -125,7 +128,7 @@ def _happening(item: Happening) -> tuple[str, Row]:
 
 
 def _detail(value: object) -> object:
-    """JSON has no word for what is no finite number: it travels as text, which `float` reads."""
+    """JSON value; a non-finite number becomes text that `float` reads."""
     plain = value.item() if isinstance(value, np.generic) else value
     return repr(plain) if isinstance(plain, float) and not np.isfinite(plain) else plain
 
@@ -133,7 +136,7 @@ def _detail(value: object) -> object:
 def _solution(item: EpochSolution) -> tuple[str, Row]:
     matrix = item.covariance
     return "solutions", {
-        "ticks": _whole("solution ticks", item.ticks),
+        "ticks": _integer("solution ticks", item.ticks),
         "answer": _text(item.text),
         "size": 0 if matrix is None else len(matrix),
         "covariance": None if matrix is None else np.ascontiguousarray(matrix, dtype="<f8").tobytes(),
@@ -142,16 +145,16 @@ def _solution(item: EpochSolution) -> tuple[str, Row]:
 
 def _document(item: Document) -> tuple[str, Row]:
     return "documents", {
-        "ticks": _whole("document ticks", item.ticks),
+        "ticks": _integer("document ticks", item.ticks),
         "name": _text(item.name),
         "text": _text(item.text),
     }
 
 
 def entry_of(table: str, row: StoredRow, samples: Samples | None = None) -> Entry:
-    """The entry of a table's row.
+    """Entry of a table's row.
 
-    samples   of a shot, where they were kept
+    samples   of a shot, if stored
     """
     return READERS[table](row, samples)
 
@@ -202,10 +205,10 @@ READERS: Mapping[str, Callable[[StoredRow, Samples | None], Entry]] = {
 
 
 def pack(samples: Samples, lag: int, packing: int) -> Row:
-    """A buffer's columns: how it is packed, the CRC-32 of the samples as taken, the bytes.
+    """Columns of a buffer: packing, CRC-32 of the original samples, bytes.
 
     samples   (n,) int16 little-endian
-    lag       samples of a cycle: what a sample is compared with is a cycle older
+    lag       samples of a cycle: a sample is compared with one a cycle earlier
     packing   RAW or PACKED; packed is 0.5 to 0.65 of raw, 0.2 ms for 8192 samples
 
     >>> pack(np.arange(4, dtype="<i2"), 2, RAW)["samples"]
@@ -215,16 +218,18 @@ def pack(samples: Samples, lag: int, packing: int) -> Row:
     if packing == RAW:
         return {"packing": RAW, "crc32": zlib.crc32(raw), "samples": raw}
     differences = samples.copy()
-    differences[lag:] -= samples[:-lag]  # wraps round, and back again when it is undone
+    differences[lag:] -= samples[:-lag]  # wraps around, and back when undone
     planes = differences.view(np.uint8).reshape(-1, 2).T.tobytes()
     return {"packing": PACKED, "crc32": zlib.crc32(raw), "samples": zlib.compress(planes, 1)}
 
 
 def unpack(row: StoredRow, lag: int, place: str) -> Samples:
-    """The samples (n,) of a row of `buffers`; InputError where they are not what was stored.
+    """Samples (n,) of a row of `buffers`.
 
     lag     samples of a cycle
-    place   for the refusal
+    place   for messages
+
+    Raises InputError if they fail the checksum.
     """
     problem = f"{place}: samples are damaged (expected CRC-32 {row.crc32:08x}); restore the journal from a copy"
     raw = row.samples
@@ -234,22 +239,22 @@ def unpack(row: StoredRow, lag: int, place: str) -> Samples:
         except zlib.error as why:
             raise InputError(problem) from why
         samples = np.ascontiguousarray(planes.reshape(2, -1).T).view("<i2").ravel()
-        whole = np.zeros(-(-len(samples) // lag) * lag, dtype="<i2")
-        whole[: len(samples)] = samples
-        raw = np.cumsum(whole.reshape(-1, lag), axis=0, dtype="<i2").ravel()[: len(samples)].tobytes()
+        padded = np.zeros(-(-len(samples) // lag) * lag, dtype="<i2")
+        padded[: len(samples)] = samples
+        raw = np.cumsum(padded.reshape(-1, lag), axis=0, dtype="<i2").ravel()[: len(samples)].tobytes()
     if zlib.crc32(raw) != row.crc32:
         raise InputError(problem)
     return np.frombuffer(raw, dtype="<i2")
 
 
-def _whole(name: str, value: int) -> int:
-    if not -MOST_WHOLE <= value <= MOST_WHOLE:
+def _integer(name: str, value: int) -> int:
+    if not -LARGEST_INTEGER <= value <= LARGEST_INTEGER:
         raise InputError(f"{name} = {value} does not fit 64 bits (expected a whole number within)")
     return int(value)
 
 
 def _number(value: float) -> float | None:
-    """NaN is NULL: SQLite has no other word for it."""
+    """A number, NULL for NaN, which SQLite cannot hold."""
     number = float(value)
     return None if number != number else number
 
@@ -259,5 +264,5 @@ def _back(value: float | None) -> float:
 
 
 def _text(value: str) -> str:
-    """What every database takes: no NUL, nothing that UTF-8 cannot say."""
+    """Text without NUL and anything that UTF-8 cannot encode."""
     return value.replace("\0", "\\x00").encode("utf-8", "backslashreplace").decode("utf-8")

@@ -1,4 +1,4 @@
-"""The beginning of a run: its row in the journal, and the files that it starts from, each text once a journal."""
+"""Start of a run in a journal: its record and files."""
 
 import json
 import os
@@ -17,13 +17,15 @@ from catseye.coordinator.parts import Clock, ticks_now
 from catseye.errors import InputError
 from catseye.version import __version__
 
-OURS = 4_276_994  # of the server's advisory locks: two hosts may begin at once
+OURS = 4_276_994  # advisory lock of the server: two hosts may start at once
 
 
 def begin(place: JournalAddress, run: Run, clock: Clock, *, buffers: bool) -> tuple[int, bytes]:
-    """The tables where there are none, the run's row and its files, in one transaction; its number and first link.
+    """Create tables if needed, the run's record and files; number and first link.
 
-    buffers   whether samples will be kept
+    In one transaction.
+
+    buffers   True if samples will be stored
     """
     settings = json.dumps(plain(dict(run.settings), "settings"), sort_keys=True, allow_nan=False)
     files = {path: (sha256(text.encode()).hexdigest(), text) for path, text in run.files().items()}
@@ -33,13 +35,13 @@ def begin(place: JournalAddress, run: Run, clock: Clock, *, buffers: bool) -> tu
         if connection.dialect.name == "postgresql":
             connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({OURS})")
         create_or_carry(connection, place.shown)
-        known = set(
+        stored = set(
             connection.scalars(select(TEXTS.c.sha256).where(TEXTS.c.sha256.in_([f[0] for f in files.values()])))
         )
-        fresh = {digest: text for digest, text in files.values() if digest not in known}
+        fresh = {digest: text for digest, text in files.values() if digest not in stored}
         if fresh:
             connection.execute(insert(TEXTS), [{"sha256": digest, "text": text} for digest, text in fresh.items()])
-        done = connection.execute(
+        inserted = connection.execute(
             insert(RUNS).values(
                 uuid=run.uuid,
                 started_ticks=ticks_now(clock),
@@ -54,7 +56,7 @@ def begin(place: JournalAddress, run: Run, clock: Clock, *, buffers: bool) -> tu
                 buffers=buffers,
             )
         )
-        number = int(done.inserted_primary_key[0])  # type: ignore[index]
+        number = int(inserted.inserted_primary_key[0])  # type: ignore[index]
         rows = [{"run": number, "path": path, "sha256": digest} for path, (digest, _) in files.items()]
         connection.execute(insert(RUN_FILES), rows)
         link = run_link(connection, number)
@@ -63,9 +65,9 @@ def begin(place: JournalAddress, run: Run, clock: Clock, *, buffers: bool) -> tu
 
 
 def _look_first(place: JournalAddress) -> None:
-    """A file of others' is refused before it is opened for writing, which would change its header.
+    """Refuse a foreign file before it is opened for writing, and one with triggers.
 
-    So is one with triggers: they could alter what is written, or drop it, though it is said to be durable.
+    A trigger could alter or drop entries that are reported as durable.
     """
     if place.path is not None and place.path.exists() and place.path.stat().st_size:
         with reading_engine(place).connect() as connection:
@@ -79,13 +81,13 @@ def _look_first(place: JournalAddress) -> None:
 
 
 def go_on(old: Connection, place: JournalAddress, run: int, *, seq: int, link: bytes, follows: str) -> None:
-    """A run's next file: its record and files again, under its number, and the link from which it goes on.
+    """Continue a run in the next file: record and files again, and the link.
 
     old         connection to the file so far
     seq, link   of its last link
     follows     the file so far
 
-    Raises SQLAlchemyError, InputError: the file cannot be made.
+    Raises SQLAlchemyError, InputError: the file cannot be created.
     """
     record = dict(old.execute(select(RUNS).where(RUNS.c.run == run)).mappings().one())
     files = [dict(row) for row in old.execute(select(RUN_FILES).where(RUN_FILES.c.run == run)).mappings()]
@@ -97,6 +99,6 @@ def go_on(old: Connection, place: JournalAddress, run: int, *, seq: int, link: b
             if rows:
                 connection.execute(insert(table), rows)
         links = [(0, LinkKind.RUN, run_link(connection, run)), (seq, LinkKind.PART, link)]
-        rows = [{"run": run, "seq": at, "kind": kind.value, "link": each} for at, kind, each in links]
+        rows = [{"run": run, "seq": at, "kind": kind.value, "link": link_value} for at, kind, link_value in links]
         connection.execute(insert(CHAIN), rows)
         connection.execute(insert(PARTS).values(run=run, follows=follows))

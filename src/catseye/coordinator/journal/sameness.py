@@ -1,6 +1,6 @@
-"""Comparison of a stored answer with the one that the same shots give now: numbers, reason codes and statuses.
+"""Comparison of a stored answer with a new one: numbers, codes, statuses.
 
-Texts for people stand apart: a version that words a reason otherwise has not changed an answer.
+Texts for people are separate: another wording of a reason is not another answer.
 """
 
 import json
@@ -16,7 +16,7 @@ from catseye.reduction.epoch.reason import status_of
 
 NOTES, REJECTED, POSE, MISSING = "notes", "rejected", "pose", "missing"  # keys of a stored answer, and of its pose
 DOUBTS, RETURNED = "doubts", "returned"  # sentences
-SOLVED = "solved or not"  # parts that are no keys of the answer
+SOLVED = "solved or not"  # parts that are not keys of the answer
 TICKS = "ticks asked for"
 COVARIANCE = "covariance"
 
@@ -29,21 +29,21 @@ class Sameness(StrEnum):
     DIFFERENT = "different numbers"  # or another reason code or status
 
 
-ORDER = tuple(Sameness)  # worse and worse
+ORDER = tuple(Sameness)  # from best to worst
 
 
-def least_same(found: Iterable[Sameness]) -> Sameness:
-    """The worst of several; identical of none.
+def least_same(values: Iterable[Sameness]) -> Sameness:
+    """The worst of several; identical if none.
 
     >>> least_same([Sameness.TEXTS, Sameness.IDENTICAL]).name
     'TEXTS'
     """
-    return max(found, key=ORDER.index, default=Sameness.IDENTICAL)
+    return max(values, key=ORDER.index, default=Sameness.IDENTICAL)
 
 
 @dataclass(frozen=True)
 class SolutionComparison:
-    """An epoch's solution, made again, beside the stored one.
+    """A new solution of an epoch compared with the stored one.
 
     sameness   of the two
     parts      keys of the answer whose numbers, reason codes or statuses differ
@@ -72,30 +72,36 @@ def compare_solutions(stored: EpochSolution, new: EpochSolution) -> SolutionComp
 
 
 def compare_shots(stored: AnsweredShot, new: AnsweredShot) -> Sameness:
-    """Likeness of a shot's new answer to the stored one, by status and numbers; NaN equals NaN."""
+    """Sameness of a shot's new answer, by status and numbers.
+
+    NaN equals NaN.
+    """
     if (stored.status, *_numbers(stored)) != (new.status, *_numbers(new)):
         return Sameness.DIFFERENT
     return Sameness.IDENTICAL if stored.text == new.text else Sameness.TEXTS
 
 
 def _numbers(shot: AnsweredShot) -> tuple[str, ...]:
-    """Numbers of a shot as text that shows every bit."""
+    """Numbers of a shot as text, to the last bit."""
     return tuple(repr(float(value)) for value in (shot.range_, shot.u_range, shot.misfit))
 
 
 def _without_texts(answer: Mapping[str, object]) -> dict[str, object]:
-    """An answer's keys with reason codes in place of reasons; notes and why a pose is missing are left out."""
-    kept = {key: value for key, value in answer.items() if key not in (NOTES, DOUBTS, RETURNED)}
-    rejected, pose = kept.get(REJECTED), kept.get(POSE)
+    """An answer with reason codes instead of texts, and without notes."""
+    comparable = {key: value for key, value in answer.items() if key not in (NOTES, DOUBTS, RETURNED)}
+    rejected, pose = comparable.get(REJECTED), comparable.get(POSE)
     if isinstance(rejected, Mapping):
-        kept[REJECTED] = {number: _code(line) for number, line in rejected.items()}
+        comparable[REJECTED] = {number: _code(line) for number, line in rejected.items()}
     if isinstance(pose, Mapping):
-        kept[POSE] = {key: value for key, value in pose.items() if key != MISSING}
-    return kept
+        comparable[POSE] = {key: value for key, value in pose.items() if key != MISSING}
+    return comparable
 
 
 def _code(line: object) -> object:
-    """The status of a reason's line; the line itself where it begins with none, lest two be taken for the same."""
+    """Status of a reason's line, or the line if it has none.
+
+    So different lines are never taken for the same.
+    """
     return status_of(line) or line if isinstance(line, str) else line
 
 
@@ -106,19 +112,19 @@ def _differ(before: object, after: object, part: str) -> bool:
 
 
 def _bits(value: object) -> str:
-    """A JSON value as text, keys sorted, in which every bit of a number shows."""
+    """A JSON value as text to the last bit, keys sorted."""
     return json.dumps(value, sort_keys=True, allow_nan=False, ensure_ascii=False)
 
 
 def _as_stored(before: object, after: object) -> object:
-    """A record with those keys alone that the stored one has."""
+    """A record with only the keys of the stored one."""
     if isinstance(before, Mapping) and isinstance(after, Mapping):
         return {key: _as_stored(before[key], value) for key, value in after.items() if key in before}
     return after
 
 
 def _only_in(after: object, before: object, place: str) -> list[str]:
-    """Names of a record's keys that the stored one lacks, "pose.dish.bending"."""
+    """Names of keys that the stored record lacks, "pose.dish.bending"."""
     if not (isinstance(before, Mapping) and isinstance(after, Mapping)):
         return []
     names: list[str] = []
@@ -130,5 +136,5 @@ def _only_in(after: object, before: object, place: str) -> list[str]:
 def _bits_of(matrix: NDArray[np.float64] | None) -> tuple[tuple[int, ...], bytes] | None:
     if matrix is None:
         return None
-    whole = np.ascontiguousarray(matrix, dtype="<f8")
-    return whole.shape, whole.tobytes()
+    contiguous = np.ascontiguousarray(matrix, dtype="<f8")
+    return contiguous.shape, contiguous.tobytes()

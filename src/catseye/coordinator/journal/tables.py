@@ -1,7 +1,7 @@
-"""The journal's tables, the same in SQLite and PostgreSQL, and the steps from older versions (docs/formats/journal.md).
+"""Tables of the journal in SQLite and PostgreSQL, and conversion from older versions.
 
-Every event has the primary key (run, seq); seq counts all events of a run in the order in which they were given, over
-all tables. Times are ticks of 1e-8 day. NULL is a number that nobody knew.
+Format: docs/formats/journal.md. Every event has the primary key (run, seq); seq counts all events of a run in order,
+over all tables. Times are ticks of 1e-8 day. NULL is an unknown number.
 """
 
 from collections.abc import Callable
@@ -45,7 +45,10 @@ METADATA = MetaData()
 
 
 class Untyped(UserDefinedType[float]):
-    """A column of SQLite without a declared type, which keeps a double as it is: a REAL one makes -0.0 to 0."""
+    """A column of SQLite without a declared type.
+
+    It keeps a double as it is: a REAL one makes -0.0 to 0.
+    """
 
     cache_ok = True
 
@@ -61,7 +64,7 @@ def _text(name: str) -> Column[str]:
     return Column(name, Text, nullable=False)
 
 
-def _whole(name: str) -> Column[int]:
+def _integer(name: str) -> Column[int]:
     return Column(name, BigInteger, nullable=False)
 
 
@@ -71,19 +74,19 @@ def _events(name: str, *columns: SchemaItem) -> "JournalTable":
     return Table(name, METADATA, run, seq, *columns, sqlite_with_rowid=False)
 
 
-JOURNAL = Table("journal", METADATA, Column("format", Text, primary_key=True), _whole("version"))
+JOURNAL = Table("journal", METADATA, Column("format", Text, primary_key=True), _integer("version"))
 RUNS = Table(
     "runs",
     METADATA,
     Column("run", Integer, primary_key=True),
     Column("uuid", Text, nullable=False, unique=True),
-    _whole("started_ticks"),
+    _integer("started_ticks"),
     Column("ended_ticks", BigInteger),
     _text("site"),
     Column("seed", BigInteger),
     _text("settings"),
     _text("host"),
-    _whole("pid"),
+    _integer("pid"),
     _text("catseye"),
     _text("python"),
     _text("numpy"),
@@ -99,13 +102,13 @@ RUN_FILES = Table(
 )
 SHOTS = _events(
     "shots",
-    _whole("number"),
+    _integer("number"),
     _text("ranger"),
     _text("target"),
-    _whole("ticks"),
-    _whole("cycles"),
-    _whole("samples_per_cycle"),
-    _whole("if_hz"),
+    _integer("ticks"),
+    _integer("cycles"),
+    _integer("samples_per_cycle"),
+    _integer("if_hz"),
     _number("volts_per_code"),
     _number("amplitude_v"),
     _number("phase_rad"),
@@ -117,19 +120,19 @@ SHOTS = _events(
     UniqueConstraint("run", "ranger", "ticks", "target", name="shots_once"),
 )
 BUFFERS = _events(
-    "buffers", _whole("packing"), _whole("crc32"), Column("samples", LargeBinary, nullable=False)
+    "buffers", _integer("packing"), _integer("crc32"), Column("samples", LargeBinary, nullable=False)
 )  # of the shot with the same seq
 WEATHER = _events(
     "weather",
     _text("station"),
-    _whole("ticks"),
+    _integer("ticks"),
     _number("temperature_c"),
     _number("pressure_hpa"),
     _number("humidity_percent"),
 )
 POSTURES = _events(
     "postures",
-    _whole("ticks"),
+    _integer("ticks"),
     _number("azimuth_rad"),
     _number("elevation_rad"),
     _number("azimuth_rate_rad_s"),
@@ -137,26 +140,26 @@ POSTURES = _events(
 )
 COMMANDS = _events(
     "commands",
-    _whole("ticks"),
+    _integer("ticks"),
     _text("ranger"),
-    _whole("tid"),
+    _integer("tid"),
     _text("line"),
     _text("reply"),
     Column("ok", Boolean),
 )
 HAPPENINGS = _events(
-    "happenings", _whole("ticks"), _text("who"), _text("kind"), _text("severity"), _text("text"), _text("details")
+    "happenings", _integer("ticks"), _text("who"), _text("kind"), _text("severity"), _text("text"), _text("details")
 )
 SOLUTIONS = _events(
     "solutions",
-    _whole("ticks"),
+    _integer("ticks"),
     _text("answer"),
-    _whole("size"),
+    _integer("size"),
     Column("covariance", LargeBinary),
 )
-DOCUMENTS = _events("documents", _whole("ticks"), _text("name"), _text("text"))
-CHAIN = _events("chain", _text("kind"), Column("link", LargeBinary, nullable=False))  # of all of an event's rows
-PARTS = Table(  # of a run whose file became too large, or too old: it goes on in another one beside
+DOCUMENTS = _events("documents", _integer("ticks"), _text("name"), _text("text"))
+CHAIN = _events("chain", _text("kind"), Column("link", LargeBinary, nullable=False))  # over all rows of an event
+PARTS = Table(  # continuation of a run in another file, after rotation by size or age
     "parts",
     METADATA,
     Column("run", Integer, ForeignKey("runs.run"), primary_key=True, autoincrement=False),
@@ -169,20 +172,20 @@ Step = Callable[[Connection], None]
 
 
 def _with_chain(connection: Connection) -> None:
-    """Version 2 has a chain, and runs in several files; runs of before have none, and say so when they are checked."""
+    """Convert to version 2: chain and parts; earlier runs stay unchained."""
     CHAIN.create(connection)
     PARTS.create(connection)
 
 
-STEPS: tuple[Step, ...] = (_with_chain,)  # STEPS[n - 1] carries version n to n + 1
+STEPS: tuple[Step, ...] = (_with_chain,)  # STEPS[n - 1] converts version n to n + 1
 
 
 def create_or_carry(connection: Connection, place: str) -> None:
-    """An empty database gets the tables, an older journal is carried to this version; in the caller's transaction.
+    """Create the tables or convert an older journal, in the caller's transaction.
 
-    place   for refusals
+    place   for messages
 
-    Raises InputError: another's database, or a newer version.
+    Raises InputError: a foreign database, or a newer version.
     """
     version = version_of(connection, place)
     if version == 0:
@@ -198,9 +201,9 @@ def create_or_carry(connection: Connection, place: str) -> None:
 
 
 def version_of(connection: Connection, place: str) -> int:
-    """The version of the journal in a database; 0 where it holds nothing at all.
+    """Version of the journal in a database; 0 if it is empty.
 
-    Raises InputError: another's database, or a newer version.
+    Raises InputError: a foreign database, or a newer version.
     """
     tables = inspect(connection).get_table_names()
     if not tables:
@@ -212,7 +215,7 @@ def version_of(connection: Connection, place: str) -> int:
             row = connection.execute(select(JOURNAL.c.version).where(JOURNAL.c.format == FORMAT)).first()
     if row is None:
         raise InputError(
-            f"journal {place}: holds other tables, such as {min(tables)!r}: it is no journal of catseye "
+            f"journal {place}: is not a journal of catseye: it has other tables, such as {min(tables)!r} "
             "(expected one, or a new name)"
         )
     version = row[0]
@@ -224,13 +227,13 @@ def version_of(connection: Connection, place: str) -> int:
     if version > VERSION:
         raise InputError(
             f"journal {place}: version {version} is newer than {VERSION}, the newest that this catseye, {__version__}, "
-            "knows (use a newer catseye)"
+            "supports (use a newer catseye)"
         )
     return version
 
 
 def insertion(table: JournalTable, dialect: Dialect) -> Executable:
-    """An insert that leaves a row alone which is there already: what was sent twice is kept once."""
+    """Insert that leaves existing rows alone: duplicates are stored once."""
     if dialect.name == "postgresql":
         from sqlalchemy.dialects import postgresql
 

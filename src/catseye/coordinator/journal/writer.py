@@ -1,7 +1,8 @@
-"""The journal's writer: what happened, in order, durable. A thread of its own; one commit for all that came in some ms.
+"""Journal writer: entries in order, durable, in a thread of its own.
 
-What an `append` holds stands in one transaction. Where the database cannot take it (disk full, server gone), an alarm
-is told, the entries wait, and it is tried again until it can: what the reduction was fed is what is journalled, once.
+One commit holds the entries of some ms; an `append` is one transaction. If the database fails (disk full, server
+down), an alarm is raised, entries are queued, and writing is retried until it succeeds: the reduction's input is
+journalled exactly once.
 """
 
 import asyncio
@@ -40,31 +41,33 @@ from catseye.coordinator.parts import Clock, ticks_now
 from catseye.errors import InputError
 from catseye.records.night.live import TICKS_PER_DAY
 
-MOST_ROWS = 512  # of one commit
-MOST_WAITING = 20_000  # rows in line
-MOST_BYTES = 256 * 2**20  # of samples in line
+MOST_ROWS = 512  # rows of one commit
+MOST_WAITING = 20_000  # rows queued
+MOST_BYTES = 256 * 2**20  # of samples queued
 PATIENCE = 2.0  # s of trouble after which futures fail
-FIRST_WAIT, LONGEST_WAIT = 0.05, 2.0  # s between attempts while there is trouble
-LOOK, AGAIN = (
+FIRST_WAIT, LONGEST_WAIT = 0.05, 2.0  # s of back-off between retries
+LOOK, RETRY_ROTATION = (
     1.0,
     600.0,
-)  # s between two looks at the file's size, and until a file that could not be made is tried again
-LONGEST_DURABLE = 10.0  # s that `durable` waits: a server may hang without a word
+)  # s between two checks of the file's size, and until a failed rotation is retried
+LONGEST_DURABLE = 10.0  # s, timeout of `durable`: a server may hang silently
 
 Tell = Callable[[str], None]
-_Told = tuple[Tell | None, Tell | None, Callable[[Head], None] | None]  # of an alarm, of its end, of a head
+_Callbacks = tuple[
+    Tell | None, Tell | None, Callable[[Head], None] | None
+]  # callbacks of an alarm, of its end, of a head
 
 
 @dataclass(frozen=True)
 class JournalSettings:
-    """How a run is written.
+    """Settings of a run's writer.
 
     group          s that a commit waits for more
-    keep_buffers   samples too: without them a replay has only what the rangers made of them
+    keep_buffers   store samples: without them a replay has only the rangers' amplitudes and phases
     compress       samples in half the space for 0.2 ms each
-    patience       s of trouble after which the futures of what waits fail; it stays in line all the same
-    rotate_bytes   size from which the run goes on in another file; 0: none
-    rotate_nightly whether it does at noon UTC
+    patience       s of trouble after which the futures of queued entries fail; they stay queued all the same
+    rotate_bytes   size at which the run continues in another file; 0: none
+    rotate_nightly True to rotate at noon UTC, too
     """
 
     group: float = 0.001
@@ -77,13 +80,13 @@ class JournalSettings:
 
 @dataclass(eq=False)
 class Batch:
-    """What one append gave: rows, seq in them, of one transaction."""
+    """Rows of one append, including seq, for one transaction."""
 
     rows: Rows
     size: int  # bytes of samples
     future: "Future[int]" = field(default_factory=Future)
-    last: int = 0  # its last entry's seq
-    refused: InputError | None = None  # what the database said of it: its numbers are chained, nothing else is kept
+    last: int = 0  # seq of its last entry
+    refused: InputError | None = None  # error of the database: its numbers are chained, nothing else is stored
     since: float = field(default_factory=time.monotonic)
 
     def fail(self, problem: InputError) -> None:
@@ -96,7 +99,7 @@ class Batch:
 
 
 class Journal:
-    """One run's writer; made by `open`.
+    """Writer of one run; created by `open`.
 
     run      its number in this journal
     place    where it is, for people
@@ -107,18 +110,18 @@ class Journal:
         place: JournalAddress,
         engine: Engine,
         lock: WriterLock,
-        begun: tuple[int, bytes],
+        start: tuple[int, bytes],
         *,
         clock: Clock,
         settings: JournalSettings,
-        told: _Told,
+        callbacks: _Callbacks,
     ):
-        (self.run, first), self.place = begun, place.shown
-        self._last = 0, first  # seq and hash of the last link that is durable: one object, other threads read it
+        (self.run, first), self.place = start, place.shown
+        self._last = 0, first  # seq and hash of the last durable link: one object, read by other threads
         self._where, self._engine, self._lock = place, engine, lock
         self._clock, self._settings = clock, settings
         self._packing = PACKED if settings.compress else RAW
-        self._on_alarm, self._on_recovery, self._on_head = told
+        self._on_alarm, self._on_recovery, self._on_head = callbacks
         self._wake = threading.Condition()
         self._queue: deque[Batch] = deque()
         self._waiting = self._bytes = self._seq = 0
@@ -129,7 +132,7 @@ class Journal:
         self._connection: Connection | None = None
         self._inserts = {table.name: insertion(table, engine.dialect) for table in METADATA.tables.values()}
         self._file = identity(place)
-        self._night, self._look_at = self._night_now(), 0.0
+        self._night, self._look_at = self._current_night(), 0.0
         self._held: str | None = None
         self._thread = threading.Thread(target=self._work, name="journal", daemon=True)
         self._thread.start()
@@ -146,24 +149,24 @@ class Journal:
         on_recovery: Tell | None = None,
         on_head: Callable[[Head], None] | None = None,
     ) -> "Journal":
-        """Create, or carry to this version, the journal at a place, and begin a run in it.
+        """Create or convert the journal at a place, and begin a run in it.
 
         url            a file, or postgresql://USER@HOST/DATABASE
-        on_alarm       told once, from the journal's thread, that nothing is durable any more and why
-        on_recovery    told when it is again
-        on_head        told the chain's head when an epoch's solution is durable, and at the end: kept elsewhere, it
-                       vouches for all before it
+        on_alarm       called once, from the journal's thread, with the reason when writing fails
+        on_recovery    called when it works again
+        on_head        called with the chain's head when an epoch's solution is durable, and at the end: a copy kept
+                       elsewhere authenticates everything before it
 
-        Raises InputError: a bad place, another's file or database, a newer journal, one that cannot be written, a file
+        Raises InputError: a bad place, a foreign file or database, a newer journal, one that cannot be written, a file
         that has a writer.
         """
         place, settings = place_of(url), settings or JournalSettings()
         refuse_foreign(place, fresh=True)
         if settings.rotate_bytes or settings.rotate_nightly:
-            next_place(place)  # a server's is refused
+            next_place(place)  # refuses a server
         lock = WriterLock(place)
         try:
-            begun = begin(place, run, clock, buffers=settings.keep_buffers)
+            start = begin(place, run, clock, buffers=settings.keep_buffers)
             engine = writing_engine(place)
         except SQLAlchemyError as problem:
             lock.release()
@@ -175,20 +178,23 @@ class Journal:
             place,
             engine,
             lock,
-            begun,
+            start,
             clock=clock,
             settings=settings,
-            told=(on_alarm, on_recovery, on_head),
+            callbacks=(on_alarm, on_recovery, on_head),
         )
 
     @property
     def head(self) -> Head:
-        """The chain's last link that is durable."""
+        """The last durable link of the chain."""
         return Head.of(*self._last)
 
     @property
     def trouble(self) -> str | None:
-        """Why nothing is durable at present; None where all is well. No shot should be fired meanwhile."""
+        """Reason why writing fails at present; else None.
+
+        No shots should be taken meanwhile.
+        """
         since = self._busy_since
         if self._trouble is None and self._held is not None:
             return self._held
@@ -198,34 +204,39 @@ class Journal:
 
     @property
     def address(self) -> JournalAddress:
-        """Where it is written at this moment."""
+        """Present location of the journal."""
         return self._where
 
     def hold(self, why: str | None) -> None:
-        """Ask for no more measurements, with the reason, or for more again (None); what comes is written still."""
+        """Ask for no more measurements, with the reason, or for more again (None).
+
+        Entries received are still written.
+        """
         self._held = why
 
     def append(self, *items: Item) -> "Future[int]":
-        """Put entries in line, in order; done, with the last one's seq, when they are durable.
+        """Queue entries, in order; the future has the last one's seq once durable.
 
         items   none: done when all before are durable
 
-        Any thread; never waits. The future fails with InputError where the entries are refused (a shot that is there
-        already), and with NotDurable where trouble lasts: then they stay in line.
+        Any thread; never waits. The future fails with InputError if the entries are refused (a duplicate shot), and
+        with NotDurable if trouble lasts: then they stay queued.
 
-        Raises InputError: nothing a journal holds, a full line, a closed journal; then nothing was put in line.
+        Raises InputError: not an entry, a full queue, a closed journal; then nothing was queued.
         """
         sets = [rows_of(item, self._settings.keep_buffers) for item in items]
         rows = [row for rows in sets for row in rows]
         size = sum(samples.nbytes for _, row in rows if isinstance(samples := row.get("samples"), np.ndarray))
         batch = Batch(rows, size)
-        batch.future.set_running_or_notify_cancel()  # from here on nobody can take it back
+        batch.future.set_running_or_notify_cancel()  # no longer cancellable
         with self._wake:
             if self._closing:
                 raise InputError(f"journal {self.place}: is closed")
             if self._waiting + len(rows) > MOST_WAITING or self._bytes + size > MOST_BYTES:
                 why = self._trouble or "it cannot keep up"
-                raise InputError(f"{self._waiting} rows wait for the journal (expected at most {MOST_WAITING}): {why}")
+                raise InputError(
+                    f"{self._waiting} rows are queued for the journal (expected at most {MOST_WAITING}): {why}"
+                )
             for seq, entry in enumerate(sets, start=self._seq + 1):
                 for _, row in entry:
                     row["run"], row["seq"] = self.run, seq
@@ -246,9 +257,11 @@ class Journal:
             raise InputError(f"journal {self.place}: not durable after {LONGEST_DURABLE:g} s") from None
 
     def close(self, timeout: float = 5.0) -> None:
-        """Write what waits, end the run, let others write. What cannot be written within the time is given up.
+        """Write the queue, end the run, release the lock.
 
-        Raises InputError where entries were given up.
+        Entries not written within the time are given up.
+
+        Raises InputError if entries were given up.
         """
         with self._wake:
             self._closing = True
@@ -267,9 +280,9 @@ class Journal:
         self.close()
 
     def _work(self) -> None:
-        """The thread: groups to the database until closed; whatever ends it, no future is left waiting."""
+        """Thread: write groups until closed; all futures end."""
         try:
-            while batches := self._taken():
+            while batches := self._next_group():
                 self._persist(batches)
                 self._rotate()
                 with self._wake:
@@ -278,21 +291,21 @@ class Journal:
         finally:
             with self._wake:
                 self._closing = True
-                left = list(self._queue)
-            for batch in left:
+                remaining = list(self._queue)
+            for batch in remaining:
                 batch.fail(InputError(f"journal {self.place}: ended before this was durable"))
             self._disconnect()
 
-    def _taken(self) -> list[Batch]:
-        """The next group, still counted as waiting; empty when closed and done."""
+    def _next_group(self) -> list[Batch]:
+        """Next group, still counted as queued; empty when closed and done."""
         with self._wake:
             while not self._queue and not self._closing:
                 self._wake.wait()
             if not self._queue:
                 return []
             full_at = self._queue[0].since + self._settings.group
-            while not self._closing and self._waiting < MOST_ROWS and (left := full_at - time.monotonic()) > 0.0:
-                self._wake.wait(left)
+            while not self._closing and self._waiting < MOST_ROWS and (timeout_s := full_at - time.monotonic()) > 0.0:
+                self._wake.wait(timeout_s)
             batches: list[Batch] = []
             rows = 0
             while self._queue and (not batches or rows + len(self._queue[0].rows) <= MOST_ROWS):
@@ -302,8 +315,8 @@ class Journal:
             return batches
 
     def _persist(self, batches: list[Batch]) -> None:
-        """Until it is written: trouble is told once, and tried again more and more seldom."""
-        wait, began = FIRST_WAIT, time.monotonic()
+        """Write until it succeeds: one alarm, retries with back-off."""
+        wait, start = FIRST_WAIT, time.monotonic()
         while True:
             try:
                 self._store(batches)
@@ -317,7 +330,7 @@ class Journal:
                 self._in_trouble(str(why))
             else:
                 break
-            if time.monotonic() - began >= self._settings.patience or self._closing:
+            if time.monotonic() - start >= self._settings.patience or self._closing:
                 self._fail_waiting(batches)
             if not self._paused(wait):
                 return
@@ -344,23 +357,23 @@ class Journal:
         if self._connection is None:
             self._connection = self._engine.connect()
         with self._connection.begin():
-            for table in sorted(rows, reverse=True):  # any fixed order will do
+            for table in sorted(rows, reverse=True):  # in any fixed order
                 self._connection.execute(self._inserts[table], rows[table])
         if identity(self._where) != self._file:
-            raise InputError(f"journal {self.place}: the file was moved or removed (put it back, or start again)")
+            raise InputError(f"journal {self.place}: the file was moved or removed (restore it, or restart)")
         self._last = linked, link
 
-    def _night_now(self) -> int:
-        """The night, which changes at noon UTC."""
+    def _current_night(self) -> int:
+        """Number of the night, which changes at noon UTC."""
         return int(ticks_now(self._clock) / TICKS_PER_DAY + 0.5)
 
     def _rotate(self) -> None:
-        """Go on in another file where that is due; in this one still where none can be had, which is told."""
-        rules, now = self._settings, time.monotonic()
-        if not (rules.rotate_bytes or rules.rotate_nightly) or now < self._look_at or self._connection is None:
+        """Continue in another file if due; stay, with an alarm, if impossible."""
+        rules, time_s = self._settings, time.monotonic()
+        if not (rules.rotate_bytes or rules.rotate_nightly) or time_s < self._look_at or self._connection is None:
             return
-        self._look_at = now + LOOK
-        night = self._night_now()
+        self._look_at = time_s + LOOK
+        night = self._current_night()
         full = rules.rotate_bytes and bytes_of(self._where) >= rules.rotate_bytes
         if not full and not (rules.rotate_nightly and night != self._night):
             return
@@ -374,20 +387,20 @@ class Journal:
                     linked, link = self._last
                     go_on(self._connection, new, self.run, seq=linked, link=link, follows=old.path.name)
                     row = {"run": self.run, "follows": None, "followed_by": Path(str(new.path)).name}
-                    done = self._connection.execute(
+                    updated = self._connection.execute(
                         update(PARTS).where(PARTS.c.run == self.run).values(followed_by=row["followed_by"])
                     )
-                    if not done.rowcount:
+                    if not updated.rowcount:
                         self._connection.execute(insert(PARTS).values(row))
                 engine = writing_engine(new)
             except (SQLAlchemyError, InputError):
                 lock.release()
                 raise
         except (SQLAlchemyError, InputError) as problem:
-            self._look_at = now + AGAIN
+            self._look_at = time_s + RETRY_ROTATION
             if self._on_alarm is not None:
                 why = problem if isinstance(problem, InputError) else refused(old, problem)
-                self._on_alarm(f"{why}: the journal goes on in {old.shown} (it is tried again in {AGAIN / 60:.0f} min)")
+                self._on_alarm(f"{why}: the journal continues in {old.shown} (retry in {RETRY_ROTATION / 60:.0f} min)")
             return
         fold(old, self._connection)
         self._disconnect()
@@ -395,16 +408,19 @@ class Journal:
         self._where, self.place, self._engine, self._lock = new, new.shown, engine, lock
         self._file, self._night = identity(new), night
         if self._on_recovery is not None:
-            self._on_recovery(f"the run goes on in {new.shown}, head {self.head}")
+            self._on_recovery(f"the run continues in {new.shown}, head {self.head}")
 
     def _sift(self, batches: list[Batch], problem: IntegrityError | DataError) -> None:
-        """A group that the database refuses is written one by one; what it refuses then has a failed future."""
+        """Write a refused group one by one.
+
+        Futures of entries refused then fail.
+        """
         if len(batches) > 1:
             for batch in batches:
                 self._persist([batch])
             return
-        text = f"{refused(self._where, problem)}: refused (expected each shot once: a ranger, a time, a target)"
-        if batches[0].refused is not None:  # not even its numbers are taken: the run's record is gone
+        text = f"{refused(self._where, problem)}: refused (expected unique shots: ranger, time, target)"
+        if batches[0].refused is not None:  # even its numbers are refused: the run's record is missing
             batches[0].fail(InputError(text))
             self._forget(batches)
             return
@@ -416,7 +432,7 @@ class Journal:
         if self._trouble is not None:
             self._trouble = None
             if self._on_recovery is not None:
-                self._on_recovery(f"journal {self.place}: is back, all that waited is written")
+                self._on_recovery(f"journal {self.place}: writing works again, the queue is written")
         for batch in batches:
             if batch.refused is not None:
                 batch.fail(batch.refused)
@@ -432,31 +448,34 @@ class Journal:
     def _in_trouble(self, text: str) -> None:
         first, self._trouble = self._trouble is None, text
         if first and self._on_alarm is not None:
-            self._on_alarm(f"{text}: nothing is durable (it is tried again by itself; fire no shots)")
+            self._on_alarm(f"{text}: writing failed, retrying; no shots are taken meanwhile")
 
     def _fail_waiting(self, batches: list[Batch]) -> None:
         with self._wake:
             waiting = [*batches, *self._queue]
         for batch in waiting:
-            batch.fail(NotDurable(f"{self._trouble}: not durable; kept, and written when that is possible"))
+            batch.fail(NotDurable(f"{self._trouble}: not durable yet; queued for retry"))
 
     def _paused(self, seconds: float) -> bool:
-        """Wait before the next attempt; False where there is none, since the journal is being closed."""
+        """Wait before a retry; False if the journal is being closed."""
         until = time.monotonic() + seconds
         with self._wake:
-            while (left := min(until, self._give_up) - time.monotonic()) > 0.0:
-                self._wake.wait(left)
+            while (timeout_s := min(until, self._give_up) - time.monotonic()) > 0.0:
+                self._wake.wait(timeout_s)
             return time.monotonic() < self._give_up
 
     def _end(self) -> None:
-        """The run's end; a file becomes one file again, without its log, where nobody else has it open."""
+        """Write the run's end.
+
+        A file becomes a single file again, without its log, if nobody else has it open.
+        """
         with suppress(SQLAlchemyError):
             if self._connection is None:
                 self._connection = self._engine.connect()
-            ended, (linked, before) = ticks_now(self._clock), self._last
-            seq, link = linked + 1, link_of(before, LinkKind.END, linked + 1, [ended])
+            ended_ticks, (linked, before) = ticks_now(self._clock), self._last
+            seq, link = linked + 1, link_of(before, LinkKind.END, linked + 1, [ended_ticks])
             with self._connection.begin():
-                self._connection.execute(update(RUNS).where(RUNS.c.run == self.run).values(ended_ticks=ended))
+                self._connection.execute(update(RUNS).where(RUNS.c.run == self.run).values(ended_ticks=ended_ticks))
                 row = {"run": self.run, "seq": seq, "kind": LinkKind.END.value, "link": link}
                 self._connection.execute(self._inserts[CHAIN.name], row)
             self._last = seq, link

@@ -1,4 +1,4 @@
-"""What a ranger's replies say of a shot: CMEAS (amplitude, phase) and BUF (the samples), checked before they count."""
+"""Decode replies of a shot: CMEAS (amplitude, phase) and BUF (samples)."""
 
 import binascii
 import math
@@ -15,15 +15,18 @@ from catseye.ranger.line import Reply
 from catseye.records.night.live import LiveShot
 
 REAL = re.compile(r"[+-]?([0-9]{1,25}(\.[0-9]{0,25})?|\.[0-9]{1,25})([eE][+-]?[0-9]{1,3})?")
-WHOLE = re.compile(r"[0-9]{1,10}")
+INTEGER = re.compile(r"[0-9]{1,10}")
 CHECK = re.compile(r"0x[0-9a-f]{8}")
-LARGEST_CODE_V = 1.0  # V a code: beyond, it is none
-LARGEST_V = 1e3  # an amplitude beyond is none
+LARGEST_CODE_V = 1.0  # V a code: more is invalid
+LARGEST_V = 1e3  # a larger amplitude is invalid
 
 
 @dataclass(frozen=True, eq=False)
 class BufferRead:
-    """A BUF: whose, when its first sample was taken, how, V a code, and the samples, (m n,) int16."""
+    """A decoded BUF.
+
+    Cube, time of its first sample, sampling, V a code, and the samples, (m n,) int16.
+    """
 
     cube: int | None
     ticks: int
@@ -34,7 +37,10 @@ class BufferRead:
 
 @dataclass(frozen=True)
 class Measurement:
-    """A CMEAS: whose, when its buffer's first sample was taken, amplitude in V, phase in rad."""
+    """A decoded CMEAS.
+
+    Cube, time of its buffer's first sample, amplitude in V, phase in rad.
+    """
 
     cube: int
     name: str
@@ -44,14 +50,14 @@ class Measurement:
 
 
 def buffer_of(reply: Reply) -> BufferRead:
-    """The buffer that a BUF brought.
+    """Buffer of a BUF reply.
 
-    Raises InputError: refused by the ranger, another form, a sampling that none can have, a length that is not what it
-    says, a CRC that is not that of the bytes.
+    Raises InputError: refused by the ranger, another form, an impossible sampling, a length or a CRC that does not
+    match the bytes.
     """
     values = _values(reply, "BUF", 7)
-    cube = None if values[0] == "none" else _whole(values[0], "BUF's cube")
-    cycles, samples, frequency = (_whole(v, "BUF's sampling") for v in values[1:4])
+    cube = None if values[0] == "none" else _integer(values[0], "BUF's cube")
+    cycles, samples, frequency = (_integer(v, "BUF's sampling") for v in values[1:4])
     try:
         sampling = SamplingSettings(samples, cycles, frequency)
     except ValidityError as problem:
@@ -60,36 +66,43 @@ def buffer_of(reply: Reply) -> BufferRead:
     if not volts > 0.0:
         raise InputError(f"BUF: {values[4][:20]} V a code (expected above 0)")
     if not CHECK.fullmatch(values[5]):
-        raise InputError(f"BUF: {values[5][:20]!a} is no CRC (expected 0x and 8 digits)")
+        raise InputError(f"BUF: {values[5][:20]!a} is not a CRC (expected 0x and 8 digits)")
     try:
         raw = binascii.a2b_base64(values[6].encode("ascii"), strict_mode=True)
     except (binascii.Error, ValueError) as problem:
         raise InputError(f"BUF: not base64: {problem}") from problem
     if len(raw) != 2 * samples * cycles:
         raise InputError(
-            f"BUF: {len(raw)} bytes came (expected {2 * samples * cycles} of {cycles} x {samples} samples)"
+            f"BUF: {len(raw)} bytes received (expected {2 * samples * cycles} of {cycles} x {samples} samples)"
         )
     if zlib.crc32(raw) != int(values[5], 16):
-        raise InputError(f"BUF: CRC is 0x{zlib.crc32(raw):08x}, not {values[5]}: damaged on its way")
+        raise InputError(f"BUF: CRC is 0x{zlib.crc32(raw):08x}, not {values[5]}: damaged in transmission")
     return BufferRead(cube, _ticks(reply), sampling, volts, np.frombuffer(raw, dtype="<i2"))
 
 
 def measurement_of(reply: Reply) -> Measurement:
-    """What a CMEAS says.
+    """Measurement of a CMEAS reply.
 
-    Raises InputError: refused by the ranger, another form, or numbers that are none.
+    Raises InputError: refused by the ranger, another form, or invalid numbers.
     """
     values = _values(reply, "CMEAS", 6)
     amplitude = _real(values[3], "CMEAS's amplitude", LARGEST_V)
     return Measurement(
-        _whole(values[1], "CMEAS's cube"), values[2], _ticks(reply), amplitude, _real(values[4], "CMEAS's phase", 100.0)
+        _integer(values[1], "CMEAS's cube"),
+        values[2],
+        _ticks(reply),
+        amplitude,
+        _real(values[4], "CMEAS's phase", 100.0),
     )
 
 
 def shot_of(
     ranger: str, target: str, measured: Measurement, *, buffer: BufferRead | None, usual: SamplingSettings
 ) -> LiveShot:
-    """A shot from its two replies; `usual` is how it was taken where the buffer itself did not come."""
+    """Shot from its two replies.
+
+    usual   sampling if the buffer was not received
+    """
     sampling = usual if buffer is None else buffer.sampling
     return LiveShot(
         ranger,
@@ -106,7 +119,7 @@ def shot_of(
 
 
 def reals_of(reply: Reply, count: int) -> tuple[float, ...]:
-    """The last so many values of a reply as numbers.
+    """Last values of a reply, as numbers.
 
     Raises InputError: fewer, or not numbers.
     """
@@ -129,13 +142,13 @@ def _ticks(reply: Reply) -> int:
     return reply.ticks
 
 
-def _whole(text: str, what: str) -> int:
-    if not WHOLE.fullmatch(text):
-        raise InputError(f"{what}: {text[:20]!a} is no whole number")
+def _integer(text: str, what: str) -> int:
+    if not INTEGER.fullmatch(text):
+        raise InputError(f"{what}: {text[:20]!a} is not a whole number")
     return int(text)
 
 
 def _real(text: str, what: str, most: float) -> float:
     if not REAL.fullmatch(text) or not abs(float(text)) <= most or not math.isfinite(float(text)):
-        raise InputError(f"{what}: {text[:20]!a} is no number within {most:g}")
+        raise InputError(f"{what}: {text[:20]!a} is not a number within {most:g}")
     return float(text)

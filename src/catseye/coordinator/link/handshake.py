@@ -1,4 +1,4 @@
-"""The three lines with which a ranger greets, HELLO, CONNECT, STW: whether it is the right one, and the port free."""
+"""Greeting of a ranger, HELLO, CONNECT, STW: identity, and free port."""
 
 import asyncio
 from typing import Literal
@@ -9,23 +9,26 @@ LINES = frozenset(["HELLO", "CONNECT", "STW"])
 
 
 class Handshake:
-    """The greeting on one new connection; `stranger` where another ranger answered."""
+    """Greeting on a new connection.
+
+    `wrong_ranger` is True if another ranger answered.
+    """
 
     def __init__(self) -> None:
         self._replies: dict[str, Reply] = {}
         self._whole = asyncio.Event()
-        self.stranger = False
+        self.wrong_ranger = False
 
     def hear(self, reply: Reply) -> None:
-        """A line that came unasked."""
+        """Take in an unsolicited line."""
         if self._whole.is_set() or reply.command not in LINES:
             return
         self._replies[reply.command] = reply
         if set(self._replies) == LINES or (reply.command == "CONNECT" and reply.ok is not True):
             self._whole.set()
 
-    async def why_not(self, ranger: str, port: int, closed: "asyncio.Future[str]", limit: float) -> str | None:
-        """What is wrong with a connection; None where it can be used.
+    async def rejection_reason(self, ranger: str, port: int, closed: "asyncio.Future[str]", limit: float) -> str | None:
+        """Reason why a connection is unusable, None if usable.
 
         closed   done when the connection is over
         limit    s
@@ -35,17 +38,17 @@ class Handshake:
             return (
                 f"port {port}: {closed.result()}"
                 if closed.done()
-                else f"hung: port {port} did not greet in {limit:g} s"
+                else f"hung: port {port} did not greet within {limit:g} s"
             )
         if self._replies["CONNECT"].ok is not True:
             return f"port {port} is taken"
         hello = self._replies["HELLO"].text
-        self.stranger = hello.split()[2:3] != [ranger]
-        return f"port {port} greets with {hello[:60]!a} (expected {ranger})" if self.stranger else None
+        self.wrong_ranger = hello.split()[2:3] != [ranger]
+        return f"port {port} greets with {hello[:60]!a} (expected {ranger})" if self.wrong_ranger else None
 
 
 async def first_of(closed: "asyncio.Future[str]", event: asyncio.Event, seconds: float) -> None:
-    """Wait for the end of a connection, for an event, or so long."""
+    """Wait for a connection's end, an event, or a timeout."""
     waiting = asyncio.ensure_future(event.wait())
     ends: list[asyncio.Future[str] | asyncio.Future[Literal[True]]] = [closed, waiting]
     try:

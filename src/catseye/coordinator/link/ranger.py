@@ -1,7 +1,7 @@
-"""One ranger, from the coordinator's side: connected, made ready, watched, and asked for one shot after another.
+"""A ranger's link: connect, make ready, supervise, shoot.
 
-Nothing here raises for what a ranger or the network does. What goes wrong is told as a happening with a name, every
-wait has an end, and a connection that is gone is made again: after 0.2 s, then a third longer each time, up to 30 s.
+Nothing here raises for errors of a ranger or the network: they are logged as events, every wait has a timeout, and a
+lost connection is retried with back-off: after 0.2 s, then a third longer each time, up to 30 s.
 """
 
 import asyncio
@@ -31,20 +31,20 @@ from catseye.ranger.status import StatusWord
 from catseye.records.night.live import LiveShot
 
 State = Literal["down", "connected", "preparing", "ready"]
-LONGEST_KEPT = 200  # characters of a reply, in the journal
+LONGEST_REPLY_TEXT = 200  # characters of a reply, in the journal
 LONGEST_PATIENCE = 60.0  # s between two attempts to make a ranger ready
-HOLDER = f"ziy-{os.getpid() % 10**8}"  # as this coordinator's lease is called: another one's is not its
+HOLDER = f"ziy-{os.getpid() % 10**8}"  # name of this coordinator's lease; each coordinator has its own
 LEASE_WITH_NUMBER, LEASE_WITH_TOKEN = 2, 4  # values: name, number of the connection, address, token
 MOVERS = frozenset(["CIL", "TRK", "STT", "FHM", "RST", "CMEAS", "INI", "INITZY", "COO", "SCN"])
 
 
 @dataclass(frozen=True)
 class LinkListeners:
-    """Who is called with what comes over a link.
+    """Callbacks of a link.
 
-    tell         with happenings
-    heard        with what another client made the ranger say (CMEAS ...)
-    commanded    with each request that was sent and does something, and with what came of it
+    tell         with events
+    heard        with replies to another client (CMEAS ...)
+    commanded    with each request sent that changes something, and its result
     """
 
     tell: Tell
@@ -55,10 +55,10 @@ class LinkListeners:
 class RangerLink:
     """A ranger behind its two ports.
 
-    ranger       name, as it must greet
-    preparation  what initialises it: geometry and cubes, from the site's records
-    wanted       "listen": ask and hear only, on the second port; "hold": connected, nothing sent that changes it;
-                 "measure": made ready, and `fire` serves
+    ranger       name, as in its greeting
+    preparation  initialisation: geometry and cubes, from the site's records
+    wanted       "listen": only query and listen, on the second port; "hold": connected, nothing sent that changes it;
+                 "measure": made ready, and `fire` works
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class RangerLink:
         clock = environment.clock
         self.ranger, self.address, self.wanted = ranger, address, wanted
         self.preparation = preparation
-        self.told: set[int] = set()  # cubes that it was told of on demand
+        self.told: set[int] = set()  # cubes sent on demand
         self.names = {number: name for name, number in self.preparation.numbers.items()}
         self.state: State = "down"
         self.sampling = SamplingSettings()
@@ -100,22 +100,22 @@ class RangerLink:
         self._heard_at = 0.0
         self._was_ready, self._patience = False, self.settings.probe_every
         self._lit_here = self._left = self._dark = False
-        self._token: str | None = None  # of the lease, while it is this coordinator's
-        self._leaseless = False  # the ranger does not know LEASE: everybody commands it
+        self._token: str | None = None  # of the lease, while this coordinator holds it
+        self._leaseless = False  # the ranger does not know LEASE: everybody may command it
 
     @property
     def connected(self) -> bool:
-        """Whether there is a connection that lives as far as is known."""
+        """True if a connection is up, as far as known."""
         return self._client is not None and not self._client.closed.done()
 
     @property
     def status(self) -> StatusWord:
-        """Its status word as last heard."""
+        """Its status word as last received."""
         return self._status.word
 
     @property
     def clock_offset(self) -> float:
-        """s by which its clock was ahead of ours when it was last seen; NaN before."""
+        """Last offset of its clock from ours, s; NaN before."""
         return self._watch.offset
 
     @property
@@ -125,23 +125,23 @@ class RangerLink:
 
     @property
     def clock_seen(self) -> int:
-        """Ticks of ours when its clock was last seen; 0 before."""
+        """Our ticks at the last sample of its clock; 0 before."""
         return self._watch.seen
 
     @property
     def troubles(self) -> tuple[str, ...]:
-        """What is wrong with it and lasts."""
+        """Its ongoing problems, kinds of events."""
         return self._event_log.standings
 
     @property
     def ready(self) -> bool:
-        """Whether a shot can begin now."""
+        """True if a shot can start now."""
         return self.state == "ready" and not self.busy and not self._dark and self.wanted == "measure"
 
     # Connection -----------------------------------------------------------------------------------------------------
 
     async def run(self) -> None:
-        """Connect, watch, connect again; until cancelled, or left."""
+        """Connect, supervise, reconnect; until cancelled or left."""
         wait = self.settings.first_wait
         while True:
             self._was_ready = False
@@ -149,14 +149,14 @@ class RangerLink:
             if self._left:
                 return
             self.state, self._client, self._shooter.aimed = "down", None, None
-            self._event_log.standing("lost", f"{self.ranger}: {why}; trying again", "warning")
+            self._event_log.standing("lost", f"{self.ranger}: {why}; reconnecting", "warning")
             if self._was_ready:
                 wait = self.settings.first_wait
             await asyncio.sleep(wait * self._rng.uniform(0.8, 1.2))
             wait = min(self.settings.growth * wait, self.settings.longest_wait)
 
     async def _session(self) -> str:
-        """One connection's life; why it ended."""
+        """Run one connection; the reason why it ended."""
         why = "no port"
         ports = list(enumerate(self.address.ports))
         for place, port in ports[::-1] if self.wanted == "listen" else ports:
@@ -178,7 +178,7 @@ class RangerLink:
             self._client = None
 
     async def _connect(self, port: int, first_tid: int) -> str | None:
-        """Connect and be greeted by the right ranger; what was wrong."""
+        """Connect and check the greeting; the problem if it fails."""
         loop, limit = asyncio.get_running_loop(), self.settings.probe_timeout
         self._handshake = Handshake()
         try:
@@ -198,18 +198,18 @@ class RangerLink:
             return f"{self.address.host} port {port} does not answer within {limit:g} s"
         wrong: str | None = "given up"
         try:
-            wrong = await self._handshake.why_not(self.ranger, port, client.closed, limit)
+            wrong = await self._handshake.rejection_reason(self.ranger, port, client.closed, limit)
         finally:
             if wrong is not None:
                 client.close()
         if wrong is None:
             self._client = client
-        elif self._handshake.stranger:
+        elif self._handshake.wrong_ranger:
             self._event_log.tell("wrong-ranger", wrong, "alarm")
         return wrong
 
     async def _supervise(self, client: ZyClient) -> str:
-        """Watch a connection until it is over."""
+        """Supervise a connection until it is over."""
         while not client.closed.done():
             if self.wanted == "measure" and self.state == "connected":
                 await self._make_ready(client)
@@ -226,19 +226,24 @@ class RangerLink:
 
     @property
     def _probe_timeout(self) -> float:
-        """How long VER may take, s; another client's moves may stand before it."""
+        """Timeout of VER, s.
+
+        Another client's moves may be queued before it.
+        """
         return self.settings.probe_timeout if self.wanted == "measure" else self.settings.move_timeout
 
     async def _lives(self, *, idle: bool = False) -> bool:
-        """Ask VER; from its stamp and the round trip, see to the clock.
+        """Probe with VER, and check the clock by its stamp and round trip.
 
-        idle   no shot is under way though `busy` says so
+        idle   True if no shot is under way though `busy` is set
         """
         loop = asyncio.get_running_loop()
         sent = self._probed_at = loop.time()
         reply = await self._ask(Request("VER"), self._probe_timeout)
         if reply.ok is not True or reply.ticks is None:
-            return not self.connected or self._heard_at > sent  # gone is not hung: the session says why
+            return (
+                not self.connected or self._heard_at > sent
+            )  # a lost connection is not hung: the session has the reason
         self.round_trip = loop.time() - sent
         self._was_ready = self._was_ready or self.wanted != "measure"
         limit = self.settings.slow
@@ -248,13 +253,16 @@ class RangerLink:
         if self.wanted == "measure" and (idle or not self.busy):
             if right is not None:
                 await self._ask(Request("STI", (stamp_text(right),)), self.settings.probe_timeout)
-            if self.state == "ready" and self.status & StatusWord.LASER_OFF:  # the ranger itself switched it off
+            if self.state == "ready" and self.status & StatusWord.LASER_OFF:  # switched off by the ranger itself
                 await self._light()
         return True
 
     async def _light(self) -> None:
-        """The laser on; where that is refused, from inside the instrument; else it stays dark, and fires nothing."""
-        if self._left:  # it has been switched off for good
+        """Switch the laser on, from ZRG inside the instrument if refused.
+
+        If that fails it stays dark, and takes no shots.
+        """
+        if self._left:  # switched off for good
             return
         if self.status & StatusWord.LATCHED:
             self._dark = True
@@ -267,10 +275,10 @@ class RangerLink:
         self._event_log.standing("dark", text, over=f"{self.ranger} is lit again")
 
     async def _make_ready(self, client: ZyClient) -> None:
-        """Tell the ranger what it lacks; where that fails, wait, longer each time."""
+        """Send the ranger what it lacks; after a failure wait with back-off."""
         self.state = "preparing"
         loop = asyncio.get_running_loop()
-        began, was_dark = loop.time(), bool(self.status & StatusWord.LASER_OFF)
+        start, was_dark = loop.time(), bool(self.status & StatusWord.LASER_OFF)
         try:
             await self._take_lease()
             self._teach_guard()
@@ -285,7 +293,7 @@ class RangerLink:
             self.state = "connected"
             if self.connected:
                 kind = problem.kind if isinstance(problem, Refused) else "not-initialised"
-                text = f"{self.ranger}: {problem}; again in {self._patience:g} s"
+                text = f"{self.ranger}: {problem}; retry in {self._patience:g} s"
                 if kind == "leased":
                     self._event_log.standing(kind, text)
                 else:
@@ -295,68 +303,70 @@ class RangerLink:
             return
         if self.state == "preparing" and self.connected:
             self.state, self._was_ready, self._patience = "ready", True, self.settings.probe_every
-            what = "made ready" if sent else "was ready still"
-            self._event_log.tell("ready", f"{self.ranger} {what} in {loop.time() - began:.1f} s", always=True)
+            what = "made ready" if sent else "was still ready"
+            self._event_log.tell("ready", f"{self.ranger} {what} in {loop.time() - start:.1f} s", always=True)
 
     async def _take_lease(self) -> None:
-        """Take the lease that a ranger's commands need. Raises Refused: somebody else has it.
+        """Take the lease that a ranger's commands need.
 
-        One that does not know the word has none, and takes commands from everybody. What has the token of before, as
-        after a cut that the ranger has not noticed, is this coordinator's still; a name says nothing.
+        A ranger that does not know the command has no lease, and takes commands from everybody. With its old token, as
+        after a cut that the ranger has not noticed, the lease is still this coordinator's; a name proves nothing.
+
+        Raises Refused: another client holds it.
         """
         if self._token is not None and (await self._ask(self._renewal(self._token), PATIENCE)).ok is True:
             return
         self._token = None
-        held = await self._ask(Request("LEASE"), PATIENCE)
-        self._leaseless = held.command == "UNKNOWN"
-        if held.ok is not True:
+        lease = await self._ask(Request("LEASE"), PATIENCE)
+        self._leaseless = lease.command == "UNKNOWN"
+        if lease.ok is not True:
             return
-        if held.values[:1] != ("none",):
-            raise Refused("leased", f"{_holder(held)} commands it (expected LEASE none of who has it)")
-        taken = await self._ask(Request("LEASE", (HOLDER,)), PATIENCE)
-        self._token = taken.values[-1] if taken.ok is True and len(taken.values) == LEASE_WITH_TOKEN else None
-        self._event_log.standing("leased", None, over=f"{self.ranger} is the coordinator's again")
+        if lease.values[:1] != ("none",):
+            raise Refused("leased", f"{_holder(lease)} holds the lease (expected LEASE none from the holder)")
+        grant = await self._ask(Request("LEASE", (HOLDER,)), PATIENCE)
+        self._token = grant.values[-1] if grant.ok is True and len(grant.values) == LEASE_WITH_TOKEN else None
+        self._event_log.standing("leased", None, over=f"{self.ranger}: the coordinator holds the lease again")
 
     def _renewal(self, token: str) -> Request:
         return Request("LEASE", (HOLDER, token))
 
     async def _renew(self, client: ZyClient) -> None:
-        """Renew the lease again and again, whatever else is waited for; until cancelled."""
+        """Renew the lease periodically, until cancelled."""
         while not client.closed.done():
             await asyncio.sleep(self.settings.renew_every)
             if self._token is not None:
                 reply = await self._ask(self._renewal(self._token), self.settings.renew_every)
                 if reply.ok is False and reply.ticks is not None:
-                    self._lease_lost("somebody else", "none")
+                    self._on_lease_lost("another client", "none")
 
     async def _give_back(self) -> None:
-        """Dark, and free: who is not asked to measure commands nothing."""
+        """Switch the laser off and free the lease of a link not measuring."""
         if self._token is None:
             return
         await self._darkened(self.settings.move_timeout)
         if self._token is not None and (await self._ask(Request("LEASE", ("none",)), PATIENCE)).ok is True:
             self._token = None
 
-    def _lease_heard(self, reply: Reply) -> None:
-        """Somebody took the lease, or it is free; who takes it is not told so again."""
+    def _on_lease(self, reply: Reply) -> None:
+        """Note that another client took the lease, or that it is free."""
         if reply.ok is True:
-            self._lease_lost(_holder(reply), reply.values[0] if reply.values else "none")
+            self._on_lease_lost(_holder(reply), reply.values[0] if reply.values else "none")
 
-    def _lease_lost(self, who: str, name: str) -> None:
+    def _on_lease_lost(self, who: str, name: str) -> None:
         self._token = None
         if self.wanted != "measure":
             return
         if name != "none" and self.state in ("ready", "preparing"):
-            self._event_log.standing("leased", f"{self.ranger}: {who} took the lease: nothing is sent that it needs")
+            self._event_log.standing("leased", f"{self.ranger}: {who} holds the lease; commands are paused")
         if self.state == "ready":
             self.state, self._shooter.aimed = "connected", None
         if name == "none":
             self._doubt.set()
 
-    def _latch_heard(self, reply: Reply) -> None:
-        """A dark order from outside the lease, or its end."""
+    def _on_latch(self, reply: Reply) -> None:
+        """Log a latched stop order, or its end."""
         if reply.values[:1] == ("none",):
-            over = f"{self.ranger}: the dark order is {' '.join(reply.values[1:]) or 'cleared'}"
+            over = f"{self.ranger}: the stop order is {' '.join(reply.values[1:]) or 'cleared'}"
             self._event_log.standing("darkened", None, over=over)
             self._doubt.set()
             return
@@ -364,24 +374,30 @@ class RangerLink:
         self._event_log.standing("darkened", text, "alarm")
 
     def _teach_guard(self) -> None:
-        """What the ranger knows already the guard must know, too, to understand CIL n."""
-        now = ticks_now(self._clock)
+        """Inform the guard of the ranger's cubes, which CIL n needs."""
+        now_ticks = ticks_now(self._clock)
         for request in self.preparation.requests:
-            self._guard.refusal(self.ranger, request, now)
+            self._guard.refusal(self.ranger, request, now_ticks)
 
     def clock_corrected(self, seconds: float) -> None:
-        """Make the ranger ready anew, and judge its clock anew: our own was corrected."""
+        """Prepare the ranger and sample its clock anew after a correction of ours."""
         self._watch.corrected()
-        self._restarted(f"{self.ranger} is looked at anew: our clock was corrected by {seconds:+.3f} s")
+        self._restarted(f"{self.ranger} is prepared anew: our clock was corrected by {seconds:+.3f} s")
 
     # Asking ---------------------------------------------------------------------------------------------------------
 
     async def sure(self, request: Request, timeout: float) -> Reply:
-        """A reply past the guard. Raises InputError: refused by the guard, or not connected."""
+        """Reply to a request past the guard.
+
+        Raises InputError: refused by the guard, or not connected.
+        """
         return await self.reply_of(request.command, self.send(request), timeout)
 
     def send(self, request: Request) -> Sent:
-        """Send a request past the guard; its TID and a future of its reply. Raises InputError, as `sure`."""
+        """Send a request past the guard; its TID and a future of its reply.
+
+        Raises InputError, as `sure`.
+        """
         if self._client is None:
             raise InputError("not connected")
         asks = COMMANDS[request.command].only_asks(request)
@@ -391,31 +407,31 @@ class RangerLink:
                 raise Refused("refused", f"{request.command}: {refusal}")
         tid, future = self._client.request(request.command, *request.parameters, ticks=request.ticks)
         if not asks and self._commanded is not None:
-            future.add_done_callback(partial(self._done, tid, format_request(replace(request, tid=tid))))
+            future.add_done_callback(partial(self._report, tid, format_request(replace(request, tid=tid))))
         return tid, future
 
-    def _done(self, tid: int, line: str, future: "asyncio.Future[Reply]") -> None:
-        """What came of a request is told; one that nobody waits for any more had no reply."""
+    def _report(self, tid: int, line: str, future: "asyncio.Future[Reply]") -> None:
+        """Report a request's result; a cancelled one had no reply."""
         reply = None if future.cancelled() else future.result()
         if self._commanded is None:
             return
         if reply is None:
             self._commanded(SentCommand(ticks_now(self._clock), self.ranger, tid, line))
             return
-        text = "" if reply.command == "BUF" else reply.text[:LONGEST_KEPT]  # samples have a table of their own
-        came = reply.ticks is not None  # the client answers itself where the connection is lost
+        text = "" if reply.command == "BUF" else reply.text[:LONGEST_REPLY_TEXT]  # samples have their own table
+        came = reply.ticks is not None  # for a lost connection the client makes the answer
         ticks = reply.ticks if reply.ticks is not None else ticks_now(self._clock)
         self._commanded(SentCommand(ticks, self.ranger, tid, line, text, reply.ok if came else None))
 
     async def _ask(self, request: Request, timeout: float) -> Reply:
-        """A reply, f = 0 where there was none in time, or it must not be sent."""
+        """Reply to a request; f = 0 if late or refused by the guard."""
         try:
             return await self.sure(request, timeout)
         except InputError as problem:
             return Reply(request.command, False, (str(problem),), 0, None)
 
     async def reply_of(self, command: str, sent: Sent, timeout: float) -> Reply:
-        """The reply to what was sent; f = 0 where it did not come in time, which is told."""
+        """Reply to a sent request; f = 0, logged, if not in time."""
         client, (tid, future) = self._client, sent
         try:
             async with asyncio.timeout(timeout):
@@ -432,7 +448,7 @@ class RangerLink:
         return reply
 
     def _hear(self, reply: Reply) -> None:
-        """What comes unasked, or for another client."""
+        """Process unsolicited lines, and replies to another client."""
         self._heard_at = asyncio.get_running_loop().time()
         if self._shooter.hears(reply):
             return
@@ -447,9 +463,9 @@ class RangerLink:
             self._event_log.tell("made-safe", f"{self.ranger}: {reply.text[:160]}", "alarm", always=True)
             self._restarted(f"{self.ranger} must be made ready again")
         elif reply.command == "LEASE":
-            self._lease_heard(reply)
+            self._on_lease(reply)
         elif reply.command == "LATCH":
-            self._latch_heard(reply)
+            self._on_latch(reply)
         elif reply.command in MOVERS:
             self._shooter.aimed = None
         if self._heard_by is not None and reply.command == "CMEAS":
@@ -462,22 +478,22 @@ class RangerLink:
             self._event_log.tell("restarted", text, "warning", always=True)
 
     async def fire(self, planned: PlannedShot) -> LiveShot | None:
-        """One shot; None where it failed, which has been told."""
+        """One shot; None, logged, if it failed."""
         shots: list[LiveShot] = []
         await self.stream(planned, shots.append, count=1)
         return shots[0] if shots else None
 
     async def stream(self, planned: PlannedShot, take: Callable[[LiveShot], None], *, count: int) -> int:
-        """Point once, and take so many buffers one behind the other; how many came.
+        """Point once, and take buffers one after another; their number.
 
-        planned   a target that moves is followed for all of them, on its line
+        planned   a moving target is tracked for all of them, on its line
         take      called with each
         """
         if not self.ready:
             return 0
         self.busy = True
         try:
-            since = asyncio.get_running_loop().time() - self._probed_at  # a ranger that is always busy is asked, too
+            since = asyncio.get_running_loop().time() - self._probed_at  # a ranger that is always busy is probed, too
             if since > self.settings.probe_every and not await self._lives(idle=True):
                 self._doubt.set()
                 return 0
@@ -486,12 +502,12 @@ class RangerLink:
             self.busy = False
 
     async def tell_sun(self, vector: Sequence[float]) -> None:
-        """Give it the unit vector to the Sun, in its own frame."""
+        """Send the unit vector to the Sun, in its frame."""
         if self.wanted == "measure" and self._client is not None:
             await self._ask(Request("SUN", tuple(f"{v:.7f}" for v in vector)), self.settings.move_timeout)
 
     async def park(self) -> bool:
-        """Look at ZRG, inside the instrument; whether that was done."""
+        """Point at ZRG, inside the instrument; True if done."""
         if not self.ready:
             return False
         self.busy = True
@@ -501,28 +517,31 @@ class RangerLink:
             self.busy = False
 
     async def darken(self) -> None:
-        """The laser off; it is switched on again when the guard allows it."""
+        """Switch the laser off until the guard allows it again."""
         if self.wanted == "measure":
             await self._darkened(self.settings.move_timeout)
 
     async def _darkened(self, timeout: float) -> bool:
-        """Say PS 0 where the lease is ours: from outside it would hold against who has it. False: not answered."""
+        """Send PS 0 if the lease is ours; False if not answered.
+
+        From outside the lease it would be latched against the holder.
+        """
         if self._token is None and not self._leaseless:
             return True
         return (await self._ask(Request("PS", ("0",)), timeout)).ok is True
 
     async def leave(self, timeout: float = 3.0) -> None:
-        """Switch off the laser that was switched on here, and close for good."""
+        """Switch off a laser switched on here, and close for good."""
         self._left = True
         if self._client is not None and not self._client.closed.done():
             if self._lit_here and not await self._darkened(timeout):
                 self._event_log.tell(
-                    "laser-left-on", f"{self.ranger} did not answer PS 0: its laser may shine", "alarm"
+                    "laser-left-on", f"{self.ranger} did not answer PS 0: its laser may be on", "alarm"
                 )
             self._client.close("the coordinator leaves")
         self._lit_here = False
 
 
 def _holder(reply: Reply) -> str:
-    """Name and address of the lease's holder by a ranger's line."""
+    """Name and address of the lease's holder, from a ranger's line."""
     return " at ".join((reply.values[0], reply.values[2])) if len(reply.values) > LEASE_WITH_NUMBER else reply.text

@@ -1,4 +1,4 @@
-"""Where a ranger is, and how long things may take."""
+"""Address of a ranger, and time limits of its link."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -8,7 +8,7 @@ Wanted = Literal["listen", "hold", "measure"]
 
 @dataclass(frozen=True)
 class Address:
-    """Where a ranger listens: a host and its two ports."""
+    """Network address of a ranger: a host and its two ports."""
 
     host: str
     ports: tuple[int, int]
@@ -18,17 +18,17 @@ class Address:
 class LinkSettings:
     """Times in s.
 
-    first_wait, longest_wait  before a connection is tried again
-    growth        of that wait: who was away for long is found again within a third of that time more
-    probe_every, probe_timeout  VER asks whether it lives
-    renew_every   the lease is renewed, whatever else is waited for
-    slow          round trip beyond which a link is called slow
-    clock_limit   how far its clock may be off before it is set
-    move_timeout  for CIL: a full turn, settling, and what stands before it
-    buffer_timeout  past a buffer's duration, for its reply
-    slack         a track goes on so long behind its shot
+    first_wait, longest_wait  back-off before a reconnection
+    growth        of that back-off: a ranger is found again within a third of the time it was away
+    probe_every, probe_timeout  VER tests if it responds
+    renew_every   renewal of the lease, whatever else is waited for
+    slow          round trip above which a link is called slow
+    clock_limit   offset of its clock above which it is set
+    move_timeout  for CIL: a full turn, settling, and queued commands before it
+    buffer_timeout  after a buffer's duration, for its reply
+    slack         duration of a track after its shot
     lead          a track must reach the ranger so long before its shot
-    latest        a shot later than this is given up: its track was predicted for another time
+    latest        a later shot is given up: its track was predicted for another time
     """
 
     first_wait: float = 0.2

@@ -1,4 +1,4 @@
-"""A ranger's shots: point at a target or follow it, trigger, take amplitude and phase, take the samples."""
+"""Shots of a ranger: point or track, trigger, read amplitude, phase, samples."""
 
 import asyncio
 import math
@@ -16,12 +16,12 @@ from catseye.errors import InputError
 from catseye.ranger.line import Reply, Request, stamp_text
 from catseye.records.night.live import LiveShot
 
-SURELY = 12  # ticks, 10 ms: a start stamp so long ago is over by the ranger's clock, too
-IN_HAND = 0.05  # s of it for replies and samples, which are over when the next shot is asked for
-LONGEST_WAY = 5_000  # ticks, 4.3 s: what is planned farther apart waits for something else
+SURELY = 12  # ticks, 10 ms: an earlier start stamp has passed by the ranger's clock, too
+IN_HAND = 0.05  # s of it for replies and samples, which are received before the next shot
+LONGEST_GAP = 5_000  # ticks, 4.3 s: longer planned gaps have another cause
 GAP = 0.02  # s between two buffers of a stream, at most
-AHEAD = 2  # triggers on their way: the next runs while the last is answered
-KINDS = (  # what a ranger's refusal of a move is called, by a word in it
+AHEAD = 2  # outstanding triggers: the next runs while the last is answered
+KINDS = (  # kind of a ranger's refusal of a move, by a word in it
     ("Sun", "sun-refused"),
     ("motor", "stuck-axis"),
     ("settled", "stuck-axis"),
@@ -34,7 +34,10 @@ KINDS = (  # what a ranger's refusal of a move is called, by a word in it
 
 @dataclass(frozen=True, eq=False)
 class Trigger:
-    """A CMEAS on its way, and the BUF behind it unless the CMEAS waits for its time; TIDs and futures."""
+    """An outstanding CMEAS, and BUF unless the CMEAS is scheduled.
+
+    TIDs and futures.
+    """
 
     begin: int | None
     measured: Sent
@@ -44,18 +47,18 @@ class Trigger:
 class Shooter:
     """Shots over one link.
 
-    `aimed` is the cube that the mirror rests on, None where it is not known or the mirror follows one.
+    `aimed` is the cube that the mirror points at, None if unknown or tracking.
     """
 
     def __init__(self, link: Wire, event_log: EventLog, clock: Clock):
         self._link, self._event_log, self._clock = link, event_log, clock
         self.aimed: int | None = None
         self._before: PlannedShot | None = None
-        self._stream: int | None = None  # TID of the stream that runs
+        self._stream: int | None = None  # TID of the running stream
         self._heard: asyncio.Queue[Reply] = asyncio.Queue()
 
     async def stream(self, planned: PlannedShot, take: Callable[[LiveShot], None], *, count: int) -> int:
-        """As `RangerLink.stream`, of a link that is ready."""
+        """Shots as of `RangerLink.stream`, of a ready link."""
         link, came = self._link, 0
         try:
             begin = await self._point(planned, count)
@@ -69,25 +72,28 @@ class Shooter:
                     take(shot)
         except InputError as problem:
             link.failures, self.aimed = link.failures + 1, None
-            if link.connected:  # a connection that is gone has been told
+            if link.connected:  # a lost connection is logged already
                 kind = problem.kind if isinstance(problem, Refused) else "bad-shot"
                 text = f"{link.ranger} {planned.target}: {problem}"
                 self._event_log.tell(kind, text, "warning", about=planned.target, target=planned.target)
         return came
 
     async def _one_by_one(self, planned: PlannedShot, begin: int | None, count: int) -> AsyncGenerator[LiveShot, None]:
-        """A CMEAS and a BUF for each; the next is on its way while the last is answered."""
+        """Shots by a CMEAS and a BUF each.
+
+        The next is sent before the last is answered.
+        """
         waiting: deque[Trigger] = deque()
         triggered = 0
         while triggered < count or waiting:
-            ahead = 1 if begin is not None and triggered <= 1 else AHEAD  # one without a time would run before it
+            ahead = 1 if begin is not None and triggered <= 1 else AHEAD  # an unscheduled one would run before it
             while triggered < count and len(waiting) < ahead:
                 waiting.append(self._trigger(planned, begin if triggered == 0 else None))
                 triggered += 1
             yield await self._shot(planned, waiting.popleft())
 
     async def _streams(self, planned: PlannedShot, begin: int | None, count: int) -> bool:
-        """Begin a stream (STM); False where the ranger does not know the command."""
+        """Start a stream (STM); False if the command is unknown to the ranger."""
         link = self._link
         if begin is not None:
             await asyncio.sleep(max(0, begin - ticks_now(self._clock)) / TICKS_PER_SECOND)
@@ -99,11 +105,11 @@ class Shooter:
         return reply.command == "STM"
 
     async def _streamed(self, planned: PlannedShot, count: int) -> AsyncGenerator[LiveShot, None]:
-        """What a stream brings; it is stopped when nobody wants more."""
+        """Shots of a stream, which is stopped at the generator's end."""
         link, came = self._link, 0
         try:
             while came < count:
-                measurement = self._own(await self._next("CMEAS", planned.duration), planned)
+                measurement = self._checked_measurement(await self._next("CMEAS", planned.duration), planned)
                 read = self._buffer(await self._next("BUF", 0.0), measurement.ticks, measurement.cube)
                 came += 1
                 yield shot_of(link.ranger, planned.target, measurement, buffer=read, usual=link.sampling)
@@ -114,19 +120,22 @@ class Shooter:
                     link.send(Request("STM", (str(self._number(planned.target)), "0")))
 
     async def _next(self, command: str, seconds: float) -> Reply:
-        """The stream's next line. Raises InputError: none in time, or another."""
+        """Next line of the stream.
+
+        Raises InputError: none in time, or another command.
+        """
         limit = seconds + self._link.settings.buffer_timeout
         try:
             async with asyncio.timeout(limit):
                 reply = await self._heard.get()
         except TimeoutError:
-            raise Refused("no-reply", f"the stream brought no {command} within {limit:.1f} s") from None
+            raise Refused("no-reply", f"no {command} from the stream within {limit:.1f} s") from None
         if reply.command != command:
-            raise InputError(f"the stream brought {reply.command} (expected {command})")
+            raise InputError(f"{reply.command} from the stream (expected {command})")
         return reply
 
     async def park(self) -> bool:
-        """CIL on ZRG; False where it was refused or did not come, which is told."""
+        """Point at ZRG (CIL); False, logged, if refused or unanswered."""
         try:
             reply = await self._link.sure(Request("CIL", ("0",)), self._link.settings.move_timeout)
             self._pointed(reply)
@@ -137,13 +146,13 @@ class Shooter:
         return True
 
     def hears(self, reply: Reply) -> bool:
-        """Whether a line is the stream's; then it is kept for it."""
+        """True if a line belongs to the stream; then it is queued."""
         streamed = reply.tid == self._stream and reply.command in ("CMEAS", "BUF")
         if streamed:
             self._heard.put_nowait(reply)
         return streamed
 
-    def _own(self, reply: Reply, planned: PlannedShot) -> Measurement:
+    def _checked_measurement(self, reply: Reply, planned: PlannedShot) -> Measurement:
         measurement = measurement_of(reply)
         if self._link.names.get(measurement.cube) != planned.target:
             raise InputError(f"CMEAS answers for cube {measurement.cube} (expected {planned.target})")
@@ -156,9 +165,12 @@ class Shooter:
         return number
 
     async def _point(self, planned: PlannedShot, count: int) -> int | None:
-        """CIL or TRK; when the first buffer shall begin, None at once. Raises Refused."""
+        """Point or track (CIL or TRK); start of the first buffer, None: at once.
+
+        Raises Refused.
+        """
         link, number, settings = self._link, self._number(planned.target), self._link.settings
-        await self._tell_of(number)
+        await self._send_cube(number)
         for azimuth, elevation in planned.via:
             self.aimed = None
             halt = Request("CIL", ("0", f"{azimuth:.0f}", f"{elevation:.0f}"))
@@ -170,30 +182,33 @@ class Shooter:
                 self.aimed = number
             return planned.begin_ticks if planned.begin_ticks > ticks_now(self._clock) else None
         trip = 0.0 if math.isnan(link.round_trip) else link.round_trip
-        way = self._way_to(planned)
-        ahead = trip + (max(settings.lead, way - IN_HAND) if trip > settings.slow else settings.lead)
+        move_time = self._planned_gap(planned)
+        ahead = trip + (max(settings.lead, move_time - IN_HAND) if trip > settings.slow else settings.lead)
         begin = max(planned.begin_ticks, ticks_now(self._clock) + round(ahead * TICKS_PER_SECOND))
         late = (begin - planned.begin_ticks) / TICKS_PER_SECOND
         if late > settings.latest:
-            raise Refused("late", f"its turn came {late:.1f} s late (limit {settings.latest:g} s)")
+            raise Refused("late", f"its start was {late:.1f} s late (limit {settings.latest:g} s)")
         self.aimed = None
         more = settings.slack + (count - 1) * (planned.duration + GAP)
         request = track(planned, number, begin, more=more)
         self._pointed(await link.sure(request, settings.probe_timeout + settings.buffer_timeout))
         late = (ticks_now(self._clock) - begin) / TICKS_PER_SECOND
-        if late > settings.slack:  # the track would be over before the buffer is: nothing would return
+        if late > settings.slack:  # the track would end before the buffer: no return
             raise Refused("late", f"TRK was answered {late:.2f} s after its shot's time (limit {settings.slack:g} s)")
         return begin
 
-    def _way_to(self, planned: PlannedShot) -> float:
-        """s that the plan leaves the mirror from the shot before to this: it needs them when it is late, too."""
+    def _planned_gap(self, planned: PlannedShot) -> float:
+        """Planned time between the previous shot and this, s.
+
+        A late mirror needs it, too.
+        """
         before, self._before = self._before, planned
-        if before is None or not 0 < planned.begin_ticks - before.begin_ticks < LONGEST_WAY:
+        if before is None or not 0 < planned.begin_ticks - before.begin_ticks < LONGEST_GAP:
             return 0.0
         return (planned.begin_ticks - before.begin_ticks) / TICKS_PER_SECOND - before.duration
 
-    async def _tell_of(self, number: int) -> None:
-        """A cube that the ranger was not told of at first."""
+    async def _send_cube(self, number: int) -> None:
+        """Send a cube that was left for on demand."""
         link = self._link
         requests = link.preparation.on_demand.get(number, ())
         if number in link.told or not requests:
@@ -218,23 +233,28 @@ class Shooter:
         return Trigger(begin, measured, None if waits else self._link.send(Request("BUF")))
 
     async def _shot(self, planned: PlannedShot, trigger: Trigger) -> LiveShot:
-        """The replies of one trigger as a shot. Raises InputError."""
+        """Shot from the replies to one trigger.
+
+        Raises InputError.
+        """
         link, limit = self._link, self._link.settings.buffer_timeout
         begin = trigger.begin
         ahead = 0.0 if begin is None else max(0, begin - ticks_now(self._clock)) / TICKS_PER_SECOND
         reply = await link.reply_of("CMEAS", trigger.measured, ahead + AHEAD * planned.duration + limit)
-        measurement = self._own(reply, planned)
+        measurement = self._checked_measurement(reply, planned)
         buffer = link.send(Request("BUF")) if trigger.buffer is None else trigger.buffer
         read = self._buffer(await link.reply_of("BUF", buffer, limit), measurement.ticks, measurement.cube)
         return shot_of(link.ranger, planned.target, measurement, buffer=read, usual=link.sampling)
 
     def _buffer(self, reply: Reply, ticks: int, cube: int) -> BufferRead | None:
-        """The samples; None where they did not come, and then the ranger's own amplitude and phase count.
+        """Samples of a shot; None if not received.
 
-        Raises InputError: samples that are damaged, or not this shot's; then nothing of it is believed.
+        The ranger's own amplitude and phase are then used.
+
+        Raises InputError: damaged samples, or those of another shot; then the shot is rejected.
         """
         if reply.ok is not True:
-            text = f"{self._link.ranger}: BUF: {reply.text[:120]}; its own amplitude and phase are taken"
+            text = f"{self._link.ranger}: BUF: {reply.text[:120]}; its own amplitude and phase are used"
             self._event_log.tell("no-buffer", text, "warning")
             return None
         read = buffer_of(reply)
@@ -246,7 +266,10 @@ class Shooter:
 
 
 def track(planned: PlannedShot, number: int, begin: int, *, more: float) -> Request:
-    """TRK of a cube on its planned line from `begin` (ticks) on, and `more` s behind the shot's end."""
+    """TRK of a cube along its planned line, starting at `begin` (ticks).
+
+    It ends `more` s after the shot.
+    """
     rate = (planned.at_end - planned.at_begin) / planned.duration
     end = begin + round((planned.duration + more) * TICKS_PER_SECOND)
     places = [planned.at_begin + rate * ((t - planned.begin_ticks) / TICKS_PER_SECOND) for t in (begin, end)]

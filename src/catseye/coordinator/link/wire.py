@@ -1,4 +1,4 @@
-"""What taking a shot needs of the connection to a ranger."""
+"""Interface of a ranger's link for shooting."""
 
 import asyncio
 from typing import Protocol
@@ -8,17 +8,17 @@ from catseye.coordinator.link.settings import LinkSettings
 from catseye.ranger.head import SamplingSettings
 from catseye.ranger.line import Reply, Request
 
-Sent = tuple[int, "asyncio.Future[Reply]"]  # TID, and what will be answered
+Sent = tuple[int, "asyncio.Future[Reply]"]  # TID, and the future reply
 
 
 class Wire(Protocol):
-    """A ranger that is connected and made ready, as `RangerLink` is.
+    """A ranger that is connected and ready, as `RangerLink` is.
 
-    told            cubes that it was told of on demand
+    told            cubes sent to it on demand
     names           of its cubes, by number
-    counts          where its mirror was last said to stand, azimuth and elevation
+    counts          last known position of its mirror, azimuth and elevation
     shots, failures good shots, and failures in a row
-    round_trip      s, NaN where none was measured
+    round_trip      s, NaN if not measured
     """
 
     told: set[int]
@@ -36,13 +36,19 @@ class Wire(Protocol):
     @property
     def connected(self) -> bool: ...
     async def sure(self, request: Request, timeout: float) -> Reply:
-        """A reply past the guard. Raises InputError: refused by the guard, or not connected."""
+        """Reply to a request past the guard.
+
+        Raises InputError: refused by the guard, or not connected.
+        """
         ...
 
     def send(self, request: Request) -> Sent:
-        """Send a request past the guard; its TID and a future of its reply. Raises InputError, as `sure`."""
+        """Send a request past the guard; its TID and a future of its reply.
+
+        Raises InputError, as `sure`.
+        """
         ...
 
     async def reply_of(self, command: str, sent: Sent, timeout: float) -> Reply:
-        """The reply to what was sent; f = 0 where it did not come in time."""
+        """Reply to a sent request; f = 0 if not in time."""
         ...

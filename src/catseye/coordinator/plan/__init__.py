@@ -1,1 +1,1 @@
-"""What to shoot next: candidates, their value, a raster."""
+"""Round planning: candidates, their value, the dish raster."""

@@ -1,4 +1,4 @@
-"""What one ranger could shoot in a round: where it must look, how long each move takes, and which moves it may make."""
+"""Shot candidates of one ranger in a round: pointings, move times, allowed moves."""
 
 from dataclasses import dataclass
 
@@ -17,15 +17,15 @@ WHY = {FREE: None, SUN: "the Sun", BOX: "a box"}
 
 @dataclass(frozen=True, eq=False)
 class ShotCandidates:
-    """The place where the mirror stands, row 0, and m things to shoot.
+    """Present mirror position, row 0, and m possible shots.
 
     names     (1 + m) the first is ""
     middle    (1 + m, 2) counts in the middle of the round
-    low, high (1 + m, 2) counts between which they stay during it
+    low, high (1 + m, 2) range of counts during it
     code      (1 + m, 1 + m) FREE, SUN or PERHAPS of a move from row to column, wherever both are by then
-    moving    (1 + m, 1 + m) s, the ways round corners in it
+    moving    (1 + m, 1 + m) s, including moves around corners
     corner    (1 + m, 1 + m) 0: one move; AZIMUTH or ELEVATION: that axis first, alone
-    units     (1 + m, 3) towards them, ground frame
+    units     (1 + m, 3) unit vectors to them, ground frame
     """
 
     names: tuple[str, ...]
@@ -38,7 +38,7 @@ class ShotCandidates:
     units: Array
 
     def via(self, row: int, column: int) -> tuple[tuple[float, float], ...]:
-        """Counts at which to halt on the way."""
+        """Counts of intermediate stops."""
         code = int(self.corner[row, column])
         if code == 0:
             return ()
@@ -46,7 +46,7 @@ class ShotCandidates:
         return ((float(self.middle[azimuth, 0]), float(self.middle[elevation, 1])),)
 
     def may(self, row: int, column: int, around: Surroundings) -> str | None:
-        """Why not to move from one to another, None where it is free; a box is asked for once."""
+        """Reason why a move is not allowed, None if free; boxes checked once."""
         if self.code[row, column] == PERHAPS:
             entered = around.box_entered(self.middle[row], self.middle[column])
             self.code[row, column] = FREE if entered is None else BOX
@@ -56,12 +56,12 @@ class ShotCandidates:
 def candidates(
     names: tuple[str, ...], looks: Array, units: Array, *, start: tuple[float, float], around: Surroundings
 ) -> tuple[ShotCandidates, dict[str, str]]:
-    """The table, and why names were left out of it.
+    """Table of candidates, and reasons why others were left out.
 
     names    (m)
     looks    (m, nodes, 2) counts at times of the round; NaN beyond the stops
     units    (m, 3) towards them
-    start    counts where the mirror stands
+    start    present counts of the mirror
     """
     unseen: dict[str, str] = {}
     reachable = np.asarray(np.isfinite(looks).all(axis=(1, 2)))
@@ -79,27 +79,28 @@ def candidates(
             box = around.box_in(looks[i].min(axis=0), looks[i].max(axis=0))
             if box is not None:
                 unseen[name] = f"too near {box}"
-    kept = [i for i, name in enumerate(names) if name not in unseen]
-    here = np.array(start, dtype=float)
-    low = np.concatenate([here[None], looks[kept].min(axis=1)]) if kept else here[None]
-    high = np.concatenate([here[None], looks[kept].max(axis=1)]) if kept else here[None]
-    middle = np.concatenate([here[None], looks[kept, looks.shape[1] // 2]]) if kept else here[None]
-    a, b = np.triu_indices(len(low))  # there and back are one rectangle
+    indices = [i for i, name in enumerate(names) if name not in unseen]
+    position = np.array(start, dtype=float)
+    low = np.concatenate([position[None], looks[indices].min(axis=1)]) if indices else position[None]
+    high = np.concatenate([position[None], looks[indices].max(axis=1)]) if indices else position[None]
+    middle = np.concatenate([position[None], looks[indices, looks.shape[1] // 2]]) if indices else position[None]
+    a, b = np.triu_indices(len(low))  # both directions are one rectangle
     code = np.empty((len(low), len(low)), dtype=np.int8)
     code[a, b] = code[b, a] = around.codes(np.minimum(low[a], low[b]), np.maximum(high[a], high[b]))
-    code[0] = np.where(leaves(around, here, low, high), FREE, code[0])
+    code[0] = np.where(leaves(around, position, low, high), FREE, code[0])
     moving = trapezoid(middle[:, None], middle[None], around.vantage.pace).total
     corner = _round_corners(around, middle, low, high, code=code, moving=moving)
-    chosen = np.concatenate([np.zeros((1, 3)), units[kept].reshape(-1, 3)])
-    return ShotCandidates(("", *(names[i] for i in kept)), middle, low, high, code, moving, corner, chosen), unseen
+    chosen = np.concatenate([np.zeros((1, 3)), units[indices].reshape(-1, 3)])
+    return ShotCandidates(("", *(names[i] for i in indices)), middle, low, high, code, moving, corner, chosen), unseen
 
 
 def _round_corners(
     around: Surroundings, middle: Array, low: Array, high: Array, *, code: NDArray[np.int8], moving: Array
 ) -> NDArray[np.int8]:
-    """Which axis to move first, alone, where both at once might look into the Sun or a box; changes `code`, `moving`.
+    """Axis to move first, alone, if both at once might hit a zone.
 
-    A rectangle of counts that holds a zone is gone round along its sides, where one of its other corners is free.
+    Changes `code` and `moving`. A rectangle of counts that contains a zone is passed along its sides, if one of its
+    other corners is free.
     """
     corner = np.zeros(code.shape, dtype=np.int8)
     free = np.asarray(around.codes(low, high) == FREE)
@@ -118,19 +119,24 @@ def _round_corners(
             total = total + trapezoid(middle[leg], at[2], around.vantage.pace).total
         better = good & (total < best)
         corner[start[better], end[better]] = first
-        corner[end[better], start[better]] = AZIMUTH + ELEVATION - first  # the same way back
+        corner[end[better], start[better]] = AZIMUTH + ELEVATION - first  # the same path back
         best = np.where(better, total, best)
-    there = np.isfinite(best)
-    for i, j in ((start[there], end[there]), (end[there], start[there])):
-        code[i, j], moving[i, j] = FREE, best[there]
+    passable = np.isfinite(best)
+    for i, j in ((start[passable], end[passable]), (end[passable], start[passable])):
+        code[i, j], moving[i, j] = FREE, best[passable]
     return corner
 
 
-def leaves(around: Surroundings, here: Array, low: Array, high: Array) -> NDArray[np.bool_]:
-    """Whether moves (n,) from counts (2,) to somewhere in rectangles (n, 2) leave the Sun's cone and come no nearer."""
-    now = float(around.from_sun(here, here))
-    if now > 0.0:
+def leaves(around: Surroundings, position: Array, low: Array, high: Array) -> NDArray[np.bool_]:
+    """True for moves that leave the Sun's cone without coming nearer.
+
+    Moves (n,) go from counts (2,) to anywhere in rectangles (n, 2).
+    """
+    present = float(around.from_sun(position, position))
+    if present > 0.0:
         return np.zeros(len(low), dtype=bool)
     outside = around.from_sun(low, high) > 0.0
-    way = around.from_sun(np.minimum(low, here), np.maximum(high, here))
-    return np.asarray(outside & (way >= now - 1e-6) & ~around.near_boxes(np.minimum(low, here), np.maximum(high, here)))
+    path = around.from_sun(np.minimum(low, position), np.maximum(high, position))
+    return np.asarray(
+        outside & (path >= present - 1e-6) & ~around.near_boxes(np.minimum(low, position), np.maximum(high, position))
+    )

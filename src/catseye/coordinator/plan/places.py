@@ -1,4 +1,4 @@
-"""Where targets will be during a round, in the frame of the ranger that looks, and the shots made of it."""
+"""Predicted positions of targets during a round, and planned shots."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,12 +15,15 @@ from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
 from catseye.records.site.folder import REFERENCE, SiteFolder
 
 Array = NDArray[np.float64]
-AS_GIVEN = 0.005  # m: a target this near to its record is where the ranger believes it; half a beam's radius
+RECORD_TOLERANCE = 0.005  # m: a target this near to its record needs no new coordinates; half a beam's radius
 
 
 @dataclass(frozen=True)
 class ChosenTarget:
-    """What a ranger shall shoot: target, s from the round's begin to its buffer, why, and halts on the way, counts."""
+    """A target for a ranger to shoot.
+
+    Time from the round's start to its buffer, s, reason, and intermediate stops, counts.
+    """
 
     target: str
     at: float
@@ -29,10 +32,10 @@ class ChosenTarget:
 
 
 class Places:
-    """Where rangers and targets are during one round.
+    """Positions of rangers and targets during one round.
 
     site, vantages, retros   the records
-    state                    whose `place` predicts
+    state                    with `place` for predictions
     ticks                    (n,) instants of the round
     """
 
@@ -51,52 +54,58 @@ class Places:
 
     @staticmethod
     def nominal(site: SiteFolder) -> LivePosture:
-        """The posture of the record."""
+        """Posture of a site's record."""
         return nominal_posture(site)
 
     def looks(self, vantage: Vantage, names: tuple[str, ...]) -> tuple[Array, Array]:
-        """Counts (m, n, 2) at the instants, NaN where the stops are in the way, and unit vectors (m, 3), ground."""
-        points = np.array([self._own(vantage, name) for name in names])
+        """Counts (m, n, 2) at the instants, and unit vectors (m, 3), ground.
+
+        NaN beyond the stops.
+        """
+        points = np.array([self._in_frame(vantage, name) for name in names])
         looks = vantage.look(points)
         for i, name in enumerate(names):
             if name == REFERENCE:
                 looks[i] = vantage.reference
         middle = len(self.ticks) // 2
-        way = points[:, middle] - vantage.station.scan_point
-        length = np.linalg.norm(way, axis=-1, keepdims=True)
-        units = way / np.where(length > 0.0, length, 1.0)
+        rays = points[:, middle] - vantage.station.scan_point
+        length = np.linalg.norm(rays, axis=-1, keepdims=True)
+        units = rays / np.where(length > 0.0, length, 1.0)
         return looks, units if vantage.frame == "ground" else units @ self._rotation[middle].T
 
     def shift(self, vantage: Vantage) -> Array:
-        """(3,) m, own frame: by how much the ranger is predicted beside its record, in the middle of the round."""
+        """Predicted shift (3,) m of the ranger from its record.
+
+        In its frame, in the middle of the round.
+        """
         if vantage.frame == "ground":
             return np.zeros(3)
         if vantage.name not in self._shifts:
             one = slice(len(self.ticks) // 2, len(self.ticks) // 2 + 1)
             at = self._place(vantage.name, self.ticks[one])
-            there = self._in_reflector(at, self._rotation[one], self._vertex[one])
-            self._shifts[vantage.name] = there[0] - vantage.station.scan_point
+            position = self._in_reflector(at, self._rotation[one], self._vertex[one])
+            self._shifts[vantage.name] = position[0] - vantage.station.scan_point
         return self._shifts[vantage.name]
 
     def shots(self, vantage: Vantage, chosen: "list[ChosenTarget]", duration: float) -> tuple[PlannedShot, ...]:
-        """The planned shots of one ranger."""
-        begin = np.array([later(int(self.ticks[0]), each.at) for each in chosen], dtype=np.int64)
-        both = np.stack([begin.astype(float), begin + duration / TICK_SECONDS], axis=1)
-        nodes = np.array([self._own(vantage, each.target) for each in chosen]).reshape(-1, len(self.ticks), 3)
-        points = np.einsum("cbn,cnk->cbk", lagrange(self.ticks, both), nodes)
+        """Planned shots of one ranger."""
+        begin = np.array([later(int(self.ticks[0]), target.at) for target in chosen], dtype=np.int64)
+        times = np.stack([begin.astype(float), begin + duration / TICK_SECONDS], axis=1)
+        nodes = np.array([self._in_frame(vantage, target.target) for target in chosen]).reshape(-1, len(self.ticks), 3)
+        points = np.einsum("cbn,cnk->cbk", lagrange(self.ticks, times), nodes)
         return tuple(
             PlannedShot(
                 vantage.name,
-                each.target,
+                target.target,
                 int(begin[i]),
                 duration,
                 points[i, 0],
                 points[i, 1],
-                self._fixed(vantage, each.target, points[i]),
-                each.reason,
-                each.via,
+                self._fixed(vantage, target.target, points[i]),
+                target.reason,
+                target.via,
             )
-            for i, each in enumerate(chosen)
+            for i, target in enumerate(chosen)
         )
 
     def _fixed(self, vantage: Vantage, name: str, points: Array) -> bool:
@@ -104,14 +113,16 @@ class Places:
             return True
         retro = self.retros[name]
         away = np.linalg.norm(points - retro.point, axis=-1)
-        return bool(retro.frame == vantage.frame and np.max(away) <= AS_GIVEN)
+        return bool(retro.frame == vantage.frame and np.max(away) <= RECORD_TOLERANCE)
 
-    def _own(self, vantage: Vantage, name: str) -> Array:
-        """(n, 3) m, own frame, at the instants."""
+    def _in_frame(self, vantage: Vantage, name: str) -> Array:
+        """Positions (n, 3) m at the instants, in the ranger's frame."""
         if name == REFERENCE:
             return np.broadcast_to(vantage.station.scan_point, (len(self.ticks), 3))
         retro = self.retros[name]
-        if retro.part == "dish" and vantage.frame == "reflector":  # millimetres are nothing to a beam; they are many
+        if (
+            retro.part == "dish" and vantage.frame == "reflector"
+        ):  # millimetres are negligible for a beam, and there are many of them
             return np.broadcast_to(retro.point, (len(self.ticks), 3)) - self.shift(vantage)
         if name not in self._predicted:
             at = self._place(name, self.ticks)
@@ -123,7 +134,10 @@ class Places:
         return np.asarray(self.state.place(name, np.asarray(ticks, dtype=float) / TICKS_PER_DAY), dtype=float)
 
     def _frames(self, ticks: ArrayLike) -> tuple[Array, Array]:
-        """Axes (k, 3, 3) and vertex (k, 3), m, of the reflector in the ground frame, the posture's rates held."""
+        """Axes (k, 3, 3) and vertex (k, 3), m, of the reflector, ground frame.
+
+        The posture's rates are assumed constant.
+        """
         posture, reflector = self.state.posture, self.site.site.frames.reflector
         since = (np.asarray(ticks, dtype=float) - posture.ticks) * TICK_SECONDS
         ground_from_reflector = ground_from_reflector_at(
@@ -141,7 +155,7 @@ class Places:
 
 
 def lagrange(nodes: ArrayLike, times: ArrayLike) -> Array:
-    """Weights (..., n) by which values at nodes (n,) give those at times (...), of a polynomial through them all.
+    """Lagrange weights (..., n) from nodes (n,) to times (...).
 
     Five nodes 2.5 s apart follow a telescope that slews at 0.01 rad/s within a micrometre at 100 m.
 
@@ -152,7 +166,7 @@ def lagrange(nodes: ArrayLike, times: ArrayLike) -> Array:
     t = np.asarray(times, dtype=float)[..., None, None] - x[0]
     x = x - x[0]
     n = len(x)
-    others = ~np.eye(n, dtype=bool)
-    top = np.where(others, t - x[None, :], 1.0)
-    bottom = np.where(others, x[:, None] - x[None, :], 1.0)
+    off_diagonal = ~np.eye(n, dtype=bool)
+    top = np.where(off_diagonal, t - x[None, :], 1.0)
+    bottom = np.where(off_diagonal, x[:, None] - x[None, :], 1.0)
     return np.asarray(np.prod(top, axis=-1) / np.prod(bottom, axis=-1))

@@ -1,9 +1,9 @@
-"""What each ranger shoots next: a round of some seconds, planned at once for all.
+"""Plan a round of some seconds for all rangers at once.
 
-In order: the reference when it is due, a benchmark now and then, then whatever teaches most about the points that
-matter for each second that it takes, then, on the feed arm, the next stretch of the dish. Rangers take turns: the one
-that is free first chooses first, knowing what the others have chosen. A point whose covariance is long in one direction
-draws the ranger that looks along it: so every point gets rangers all round where there are any.
+In order: the reference when it is due, a benchmark now and then, then the shots with the largest gain of information
+about the points that matter per second, then, on the feed arm, the next stretch of the dish. Rangers take turns: the
+one that is free first chooses first, knowing the others' choices. A point whose covariance is long in one direction
+attracts the ranger that looks along it: so every point gets rangers all round if there are any.
 """
 
 from collections.abc import Iterable
@@ -30,22 +30,22 @@ from catseye.records.site.solids import Solids
 
 Array = NDArray[np.float64]
 HOUR_TICKS = 100_000_000 // 24
-RANGERS_GRID = servo_margin([0.5 * LARGEST_STEP] * 2)  # rad by which a ranger's own look at the Sun may be too careful
+RANGERS_GRID = servo_margin([0.5 * LARGEST_STEP] * 2)  # rad by which a ranger's own check of the Sun may be too strict
 
 
 @dataclass(frozen=True)
 class RoundSettings:
-    """How rounds are made; s, m.
+    """Settings of rounds; s, m.
 
     period            of a round
     lead              from now to the first move
     settle            from the end of a move to the buffer
     transfer          from the end of a buffer to the next move: reply and samples
     duration          of a buffer
-    reference_every   and benchmark_every: no longer ago than this
-    dish_share        of a feed-arm ranger's round for the dish
+    reference_every   and benchmark_every: longest intervals
+    dish_share        share of a feed-arm ranger's round for the dish
     sigma             of a range
-    drift             per square root of a second: how points forget
+    drift             process noise of points, per square root of a second
     """
 
     period: float = 10.0
@@ -62,12 +62,12 @@ class RoundSettings:
 
 @dataclass(eq=False)
 class _Turn:
-    """One ranger's round in the making.
+    """One ranger's round under construction.
 
-    points, variance   of the table's rows: index in what is known (-1: none), and of a range to it, m^2
-    until              s, for what is chosen by its worth
-    counted, open_     rows that are chosen so, and those of them not shot in this pass
-    row, at            where the mirror is, and from when on, s
+    points, variance   of the table's rows: index of the point (-1: none), and variance of a range to it, m^2
+    until              s, end of the time for shots chosen by value
+    counted, open_     rows chosen by value, and those of them not yet shot in this pass
+    row, at            present row of the mirror, and since when, s
     """
 
     vantage: Vantage
@@ -84,13 +84,13 @@ class _Turn:
 
 
 class RoundPlanner:
-    """Plans rounds for a site; the same states in the same order give the same rounds.
+    """Planner of rounds; the same sequence of states gives the same rounds.
 
-    site         whose records say who stands where
+    site         its records
     targets      that matter to rangers on the ground; structure and triplets' balls if None
     keep_clear   Sun and boxes; the site's Sun without boxes if None
-    solids       what stands in the way
-    settings     how
+    solids       obstacles
+    settings     of rounds
     """
 
     def __init__(
@@ -105,24 +105,25 @@ class RoundPlanner:
         self.site, self.settings = site, settings or RoundSettings()
         self.keep_clear = keep_clear or KeepClear(site)
         self.vantages, self.retros = vantages_of(site), retros_of(site)
-        wanted = None if targets is None else frozenset(targets)
+        selection = None if targets is None else frozenset(targets)
         dish = tuple(r for r in self.retros.values() if r.part == "dish")
-        ground = {n: r for n, r in self.retros.items() if _matters(r, wanted)}
+        ground = {n: r for n, r in self.retros.items() if _matters(r, selection)}
         arm = {n: r for n, r in self.retros.items() if r.part == "dish" or (r.part != "benchmark" and r.kind != "ball")}
         self._sights = VisibleSights(site, self.vantages, ground=ground, arm=arm, solids=solids)
         self._benchmarks = {b.ranger: b.target for b in site.benchmarks}
         self._benchmarked: dict[str, int] = {}
-        seen = self._sights.at(Places.nominal(site)).targets
+        visible = self._sights.at(Places.nominal(site)).targets
         riders = [v for v in self.vantages.values() if v.frame == "reflector"]
         in_dish = {r.name for r in dish}
         self.rasters = {
-            v.name: DishRaster(v, tuple(self.retros[n] for n in seen.get(v.name, ()) if n in in_dish)) for v in riders
+            v.name: DishRaster(v, tuple(self.retros[n] for n in visible.get(v.name, ()) if n in in_dish))
+            for v in riders
         }
         self._in_dish, self._started = in_dish, False
         self._visited: set[str] = set()
 
     def round(self, state: SiteState) -> Round:
-        """The next round, from `state.now_ticks` and the lead on.
+        """Next round, from `state.now_ticks` plus the lead.
 
         Raises InputError for a ranger that the site does not have.
         """
@@ -131,18 +132,18 @@ class RoundPlanner:
         self._start_tours(begin, state.ready)
         places = Places(self.site, self.vantages, self.retros, state, instants(begin, end))
         suns = self.keep_clear.sun(places.ticks)
-        seen, unseen = self._sights.at(state.posture), {}
+        visible, unseen = self._sights.at(state.posture), {}
         rangers = [self._vantage(name) for name in sorted(state.ready)]
-        wanted = {v.name: self._wanted(v, seen.targets.get(v.name, ()), state) for v in rangers}
-        know = self._knowledge(sorted({n for names in wanted.values() for n in names if n in self.retros}), state)
+        options = {v.name: self._options(v, visible.targets.get(v.name, ()), state) for v in rangers}
+        know = self._knowledge(sorted({n for names in options.values() for n in names if n in self.retros}), state)
         turns = {}
         for v in rangers:
             around = self.keep_clear.around(v, begin, end, posture=state.posture, suns=suns, wider=RANGERS_GRID)
-            turn, why = self._turn(v, around, wanted[v.name], places, know, state)
+            turn, why = self._turn(v, around, options[v.name], places, know, state)
             turns[v.name] = turn
             unseen.update({(v.name, target): text for target, text in why.items()})
-            unseen.update({pair: text for pair, text in seen.unseen.items() if pair[0] == v.name})
-            unseen.update({(r, t): "left alone for now: it failed" for r, t in state.suspended if r == v.name})
+            unseen.update({pair: text for pair, text in visible.unseen.items() if pair[0] == v.name})
+            unseen.update({(r, t): "suspended after failures" for r, t in state.suspended if r == v.name})
             self._due(turn, state, begin)
         self._by_worth(turns, know)
         for turn in turns.values():
@@ -156,14 +157,15 @@ class RoundPlanner:
     def _vantage(self, name: str) -> Vantage:
         if name not in self.vantages:
             raise InputError(
-                f"ranger {name!r} is not in the site (expected one of {len(self.vantages)} of its records)"
+                f"ranger {name!r} is unknown at the site (expected one of {len(self.vantages)} of its records)"
             )
         return self.vantages[name]
 
     def _start_tours(self, ticks: int, ready: tuple[str, ...]) -> None:
-        """Spread over the dish, and by the hour: what starts again does not begin at the same prism.
+        """Spread the rasters' starts over the dish, and by the hour.
 
-        A new lap begins when all that the rangers at hand can see are visited.
+        So restarts do not begin at the same prism. A new lap begins when all prisms visible to the available rangers
+        are visited.
         """
         at_hand = [raster for name, raster in self.rasters.items() if name in ready]
         if self._visited.issuperset(n for raster in at_hand for n in raster.names):
@@ -174,14 +176,20 @@ class RoundPlanner:
             raster.begin((k / len(self.rasters) + (ticks % HOUR_TICKS) / HOUR_TICKS) % 1.0)
         self._started = True
 
-    def _wanted(self, vantage: Vantage, seen: tuple[str, ...], state: SiteState) -> tuple[str, ...]:
-        """What a ranger may shoot besides the dish: ZRG first, its benchmark, then what it sees."""
+    def _options(self, vantage: Vantage, visible: tuple[str, ...], state: SiteState) -> tuple[str, ...]:
+        """Possible shots of a ranger besides the dish.
+
+        ZRG first, its benchmark, then what it sees.
+        """
         bench = self._benchmarks.get(vantage.name)
-        names = [REFERENCE, *([bench] if bench else []), *(n for n in seen if n not in self._in_dish)]
+        names = [REFERENCE, *([bench] if bench else []), *(n for n in visible if n not in self._in_dish)]
         return tuple(n for n in names if (vantage.name, n) not in state.suspended)
 
     def _knowledge(self, names: list[str], state: SiteState) -> Knowledge:
-        """What is known of points before the round: as last told and forgotten a little, or as the records say."""
+        """Covariances of points before the round.
+
+        The last ones plus process noise, or those of the records.
+        """
         forgotten = self.settings.drift**2 * self.settings.period * np.eye(3)
         table = [state.u[n] + forgotten if n in state.u else self.retros[n].u ** 2 * np.eye(3) for n in names]
         return Knowledge(tuple(names), np.array(table))
@@ -200,19 +208,19 @@ class RoundPlanner:
         start = state.counts.get(vantage.name, vantage.reference)
         table, why = candidates(names, looks, units, start=start, around=around)
         points = np.array([know.at.get(n, -1) for n in table.names])
-        own = state.u.get(vantage.name)
+        covariance = state.u.get(vantage.name)
         variance = np.full(len(points), s.sigma**2)
-        if own is not None:
-            variance = variance + np.einsum("mi,ij,mj->m", table.units, own, table.units)
+        if covariance is not None:
+            variance = variance + np.einsum("mi,ij,mj->m", table.units, covariance, table.units)
         share = 1.0 - s.dish_share if vantage.name in self.rasters and self.rasters[vantage.name].names else 1.0
         counted = np.array([n in self.retros and self.retros[n].part != "benchmark" for n in table.names])
         return _Turn(vantage, around, table, points, variance, share * s.period, counted, counted.copy()), why
 
     def _due(self, turn: _Turn, state: SiteState, begin: int) -> None:
-        """The reference, and a benchmark, where the last is too long ago by the end of the round."""
+        """Choose reference and benchmark, if due by the end of the round."""
         s, name = self.settings, turn.vantage.name
         if state.since_reference.get(name, np.inf) + s.period > s.reference_every:
-            self._go(turn, REFERENCE, "reference: the last is too long ago")
+            self._go(turn, REFERENCE, "reference: due")
         bench = self._benchmarks.get(name)
         last = self._benchmarked.get(name)
         due = last is None or (begin - last) * TICK_SECONDS + s.period > s.benchmark_every
@@ -265,39 +273,40 @@ class RoundPlanner:
         return False
 
     def _open(self, turn: _Turn) -> NDArray[np.int64]:
-        """Rows that fit into the rest of the round: those that are surely free to go to, else those that may be."""
+        """Rows that fit into the remaining round.
+
+        Those surely free, or else those possibly free.
+        """
         code = turn.table.code[turn.row]
         fits = turn.open_ & (turn.at + turn.table.moving[turn.row] + self._a_shot <= turn.until)
-        for wanted in (FREE, PERHAPS):
-            rows = np.flatnonzero(fits & (code == wanted))
+        for category in (FREE, PERHAPS):
+            rows = np.flatnonzero(fits & (code == category))
             if len(rows):
                 return rows
         return rows
 
     def _dish(self, turn: _Turn, places: Places, state: SiteState) -> dict[tuple[str, str], str]:
-        """The next stretch of the dish behind what was chosen."""
+        """Add the next stretch of the dish after the other shots."""
         s, name = self.settings, turn.vantage.name
-        left = frozenset(t for r, t in state.suspended if r == name)
-        here = turn.table.middle[turn.row]
+        suspended = frozenset(t for r, t in state.suspended if r == name)
+        position = turn.table.middle[turn.row]
         raster = self.rasters[name]
         chosen, why = raster.stretch(
-            here,
+            position,
             s.period - turn.at,
             turn.around,
-            each=self._a_shot,
+            shot_seconds=self._a_shot,
             shift=places.shift(turn.vantage),
-            left_alone=left,
+            left_alone=suspended,
             visited=self._visited,
         )
         self._visited.update(raster.names[i] for i, _ in chosen)
-        turn.chosen += [
-            ChosenTarget(raster.names[i], turn.at + moved + s.settle, "the dish in turn") for i, moved in chosen
-        ]
+        turn.chosen += [ChosenTarget(raster.names[i], turn.at + moved + s.settle, "dish raster") for i, moved in chosen]
         return {(name, target): text for target, text in why.items()}
 
 
-def _matters(retro: SeenRetroreflector, wanted: frozenset[str] | None) -> bool:
-    """To rangers on the ground."""
-    if wanted is not None:
-        return retro.name in wanted
+def _matters(retro: SeenRetroreflector, selection: frozenset[str] | None) -> bool:
+    """True for targets of ground rangers."""
+    if selection is not None:
+        return retro.name in selection
     return retro.part == "structure" or retro.kind == "ball"

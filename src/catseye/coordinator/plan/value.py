@@ -1,9 +1,9 @@
-"""What a range is worth: by how much it lowers the variances of the point that it leads to.
+"""Value of a range: reduction of the variances of its point.
 
 A range of standard uncertainty s along the unit vector e to a point of covariance P lowers its trace by
 |P e|^2 / (s^2 + e'P e): the update of information, one range at a time, as `estimation.network.plan.schedule` does it
-for whole networks. The ranger's own covariance along e counts to s^2. Points are taken one by one, their correlations
-left out: a plan needs the order, not the figure.
+for whole networks. The ranger's own covariance along e is added to s^2. Points are treated singly, without their
+correlations: a plan needs the order, not the figure.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,10 @@ SIGMA = 30e-6  # m, of a range
 
 @dataclass(frozen=True, eq=False)
 class Worth:
-    """What some ranges are worth: fall of the trace (m,), m^2; P e (m, 3); and s^2 + e'P e (m,)."""
+    """Value of some ranges.
+
+    Fall of the trace (m,), m^2; P e (m, 3); and s^2 + e'P e (m,).
+    """
 
     gain: Array
     across: Array
@@ -25,7 +28,7 @@ class Worth:
 
 
 class Knowledge:
-    """Covariances of points while a plan is made.
+    """Covariances of points during planning.
 
     names         of the points
     covariances   (p, 3, 3) m^2
@@ -37,7 +40,9 @@ class Knowledge:
         self.covariances = np.array(covariances, dtype=float).reshape(-1, 3, 3)
 
     def worth(self, points: NDArray[np.int64], units: Array, variance: Array) -> Worth:
-        """The worth of a range along each of units (m, 3), ground, to points (m,), by index, of variances (m,), m^2.
+        """Value of ranges along unit vectors to points.
+
+        units (m, 3), ground; points (m,), by index; variances (m,), m^2.
 
         Source: rank-one update of a covariance, Sherman and Morrison 1950.
 
@@ -50,7 +55,10 @@ class Knowledge:
         return Worth(np.sum(across**2, axis=1) / total, across, total)
 
     def learn(self, point: int, across: Array, total: float) -> tuple[float, float]:
-        """Take a range as measured; the point's u, m (root of the mean variance), before and after."""
+        """Update by a planned range; the point's u, m, before and after.
+
+        u is the root of the mean variance.
+        """
         p = self.covariances[point]
         before = float(p.trace())
         self.covariances[point] = p - np.outer(across, across / total)

@@ -1,1 +1,1 @@
-"""Which ranger sees which target from where it stands."""
+"""Visibility of targets from rangers, and zones to avoid."""

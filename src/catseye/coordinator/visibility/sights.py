@@ -1,4 +1,4 @@
-"""Which ranger can see which retroreflector, posture by posture; kept for half a degree of the telescope's motion."""
+"""Visible ranger-target pairs by posture, cached per half degree."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,13 +12,16 @@ from catseye.records.site.folder import SiteFolder
 from catseye.records.site.solids import Solids
 from catseye.reduction.steering.visibility import RangeLimits, Retroreflectors, Sight, Visibility, frames_at, visibility
 
-STEP = 0.5 * DEGREE  # of azimuth and elevation, within which the answer is kept
-KEPT = 8  # answers; one takes some ms, and a telescope that tracks does not come back
+STEP = 0.5 * DEGREE  # of azimuth and elevation, size of a cached cell
+CACHE_SIZE = 8  # cells; one takes some ms, and a tracking telescope does not return
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """For one posture: by ranger the names it sees; for each other pair that was asked why not."""
+    """Visible targets by ranger in one posture.
+
+    unseen   reason for each other pair that was tested
+    """
 
     targets: dict[str, tuple[str, ...]]
     unseen: dict[tuple[str, str], str]
@@ -29,11 +32,11 @@ class VisibleSights:
 
     vantages   of the rangers
     retros     that matter: those of the ground rangers, and those of the feed arm's
-    solids     what stands in the way
+    solids     obstacles
     limits     of ranges
 
-    What moves with the feed arm sees what moves with the reflector the same way in every posture: it is found once, in
-    the posture of the record.
+    Pairs that both move with the reflector are the same in every posture: they are computed once, in the posture of the
+    record.
     """
 
     def __init__(
@@ -53,21 +56,24 @@ class VisibleSights:
         self._arm = self._pairs(riders, {n: r for n, r in arm.items() if r.frame == "reflector"}, None)
 
     def at(self, posture: LivePosture) -> Seen:
-        """What is seen in a posture: that of the middle of its cell of half a degree."""
+        """Visible pairs in a posture, by the middle of its half-degree cell."""
         cell = round(posture.azimuth / STEP), round(posture.elevation / STEP)
         if cell not in self._kept:
-            if len(self._kept) >= KEPT:
+            if len(self._kept) >= CACHE_SIZE:
                 self._kept.pop(next(iter(self._kept)))
             middle = LivePosture(0, cell[0] * STEP, cell[1] * STEP)
-            standing = {name: v for name, v in self.vantages.items() if v.frame == "ground"}
-            seen = self._pairs(standing, self.ground, middle)
-            self._kept[cell] = Seen({**seen.targets, **self._arm.targets}, {**seen.unseen, **self._arm.unseen})
+            ground_vantages = {name: v for name, v in self.vantages.items() if v.frame == "ground"}
+            pairs = self._pairs(ground_vantages, self.ground, middle)
+            self._kept[cell] = Seen({**pairs.targets, **self._arm.targets}, {**pairs.unseen, **self._arm.unseen})
         return self._kept[cell]
 
     def _pairs(
         self, vantages: Mapping[str, Vantage], retros: Mapping[str, SeenRetroreflector], posture: LivePosture | None
     ) -> Seen:
-        """Which rangers see which retroreflectors; without a posture in the record's, where riders are asked."""
+        """Visible pairs of rangers and retroreflectors.
+
+        Without a posture in the record's, for pairs on the telescope.
+        """
         if not vantages or not retros:
             return Seen(dict.fromkeys(vantages, ()), {})
         stands = posture or nominal_posture(self.site)
@@ -90,9 +96,9 @@ def _names(table: Visibility, ranger: int) -> tuple[str, ...]:
     return tuple(table.targets[t] for t in np.flatnonzero(table.code[ranger] == Sight.SEEN))
 
 
-def _reasons(table: Visibility, wanted: bool) -> dict[tuple[str, str], str]:
-    """Why pairs are not seen; of riders, who have thousands, nothing."""
-    if not wanted:
+def _reasons(table: Visibility, enabled: bool) -> dict[tuple[str, str], str]:
+    """Reasons for invisible pairs; none for pairs on the telescope (thousands)."""
+    if not enabled:
         return {}
     pairs = np.argwhere(table.code != Sight.SEEN).tolist()
     return {(table.rangers[r], table.targets[t]): table.reason(r, t) for r, t in pairs}

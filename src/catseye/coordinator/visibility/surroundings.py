@@ -1,8 +1,8 @@
-"""What the beam of a ranger must keep out of between two times: the Sun's cone and boxes, in the ranger's own frame.
+"""Zones that a ranger's beam must avoid between two times.
 
-A move is asked for the whole rectangle of counts between its ends (`sweep`): both for the Sun and for the sphere about
-each box, then for spheres about pieces of it. Where one of these is touched, the box itself is asked for along the
-profiles of the axes.
+They are the Sun's cone and boxes, in the ranger's frame. A move is checked for the whole rectangle of counts between
+its ends (`sweep`): for the Sun and for the sphere about each box, then for spheres about pieces of it. If one of these
+is touched, the box itself is checked along the profiles of the axes.
 """
 
 from dataclasses import dataclass, replace
@@ -24,37 +24,40 @@ from catseye.reduction.site.earth_rotation import FramePlace, place_of, sun_at
 from catseye.reduction.steering.guard import Guard, guard_of
 
 Array = NDArray[np.float64]
-NODES = 5  # instants at which a ranger that the telescope carries is looked at
-FREE, SUN, PERHAPS, BOX = 0, 1, 2, 3  # perhaps a box; surely
+NODES = 5  # instants for the positions of a ranger on the telescope
+FREE, SUN, PERHAPS, BOX = 0, 1, 2, 3  # PERHAPS: possibly a box; BOX: certainly
 PIECE = 5.0  # m: no piece of a box is longer
 
 
 @dataclass(frozen=True, eq=False)
 class Spheres:
-    """Directions (k, 3) to middles, own frame, and angles (k,), rad, within which no beam may come."""
+    """Spheres as seen from a ranger.
+
+    Directions (k, 3) of their middles, in its frame, and angles (k,), rad, to keep clear.
+    """
 
     middles: Array
     limits: Array
 
     def grown(self, angle: float) -> "Spheres":
-        """All wider by an angle, rad."""
+        """The same, widened by an angle, rad."""
         return Spheres(self.middles, self.limits + angle)
 
     def inside(self, vantage: Vantage, low: Array, high: Array) -> NDArray[np.bool_]:
-        """Whether (..., k) a beam within rectangles of counts (..., 2) may come into each."""
+        """True (..., k) if a beam in rectangles of counts (..., 2) may enter."""
         return np.asarray(nearest(vantage.station, low, high, directions=self.middles) <= self.limits)
 
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What one ranger must keep clear of in a span of time.
+    """Zones of one ranger in a span of time.
 
     vantage        the ranger
-    suns           (k, 3) directions, own frame; none where the Sun is set
+    suns           (k, 3) directions, own frame; none if the Sun is set
     sun_limit      rad: no beam nearer
-    boxes          spheres about boxes, box by box, one for each of k stands of the ranger
-    pieces         of each box, those about its pieces
-    guards         that know the boxes only, one a stand
+    boxes          spheres about boxes, box by box, one for each of k positions of the ranger
+    pieces         of each box, spheres about its pieces
+    guards         for boxes only, one per position
     names          of the boxes
     """
 
@@ -67,7 +70,10 @@ class Surroundings:
     names: tuple[str, ...]
 
     def from_sun(self, low: ArrayLike, high: ArrayLike) -> Array:
-        """Angle (...), rad, left between the Sun's cone and a beam that stays within rectangles of counts (..., 2)."""
+        """Angle (...), rad, between the Sun's cone and a beam.
+
+        The beam stays within rectangles of counts (..., 2).
+        """
         if len(self.suns) == 0:
             return np.full(np.shape(low)[:-1], np.inf)
         return np.asarray(
@@ -75,7 +81,7 @@ class Surroundings:
         )
 
     def near_boxes(self, low: ArrayLike, high: ArrayLike) -> NDArray[np.bool_]:
-        """Whether (...) a beam within rectangles of counts (..., 2) may come near a box."""
+        """True (...) if a beam in rectangles of counts (..., 2) may near a box."""
         a, b = np.broadcast_arrays(np.asarray(low, dtype=float), np.asarray(high, dtype=float))
         near_any = np.zeros(a.shape[:-1], dtype=bool)
         if self.pieces:
@@ -84,9 +90,9 @@ class Surroundings:
                 self.boxes.inside(self.vantage, a, b).reshape(*a.shape[:-1], len(self.pieces), stands).any(axis=-1)
             )
             for k, pieces in enumerate(self.pieces):
-                asked = near[..., k] & ~near_any
-                if asked.any():
-                    near_any[asked] = pieces.inside(self.vantage, a[asked], b[asked]).any(axis=-1)
+                unresolved = near[..., k] & ~near_any
+                if unresolved.any():
+                    near_any[unresolved] = pieces.inside(self.vantage, a[unresolved], b[unresolved]).any(axis=-1)
         return near_any
 
     def codes(self, low: ArrayLike, high: ArrayLike) -> NDArray[np.int8]:
@@ -95,7 +101,10 @@ class Surroundings:
         return np.asarray(np.where(self.from_sun(low, high) <= 0.0, SUN, code), dtype=np.int8)
 
     def box_entered(self, start: ArrayLike, end: ArrayLike) -> str | None:
-        """The box into which a slew (2,) to (2,) counts leads, both axes starting together; None where it does not."""
+        """Box entered by a slew (2,) to (2,) counts; else None.
+
+        Both axes start together.
+        """
         move = trapezoid(start, end, self.vantage.pace)
         for guard in self.guards:
             entry = guard.entries(0.0, move)
@@ -104,21 +113,24 @@ class Surroundings:
         return None
 
     def box_in(self, low: ArrayLike, high: ArrayLike, step: float = 100.0) -> str | None:
-        """A box that a beam within a rectangle of counts (2,) may come into, in whatever order the axes move."""
+        """Box that a beam in a rectangle of counts (2,) may enter; else None.
+
+        In whatever order the axes move.
+        """
         a, b = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
         grid = [np.linspace(a[k], b[k], int(np.ceil((b[k] - a[k]) / step)) + 1) for k in (0, 1)]
         cell = np.array([np.ptp(g) / max(len(g) - 1, 1) for g in grid]) * 0.5
         looks = np.stack(np.meshgrid(*grid, indexing="ij"), axis=-1).reshape(-1, 2)
         far = float(np.hypot(*(cell * (1.0, 2.0)))) * 2.0 * np.pi * 1e-5  # half a cell's diagonal on the sky, at most
         for guard in self.guards:
-            left = np.min(guard.clearance(0.0, looks, exact_below=0.05)[:, 1:], axis=0, initial=np.inf)
-            if np.any(left <= far):
-                return self.names[int(np.argmin(left))]
+            clearance = np.min(guard.clearance(0.0, looks, exact_below=0.05)[:, 1:], axis=0, initial=np.inf)
+            if np.any(clearance <= far):
+                return self.names[int(np.argmin(clearance))]
         return None
 
 
 Zones = tuple[Spheres, tuple[Spheres, ...], tuple[Guard, ...]]
-NOTHING = Spheres(np.zeros((0, 3)), np.zeros(0))
+NO_SPHERES = Spheres(np.zeros((0, 3)), np.zeros(0))
 
 
 class KeepClear:
@@ -138,7 +150,7 @@ class KeepClear:
         self._standing: dict[tuple[str, float], Zones] = {}
 
     def guard(self, vantage: Vantage) -> Guard:
-        """The guard of a ranger against boxes only, as it stands in its own frame."""
+        """Guard of a ranger against boxes only, in its own frame."""
         if vantage.name not in self._guards:
             self._guards[vantage.name] = guard_of(
                 vantage.name,
@@ -151,11 +163,11 @@ class KeepClear:
         return self._guards[vantage.name]
 
     def sun(self, ticks: ArrayLike) -> Array:
-        """Direction (..., 3) of the Sun, ground frame, also where it is set."""
+        """Direction (..., 3) of the Sun, ground frame, also if set."""
         return sun_at(np.asarray(ticks, dtype=float) / TICKS_PER_DAY, self.place).direction
 
     def counts_at(self, directions: Array) -> bool:
-        """Whether a Sun that stands at directions (k, 3), ground, is one to keep out of at some time."""
+        """True if a Sun at directions (k, 3), ground, must be avoided."""
         return bool(np.max(directions[..., 2]) >= np.sin(self.keep_out.sun.horizon_deg * DEGREE))
 
     def around(
@@ -168,46 +180,46 @@ class KeepClear:
         suns: Array | None = None,
         wider: float = 0.0,
     ) -> Surroundings:
-        """The Sun and boxes about a ranger between two times.
+        """Zones of a ranger between two times.
 
-        posture   of the telescope, which a ranger on the feed arm needs; its rates are held
-        suns      (NODES, 3) of `instants`, where they are known already
+        posture   of the telescope, needed for a ranger on the feed arm; its rates are assumed constant
+        suns      (NODES, 3) of `instants`, if already computed
         wider     rad, added to every zone
 
-        Raises InputError where a ranger on the feed arm is asked about without a posture.
+        Raises InputError for a ranger on the feed arm without a posture.
         """
         ticks = instants(since_ticks, until_ticks)
-        suns_then = self.sun(ticks) if suns is None else suns
+        directions = self.sun(ticks) if suns is None else suns
         guard = self.guard(vantage)
         if vantage.frame == "reflector" and posture is None:
-            raise InputError(f"{vantage.name} rides on the telescope, whose posture is not known (expected one first)")
+            raise InputError(f"{vantage.name} is on the telescope, whose posture is unknown (expected one first)")
         if vantage.frame == "ground" or posture is None:
             frames = [Transform("ground", vantage.frame, np.eye(3), np.zeros(3))]
-            turned = suns_then
+            turned = directions
         else:
-            every = _every(posture, seconds_between(since_ticks, until_ticks))
-            ticks, suns_then = ticks[::every], suns_then[::every]
+            step = _node_step(posture, seconds_between(since_ticks, until_ticks))
+            ticks, directions = ticks[::step], directions[::step]
             frames = [reflector_at(self.site, posture, seconds_between(posture.ticks, t)) for t in ticks.tolist()]
-            turned = np.einsum("kji,kj->ki", np.stack([f.rotation for f in frames]), suns_then)
+            turned = np.einsum("kji,kj->ki", np.stack([f.rotation for f in frames]), directions)
         margin = guard.margin + wider + chords(turned)
         cone = self.keep_out.sun.half_angle_deg * DEGREE + margin
         boxes, pieces, guards = self._spheres(vantage, guard, frames, wider)
-        up = self.counts_at(suns_then)
+        up = self.counts_at(directions)
         return Surroundings(
             vantage, turned if up else turned[:0], cone, boxes, pieces, guards, tuple(b.name for b in self.boxes)
         )
 
     def _spheres(self, vantage: Vantage, guard: Guard, frames: list[Transform], wider: float) -> Zones:
-        """Spheres about boxes and their pieces as seen from a ranger, and its guards, at each of some stands."""
+        """Spheres of boxes and pieces from a ranger's positions, and guards."""
         if not self.boxes:
-            return NOTHING, (), ()
+            return NO_SPHERES, (), ()
         key = vantage.name, wider
         if vantage.frame == "ground" and key in self._standing:
             return self._standing[key]
-        whole, step = _seen(vantage, frames, *self._whole)
-        parts = [_seen(vantage, frames, *part) for part in self._parts]
-        # A carried ranger stands between its nodes, too: what is half a step away widens every box.
-        extra = wider + max(step, *(each for _, each in parts))
+        spheres_of_boxes, step = _spheres_from(vantage, frames, *self._whole)
+        parts = [_spheres_from(vantage, frames, *part) for part in self._parts]
+        # A ranger on the telescope is between its nodes, too: half a step widens every box.
+        extra = wider + max(step, *(part_step for _, part_step in parts))
         guards = tuple(
             replace(
                 guard,
@@ -217,14 +229,14 @@ class KeepClear:
             for f in frames
         )
         off = guard.margin + extra
-        zones = whole.grown(off), tuple(spheres.grown(off) for spheres, _ in parts), guards
+        zones = spheres_of_boxes.grown(off), tuple(spheres.grown(off) for spheres, _ in parts), guards
         if vantage.frame == "ground":
             self._standing[key] = zones
         return zones
 
 
-def _every(posture: LivePosture, seconds: float) -> int:
-    """Which of the instants are looked at from a ranger that is carried: 4 the ends, 2 the middle too, 1 all."""
+def _node_step(posture: LivePosture, seconds: float) -> int:
+    """Step in the instants for a ranger on the telescope: 4, 2 or 1."""
     turn = max(abs(posture.azimuth_rate), abs(posture.elevation_rate)) * seconds
     return NODES - 1 if turn < DEGREE else (NODES - 1) // 2 if turn < 3.0 * DEGREE else 1
 
@@ -233,13 +245,16 @@ def _table(spheres: list[tuple[Array, float]]) -> tuple[Array, Array]:
     return np.array([c for c, _ in spheres]).reshape(-1, 3), np.array([r for _, r in spheres])
 
 
-def _seen(vantage: Vantage, frames: list[Transform], centres: Array, radii: Array) -> tuple[Spheres, float]:
-    """Spheres of middles (b, 3) m, ground, from each of some stands, and half the largest step between stands."""
+def _spheres_from(vantage: Vantage, frames: list[Transform], centres: Array, radii: Array) -> tuple[Spheres, float]:
+    """Spheres of middles (b, 3) m, ground, from some positions.
+
+    And half the largest step between positions.
+    """
     stands = np.stack([f.points(vantage.station.scan_point) for f in frames])
     turns = np.stack([f.rotation for f in frames])
-    way = centres[:, None] - stands
-    far = np.linalg.norm(way, axis=-1)
-    axes = np.einsum("bki,kij->bkj", way, turns) / np.maximum(far, 1e-9)[..., None]
+    rays = centres[:, None] - stands
+    far = np.linalg.norm(rays, axis=-1)
+    axes = np.einsum("bki,kij->bkj", rays, turns) / np.maximum(far, 1e-9)[..., None]
     outside = far > radii[:, None]
     sine = np.divide(np.broadcast_to(radii[:, None], far.shape), far, out=np.ones_like(far), where=outside)
     limits = np.where(outside, np.arcsin(sine), np.pi)
@@ -249,10 +264,10 @@ def _seen(vantage: Vantage, frames: list[Transform], centres: Array, radii: Arra
 
 
 def _pieces(box: BoxZone) -> list[tuple[Array, float]]:
-    """Middles (3,) m, ground, and radii of spheres about equal pieces of a box."""
+    """Middles (3,) m, ground, and radii of spheres about a box's pieces."""
     number = np.ceil(box.size / PIECE).astype(int)
     size = box.size / number
-    grid = [(np.arange(n) + 0.5) * d - 0.5 * whole for n, d, whole in zip(number, size, box.size, strict=True)]
+    grid = [(np.arange(n) + 0.5) * d - 0.5 * extent for n, d, extent in zip(number, size, box.size, strict=True)]
     x, y, z = np.stack(np.meshgrid(*grid, indexing="ij"), axis=-1).reshape(-1, 3).T
     c, s = np.cos(box.turn), np.sin(box.turn)
     middles = box.centre + np.stack([c * x - s * y, s * x + c * y, z], axis=-1)
@@ -260,10 +275,10 @@ def _pieces(box: BoxZone) -> list[tuple[Array, float]]:
 
 
 def instants(since_ticks: int, until_ticks: int) -> NDArray[np.int64]:
-    """(NODES,) ticks, from the first to the last, evenly."""
+    """Ticks (NODES,), from the first to the last, evenly."""
     return np.rint(np.linspace(since_ticks, until_ticks, NODES)).astype(np.int64)
 
 
 def later(ticks: int, seconds: float) -> int:
-    """The tick some seconds after a tick."""
+    """Tick some seconds after a tick."""
     return ticks + round(seconds / TICK_SECONDS)

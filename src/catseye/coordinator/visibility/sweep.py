@@ -1,4 +1,4 @@
-"""How near a beam can come to directions while both axes of a mirror go anyhow between counts: in closed form.
+"""Least angle between a beam and directions during a move, in closed form.
 
 Axes may start one after the other, be slow, stop half-way and go on: whatever they do, their counts stay within the
 rectangle between start and end. A direction s, (Theta_s, Phi_s) in the mirror's axes, has from the beam at (Theta, Phi)
@@ -6,7 +6,7 @@ rectangle between start and end. A direction s, (Theta_s, Phi_s) in the mirror's
     cos = cos Phi_s cos Phi + sin Phi_s cos(Theta - Theta_s) sin Phi
 
 which is linear in c = cos(Theta - Theta_s): over the rectangle it is largest at the largest or the smallest c, and for
-each of these along Phi at atan2(sin Phi_s c, cos Phi_s) or at an end. No grid, nothing left between two looks.
+each of these along Phi at atan2(sin Phi_s c, cos Phi_s) or at an end. No grid, so nothing is missed between samples.
 """
 
 import numpy as np
@@ -20,7 +20,9 @@ TWO_PI = 2.0 * np.pi
 
 
 def nearest(station: MirrorStation, low: ArrayLike, high: ArrayLike, *, directions: ArrayLike) -> Array:
-    """Least angle (..., k), rad, between the beam and directions while the counts stay within rectangles.
+    """Least angle (..., k), rad, between the beam and directions.
+
+    The counts stay within rectangles.
 
     station       one ranger, in the frame of the directions
     low, high     (..., 2), counts: corners of the rectangles, in order
@@ -52,7 +54,7 @@ def nearest(station: MirrorStation, low: ArrayLike, high: ArrayLike, *, directio
 
 
 def chords(directions: Array) -> float:
-    """Half the largest angle, rad, between neighbours of directions (k, 3) along a way: what lies between them."""
+    """Half the largest angle, rad, between neighbours of directions (k, 3)."""
     if len(directions) < 2:
         return 0.0
     apart = np.linalg.norm(np.diff(directions, axis=0), axis=-1)
@@ -60,5 +62,5 @@ def chords(directions: Array) -> float:
 
 
 def _holds(angle: float | Array, low: Array, high: Array) -> NDArray[np.bool_]:
-    """Whether angles, any turn, lie between low and high."""
+    """True if angles, any turn, lie between low and high."""
     return np.asarray(np.floor((high - angle) / TWO_PI) >= np.ceil((low - angle) / TWO_PI))

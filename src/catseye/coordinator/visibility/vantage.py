@@ -1,7 +1,7 @@
-"""Where rangers and retroreflectors stand, each in the frame that carries it, by the records of a site.
+"""Positions of rangers and retroreflectors in their frames, from a site's records.
 
-A ranger on the ground lives in the ground frame, one on the feed arm in the reflector frame: there it stands still, its
-counts for the dish do not change, and it is the Sun and the ground that turn.
+A ranger on the ground is in the ground frame, one on the feed arm in the reflector frame: there it is fixed, its counts
+for the dish do not change, and it is the Sun and the ground that turn.
 """
 
 from dataclasses import dataclass
@@ -26,15 +26,15 @@ from catseye.records.site.target import FrameName
 
 Array = NDArray[np.float64]
 Frame = Literal["ground", "reflector"]
-TYPED = 0.010  # m: u of a coordinate that nobody states, as in the reduction
+TYPED = 0.010  # m: u of a coordinate without a stated one, as in the reduction
 
 
 @dataclass(frozen=True, eq=False)
 class Vantage:
-    """A ranger's place.
+    """A ranger's position.
 
     name        of the ranger
-    frame       that carries it: ground, or reflector for the feed arm
+    frame       ground, or reflector for the feed arm
     station     its mirror, in that frame
     mirror      its record: stops, ZRG, tilts
     pace        speed and acceleration of its axes
@@ -53,41 +53,46 @@ class Vantage:
 
     @property
     def reference(self) -> tuple[float, float]:
-        """Counts that look at ZRG."""
+        """Counts that point at ZRG."""
         return float(self.mirror.azm_zrg), float(self.mirror.elv_zrg)
 
     def look(self, points: ArrayLike) -> Array:
-        """Counts (..., 2) that its ZY takes for points (..., 3), m, own frame: direct within the stops, else prime.
+        """Counts (..., 2) of its ZY for points (..., 3), m, own frame.
 
-        NaN where neither is within them.
+        Direct within the stops, else prime; NaN if neither is.
 
         Source: as `ranger.cubes.Cubes.look` without a current pointing.
         """
         direct = counts(self.station, points)
         low, high = self.stops
-        other = np.stack(prime_counts(direct[..., 0], direct[..., 1], self.station.zeros[1]), axis=-1)
+        prime = np.stack(prime_counts(direct[..., 0], direct[..., 1], self.station.zeros[1]), axis=-1)
         answer = np.full(direct.shape, np.nan)
-        for setting in (other, direct):
+        for setting in (prime, direct):
             azimuth = turned_within(setting[..., 0], low, high)
             allowed = within(azimuth, low, high)
             answer[allowed] = np.stack([azimuth, setting[..., 1]], axis=-1)[allowed]
         return answer
 
     def on_ground(self, frame: Transform) -> MirrorStation:
-        """Its mirror in the ground frame while the reflector stands so: `ground_from_reflector`."""
+        """Its mirror in the ground frame, given `ground_from_reflector`."""
         if self.frame == "ground":
             return self.station
-        own = self.station
-        turned = own.gamma @ frame.rotation.T
+        station = self.station
+        turned = station.gamma @ frame.rotation.T
         return MirrorStation.from_matrix(
-            frame.points(own.scan_point), turned, offset=own.offset, beta=own.beta, zeros=own.zeros
+            frame.points(station.scan_point), turned, offset=station.offset, beta=station.beta, zeros=station.zeros
         )
 
 
 @dataclass(frozen=True, eq=False)
 class SeenRetroreflector:
-    """A retroreflector: kind as in `reduction.steering.visibility.ACCEPTANCE`; point (3,) m and outward axis (3,), NaN
-    where unknown, in its frame; u m of each coordinate; what it is `part` of.
+    """A retroreflector, in its frame.
+
+    kind    as in `reduction.steering.visibility.ACCEPTANCE`
+    point   (3,) m
+    axis    (3,) outward, NaN if unknown
+    u       m, of each coordinate
+    part    what it belongs to
     """
 
     name: str
@@ -100,7 +105,10 @@ class SeenRetroreflector:
 
 
 def vantages_of(site: SiteFolder) -> dict[str, Vantage]:
-    """Every ranger of a site, by name, sorted; mounts without a record as `ranger.initialisation` has them."""
+    """Every ranger of a site, by name, sorted.
+
+    Mounts without a record as in `ranger.initialisation`.
+    """
     return {
         name: Vantage(name, frame_of(site, name), own_station(site, name), mirror, pace_by(mirror))
         for name in site.rangers
@@ -109,7 +117,7 @@ def vantages_of(site: SiteFolder) -> dict[str, Vantage]:
 
 
 def pace_by(mirror: Mirror) -> Pace:
-    """The axes' speeds by the record, else those with which a ZY boots."""
+    """Speeds of the axes by the record, else a ZY's defaults."""
     if all(getattr(mirror, key) for key in ("abv_0", "aba_0", "abv_1", "aba_1")):
         return pace_of(mirror)
     boot = AxisSettings()
@@ -122,7 +130,7 @@ def retros_of(site: SiteFolder) -> dict[str, SeenRetroreflector]:
 
     Source: [GOLDMAN00] figure 10 for triplets: ball = mid-point + h_corr normal, which points to the prisms' side.
     """
-    benches = {each.target for each in site.benchmarks}
+    benches = {benchmark.target for benchmark in site.benchmarks}
     retros: dict[str, SeenRetroreflector] = {}
     for target in site.targets.values():
         part: Literal["dish", "structure", "benchmark"] = "structure"
@@ -139,16 +147,16 @@ def retros_of(site: SiteFolder) -> dict[str, SeenRetroreflector]:
         ball, normal = np.array(triplet.nominal_position_mm) * MILLIMETRE, np.array(triplet.normal)
         middle = ball - triplet.h_corr_mm * MILLIMETRE * normal
         half = 0.5 * triplet.d12_mm * MILLIMETRE * np.array(triplet.axis)
-        left, right, own = triplet.left_prism.target, triplet.right_prism.target, triplet.ball.target
+        left_name, right_name, ball_name = triplet.left_prism.target, triplet.right_prism.target, triplet.ball.target
         u, frame = _u(triplet.u_position_mm), triplet.frame
-        retros[left] = SeenRetroreflector(left, "prism", frame, middle - half, normal, u, "triplet")
-        retros[right] = SeenRetroreflector(right, "prism", frame, middle + half, normal, u, "triplet")
-        retros[own] = SeenRetroreflector(own, "ball", frame, ball, -normal, u, "triplet")
+        retros[left_name] = SeenRetroreflector(left_name, "prism", frame, middle - half, normal, u, "triplet")
+        retros[right_name] = SeenRetroreflector(right_name, "prism", frame, middle + half, normal, u, "triplet")
+        retros[ball_name] = SeenRetroreflector(ball_name, "ball", frame, ball, -normal, u, "triplet")
     return retros
 
 
 def reflector_at(site: SiteFolder, posture: LivePosture, seconds: float = 0.0) -> Transform:
-    """Ground from reflector, nominal, some s after a posture, its rates held."""
+    """Nominal ground from reflector some s after a posture, rates constant."""
     reflector = site.site.frames.reflector
     return ground_from_reflector(
         posture.azimuth + posture.azimuth_rate * seconds,

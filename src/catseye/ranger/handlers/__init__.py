@@ -1,1 +1,1 @@
-"""What each ZY command does: functions of a ranger's state and the values of its request."""
+"""Handlers of ZY commands, functions of state and request values."""

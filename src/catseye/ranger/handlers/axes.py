@@ -1,4 +1,4 @@
-"""Commands of the axes: moves, filters, homing, waiting. See `ranger.handlers` for how a handler answers."""
+"""Commands of the axes: moves, filters, homing, waiting. See `ranger.handlers.table`."""
 
 from collections.abc import Callable, Generator
 
@@ -44,12 +44,12 @@ def _stt(z: RangerState, _: int, axis: int) -> Values:
 
 
 def start_moves(z: RangerState, targets: dict[int, int]) -> None:
-    """Begin moves of one or both axes, unless amplifiers are off, a stop or the Sun forbids it."""
+    """Start moves, unless amplifiers are off, a stop or the Sun forbids."""
     end = [targets.get(axis, z.head.desired(axis)) for axis in (0, 1)]
     for axis in targets:
         if not z.head.enabled(axis):
             raise InputError(f"amplifier of axis {axis} is off (expected AXIS {axis}, 1 first)")
-    if z.homed:  # before, counts are no directions
+    if z.homed:  # before homing counts are no directions
         if 0 in targets and not z.limits[0] <= end[0] <= z.limits[1]:
             raise InputError(f"azimuth {end[0]} counts is outside the stops {z.limits[0]:g} to {z.limits[1]:g}")
         z.refuse_sun(end)
@@ -75,13 +75,18 @@ def refuse_motors_off(z: RangerState, axes: tuple[int, ...]) -> None:
 
 
 def wait_until(
-    z: RangerState, done: Callable[[], bool], seconds: float, *, what: str, earliest: float | None = None
+    z: RangerState, condition: Callable[[], bool], seconds: float, *, what: str, earliest: float | None = None
 ) -> Generator[int | None, None, None]:
-    """Give the turn back until it is done, `earliest` in so many s; InputError after `seconds`."""
+    """Yield until a condition holds.
+
+    earliest   s, before which it need not be polled
+
+    Raises InputError after `seconds`.
+    """
     begin = z.now_ns()
     end = begin + round(seconds * PER_SECOND)
     ask = None if earliest is None else begin + round(earliest * PER_SECOND)
-    while not done():
+    while not condition():
         if z.now_ns() > end:
             raise InputError(f"{what} after {seconds:g} s")
         yield ask
@@ -136,11 +141,9 @@ def _fhm(z: RangerState, _: int, axis: int) -> Work:
         try:
             z.refuse_sun(turn)
         except InputError as problem:
-            raise InputError(
-                f"the search turns the whole way round: {problem}; or search with the laser off: PS 0"
-            ) from None
+            raise InputError(f"the search makes a full turn: {problem}; or search with the laser off: PS 0") from None
     z.aimed = None
-    if not z.laser_at_boot:  # not homed is dark
+    if not z.laser_at_boot:  # dark until homed
         z.switch_laser(False)
     z.head.find_home(axis)
     text = f"the index of axis {axis} is not found"
@@ -157,11 +160,11 @@ def _cwt(z: RangerState, _: int, key: Value) -> Work:
 
 
 def settle(z: RangerState, counts: tuple[float, float]) -> Generator[int | None, None, None]:
-    """WCNT reads in a row within WTOL of both axes, before WTMO."""
-    wanted, row = [round(n) for n in counts], 0
+    """Wait for WCNT reads in a row within WTOL of both axes, before WTMO."""
+    desired, row = [round(n) for n in counts], 0
     end = z.now_ns() + round(z.timeout * PER_SECOND)
     while True:
-        off = max(abs(z.head.actual(axis) - wanted[axis]) for axis in (0, 1))
+        off = max(abs(z.head.actual(axis) - desired[axis]) for axis in (0, 1))
         row = row + 1 if off <= z.tolerance else 0
         if row >= z.reads:
             return

@@ -1,4 +1,4 @@
-"""Commands of cubes and the ranger's geometry: tables, encoder values, illuminating, tracking."""
+"""Commands of cubes and geometry: tables, encoder values, pointing, tracking."""
 
 from collections.abc import Generator
 from dataclasses import replace
@@ -56,7 +56,7 @@ def _coo(z: RangerState, _: int, *values: Value) -> Values | Work:
 
 
 def _page(z: RangerState, first: int, count: int) -> Work:
-    """So many cubes from a number on; where there are more, the last line says from where."""
+    """A page of cubes; a last line "more" has the next number."""
     numbers = sorted(number for number in z.cubes.by_number if number >= first)
     for number in numbers[:count]:
         if number in z.cubes.by_number:
@@ -121,9 +121,12 @@ def refuse_unready(z: RangerState) -> None:
         raise InputError("not initialised (expected BP, ALPHA, BETA, MO, EZ and D0, or INITZY, first)")
 
 
-def _trk(z: RangerState, _: int, key: Value, t0: int, *rest: float) -> Work:
-    """[PARKER04] eq. 2.45, 2.46: encoder counts linear between t0 and t1. A move that is under way ends first."""
-    cube, start, t1, end = z.cubes.find(key), rest[:3], int(rest[3]), rest[4:]
+def _trk(z: RangerState, _: int, key: Value, t0: int, *values: float) -> Work:
+    """Track a cube: encoder counts linear between t0 and t1.
+
+    A move under way ends first. Source: [PARKER04] eq. 2.45, 2.46.
+    """
+    cube, start, t1, end = z.cubes.find(key), values[:3], int(values[3]), values[4:]
     refuse_unready(z)
     if not (t0 < t1 and t1 > z.now_ticks()):
         raise InputError(f"t0 {stamp(t0)}, t1 {stamp(t1)} (expected t0 before t1, and t1 to come)")

@@ -21,7 +21,7 @@ from catseye.ranger.values import Value
 from catseye.signal.cycles.whole import fraction
 from catseye.signal.detection.phase import detect, phasors
 
-SLACK = 2.0  # s that a buffer may come late
+SLACK = 2.0  # s that a buffer may be late
 CONVERTER_END = 32_767  # code
 
 
@@ -38,7 +38,7 @@ def _shoot(z: RangerState) -> Generator[int | None, None, None]:
     owner, times_off = z.aimed, z.times_off
     _fire(z)
     z.measured = None
-    buffer = yield from _taken(z)
+    buffer = yield from _complete_buffer(z)
     _refuse_dark(z, times_off)
     z.measured = MeasuredBuffer(buffer, owner)
 
@@ -52,26 +52,29 @@ def _fire(z: RangerState) -> None:
 
 
 def _refuse_dark(z: RangerState, times_off: int) -> None:
-    """Raises InputError where the laser has been off since so many times; light that is on again is no help."""
+    """Raise InputError if the laser was off since a count of switch-offs.
+
+    Light that is on again does not help.
+    """
     if z.times_off != times_off or not z.head.laser_on():
         raise InputError("the laser went off meanwhile (expected PS 1 first)")
 
 
-def _taken(z: RangerState) -> Generator[int | None, None, Buffer]:
-    """The buffer that was fired for, when it is whole."""
-    seconds, buffer_now = z.sampling.duration, z.head.buffer
+def _complete_buffer(z: RangerState) -> Generator[int | None, None, Buffer]:
+    """The triggered buffer, when it is complete."""
+    seconds, read_buffer = z.sampling.duration, z.head.buffer
 
     yield from wait_until(
-        z, lambda: buffer_now() is not None, seconds + SLACK, what="no buffer has come", earliest=seconds
+        z, lambda: read_buffer() is not None, seconds + SLACK, what="no buffer received", earliest=seconds
     )
-    buffer = buffer_now()
+    buffer = read_buffer()
     if buffer is None:
-        raise InputError("no buffer has come")
+        raise InputError("no buffer received")
     return buffer
 
 
 def _computed(z: RangerState) -> MeasuredBuffer:
-    """Amplitude and phase of the buffer. Source: [PARKER04] eq. 5.5, 5.6."""
+    """Buffer with amplitude and phase. Source: [PARKER04] eq. 5.5, 5.6."""
     measured = z.measured
     if measured is None:
         raise InputError("there is no buffer (expected TRG first)")
@@ -98,36 +101,38 @@ def _mpc(z: RangerState, _: int) -> Values:
     return ()
 
 
-def _known(z: RangerState) -> MeasuredBuffer:
+def _evaluated(z: RangerState) -> MeasuredBuffer:
     if z.measured is None or z.measured.phase is None:
-        raise InputError("nothing is computed (expected TRG, then MPC, first)")
+        raise InputError("no phase computed (expected TRG, then MPC, first)")
     return z.measured
 
 
 def _rad(z: RangerState, _: int) -> Values:
-    return (f"{_known(z).phase:.7f}",)
+    return (f"{_evaluated(z).phase:.7f}",)
 
 
 def _mag(z: RangerState, _: int) -> Values:
-    return (f"{_known(z).amplitude:.6g}",)
+    return (f"{_evaluated(z).amplitude:.6g}",)
 
 
 def _seq(z: RangerState, _: int, first: int = 1, count: int = LONGEST_PAGE) -> Work:
-    """Cycles from a number on; where there are more, the last line says from where."""
+    """A page of cycles; a last line "more" has the next number."""
     measured = _computed(z)
     n = measured.buffer.sampling.samples
     cycles = measured.buffer.samples.reshape(-1, n)
     if first > len(cycles):
         raise InputError(f"cycle {first} is not in a buffer of {len(cycles)} (expected 1 to {len(cycles)})")
     page = cycles[first - 1 : first - 1 + count]
-    each = detect(page, n, measured.buffer.volts_per_code, harmonics=())
-    for k, (amplitude, phase) in enumerate(zip(each.amplitude.tolist(), each.phase.tolist(), strict=True), first):
+    detected = detect(page, n, measured.buffer.volts_per_code, harmonics=())
+    for k, (amplitude, phase) in enumerate(
+        zip(detected.amplitude.tolist(), detected.phase.tolist(), strict=True), first
+    ):
         yield str(k), f"{amplitude:.6g}", f"{phase:.7f}"
     return ("more", str(first + count)) if first - 1 + count < len(cycles) else None
 
 
 def _keep(z: RangerState, cube: Cube, measured: MeasuredBuffer) -> RangerShot:
-    """The shot of a cube, with its distance where a reference phase is known."""
+    """Store a cube's shot, with its distance if a reference phase exists."""
     amplitude, phase = measured.amplitude or 0.0, measured.phase or 0.0
     if cube.number == 0:
         z.reference_phase = phase
@@ -158,18 +163,18 @@ def measure(z: RangerState, how: int, key: Value) -> Generator[int | None, None,
     if how == 1:
         yield from illuminate(z, cube, z.cubes.counts(cube))
     else:
-        _refuse_other(z, cube)
+        _refuse_other_cube(z, cube)
     yield from _shoot(z)
     return _measured(z, how, cube.number)
 
 
-def _refuse_other(z: RangerState, cube: Cube) -> None:
+def _refuse_other_cube(z: RangerState, cube: Cube) -> None:
     if z.aimed not in (None, cube.number):
         raise InputError(f"the beam is on cube {z.aimed}, not on {cube.number} (expected CIL {cube.number}, or f = 1)")
 
 
 def _measured(z: RangerState, how: int, number: int) -> Values:
-    """The buffer computed as a cube's: what CMEAS says of it."""
+    """The buffer evaluated as a cube's: the values of CMEAS."""
     cube = z.cubes.find(number)
     if z.measured is not None:
         z.measured = replace(z.measured, cube=number)
@@ -196,7 +201,7 @@ def _last(pick: Callable[[Cube, RangerShot], str]) -> Handler:
 
 def _dst(cube: Cube, shot: RangerShot) -> str:
     if shot.distance is None:
-        raise InputError("no reference phase is known (expected CMEAS 1, 0 first: ZRG)")
+        raise InputError("no reference phase (expected CMEAS 1, 0 first: ZRG)")
     return _distance_text(cube, shot.distance)
 
 
@@ -216,7 +221,7 @@ def _stm(z: RangerState, client: int, key: Value, count: int) -> Values:
         z.end_stream()
     else:
         refuse_unready(z)
-        _refuse_other(z, cube)
+        _refuse_other_cube(z, cube)
         if z.stream is not None:
             raise InputError(f"a stream is under way (expected STM {z.stream.cube}, 0 first)")
         z.stream = Stream(client, z.tid, cube.number, count)
@@ -224,25 +229,28 @@ def _stm(z: RangerState, client: int, key: Value, count: int) -> Values:
 
 
 def stream_shots(z: RangerState, stream: Stream) -> Generator[Outgoing | int | None, None, None]:
-    """Measure one cube again and again; the next buffer is fired before the last is computed and told."""
+    """Measure one cube repeatedly, without gaps.
+
+    The next buffer is triggered before the last is evaluated and sent.
+    """
 
     times_off = z.times_off
 
     def fire() -> str | None:
         try:
-            _refuse_other(z, z.cubes.find(stream.cube))
+            _refuse_other_cube(z, z.cubes.find(stream.cube))
             _fire(z)
         except CatseyeError as problem:
             return str(problem)
         return None
 
     problem = fire()
-    for left in range(stream.count - 1, -1, -1):
+    for remaining in range(stream.count - 1, -1, -1):
         if problem is None:
             try:
-                buffer = yield from _taken(z)
+                buffer = yield from _complete_buffer(z)
                 _refuse_dark(z, times_off)
-                problem = fire() if left else None
+                problem = fire() if remaining else None
                 z.measured = MeasuredBuffer(buffer, stream.cube)
                 yield Outgoing(Reply("CMEAS", True, _measured(z, 2, stream.cube), stream.tid))
                 yield Outgoing(Reply("BUF", True, _buf(z, stream.client), stream.tid), stream.client)
@@ -283,17 +291,17 @@ def _scn(z: RangerState, _: int, on: int | None = None, start: int = 0, rounds: 
 
 
 def scan_rounds(z: RangerState) -> Generator[Reply | int | None, None, None]:
-    """Measure the cubes of the list one after another, round after round, from the scan's start on."""
+    """Measure the listed cubes in rounds, from the scan's start on."""
     while z.now_ns() < z.scan_start * TICK_NS:
         yield z.scan_start * TICK_NS
-    done = 0
-    while z.scan_rounds == 0 or done < z.scan_rounds:
+    rounds = 0
+    while z.scan_rounds == 0 or rounds < z.scan_rounds:
         for number in tuple(z.order):
             try:
                 yield Reply("CMEAS", True, (yield from measure(z, 1, number)))
             except CatseyeError as problem:
                 yield Reply("CMEAS", False, (f"cube {number}: {problem}",))
-        done += 1
+        rounds += 1
 
 
 SHOTS: dict[str, Handler] = {

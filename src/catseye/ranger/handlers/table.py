@@ -1,7 +1,7 @@
-"""What each ZY command does: functions of a ranger and the values that the table of commands has checked.
+"""Table of handlers, by ZY command.
 
-A handler gives the values of its reply, or is a generator: `None` or a time gives the turn back, values are one more
-reply, what it returns is the last (None: there is none). Refusals are raised, with the state as it was.
+A handler returns the values of its reply, or is a generator: `None` or a time yields control, values are one more
+reply, its return value is the last (None: there is none). Refusals are raised, with the state unchanged.
 """
 
 import hmac
@@ -46,7 +46,7 @@ def _ps(z: RangerState, _: int, on: int | None = None) -> Values:
     if on and z.in_sun:
         raise InputError("the beam looks into the Sun (expected a move away first)")
     if on and not z.homed and not z.laser_at_boot:
-        raise InputError("not homed: nobody knows where the beam goes (expected FHM 0 and FHM 1 first)")
+        raise InputError("not homed: the beam's direction is unknown (expected FHM 0 and FHM 1 first)")
     if on is not None:
         z.switch_laser(bool(on))
     return str(int(z.head.laser_on())), *(f"{k} {v:.2f}" for k, v in sorted(z.head.supplies().items()))
@@ -55,7 +55,7 @@ def _ps(z: RangerState, _: int, on: int | None = None) -> Values:
 def _entemp(z: RangerState, _: int) -> Values:
     temperature = z.head.enclosure_temperature_c()
     if not np.isfinite(temperature):
-        raise InputError("the enclosure's temperature is not known")
+        raise InputError("the enclosure's temperature is unknown")
     return (f"{temperature:.2f}",)
 
 
@@ -65,9 +65,9 @@ def _rst(z: RangerState, _: int) -> Values:
 
 
 def _lst(z: RangerState, client: int) -> Values:
-    own = [e for e in z.scheduler.entries if e.client == client]
-    return str(len(own)), *(
-        f"{stamp(nanoseconds_to_ticks(e.due_ns))} {e.repeats} {e.request.command}" for e in own[:24]
+    entries = [e for e in z.scheduler.entries if e.client == client]
+    return str(len(entries)), *(
+        f"{stamp(nanoseconds_to_ticks(e.due_ns))} {e.repeats} {e.request.command}" for e in entries[:24]
     )
 
 
@@ -86,28 +86,28 @@ def _lease(z: RangerState, client: int, name: str | None = None, token: str | No
 
 
 def _renewed(z: RangerState, client: int, name: str, token: str) -> Values:
-    """The lease of who shows its token; it goes along to another connection of the same program."""
+    """Renew the lease by its token, perhaps from another connection."""
     lease = z.lease
     if lease is None or not hmac.compare_digest(token.encode(), lease.token.encode()):
-        raise InputError("that is not the token of the lease (expected LEASE and a name to take it)")
+        raise InputError("invalid token of the lease (expected LEASE and a name to take it)")
     if (lease.client, lease.name) != (client, name):
         z.lease = Lease(client, name, token, z.peer(client))
     return holder_of(z)
 
 
 def holder_of(z: RangerState) -> Values:
-    """Name, connection (1 or 2) and address of who has the lease; `none` where nobody has."""
+    """Name, connection (1 or 2) and address of the lease's holder, or `none`."""
     return ("none",) if z.lease is None else (z.lease.name, str(z.lease.client + 1), z.lease.peer)
 
 
 def latch_of(z: RangerState) -> Values:
-    """The dark order that holds: what is off, and who ordered it; `none` where there is none."""
+    """Latched stop order: extent and sender; `none` without one."""
     return ("none",) if z.latch is None else (z.latch.extent, _commas(z.latch.order))
 
 
 def _unlatch(z: RangerState, client: int, name: str) -> Values:
     if z.guarded and z.lease is not None and z.lease.client == client:
-        raise InputError("who has the lease cannot clear it (expected another connection, or LEASE none first)")
+        raise InputError("the holder of the lease cannot clear it (expected another connection, or LEASE none first)")
     z.set_latch(None)
     z.cleared_by = f"{name} at {z.peer(client)}"
     return latch_of(z)
@@ -121,25 +121,25 @@ def _hlp(z: RangerState, _: int, name: str | None = None) -> Values | Work:
     if name is None:
         return (" ".join(["AT", *sorted(COMMANDS)]),)
     if name.upper() not in COMMANDS:
-        raise InputError(f"{name} is no command (expected one that HLP lists)")
+        raise InputError(f"unknown command {name} (expected one listed by HLP)")
     row = COMMANDS[name.upper()]
     return (_commas(row.help), _commas(row.usage))
 
 
 def _commas(text: str) -> str:
-    """A reply's value holds no comma."""
+    """Text without commas, as values of a reply need."""
     return text.replace(",", ";")
 
 
 def _initzy(z: RangerState, client: int) -> Work:
-    """CUBES.INI, ZYnnn.INI, the head's own; the first command that fails ends it."""
+    """Run CUBES.INI, ZYnnn.INI and the head's file until a command fails."""
     if z.files is None:
         raise InputError("this ranger has no initialisation files (expected their folder at its start)")
-    commands = [(name, *each) for name in file_names(z) for each in _commands(z.files / name)]
+    commands = [(name, *numbered) for name in file_names(z) for numbered in _commands(z.files / name)]
     for name, line, request in commands:
         where = f"{name} line {line}"
         if request.command not in COMMANDS or request.command in NOT_OF_A_FILE:
-            raise InputError(f"{where}: {request.command} is no command of an initialisation file")
+            raise InputError(f"{where}: {request.command} is not allowed in an initialisation file")
         try:
             answer = z.work_of(client, request)
             if isinstance(answer, tuple):
@@ -154,7 +154,7 @@ def _initzy(z: RangerState, client: int) -> Work:
 
 
 def _replies(command: str, work: Work) -> Work:
-    """The replies of another command, each with its name."""
+    """Replies of another command, each with its name."""
     while True:
         try:
             values = next(work)
@@ -164,7 +164,7 @@ def _replies(command: str, work: Work) -> Work:
 
 
 def file_names(z: RangerState) -> tuple[str, str, str]:
-    """Initialisation files of a ranger in their order: all rangers' cubes, the monument's, the head's."""
+    """Initialisation files in their order: cubes, monument, head."""
     return "CUBES.INI", f"{z.name.upper()}.INI", f"{z.mirror.lower()}.INI"
 
 
@@ -176,18 +176,18 @@ def _commands(path: Path) -> list[tuple[int, Request]]:
 
 
 def replace_file(folder: Path, name: str, text: str) -> None:
-    """A new initialisation file; the old one is kept as NAME.BAK. Refused whole where a line cannot be read.
+    """Replace an initialisation file, if valid; the old one becomes NAME.BAK.
 
     folder   of the ranger's files
     name     one of `file_names`
     text     commands, ASCII, with comments after ;
 
-    Raises InputError: a line that is no command of the table with fitting parameters, or the file cannot be written.
+    Raises InputError: an invalid command, or the file cannot be written.
     """
     for line, request in commands_of_file(text, name):
         try:
             if request.command not in COMMANDS:
-                raise InputError(f"{request.command} is no command")
+                raise InputError(f"unknown command {request.command}")
             COMMANDS[request.command].read(request)
         except InputError as problem:
             raise InputError(f"{name} line {line}: {problem}") from problem
@@ -199,7 +199,7 @@ def replace_file(folder: Path, name: str, text: str) -> None:
         new.replace(path)
     except (OSError, UnicodeEncodeError) as problem:
         new.unlink(missing_ok=True)
-        raise InputError(f"{name} cannot be written (expected ASCII and room in its folder)") from problem
+        raise InputError(f"{name} cannot be written (expected ASCII and space in its folder)") from problem
 
 
 HANDLERS: dict[str, Handler] = {
@@ -218,9 +218,9 @@ HANDLERS: dict[str, Handler] = {
     "LEASE": _lease,
     "LATCH": lambda z, _: latch_of(z),
     "UNLATCH": _unlatch,
-    "STOP": lambda z, _: (),  # the ranger itself stops everything, before it asks for this
+    "STOP": lambda z, _: (),  # the ranger itself has stopped everything before
     "HLP": _hlp,
     "HELP": _hlp,
     "INITZY": _initzy,
-    "BYE": lambda z, _: ("Closing Connection",),  # the server puts the port before it
+    "BYE": lambda z, _: ("Closing Connection",),  # the server prepends the port
 }

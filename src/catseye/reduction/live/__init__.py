@@ -1,1 +1,1 @@
-"""The same recipe as shots come: states carried from epoch to epoch."""
+"""The night's recipe, applied shot by shot with a filter state."""

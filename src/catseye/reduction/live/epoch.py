@@ -1,7 +1,7 @@
-"""One epoch of a living site: its shots, what was carried to it, one adjustment, and what is carried on.
+"""Solve one epoch of a live site from shots and state.
 
-The recipe is that of a campaign (`coordinates.settle_network`), with two differences: each shot finds its ends where
-the telescope had carried them, and what earlier epochs know takes the place of the records' priors.
+The recipe is a campaign's (`coordinates.settle_network`), with two differences: each shot's ends are where the
+telescope was at that shot, and the state of earlier epochs replaces the records' priors.
 """
 
 import dataclasses
@@ -30,8 +30,8 @@ from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.settling import SettledNetwork, allowed, refuted_priors, settle_network
 from catseye.reduction.epoch.unknowns import CampaignNetwork, build_network
 from catseye.reduction.live.shots import PhasedShot
-from catseye.reduction.live.state import Carried, from_ground, to_ground, with_unseen
-from catseye.reduction.live.thermometers import SuspectedBias, biases_of, considering, pull_of
+from catseye.reduction.live.state import Carried, from_ground, to_ground, update_correlated
+from catseye.reduction.live.thermometers import SuspectedBias, biases_of, prior_pulls, with_suspected_biases
 from catseye.reduction.site.motion import CarriedMotion, ground_from
 
 SHARED_BY_AN_EPOCH = (
@@ -41,25 +41,25 @@ SHARED_BY_AN_EPOCH = (
     ParameterKind.AIR,
     ParameterKind.RADIATION,
 )
-SETTLED = 2e-6  # m: an epoch is one of many; a micrometre more is a thousandth of what a round claims
+SETTLED = 2e-6  # m: an epoch is one of many; a micrometre more is a thousandth of a round's u
 
 
 @dataclass(frozen=True, eq=False)
 class Epoch:
-    """What an epoch's adjustment gave.
+    """Result of an epoch's adjustment.
 
     rows          its shots, repeats joined
     coordinates   in the ground frame, at the epoch
-    carried       all that lasts
-    reasons       row of the shots: why it was left out
-    biases        station: how its thermometer may be biased
-    opened        stations whose thermometers' priors were left out
-    pulls         parameter of the air: what is doubted of its prior over the prior's variance
+    state         parameters that persist
+    reasons       row of the shots: why it was rejected
+    biases        station: suspected bias of its thermometer
+    opened        stations whose thermometers' priors were dropped
+    pulls         parameter of the air: possible error of its prior over the prior's variance
     """
 
     rows: tuple[PhasedShot, ...]
     coordinates: AdjustedCoordinates
-    carried: Carried
+    state: Carried
     reasons: dict[int, Reason]
     biases: dict[str, SuspectedBias] = field(default_factory=dict)
     opened: frozenset[str] = frozenset()
@@ -75,31 +75,31 @@ def observed_site(
     elevation: float,
     mjd: float,
 ) -> ObservedSite:
-    """The shots and the weather of an epoch, at a site whose telescope stands as it stood then.
+    """Shots and weather of an epoch, with the telescope's position.
 
     rows      shots, in any order; times are those of the buffers' middles
-    weather   readings of the stations that speak; the others are left out of the site
+    weather   readings of the stations in use; the others are removed from the site
     azimuth, elevation, mjd   rad, of the epoch
 
-    Raises InputError: no weather at all.
+    Raises InputError if there is no weather at all.
     """
     stations = tuple(s for s in site.site.weather_station if any(w.station == s.name for w in weather))
     if not stations:
-        raise InputError("no weather station has spoken (expected at least one reading before an epoch is solved)")
+        raise InputError("no weather reading received (expected at least one before an epoch is solved)")
     posture = site.site.campaign.model_copy(
         update={"azimuth_deg": azimuth / DEGREE % 360.0, "elevation_deg": elevation / DEGREE, "start_mjd_utc": mjd}
     )
-    said = [w for w in weather if any(w.station == s.name for s in stations)]
+    readings = [w for w in weather if any(w.station == s.name for s in stations)]
     fields = {field.name: getattr(site, field.name) for field in dataclasses.fields(SiteFolder)}
     fields["site"] = site.site.model_copy(update={"campaign": posture, "weather_station": stations})
     return ObservedSite(
         **fields,
         weather=Weather(
-            np.array([w.ticks / TICKS_PER_DAY for w in said]),
-            tuple(w.station for w in said),
-            np.array([w.temperature_c for w in said]),
-            np.array([w.pressure_hpa for w in said]),
-            np.array([w.humidity_percent for w in said]),
+            np.array([w.ticks / TICKS_PER_DAY for w in readings]),
+            tuple(w.station for w in readings),
+            np.array([w.temperature_c for w in readings]),
+            np.array([w.pressure_hpa for w in readings]),
+            np.array([w.humidity_percent for w in readings]),
         ),
         shots=ShotColumns(
             np.array([r.shot.number for r in rows], dtype=np.int64),
@@ -119,33 +119,33 @@ def solve_epoch(
     motion: CarriedMotion,
     *,
     settings: ReductionSettings,
-    carried: Carried | None,
-    lasting: Sequence[str],
+    state: Carried | None,
+    tracked: Sequence[str],
     ticks: int,
     opened: Collection[str] = (),
 ) -> Epoch:
-    """Everything that the shots of an epoch and what was carried to it say.
+    """Solve an epoch from its shots and the predicted state.
 
     observed   the shots and the weather, see `observed_site`
     rows       the same shots with their phases
     motion     of the telescope, its epoch that of `ticks`
     settings   of the reduction
-    carried    prior at this very instant, None for the first epoch
-    lasting    rangers and targets that stay in the state
+    state      prior at this instant, None for the first epoch
+    tracked    rangers and targets that stay in the state
     ticks      the epoch
-    opened     stations whose thermometers' records pull the carried state no more
+    opened     stations whose thermometer priors no longer affect the state
 
-    Raises InputError where no shot can be used and EstimationError where the adjustment finds no answer.
+    Raises InputError if no shot can be used and EstimationError if the adjustment does not converge.
     """
     phases = Phases.of([row.phase for row in rows])
     reasons = {k: reason for k, reason in enumerate(phases.reason) if reason}
     electronics, wrong = follow_electronics(observed, phases, settings.dense_shots)
     reasons |= wrong
     resolved = Resolved({}, {}, ())
-    if carried is None:
+    if state is None:
         resolved = resolve_cycles(build_network(observed, phases, electronics, settings=settings, motion=motion))
         electronics = without_shots(electronics, set(resolved.rejected))
-    known = () if carried is None else carried.points()
+    state_points = () if state is None else state.points()
 
     def network_with(allowance: Allowance) -> CampaignNetwork:
         built = build_network(
@@ -154,27 +154,31 @@ def solve_epoch(
             electronics,
             settings=settings,
             motion=motion,
-            also=lasting,
-            known=known,
+            also=tracked,
+            known=state_points,
             allowance=allowance,
         )
-        return built if carried is None else _with_carried(built, carried, frames_at(built, motion))
+        return built if state is None else _with_state(built, state, frames_at(built, motion))
 
     network = network_with(Allowance())
     if not network.rangers:
-        raise InputError("no shot of this epoch can be used (expected a phase, a reference and a place for one)")
-    settled = _judged(network, network_with, resolved.starts, predicted=carried is not None)
+        raise InputError("no usable shot in this epoch (expected a phase, a reference and a position for at least one)")
+    settled = _judged(network, network_with, resolved.starts, predicted=state is not None)
     refuted = frozenset(p.of for p in refuted_priors(settled) if p.kind is ParameterKind.THERMOMETER)
     biases = biases_of(settled.network.field, settled.solution, settled.network.layout.air)
-    settled = _claiming(settled, biases, opened=opened, refuted=refuted)
+    settled = _with_suspicions(settled, biases, opened=opened, refuted=refuted)
     network, frames = settled.network, frames_at(settled.network, motion)
     solution, coordinates = settled.solution, coordinates_of(settled, resolved=resolved)
     reasons |= resolved.rejected
     layout = network.layout
     lasts = np.array(
-        [i for i, free in enumerate(layout.free) if free and _lasts(layout.parameters[i], lasting, observed.triplets)]
+        [
+            i
+            for i, free in enumerate(layout.free)
+            if free and _persists(layout.parameters[i], tracked, observed.triplets)
+        ]
     )
-    seen = from_ground(
+    estimate = from_ground(
         tuple(layout.parameters[i] for i in lasts),
         solution.x[lasts],
         solution.q.within(lasts),
@@ -185,11 +189,11 @@ def solve_epoch(
     return Epoch(
         tuple(rows),
         coordinates,
-        seen if carried is None else with_unseen(carried, seen),
+        estimate if state is None else update_correlated(state, estimate),
         reasons,
         biases,
         refuted,
-        pull_of(network.allowance, network.field),
+        prior_pulls(network.allowance, network.field),
     )
 
 
@@ -200,88 +204,88 @@ def _judged(
     *,
     predicted: bool,
 ) -> SettledNetwork:
-    """The adjustment, its explanations judged; once more where something has to be allowed for.
+    """Adjust, check the explanations, repeat once if allowances are needed.
 
-    Once: what a second adjustment would ask for, the next epoch asks for again. Doubts of the stations are told and
-    claimed (`_claiming`), and not taken in: an epoch hardly knows a gradient, and what was carried on knows their
-    offsets from hours.
+    Once only: the next epoch asks again for what a second adjustment would need. Suspected stations are reported and
+    covered by the claims (`_with_suspicions`), but not estimated: an epoch hardly determines a gradient, and the state
+    knows the stations' offsets from hours.
     """
     settled = settle_network(network, starts, keep=SETTLED, predicted=predicted)
-    told = allowed(settled)
-    asked = replace(told, thermometers={}, profile=0.0)
-    if not asked.same(settled.network.allowance):
-        network = network_with(asked).with_strength(settled.network.strength)
+    allowance = allowed(settled)
+    requested = replace(allowance, thermometers={}, profile=0.0)
+    if not requested.same(settled.network.allowance):
+        network = network_with(requested).with_strength(settled.network.strength)
         settled = settle_network(network, starts, keep=SETTLED, predicted=predicted)
-    return settled._replace(network=replace(settled.network, allowance=replace(asked, profile=told.profile)))
+    return settled._replace(network=replace(settled.network, allowance=replace(requested, profile=allowance.profile)))
 
 
-def _claiming(
+def _with_suspicions(
     settled: SettledNetwork, biases: Mapping[str, SuspectedBias], *, opened: Collection[str], refuted: Collection[str]
 ) -> SettledNetwork:
-    """An adjustment whose claims take in what is suspected of the thermometers; the refuted are told already."""
+    """The adjustment with claims covering suspected but not refuted thermometers."""
     network = settled.network
-    allowance = considering(network.allowance, biases, network.field, opened=opened, refuted=refuted)
+    allowance = with_suspected_biases(network.allowance, biases, network.field, opened=opened, refuted=refuted)
     return settled._replace(network=replace(network, allowance=allowance))
 
 
 def frames_at(network: CampaignNetwork, motion: CarriedMotion) -> dict[str, Transform]:
-    """Ground from the frame of each moving point of a network, at the epoch."""
+    """Ground from the frame of each moving network point."""
     return {n: t for n, t in frames_of_points(motion, list(network.places)).items() if n in network.layout.points}
 
 
 def frames_of_points(motion: CarriedMotion, names: Sequence[str]) -> dict[str, Transform]:
-    """Ground from the frame of each of some points that move, at the motion's epoch."""
+    """Ground from the frame of each moving point."""
     azimuth, elevation = motion.track.at(motion.epoch)
     kinds = {f: ground_from(motion.site, f, azimuth, elevation).single for f in ("alidade", "reflector")}
     return {name: kinds[motion.frames[name]] for name in names if motion.frames.get(name) in kinds}
 
 
-def _lasts(parameter: Parameter, lasting: Sequence[str], triplets: Mapping[str, TripletRecord]) -> bool:
-    """Whether a parameter is one of something that stays: the air, a ranger's, a lasting point's.
+def _persists(parameter: Parameter, tracked: Sequence[str], triplets: Mapping[str, TripletRecord]) -> bool:
+    """True for parameters of the air, a ranger, a tracked point.
 
-    Errors that an epoch's shots share do not, nor by how much a body's table is off: its points that last say it.
+    Errors shared by an epoch's shots do not persist, nor does a body's table offset: its tracked points hold it.
     """
     kind, of, part = parameter
     if kind in SHARED_BY_AN_EPOCH:
         return False
     if kind in (ParameterKind.POINT, ParameterKind.GLASS):
-        return of in lasting
+        return of in tracked
     if kind is ParameterKind.PATH:
-        return of in lasting and part in lasting
+        return of in tracked and part in tracked
     if kind is ParameterKind.NORMAL:
-        return any(n in lasting for n in (triplets[of].targets if of in triplets else [of]))
+        return any(n in tracked for n in (triplets[of].targets if of in triplets else [of]))
     return True
 
 
-def _with_carried(network: CampaignNetwork, carried: Carried, frames: Mapping[str, Transform]) -> CampaignNetwork:
-    """The network that begins at the carried state and has it instead of the priors that it took in already."""
-    x, covariance = to_ground(carried, frames)
+def _with_state(network: CampaignNetwork, state: Carried, frames: Mapping[str, Transform]) -> CampaignNetwork:
+    """The network with the state in place of its priors."""
+    x, covariance = to_ground(state, frames)
     at = {parameter: i for i, parameter in enumerate(network.layout.parameters)}
-    shared = [i for i, parameter in enumerate(carried.parameters) if parameter in at]
-    columns = np.array([at[carried.parameters[i]] for i in shared])
-    prior = Linear("carried on", x[shared], covariance[np.ix_(shared, shared)], columns, np.eye(len(shared)))
-    known = set(columns.tolist()) | {i for i, free in enumerate(network.layout.free) if not free}
-    left = [g for g in (_without_known(group, known) for group in network.priors) if g is not None]
+    shared = [i for i, parameter in enumerate(state.parameters) if parameter in at]
+    columns = np.array([at[state.parameters[i]] for i in shared])
+    prior = Linear("predicted state", x[shared], covariance[np.ix_(shared, shared)], columns, np.eye(len(shared)))
+    present = set(columns.tolist()) | {i for i, free in enumerate(network.layout.free) if not free}
+    priors = [g for g in (_without_present(group, present) for group in network.priors) if g is not None]
     start = np.array(network.layout.start)
     start[columns] = x[shared]
-    return replace(network, layout=replace(network.layout, start=start.tolist()), priors=[prior, *left])
+    return replace(network, layout=replace(network.layout, start=start.tolist()), priors=[prior, *priors])
 
 
-def _without_known(group: ObservationGroup, known: set[int]) -> ObservationGroup | None:
-    """A prior without what the carried state has taken in already: rows all of whose parameters are known."""
+def _without_present(group: ObservationGroup, present: set[int]) -> ObservationGroup | None:
+    """A prior without rows that the state already contains."""
     columns = np.asarray(group.columns)
-    if columns.ndim == 2:  # a row its own: distances between carried points, priors of single parameters
-        new = np.array([not set(row[row >= 0].tolist()) <= known for row in columns])
+    if columns.ndim == 2:  # parameters per row: distances between points, priors of single parameters
+        new = np.array([not set(row[row >= 0].tolist()) <= present for row in columns])
         if not isinstance(group, Linear) or group.covariance.ndim != 1 or new.all() or not new.any():
             return group if new.any() else None
         return Linear(group.name, group.observed[new], group.covariance[new], columns[new], group.matrix[new])
-    if set(columns.tolist()) <= known:
+    if set(columns.tolist()) <= present:
         return None
     if not isinstance(group, Linear) or group.matrix.shape != (len(columns), len(columns)):
         return group
-    new = np.array([int(c) not in known for c in columns])
+    new = np.array([int(c) not in present for c in columns])
     if new.all() or np.count_nonzero(group.matrix - np.diag(np.diag(group.matrix))):
         return group
     if group.covariance.ndim != 1:
-        raise EstimationError(f"{group.name}: a prior of some carried parameters and some new is not independent")
+        raise EstimationError(f"{group.name}: a correlated prior mixes parameters of the state with new ones")
     return Linear(group.name, group.observed[new], group.covariance[new], columns[new], group.matrix[np.ix_(new, new)])

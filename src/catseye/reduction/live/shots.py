@@ -1,7 +1,7 @@
-"""One shot at a time: samples to a phase with its status, and at once a range with what is known by then.
+"""Phase, status and preliminary range of single shots.
 
-The range of `ShotAnswer` is a first one: corrections are those of the line's last epoch, the electronics those of the
-last good reference. The epoch's solution uses the phases, not these ranges.
+The range of `ShotAnswer` uses the corrections of the line's last epoch and the electronics of the last good reference.
+The epoch's solution uses the phases, not these ranges.
 """
 
 import cmath
@@ -25,22 +25,22 @@ from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.signal.detection.buffers import shortest_run
 from catseye.signal.detection.cycle_scatter import FEWEST_FOR_BATCHES, variance_across
 
-USUAL_OF = 31  # amplitudes whose median is usual for a ranger's reference, or for its targets
-U_UNSEEN_VOLT = 0.01  # each quadrature, of a shot whose samples did not travel; 0.25 V of noise a sample make 0.004
-REFERENCE_CHANGE = 0.03  # of the cube's amplitude, beyond which something else is in its return
+USUAL_OF = 31  # amplitudes in the median that is usual for a ranger's reference, or for its targets
+U_UNSEEN_VOLT = 0.01  # each quadrature, of a shot received without samples; 0.25 V of noise a sample make 0.004
+REFERENCE_CHANGE = 0.03  # of the cube's amplitude, above which there is a stray reflection in its return
 
 
 @dataclass(frozen=True)
 class ShotAnswer:
-    """What one shot is worth, at once.
+    """Immediate result of one shot.
 
-    status     what became of it
-    reason     why it gives no range, None where it does
-    amplitude  V, leakage taken out
+    status     used, reference, or why not
+    reason     why it gives no range, None if it does
+    amplitude  V, leakage removed
     phase      rad, the same, in [0, 2 pi)
-    range_     m, from the scan point; NaN where there is none
+    range_     m, from the scan point; NaN if there is none
     u_range    m, noise and drift since the reference
-    misfit     m, range less what was predicted
+    misfit     m, range less prediction
     """
 
     status: ShotStatus
@@ -53,21 +53,21 @@ class ShotAnswer:
 
     @property
     def text(self) -> str:
-        """Why it gives no range, "" where it does."""
+        """Reason why it gives no range, "" if it does."""
         return str(self.reason or "")
 
     @classmethod
     def refused(cls, reason: Reason, amplitude: float, phase: float) -> "ShotAnswer":
-        """Of a shot that gives no range."""
+        """Answer of a shot without a range."""
         return cls(reason.status, reason, amplitude, phase)
 
 
 @dataclass(frozen=True, eq=False)
 class PhasedShot:
-    """A shot with its phase, kept for the epoch.
+    """A shot with its phase, stored for the epoch.
 
     mjd       of its buffer's middle
-    repeats   numbers of those that it stands for
+    repeats   numbers of the shots joined in it
     """
 
     shot: LiveShot
@@ -77,30 +77,30 @@ class PhasedShot:
 
     @property
     def reason(self) -> Reason | None:
-        """Why the shot cannot be used, None where it can."""
+        """Reason why it cannot be used, None if it can."""
         return self.phase.reason
 
     def left_out(self, reason: Reason) -> "PhasedShot":
-        """The same shot, not to be used."""
+        """The same shot, rejected."""
         return replace(self, phase=replace(self.phase, reason=reason))
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """Its own number, or those of all repeats that it stands for."""
+        """Its number, or those of all repeats joined in it."""
         return self.repeats or (self.shot.number,)
 
 
 @dataclass(slots=True)
 class SolvedLine:
-    """What a line's last epoch made of its range: optical path = index (distance + added), m."""
+    """Corrections of a line: optical path = index (distance + added), m."""
 
     index: float
     added: float
 
 
 @dataclass
-class RangerNow:
-    """What is known of one ranger between epochs."""
+class RangerHistory:
+    """Recent references and amplitudes of one ranger."""
 
     references: deque[PhasedShot] = field(default_factory=lambda: deque(maxlen=64))
     usual: dict[bool, deque[float]] = field(
@@ -111,13 +111,13 @@ class RangerNow:
 def phased(
     shot: LiveShot, mirror: Mirror, adc: Adc, *, settings: ReductionSettings, usual: float, run: float = 0.0
 ) -> PhasedShot:
-    """The phase of one shot, judged as `catseye reduce` judges it.
+    """Phase of one shot, judged as `catseye reduce` does.
 
-    usual   V, amplitude that such shots have; for the text alone
-    run     rad a cycle, by which the phase is known to move; taken out before the mean
+    usual   V, typical amplitude of such shots; for the text only
+    run     rad a cycle, predicted change of the phase; removed before the mean
 
-    Where the samples did not travel the ranger's own amplitude and phase count, their noise a guess (`U_UNSEEN_VOLT`),
-    and clipping and dropouts are not seen.
+    Without samples the ranger's own amplitude and phase are used, with an assumed noise (`U_UNSEEN_VOLT`); clipping and
+    dropouts are then not detected.
     """
     leaked = mirror.leakage_amplitude_volt * cmath.exp(1j * mirror.leakage_phase_rad)
     buffer = _detection(shot, adc.bits, run, leaked)
@@ -127,7 +127,7 @@ def phased(
     across = buffer.u_phasor
     if shot.samples is None:
         across = U_UNSEEN_VOLT
-    elif shot.cycles >= FEWEST_FOR_BATCHES:  # fewer tell too little of one quadrature's own scatter
+    elif shot.cycles >= FEWEST_FOR_BATCHES:  # fewer do not determine one quadrature's scatter
         across = math.sqrt(variance_across(buffer.total, buffer.between, shot.cycles, phasor=phasor))
     phase = ShotPhase(
         phasor, buffer.u_phasor, across, buffer.offset, buffer.harmonics, buffer.largest, buffer.wrong or reason
@@ -136,31 +136,31 @@ def phased(
 
 
 def _detection(shot: LiveShot, bits: int, run: float, leaked: complex) -> BufferDetection:
-    """What a shot's samples hold, or what the ranger itself made of them."""
+    """Detection from samples, or from the ranger's amplitude and phase."""
     if shot.samples is not None and len(shot.samples) != shot.cycles * shot.samples_per_cycle:
-        told = f"{len(shot.samples)} samples where {shot.cycles} cycles of {shot.samples_per_cycle} make"
-        wrong = Reason(ShotStatus.WRONG_LENGTH, f"{told} {shot.cycles * shot.samples_per_cycle}")
+        count = f"{len(shot.samples)} samples, but {shot.cycles} cycles of {shot.samples_per_cycle} make"
+        wrong = Reason(ShotStatus.WRONG_LENGTH, f"{count} {shot.cycles * shot.samples_per_cycle}")
         return BufferDetection(0j, 0.0, wrong=wrong)
     if shot.samples is not None:
         return _detected(shot, shot.samples, bits, run, leaked)
     if not (math.isfinite(shot.amplitude) and math.isfinite(shot.phase)):
-        wrong = Reason(ShotStatus.NO_SAMPLES, "neither the buffer came nor what the ranger made of it")
+        wrong = Reason(ShotStatus.NO_SAMPLES, "received neither samples nor the ranger's amplitude and phase")
         return BufferDetection(0j, 0.0, wrong=wrong)
     raw = shot.amplitude * complex(math.cos(shot.phase), math.sin(shot.phase))
     return BufferDetection(raw, U_UNSEEN_VOLT, largest=shot.amplitude)
 
 
 def _detected(shot: LiveShot, samples: NDArray[np.int16], bits: int, run: float, leaked: complex) -> BufferDetection:
-    """A buffer, compiled; what is wrong with it in words, by the plain form."""
+    """Detection by the compiled form, problems worded by the plain form."""
     from catseye.signal.detection import buffer_kernel as kernel
 
     n, volts, m = shot.samples_per_cycle, shot.volts_per_code, shot.cycles
-    if m < 2:  # a single cycle's noise comes from its overtones: rare, and not here
+    if m < 2:  # a single cycle's noise comes from its overtones: rare, left to the plain form
         return _plainly(samples, n, volts, bits)
     ends = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
-    moving, standing = np.zeros(16), np.zeros(8)
-    kernel.one_buffer(np.ascontiguousarray(samples), n, ends, run, leaked / volts, moving, standing)
-    out, stand = moving.tolist(), standing.tolist()
+    moving, stationary = np.zeros(16), np.zeros(8)
+    kernel.one_buffer(np.ascontiguousarray(samples), n, ends, run, leaked / volts, moving, stationary)
+    out, stand = moving.tolist(), stationary.tolist()
     wrong = None
     if out[kernel.CLIPPED] or out[kernel.DROPPED] or out[kernel.LONGEST] >= shortest_run(n):
         wrong = _plainly(samples, n, volts, bits).wrong
@@ -179,7 +179,7 @@ def _detected(shot: LiveShot, samples: NDArray[np.int16], bits: int, run: float,
 
 
 def _plainly(samples: NDArray[np.int16], n: int, volts: float, bits: int) -> BufferDetection:
-    """By the form of the campaigns."""
+    """Detection by the campaigns' plain form."""
     one = Detections.empty(1)
     one.put(np.zeros(1, dtype=np.int64), samples[None], n, volts, bits)
     return one.row(0)
@@ -187,7 +187,7 @@ def _plainly(samples: NDArray[np.int16], n: int, volts: float, bits: int) -> Buf
 
 def answer(
     row: PhasedShot,
-    now: RangerNow,
+    history: RangerHistory,
     *,
     predicted: Callable[[], float] | None,
     line: Callable[[], SolvedLine],
@@ -195,11 +195,11 @@ def answer(
     modulation_hz: float,
     walk: float,
 ) -> ShotAnswer:
-    """What one shot says at once.
+    """Immediate answer to one shot.
 
-    now         of its ranger, before this shot
-    predicted   distance, m, scan point to target at its middle; None where nobody knows
-    line        what its line's corrections are
+    history     of its ranger, before this shot
+    predicted   distance, m, scan point to target at its middle; None if unknown
+    line        the line's corrections
     d0          m, of the internal cube
     walk        rad per root second, of the electronics
 
@@ -209,18 +209,18 @@ def answer(
     if row.reason:
         return ShotAnswer.refused(row.reason, amplitude, phase)
     if row.shot.target == REFERENCE:
-        usual = now.usual[True]
+        usual = history.usual[True]
         level = median(usual) if len(usual) >= 3 else amplitude
         if abs(amplitude / level - 1.0) > REFERENCE_CHANGE:
-            text = f"return {amplitude:.3f} V where the cube gives {level:.3f} V"
+            text = f"return {amplitude:.3f} V, expected {level:.3f} V from the cube"
             return ShotAnswer.refused(Reason(ShotStatus.BAD_REFERENCE, text), amplitude, phase)
         return ShotAnswer(ShotStatus.REFERENCE, None, amplitude, phase, d0, 0.0, 0.0)
-    if not now.references:
-        text = "the ranger has no good shot on its internal cube yet"
+    if not history.references:
+        text = "no good shot on the ranger's internal cube yet"
         return ShotAnswer.refused(Reason(ShotStatus.NO_REFERENCE, text), amplitude, phase)
     if predicted is None:
-        return ShotAnswer.refused(Reason(ShotStatus.NO_PLACE, "the telescope has told no posture"), amplitude, phase)
-    last = now.references[-1]
+        return ShotAnswer.refused(Reason(ShotStatus.NO_PLACE, "no telescope position received"), amplitude, phase)
+    last = history.references[-1]
     half = 0.5 * SPEED_OF_LIGHT / modulation_hz
     share = ((phase - math.atan2(last.phase.phasor.imag, last.phase.phasor.real)) / TWO_PI) % 1.0
     corrections, distance = line(), predicted()
