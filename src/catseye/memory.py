@@ -6,6 +6,7 @@ import resource
 from contextlib import suppress
 
 GIB = 2.0**30
+MALLOPT = {-3: 2**18, -8: 2}  # M_MMAP_THRESHOLD, bytes; M_ARENA_MAX (mallopt(3))
 UNLOADED = ("failed to map segment", "cannot allocate memory", "Cannot allocate memory")  # messages of the loader
 UNFOUND = "load shared object file"  # llvmlite's, whose file is missing or did not fit
 WORKSPACE = 200 * 2**20  # bytes: 32 MiB a library and thread of OpenBLAS, the libraries, their arguments
@@ -16,6 +17,17 @@ def give_back() -> None:
     """Return freed memory to the system before a demanding step; glibc keeps fragments."""
     with suppress(OSError, AttributeError):
         ctypes.CDLL(None).malloc_trim(0)
+
+
+def keep_heap_small() -> None:
+    """Allocate large arrays outside the heap of a process that runs for days, where the C library can.
+
+    glibc takes them from the heap after the first one was freed, and keeps the gaps between them.
+    """
+    with suppress(OSError, AttributeError):
+        libc = ctypes.CDLL(None)
+        for option, value in MALLOPT.items():
+            libc.mallopt(option, value)
 
 
 def reserve_workspace() -> None:

@@ -27,6 +27,7 @@ from catseye.coordinator.plan.round import RoundPlanner, RoundSettings
 from catseye.coordinator.visibility.surroundings import KeepClear
 from catseye.coordinator.ziy import Coordinator, CoordinatorParts
 from catseye.errors import InputError
+from catseye.memory import keep_heap_small
 from catseye.ranger.addresses import COORDINATOR_PORT
 from catseye.ranger.door import Door
 from catseye.ranger.network import NO_TLS, ConnectionMaker, Sockets, TlsFiles
@@ -290,6 +291,7 @@ class LiveCoordinator:
         """
         before, loading = sys.getswitchinterval(), None
         watching = None
+        keep_heap_small()
         sys.setswitchinterval(SWITCH)
         try:
             await self.server.start()

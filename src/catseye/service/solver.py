@@ -17,7 +17,7 @@ from contextlib import suppress
 from functools import partial
 from typing import Any, BinaryIO
 
-from catseye.memory import give_back
+from catseye.memory import give_back, keep_heap_small
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.live.live import EpochJob
 
@@ -137,6 +137,7 @@ def loaded(message: bytes, site: SiteFolder | None) -> Any:
 
 def serve() -> None:
     """Serve jobs for one site until standard input ends."""
+    keep_heap_small()
     with suppress(OSError):
         os.nice(NICE)
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
