@@ -1,8 +1,9 @@
-"""One word, one meaning: class names stand once, docstrings say something, and no text is read back into a value."""
+"""One word, one meaning: class names, docstrings, plain names, and no text read back into a value."""
 
 import ast
 import re
-from collections import defaultdict
+import statistics
+from collections import Counter, defaultdict
 
 import pytest
 
@@ -121,3 +122,70 @@ def test_classes_that_docstrings_name_are_there():
     assert strangers("as `Slews.position`", names) == ["Slews"]
     texts = {path.relative_to(ROOT): path.read_text(encoding="utf-8") for path in (*TREES, ROOT / "CONTRIBUTING.md")}
     assert {path: gone for path, text in texts.items() if (gone := strangers(text, names))} == {}
+
+
+BEGINNINGS = {"what", "whether", "how", "as", "of", "that", "which", "who", "where", "when"}  # of no noun and no verb
+VAGUE = frozenset(  # participles, pronouns and adverbs, as whole names or their last part
+    re.findall(
+        r"\w+",
+        """
+        told given kept rest whole each way here own found seen asked stood risen said known wanted taken shown meant
+        held left gone made done lasting standing carried begun began ended grown spoken heard lost lain put these those
+        this that such same other others another every both none nobody nothing something someone again already beside
+        beyond behind hence once ever yet so now then there believed doubted suspected
+        """,
+    )
+)
+MOST_VAGUE, MOST_BEGINNINGS, MEDIAN_WORDS = 0.01, 0.01, 10.0
+
+
+def first_lines(tree):
+    """First line of each docstring."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            text = ast.get_docstring(node)
+            if text:
+                yield text.splitlines()[0]
+
+
+def assigned_names(tree):
+    """Names of functions, classes, arguments and variables."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            yield node.name
+            yield from (a.arg for a in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs))
+        elif isinstance(node, ast.ClassDef):
+            yield node.name
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            yield node.id
+
+
+def is_vague(name):
+    parts = re.findall(r"[A-Z]?[a-z0-9]+|[A-Z]+(?![a-z])", name)
+    return (parts[-1] if parts else name).lower() in VAGUE
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_docstrings_begin_with_a_noun_or_a_verb(room):
+    lines = [
+        line for path, tree in TREES.items() if room in path.relative_to(SOURCE).parts for line in first_lines(tree)
+    ]
+    wrong = [line for line in lines if re.match(r"\W*(\w*)", line)[1].lower() in BEGINNINGS]
+    assert len(wrong) <= MOST_BEGINNINGS * len(lines), wrong
+
+
+def test_first_lines_are_short():
+    assert statistics.median(len(line.split()) for tree in TREES.values() for line in first_lines(tree)) <= MEDIAN_WORDS
+
+
+def test_names_are_nouns_of_the_field():
+    names = [name for tree in TREES.values() for name in assigned_names(tree)]
+    vague = Counter(name for name in names if is_vague(name))
+    assert vague.total() <= MOST_VAGUE * len(names), vague.most_common(20)
+
+
+@pytest.mark.parametrize(
+    ("name", "vague"), [("found", True), ("points_at_rest", True), ("AsLeft", True), ("range_m", False)]
+)
+def test_vague_names_are_recognised(name, vague):
+    assert is_vague(name) is vague

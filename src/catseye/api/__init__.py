@@ -1,4 +1,4 @@
-"""What `import catseye` gives: a function a job, arrays and paths in, frozen results out.
+"""Functions of `import catseye`, one a job: arrays and paths in, frozen results out.
 
 Each function takes a path, a bundled name or what `load` gave, and answers with a `Result` (`result`). A subject is a
 file: `reading` (load, examples), `night` (reduce, explain), `weather` (air, sound), `living` (simulate, replay).

@@ -50,7 +50,7 @@ class CalibrationResult(Result):
     read: tuple[Path, ...]
 
     def passages(self) -> "Sequence[Passage]":
-        """What was calibrated, what was found, the tests, the readings."""
+        """Quantity, result, tests and readings."""
         from catseye.gateways.calibrations.certificate import passages
         from catseye.gateways.writers.passage import Passage
 
@@ -63,7 +63,7 @@ class CalibrationResult(Result):
         return list(takewhile(lambda passage: passage.title in ("Calibration", "Found", ""), self.passages()))[:6]
 
     def to_object(self) -> dict[str, Any]:
-        """As `catseye calibrate --json`."""
+        """JSON object of `catseye calibrate --json`."""
         from catseye.gateways.calibrations.certificate_record import calibration_object
 
         return calibration_object(self.calibration)
@@ -187,7 +187,7 @@ class TripletsResult(Result):
         return told
 
     def to_object(self) -> Any:
-        """As `catseye triplet --json`: one object, or a list of them for several sheets."""
+        """JSON object of `catseye triplet --json`: one object, or a list of them for several sheets."""
         from catseye.gateways.triplet.objects import triplet_object
 
         objects = [triplet_object(unit, path.name) for path, unit in self.units]
@@ -214,7 +214,7 @@ class TripletsResult(Result):
         return {path.stem: triplet_figure(unit) for path, unit in self.units}
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
-        """As `catseye triplet --out`."""
+        """Write the files of `catseye triplet --out`."""
         from catseye.gateways.triplet.files import write_triplets
 
         write_triplets(dict(self.units), directory, self.hashes, progress=progress)
@@ -306,7 +306,7 @@ class BaselineResult(Result):
         return self.passages()[:3]
 
     def to_object(self) -> dict[str, Any]:
-        """As `catseye baseline --json`."""
+        """JSON object of `catseye baseline --json`."""
         from catseye.gateways.baseline.objects import baseline_object
 
         return baseline_object(self.calibration)
@@ -332,7 +332,7 @@ class BaselineResult(Result):
         return baseline_figures(self.calibration)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
-        """As `catseye baseline --out`."""
+        """Write the files of `catseye baseline --out`."""
         from catseye.gateways.baseline.files import write_calibration
 
         write_calibration(self.calibration, directory, self.hashes, progress=progress)

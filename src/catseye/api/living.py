@@ -48,7 +48,7 @@ class SimulationResult(Result):
         return [Passage(title, text) for title, text in told]
 
     def to_object(self) -> dict[str, Any]:
-        """As `catseye simulate --json`."""
+        """JSON object of `catseye simulate --json`."""
         from catseye.service.objects import simulation_object
 
         sim = self.simulation
@@ -165,7 +165,7 @@ class ReplayResult(Result):
         return [Passage(title, text) for title, text in replay_passages(self.outcome)]
 
     def to_object(self) -> dict[str, Any]:
-        """As `catseye replay --json`."""
+        """JSON object of `catseye replay --json`."""
         from catseye.service.replay import replay_object
 
         return replay_object(self.outcome)

@@ -84,7 +84,7 @@ class AdjustmentResult(Result):
         return [*passages(self.findings), *treatment_passages(self.treated, self.findings)]
 
     def to_object(self) -> dict[str, Any]:
-        """As `catseye adjust --json`."""
+        """JSON object of `catseye adjust --json`."""
         from catseye.gateways.network.objects import network_object
 
         return network_object(self.findings, self.treated)
@@ -124,7 +124,7 @@ class AdjustmentResult(Result):
         return {name: drawn.figure for name, drawn in network_figures(self.findings).items()}
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
-        """As `catseye adjust --out`; EstimationError where there is no answer to write."""
+        """Write the files of `catseye adjust --out`; EstimationError where there is no answer to write."""
         require_answer(self)
         from catseye.gateways.network.files import write_network
 
@@ -206,7 +206,7 @@ def adjust(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ComparisonResult(Result):
-    """What moved between two epochs: k common points, in the axes of the first epoch's file.
+    """Movements of k common points between two epochs, in the axes of the first epoch's file.
 
     names           of the common points
     displacement    (k, 3) m, second epoch less first
@@ -229,13 +229,13 @@ class ComparisonResult(Result):
     second: AdjustmentResult
 
     def passages(self) -> "Sequence[Passage]":
-        """What moved, and what was assumed."""
+        """Movements and assumptions."""
         from catseye.gateways.network.comparison import comparison_passages
 
         return comparison_passages(self.compared)
 
     def to_object(self) -> dict[str, Any]:
-        """As `catseye adjust A B --json`."""
+        """JSON object of `catseye adjust A B --json`."""
         from catseye.gateways.network.comparison import comparison_object
 
         return comparison_object(self.compared)
@@ -259,7 +259,7 @@ class ComparisonResult(Result):
         return {name: drawn.figure for name, drawn in comparison_figures(self.compared).items()}
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
-        """As `catseye adjust A B --out`."""
+        """Write the files of `catseye adjust A B --out`."""
         from catseye.gateways.network.files import write_comparison
 
         write_comparison(self.compared, directory, self.inputs(), progress=progress)
@@ -284,7 +284,7 @@ def compare(
     scale_by_variance_factor: bool = False,
     progress: Progress | None = None,
 ) -> ComparisonResult:
-    """What moved between two epochs of a network.
+    """Movements between two epochs of a network.
 
     first, second   networks as for `adjust`, or what it gave
     points          names to compare; all common ones without
@@ -350,7 +350,7 @@ class PlanResult(Result):
         return plan_passages(self.planned)
 
     def to_object(self) -> dict[str, Any]:
-        """As `catseye plan --json`."""
+        """JSON object of `catseye plan --json`."""
         from catseye.gateways.network.plan import plan_object
 
         return plan_object(self.planned)
@@ -380,7 +380,7 @@ class PlanResult(Result):
         return {name: drawn[name].figure for name in ("plan", "elevation") if name in drawn}
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
-        """As `catseye plan --out`."""
+        """Write the files of `catseye plan --out`."""
         from catseye.gateways.network.plan import write_plan
 
         write_plan(self.planned, directory, self.inputs(), progress=progress)
@@ -478,7 +478,7 @@ class PositionsResult(Result):
     ranges: np.ndarray
 
     def passages(self) -> "Sequence[Passage]":
-        """How many were found, how well, and what is wrong with the first of the others."""
+        """Number and quality of the positions, and the status of the first that failed."""
         from catseye.gateways.network.summary import quantity
         from catseye.gateways.writers.passage import Passage
 

@@ -71,7 +71,7 @@ class NightResult(Result):
         return [p for p in self.passages() if p.title in ("The night", "The feed arm")]
 
     def to_object(self) -> dict[str, Any]:
-        """As `catseye reduce --json`."""
+        """JSON object of `catseye reduce --json`."""
         from catseye.gateways.epoch.objects import reduction_object
 
         return reduction_object(self.reduction)
@@ -119,7 +119,7 @@ class NightResult(Result):
         return figures(self.reduction)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
-        """As `catseye reduce --out`."""
+        """Write the files of `catseye reduce --out`."""
         from catseye.gateways.epoch.files import write_reduction
 
         write_reduction(self.reduction, directory, progress)
@@ -201,7 +201,7 @@ class ExplanationResult(Result):
         return [p for p in self.passages() if p.title in (f"Shot {self.shot}", "The range")]
 
     def to_object(self) -> dict[str, Any]:
-        """As `catseye explain --json`."""
+        """JSON object of `catseye explain --json`."""
         from catseye.gateways.epoch.explain import explanation_object
 
         return explanation_object(self.explanation, self.seed)

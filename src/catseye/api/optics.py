@@ -51,7 +51,7 @@ class GlassResult(Result):
         return [Passage(*row) for row in (table_rows() if self.name is None else glass_rows(dict(self.values)))]
 
     def to_object(self) -> dict[str, Any]:
-        """As `catseye glass --json`."""
+        """JSON object of `catseye glass --json`."""
         return dict(self.values)
 
     def tables(self) -> "dict[str, QTable]":
@@ -146,7 +146,7 @@ class LinkResult(Result):
         yield f"{'crosstalk left, at worst':<32}{b.crosstalk_range * 1e6:10.4g} µm"
 
     def to_object(self) -> dict[str, Any]:
-        """As `catseye link --json`."""
+        """JSON object of `catseye link --json`."""
         b = self.budget
         return {
             "verdict": self.verdict.to_object(),
@@ -252,7 +252,7 @@ class SafetyResult(Result):
         yield from safety_table(dict(self.values)).splitlines()
 
     def to_object(self) -> dict[str, Any]:
-        """As `catseye safety --json`."""
+        """JSON object of `catseye safety --json`."""
         return dict(self.values)
 
     def tables(self) -> "dict[str, QTable]":
@@ -357,7 +357,7 @@ class BeamResult(Result):
         return lines(self.beam)
 
     def to_object(self) -> dict[str, Any]:
-        """As `catseye beam --json`."""
+        """JSON object of `catseye beam --json`."""
         from catseye.gateways.optics.beam_figures import beam_object
 
         return beam_object(self.beam)
@@ -397,7 +397,7 @@ class BeamResult(Result):
         return (self.source,)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
-        """As `catseye beam --out`."""
+        """Write the files of `catseye beam --out`."""
         from catseye.gateways.optics.beam_figures import write_beam
 
         write_beam(self.beam, directory, dict(self.hashes))

@@ -27,7 +27,7 @@ EXPECTED = (
 
 
 def examples(name: str | None = None) -> Any:
-    """Where an example is, or the names of all.
+    """Path of an example, or the names of all.
 
     name   "night-01", "gbt", or one of the names listed; None: list them
 

@@ -1,4 +1,4 @@
-"""What every answer of `import catseye` can do: say itself, be a table, a figure, JSON's types, and files."""
+"""Base of every result of `import catseye`: text, tables, figures, JSON's types and files."""
 
 import hashlib
 import textwrap
@@ -40,7 +40,7 @@ class Result:
         raise NotImplementedError
 
     def to_object(self) -> dict[str, Any]:
-        """What the command prints with `--json`, in Python's and numpy's own types."""
+        """JSON object of the command, in Python's and numpy's own types."""
         raise NotImplementedError
 
     def tables(self) -> "dict[str, QTable]":

@@ -61,7 +61,7 @@ class PointingResult(Result):
     read: tuple[Path, ...] = ()
 
     def passages(self) -> "Sequence[Passage]":
-        """How many points the mirror reaches, and what the table does not show."""
+        """Number of points within reach, and remarks."""
         from catseye.gateways.steering.pointing_objects import pointing_remarks
         from catseye.gateways.writers.passage import Passage
 
@@ -71,7 +71,7 @@ class PointingResult(Result):
         return [Passage("Counts", text), *(Passage("Note", remark) for remark in remarks)]
 
     def to_object(self) -> Any:
-        """As `catseye point --json`: a list, one object a point."""
+        """JSON object of `catseye point --json`: a list, one object a point."""
         from catseye.gateways.steering.pointing_objects import pointing_objects
 
         return [{**item, **self.names} for item in pointing_objects(self.pointings, self.sightings, self.visibility)]
@@ -218,7 +218,7 @@ class TrackResult(Result):
     followed: "CountTrack"
 
     def passages(self) -> "Sequence[Passage]":
-        """How many points are followed, and how far the beams pass them."""
+        """Number of points followed, and the beams' largest distances from them."""
         from catseye.gateways.writers.passage import Passage
 
         good = np.isfinite(self.worst)
@@ -244,7 +244,7 @@ class TrackResult(Result):
         return {"counts": quantities(columns)}
 
     def figures(self) -> "dict[str, Figure]":
-        """How far the beams pass their targets, over the track."""
+        """Distances of the beams from their targets, over the track."""
         from catseye.gateways.steering.tracking_figures import miss_figure
         from catseye.reduction.steering.tracking import SHARES
 

@@ -84,7 +84,7 @@ class PoseResult(Result):
         return [*self.passages()[:2], Passage("Pose", six + ".")]
 
     def to_object(self) -> dict[str, Any]:
-        """As `catseye pose --json`."""
+        """JSON object of `catseye pose --json`."""
         from catseye.gateways.pose.objects import pose_result_object
 
         return pose_result_object(self.found)
@@ -114,7 +114,7 @@ class PoseResult(Result):
         return pose_figures(self.found)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
-        """As `catseye pose --out`."""
+        """Write the files of `catseye pose --out`."""
         from catseye.gateways.pose.files import write_pose
 
         write_pose(self.found, directory, self.hashes, settings=self.settings, progress=progress)
@@ -284,7 +284,7 @@ class SurfaceResult(Result):
         return surface_passages(self.found)
 
     def to_object(self) -> dict[str, Any]:
-        """As `catseye surface --json`."""
+        """JSON object of `catseye surface --json`."""
         from catseye.gateways.surface.files import surface_object
 
         return surface_object(self.found)
@@ -340,7 +340,7 @@ class SurfaceResult(Result):
         return drawn
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
-        """As `catseye surface --out`."""
+        """Write the files of `catseye surface --out`."""
         from catseye.gateways.surface.files import write_surface
 
         write_surface(self.found, directory, self.hashes, progress=progress)

@@ -69,7 +69,7 @@ class AirResult(Result):
         return [*air_passages(self.to_object()), *surface]
 
     def to_object(self) -> dict[str, Any]:
-        """As `catseye air --json`."""
+        """JSON object of `catseye air --json`."""
         from catseye.gateways.air.objects import air_object
 
         answer = air_object(
@@ -278,7 +278,7 @@ class SoundResult(Result):
         return sound_passages(self.to_object())
 
     def to_object(self) -> dict[str, Any]:
-        """As `catseye sound --json`."""
+        """JSON object of `catseye sound --json`."""
         from catseye.gateways.air.sound_objects import sound_object
 
         weather = (self.temperature_c, self.pressure_hpa, self.humidity_percent)
@@ -380,7 +380,7 @@ class RefractometerResult(Result):
         return passages(self.calibration)
 
     def to_object(self) -> dict[str, Any]:
-        """As `catseye refractometer --json`."""
+        """JSON object of `catseye refractometer --json`."""
         from catseye.gateways.air.refractometer_report import refractometer_object
 
         return refractometer_object(self.calibration)
@@ -404,7 +404,7 @@ class RefractometerResult(Result):
         return refractometer_figures(self.calibration)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
-        """As `catseye refractometer --out`."""
+        """Write the files of `catseye refractometer --out`."""
         from catseye.gateways.air.refractometer_report import write_refractometer
 
         write_refractometer(self.calibration, directory, progress)

@@ -82,7 +82,7 @@ class _Inputs(NamedTuple):
 
 
 class _Settings(NamedTuple):
-    """How the baseline is calibrated; units are in the names, those without one are m or plain numbers."""
+    """Options of a baseline calibration; names say units, those without are m or plain numbers."""
 
     reference_index: Annotated[
         float, typer.Option("--reference-index", help="Group index for which the instrument shows lengths.")
@@ -151,7 +151,7 @@ class _Settings(NamedTuple):
 
 
 class _Provenance(NamedTuple):
-    """Who measured the baseline, when, with what."""
+    """Provenance of the baseline: person, date, instrument."""
 
     serial: Annotated[str | None, typer.Option("--serial", help=f"Of the instrument; {UNKNOWN}.")] = None
     measured_on: Annotated[

@@ -179,7 +179,7 @@ def examples(
     ] = None,
     json: Json = False,
 ) -> None:
-    """What comes with catseye, listed, or written into a folder to change."""
+    """List the bundled examples, or write them into a folder."""
     from catseye.gateways.examples import copy_example, example_names
     from catseye.gateways.writers.objects import json_line
 

@@ -1,4 +1,4 @@
-"""What all commands share at their door: paths that may be examples, and words that a shell completes."""
+"""Inputs of all commands: paths that may be examples, and words that a shell completes."""
 
 import functools
 import inspect

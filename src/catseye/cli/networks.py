@@ -52,7 +52,7 @@ Out = Annotated[
 
 
 class _Claim(NamedTuple):
-    """What is claimed of ranges whose file says nothing of it."""
+    """Standard uncertainties of ranges whose file states none."""
 
     sigma_mm: Annotated[
         float | None,
@@ -62,7 +62,7 @@ class _Claim(NamedTuple):
 
 
 class _Treatment(NamedTuple):
-    """How the observations are treated, and what the tests and variances rest on."""
+    """Treatment of the observations: weights, rejection, variance components."""
 
     datum: Datum = None
     scale_by_variance_factor: Scaled = False
@@ -224,7 +224,7 @@ def _pair(text: str) -> tuple[str, str]:
 
 
 class _Further(NamedTuple):
-    """Which points matter, and what further ranges may cost."""
+    """Points of interest, and the number of further ranges."""
 
     interest: Annotated[
         str | None,
@@ -239,7 +239,7 @@ class _Further(NamedTuple):
 
 
 class _OnPaper(NamedTuple):
-    """How often the network is measured on paper, and what is wrong with it then."""
+    """Monte Carlo runs and their blunders."""
 
     runs: Annotated[int, typer.Option("--runs", min=0, help="Times to measure the network on paper.")] = 0
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the runs.")] = 1

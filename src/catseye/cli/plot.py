@@ -137,7 +137,7 @@ def air(  # noqa: PLR0913 - its options are its command line
 
 @plots.command("return", epilog="\b\nExample: catseye plot return --out return.svg")
 def return_(out: Out, json: Json = False, quiet: Quiet = False) -> None:
-    """What each kind of retroreflector returns against the incidence, and how its range changes."""
+    """Return and range change of each kind of retroreflector against the incidence."""
     from catseye.gateways.optics.retroreflector_figures import return_plot
 
     _finish("return", return_plot(), out, json, quiet)
@@ -188,7 +188,7 @@ def polarization(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """What cube corners do to polarized light: six sectors, and the return through an analyser."""
+    """Polarization of cube corners: six sectors, and the return through an analyser."""
     from catseye.gateways.optics.polarization_figures import polarization_plot
 
     _finish("polarization", polarization_plot(wavelength_um, glass), out, json, quiet)

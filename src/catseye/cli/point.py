@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def time_text(text: str | None) -> str | None:
-    """As given, if it is a time."""
+    """Validate a time; returns it unchanged."""
     if text is not None:
         from catseye.geometry.sky.time_tag import mjd_of
 
@@ -83,7 +83,7 @@ def _refuse_alone(values: Mapping[str, Any], needed: str) -> None:
 
 
 class _Forbidden(NamedTuple):
-    """When and where the mirror stands, and what its beam must not meet."""
+    """Time and place of the mirror, and its keep-out regions."""
 
     at: Annotated[
         str | None,
@@ -115,7 +115,7 @@ class _Forbidden(NamedTuple):
             )
 
     def zones(self) -> "KeepOut":
-        """Where no beam may go: the boxes of the file, and the Sun's cone."""
+        """Keep-out regions: the boxes of the file, and the Sun's cone."""
         from catseye.records.files.reading import read_record
         from catseye.records.site.keep_out import KeepOut
 
@@ -126,7 +126,7 @@ class _Forbidden(NamedTuple):
 
 
 class _View(NamedTuple):
-    """What stands at the points, and what may hide it."""
+    """Retroreflectors at the points, and obstacles."""
 
     reflector: Annotated[
         str | None,

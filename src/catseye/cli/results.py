@@ -1,4 +1,4 @@
-"""How commands end: a result told to people or programs, written where asked, and the exit status it deserves."""
+"""Ends of commands: print a result for people or programs, and set the exit status."""
 
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Annotated

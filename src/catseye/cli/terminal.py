@@ -1,4 +1,4 @@
-"""What people see on a terminal: answers on stdout, progress and one line about a failure on stderr."""
+"""Terminal output: answers on stdout, progress and one line about a failure on stderr."""
 
 import os
 import re
@@ -98,7 +98,7 @@ def wrapped(title: str, text: str) -> str:
 
 
 class ProgressLine:
-    """What is being done, on stderr, with an estimate of the end.
+    """Progress on stderr, with an estimate of the remaining time.
 
     On a terminal one line that changes; elsewhere plain lines, few and only of long work, and none at all with
     `--json`, whose reader expects stderr empty unless something is wrong. A step that says nothing for long, as the
@@ -190,7 +190,7 @@ def _asks_for_json() -> bool:
 
 
 def _silence_stdout() -> None:
-    """What is still buffered goes nowhere, so that the interpreter's own flush at its end cannot fail."""
+    """Discard buffered output, so that the interpreter's own flush at exit cannot fail."""
     with suppress(OSError, ValueError):
         null = os.open(os.devnull, os.O_WRONLY)
         os.dup2(null, sys.stdout.fileno())

@@ -15,7 +15,7 @@ from catseye.errors import InputError
 
 
 class ExportedPart(NamedTuple):
-    """What of a journal is taken; each field is the option of its name."""
+    """Selection of a journal; each field is the option of its name."""
 
     run: RunName = None
     since: Annotated[

@@ -113,11 +113,11 @@ class CoordinatorOptions(NamedTuple):
 
     @property
     def elsewhere(self) -> bool:
-        """Whether rangers or feed are asked for where a twin of this machine does not bring them."""
+        """True if rangers or feed are given without a twin on this machine."""
         return self.loopback or self.addresses is not None or self.feed is not None or self.motion_script is not None
 
     def orders(self) -> "Orders":
-        """How the coordinator shall work."""
+        """Orders of the coordinator."""
         return orders_of(
             mode=self.mode,
             drop=self.drop,

@@ -33,7 +33,7 @@ def within(low: float, high: float, unit: str) -> Callable[[float | None], float
 
 
 def time_of(text: str | None) -> str | None:
-    """As given, if it is a time."""
+    """Validate a time; returns it unchanged."""
     if text is not None:
         from catseye.geometry.sky.time_tag import mjd_of
 
@@ -47,7 +47,7 @@ def time_of(text: str | None) -> str | None:
 
 
 def motion_of(text: str | None) -> str | None:
-    """As given, if it is a motion; a table is read when it is needed."""
+    """Validate a motion; returns it unchanged. A table is read when it is needed."""
     if text is not None and not text.startswith("table "):
         from catseye.simulator.twin.motion import AxisMotion
 
@@ -59,7 +59,7 @@ def motion_of(text: str | None) -> str | None:
 
 
 def faults_of(texts: list[str] | None) -> list[str]:
-    """As given, if they are faults."""
+    """Validate faults; returns them unchanged."""
     from catseye.simulator.twin.faults import Fault
 
     for text in texts or []:
@@ -164,7 +164,7 @@ def mjd_start(text: str | None, usual: float | None = None, *, offset: float = 0
 
 
 def orders_of(*, drop: list[str] | None, **given: Any) -> "Orders":
-    """Of a coordinator, from the options; one that was not given is as `Orders` has it."""
+    """Orders of a coordinator from its options; those missing have the defaults of `Orders`."""
     from catseye.ranger.door import key_of
     from catseye.ranger.network import TlsFiles
     from catseye.service.coordinator import Orders

@@ -15,7 +15,7 @@ RunName = Annotated[
 
 
 def run_of(text: str | None) -> int | str | None:
-    """As a journal's reader takes it."""
+    """Validate the address of a journal."""
     return int(text) if text is not None and text.isdecimal() else text
 
 

@@ -205,7 +205,7 @@ def predict(
     model: Annotated[str, typer.Option("--model", metavar="published|MODEL.toml", help="The series.")] = "published",
     json: Json = False,
 ) -> None:
-    """What the series adds to a direction on the sky to give the encoders'."""
+    """Predict the encoders' corrections for a direction on the sky."""
     import numpy as np
 
     from catseye.gateways.pose.pointing_series_objects import read_series
@@ -255,7 +255,7 @@ def track(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """How the alidade tilts as it goes round: poses and inclinometer in one least squares, as a Fourier series."""
+    """Tilt of the alidade against azimuth: poses and inclinometer in one Fourier series."""
     from dataclasses import replace
 
     import numpy as np

@@ -135,7 +135,7 @@ def structure(  # noqa: PLR0913 - its options are its command line
 
 
 class _Answer(NamedTuple):
-    """Where an answer goes: a directory, one JSON object or text; and the line of progress until then."""
+    """Outputs of a command: a directory, one JSON object or text, and the progress line."""
 
     out: Path | None
     json: bool

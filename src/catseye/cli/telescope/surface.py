@@ -43,7 +43,7 @@ def _angles(values: list[float] | None) -> list[float]:
 
 
 class _Shape(NamedTuple):
-    """What is fitted to the prisms and told of the shape."""
+    """Options of the surface fit."""
 
     free: Annotated[
         str, typer.Option("--free", metavar="vertex,axis,focal-length|none", callback=_free, help="What is fitted.")
@@ -72,7 +72,7 @@ class _Shape(NamedTuple):
 
 
 class _Reading(NamedTuple):
-    """How the command's input files are read."""
+    """Options of the input files."""
 
     frame: Annotated[
         str,

@@ -34,7 +34,7 @@ LEAST_LEFT = 1e-7  # of a row that goes: what the others say of it, over its own
 
 @dataclass(frozen=True, eq=False)
 class TargetBlocks:
-    """How the parameters of one system fall into blocks and a border, and where each entry of its rows stands.
+    """Partition of a system's parameters into blocks and a border, with the place of each row's entries.
 
     moving         (k,) parameters that are not held
     columns        of the groups, as the layout was made for
@@ -139,7 +139,7 @@ class TargetBlocks:
         return np.concatenate([j.ravel() for j in jacobians])[self.take]
 
     def fits(self, rows: Sequence[ActiveRows], moving: np.ndarray) -> bool:
-        """Whether these blocks are those of the rows."""
+        """True if these blocks are those of the rows."""
         return (
             np.array_equal(moving, self.moving)
             and len(rows) == len(self.columns)
@@ -299,7 +299,7 @@ def _on_cores(size: int, work: Callable):
 
 @dataclass(eq=False)
 class Border:
-    """Which parameters are not eliminated, and what the last solves of the same shape left behind.
+    """Parameters that are not eliminated, with the last elimination of the same shape.
 
     columns   (n,) bool
     fine      (n,) bool, details that the search for a robust start can hold at their start values

@@ -159,7 +159,7 @@ class NormalEquations:
         return self.covariance().solve(right)
 
     def _energy(self, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of scaled directions (k, d): combinations (d, d), least held first, and their |A v|^2."""
+        """Combinations (d, d) of scaled directions (k, d), least determined first, and their |A v|^2."""
         scaled = np.zeros((self.size, directions.shape[1]))
         scaled[self.moving] = directions * self._scale[:, None]
         triangles = []

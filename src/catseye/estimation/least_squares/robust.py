@@ -1,4 +1,4 @@
-"""Which observations are wrong: a robust start, the smallest conflict of each point, then removal by test."""
+"""Outlier search: a robust start, the smallest conflict of each point, then removal by test."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -43,7 +43,7 @@ MOST_RETURNS = 2  # of one observation; so the rounds end
 
 @dataclass(frozen=True, eq=False)
 class OutlierSearch:
-    """What `adjust_robustly` searches by.
+    """Settings of the search of `adjust_robustly`.
 
     points     columns of each point, (3,) an array: where a few observations meet, the smallest conflict is sought
     advice     what is known of single points besides; it helps to tell which observation is wrong, and takes no part
@@ -163,7 +163,7 @@ def _without_worst(
 
 
 def _checked(fit: GroupFit) -> np.ndarray:
-    """Which observations the others check: an error of some sigmas would be found; of the inactive, all.
+    """Observations that the others check, so that an error of some sigmas shows; all inactive ones.
 
     Without correlations this is redundancy > UNCHECKED. With them a redundancy number may be zero or negative although
     a neighbour that shares its errors checks the observation well.

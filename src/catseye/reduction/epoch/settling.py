@@ -228,7 +228,7 @@ def _unsettled(worst: Parameter, moved: float) -> EstimationError:
 
 
 def _unsuspicious(solution: LeastSquaresSolution, removable: Sequence[np.ndarray], critical: float) -> bool:
-    """Whether every observation that may be wrong passes its test by half a sigma, and all together theirs."""
+    """True if every removable observation passes its test by half a sigma, and all together theirs."""
     if not solution.solved or solution.status != CONVERGED:
         return False
     large = [np.abs(f.standardised[may]) > critical - 0.5 for f, may in zip(solution.fits, removable, strict=True)]
