@@ -177,7 +177,7 @@ def one_night(prisms: int, place: Path) -> None:
         shutil.rmtree(place, ignore_errors=True)
         night(place, dish_prisms=abs(prisms), again=0.43 if prisms < 0 else 0.0, nature=0.0)
     took = {}
-    settle = coordinates.settle_network
+    settle = coordinates.iterate_adjustment
 
     def timed(*given, **options):
         begun = time.perf_counter()
@@ -185,7 +185,7 @@ def one_night(prisms: int, place: Path) -> None:
         took["settle"] = time.perf_counter() - begun
         return answer
 
-    coordinates.settle_network = timed
+    coordinates.iterate_adjustment = timed
     campaign = read_campaign(place)
     reduced(read_campaign(EXAMPLE), ReductionSettings(dense_shots=0))  # kernels loaded
     before = time.perf_counter()

@@ -38,7 +38,7 @@ from catseye.cli.live.options import site_of
 from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
 from catseye.geometry.sky.time_tag import PER_DAY
 from catseye.service.coordinator import LiveCoordinator, Orders
-from catseye.service.rangers import Listening, RangersServed, ServedAt
+from catseye.service.rangers import ListenAddresses, Listening, RangersServed
 from catseye.service.running import FastLoop
 from catseye.service.screen import SilentView
 from catseye.service.simulation import Simulation, listening_of, peers_of
@@ -137,7 +137,7 @@ def twin_process(began: int, rate: float, motion: str) -> None:
     truth, clock = world.twin(site), FastClock(began, rate)
     warming = WarmingClock(clock)
     heads = twin_heads(truth, site.rangers, warming)
-    served = RangersServed(site, heads, clock=clock, twin=truth, warming=warming, at=ServedAt(0))
+    served = RangersServed(site, heads, clock=clock, twin=truth, warming=warming, at=ListenAddresses(0))
 
     def say(at: Listening) -> None:
         sys.stdout.write(json.dumps(at.plain()) + "\n")

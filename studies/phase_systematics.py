@@ -21,7 +21,12 @@ from catseye.signal.systematics.amplitude import amplitude_phase
 from catseye.signal.systematics.cyclic import imbalance_range, leakage_range
 from catseye.signal.systematics.feedback import fringe_contrast, fringe_uncertainty
 from catseye.signal.systematics.leakage import rms_range_error, worst_range_error
-from catseye.signal.systematics.multipath import cats_eye_error, largest_share, share_a_pass, two_retroreflectors
+from catseye.signal.systematics.multipath import (
+    cats_eye_error,
+    largest_share,
+    returned_share_of_pass,
+    two_retroreflectors,
+)
 
 WAVELENGTH = 0.199811  # m, [PARKER04] eq. 1.30
 LIGHT = 780e-9  # m
@@ -32,7 +37,9 @@ CUBE, USUAL, WEAK = 6.50, 4.35, 0.91  # V, its reference, its median return, and
 COUPLING, U_COUPLING = 2e-3, 1e-4  # rad a factor e of amplitude; assumed
 WALK = 0.01 / 60  # rad per root second: 10 mrad per root hour
 NOISE = 5e-4  # rad, of a reference shot: 3.4 mV in 6.5 V
-BARE, TILTED = (float(share_a_pass(0.01, part, 0.3)) for part in (0.5, 0.02))  # a coated diode, square on and tilted
+BARE, TILTED = (
+    float(returned_share_of_pass(0.01, part, 0.3)) for part in (0.5, 0.02)
+)  # a coated diode, square on and tilted
 
 
 def effects() -> list[tuple[str, float, float, str]]:

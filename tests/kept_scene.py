@@ -130,10 +130,10 @@ def reduction_of_example():
 def reduction_directory() -> Path:
     """Everything that `catseye reduce --out` writes of it: to be read, and copied by whoever changes it."""
     from catseye.gateways.epoch.files import write_reduction
-    from catseye.gateways.writers.output import whole_directory
+    from catseye.gateways.writers.output import atomic_directory
 
     def make(path):
-        with whole_directory(path, ROOT / "examples" / "night-01") as directory:
+        with atomic_directory(path, ROOT / "examples" / "night-01") as directory:
             write_reduction(reduction_of_example(), directory)
 
     return kept("reduction", make)

@@ -49,7 +49,7 @@ def reserve_workspace() -> None:
     np.ones((900, 900)) @ np.ones((900, 900))
 
 
-def lacks_memory(problem: MemoryError | ImportError | OSError) -> bool:
+def is_memory_error(problem: MemoryError | ImportError | OSError) -> bool:
     """True for a memory error, and for a library that did not fit into memory."""
     text = str(problem)
     unfit = any(words in text for words in UNLOADED) or (UNFOUND in text and bool(_limit()))
@@ -74,7 +74,7 @@ def out_of_memory(problem: MemoryError | ImportError | OSError) -> str:
     )
 
 
-def memory_of_a_killed(name: str, peak: int) -> str:
+def killed_process_message(name: str, peak: int) -> str:
     """Message for a process ended by the system.
 
     name   of the signal

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from catseye.cli.terminal import attempt
-from catseye.memory import lacks_memory, memory_of_a_killed, out_of_memory
+from catseye.memory import is_memory_error, killed_process_message, out_of_memory
 from process_scene import ends_with_us
 
 GIB = 2**30
@@ -43,13 +43,13 @@ def test_an_array_is_told_by_its_size(capfd):
 
 def test_an_error_that_does_not_say_the_size_says_what_was_in_use():
     assert re.match(r"out of memory with [0-9.]+ GiB in use.*: more is needed", out_of_memory(MemoryError()))
-    assert memory_of_a_killed("SIGKILL", 3 * GIB).startswith("ended by SIGKILL with 3.0 GiB in use")
+    assert killed_process_message("SIGKILL", 3 * GIB).startswith("ended by SIGKILL with 3.0 GiB in use")
 
 
 def test_a_library_that_finds_no_room_is_memory_and_one_that_is_missing_is_not():
-    assert lacks_memory(ImportError("libx.so: failed to map segment from shared object"))
-    assert lacks_memory(ImportError("libx.so: cannot allocate memory in static TLS block"))
-    assert not lacks_memory(ImportError("No module named 'x'"))
+    assert is_memory_error(ImportError("libx.so: failed to map segment from shared object"))
+    assert is_memory_error(ImportError("libx.so: cannot allocate memory in static TLS block"))
+    assert not is_memory_error(ImportError("No module named 'x'"))
     with pytest.raises(ImportError, match="No module"):
         attempt(lambda: __import__("catseye.no_such_module"))
 
@@ -75,8 +75,8 @@ def test_llvmlite_that_finds_no_room_is_memory_only_under_a_limit(monkeypatch):
     problem = OSError("Could not find/load shared object file 'libllvmlite.so' from resource location")
     for soft, short in ((900 << 20, True), (resource.RLIM_INFINITY, False)):
         monkeypatch.setattr(resource, "getrlimit", lambda which, soft=soft: (soft, soft))
-        assert lacks_memory(problem) is short
-    assert not lacks_memory(FileNotFoundError("night.csv"))
+        assert is_memory_error(problem) is short
+    assert not is_memory_error(FileNotFoundError("night.csv"))
 
 
 @pytest.mark.parametrize("mebibytes", [100, 160, pytest.param(220, marks=pytest.mark.slow), 330])

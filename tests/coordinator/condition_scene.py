@@ -9,7 +9,7 @@ from catseye.coordinator.modes import Suspensions
 from catseye.coordinator.parts import ticks_now
 from catseye.ranger.status import StatusWord
 from catseye.records.night.live import Happening, LivePosture, LiveShot
-from catseye.service.book import LiveBook
+from catseye.service.book import RunSummary
 from catseye.simulator.clock.world_clock import ManualClock
 
 START = 60635.125
@@ -41,7 +41,7 @@ class ScenedSite:
             clock_believed=lambda: self.believed,
             telescope_known=lambda: self.telescope,
         )
-        self.book = LiveBook()
+        self.book = RunSummary()
 
     @property
     def running(self):

@@ -134,9 +134,9 @@ def test_atomic_steps_are_not_interrupted(tmp_path):
     code = (
         "import os, signal, sys\n"
         "from pathlib import Path\n"
-        "from catseye.gateways.writers.interruption import deferred, leave_on_signals, undone_when_interrupted\n"
-        "leave_on_signals()\n"
-        "with undone_when_interrupted(Path(sys.argv[1], 'undone').touch):\n"
+        "from catseye.gateways.writers.interruption import deferred, exit_on_signals, undo_on_interruption\n"
+        "exit_on_signals()\n"
+        "with undo_on_interruption(Path(sys.argv[1], 'undone').touch):\n"
         "    with deferred():\n"
         "        os.kill(os.getpid(), signal.SIGINT)\n"
         "        Path(sys.argv[1], 'second').touch()\n"
@@ -152,7 +152,7 @@ def test_atomic_steps_cannot_delay_an_interrupt_forever():
         "import os, signal\n"
         "from catseye.gateways.writers import interruption\n"
         "interruption.LONGEST_DEFERRAL = 0.05\n"
-        "interruption.leave_on_signals()\n"
+        "interruption.exit_on_signals()\n"
         "with interruption.deferred():\n"
         "    os.kill(os.getpid(), signal.SIGTERM)\n"
         "    while True: pass\n"
@@ -169,9 +169,9 @@ def work():
     import numpy as np
     from pathlib import Path
     from scipy.linalg import lapack
-    from catseye.gateways.writers.output import whole_directory
+    from catseye.gateways.writers.output import atomic_directory
     matrix = np.asfortranarray(np.ones((4000, 4000)) + 4000 * np.eye(4000))
-    with whole_directory(Path(OUT)) as directory:
+    with atomic_directory(Path(OUT)) as directory:
         (directory / "half.csv").write_text("x")
         print("begun", flush=True)
         while True:  # no bytecode for seconds, were the matrix larger: LAPACK holds the interpreter

@@ -18,8 +18,8 @@ from catseye.ranger.initialisation import (
     files_of_ranger,
     frame_of,
     head_commands,
+    local_station,
     mount_from_reflector,
-    own_station,
 )
 from catseye.ranger.line import format_request
 from catseye.ranger.ranger import Ranger
@@ -89,7 +89,7 @@ def test_feed_arm_ranger_uses_the_reflector_frame(gbt):
     frame = nominal_frame(gbt)
     for record in gbt.feedarm.ranger:
         assert frame_of(gbt, record.name) == "reflector"
-        station = own_station(gbt, record.name)
+        station = local_station(gbt, record.name)
         assert np.allclose(station.scan_point / MILLIMETRE, record.nominal_scan_point_mm, atol=1e-6)
         place = cube_places_mm(gbt, record.name)["DP20C"]
         assert np.allclose(place, gbt.targets["DP20C"].position_mm, atol=1e-6)
@@ -115,7 +115,7 @@ def test_mount_without_a_record_faces_the_dish(gbt):
         assert np.linalg.det(mount) == pytest.approx(1.0)
         way = centre - np.array(record.nominal_scan_point_mm) * MILLIMETRE
         assert np.allclose(mount @ way, [0.0, np.linalg.norm(way), 0.0], atol=1e-9)
-        phi = np.degrees(aim(own_station(unsaid, record.name), dish).phi)
+        phi = np.degrees(aim(local_station(unsaid, record.name), dish).phi)
         assert np.all((phi > 44.0) & (phi < 136.0))
         assert np.allclose(mount, mount_from_reflector(gbt, record.name), atol=1e-5)  # gbt's records say the same
 

@@ -14,7 +14,7 @@ from catseye.errors import InputError
 from catseye.ranger import door as door_module
 from catseye.ranger import network as network_module
 from catseye.ranger.client import SECOND_CLIENT_TID, ZyClient
-from catseye.ranger.door import Door, refuse_open
+from catseye.ranger.door import Door, refuse_exposed_port
 from catseye.ranger.network import NO_TLS, Sockets, TlsFiles, bound_socket, is_here, socket_path
 from catseye.ranger.server import LOOPBACK, ZyServer
 from ranger.ranger_scene import ready
@@ -144,11 +144,11 @@ def test_tls_files_come_from_the_environment(made):
 def test_invalid_tls_files_are_refused_before_listening(made):
     door = Door(key=KEY, tls=TlsFiles(made["ranger"][0], made["other"][1]))
     with pytest.raises(InputError, match=r"feed: CATSEYE_TLS_CERTIFICATE=.* cannot be used"):
-        refuse_open("feed", "192.0.2.7", door)
+        refuse_exposed_port("feed", "192.0.2.7", door)
     with pytest.raises(InputError, match="expected CATSEYE_TLS_CERTIFICATE"):
-        refuse_open("feed", "192.0.2.7", Door(key=KEY))
+        refuse_exposed_port("feed", "192.0.2.7", Door(key=KEY))
     for host in ("127.0.0.1", "unix:/run/site"):
-        refuse_open("feed", host, Door())
+        refuse_exposed_port("feed", host, Door())
 
 
 # Unix sockets ---------------------------------------------------------------------------------------------------------

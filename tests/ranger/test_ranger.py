@@ -803,12 +803,12 @@ def test_way_out_avoids_other_suns():
 
 
 def test_own_sun_agrees_with_the_almanac_and_sets():
-    from catseye.ranger.sun_watch import own_sun
+    from catseye.ranger.sun_watch import sun_of_site
     from catseye.records.site.site import Location
     from catseye.reduction.site.earth_rotation import sun_at
 
     place = Location(latitude_deg=38.433, longitude_deg=-79.84, elevation_of_z0_m=806.0)
-    source = own_sun(place)
+    source = sun_of_site(place)
     seen = set()
     for mjd in 52_889.0 + np.random.default_rng(2).uniform(0.0, 365.0, 100):
         towards, true = source(mjd), sun_at(mjd, place).direction

@@ -11,7 +11,7 @@ from catseye.records.files.record import Record
 from catseye.records.laboratory.triplet_measurement import TripletMeasurement
 from catseye.records.night.path_temperature import PathTemperature
 from catseye.records.night.recording import AcousticSheet
-from catseye.records.night.shot import ShotRow, let_go, read_buffers
+from catseye.records.night.shot import ShotRow, read_buffers, release_buffers
 from catseye.records.night.weather import WeatherSample
 from catseye.records.panels.actuators import ActuatorCorrection, ActuatorPosition
 from catseye.records.panels.instrument import PanelInstrument
@@ -119,6 +119,6 @@ def test_unknown_version_is_refused_with_the_supported_ones(tmp_path, version):
 def test_released_buffers_are_read_again():
     buffers = read_buffers(Folder(FORMATS), "frames-1.npy")
     before = np.array(buffers)
-    let_go(buffers)
-    let_go(before)  # an array of its own stays
+    release_buffers(buffers)
+    release_buffers(before)  # an array of its own stays
     assert np.array_equal(buffers, before)

@@ -10,7 +10,7 @@ import pytest
 from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
 from catseye.gateways.writers.objects import json_line
 from catseye.records.night.live import Happening, LivePosture, LiveShot
-from catseye.service.book import LiveBook
+from catseye.service.book import RunSummary
 from catseye.service.comparison import EpochComparison
 from catseye.service.objects import epoch_line, simulation_object, summary
 from catseye.service.screen import LinesView
@@ -65,7 +65,7 @@ def epoch(number, *, used=(1, 2), of=None, **rejected):
 
 def filled(**other):
     judge = Judge(**other)
-    book = LiveBook(judge)
+    book = RunSummary(judge)
     for entry in [
         shot(1),
         shot(2, "ZY102", "reference", math.nan),
@@ -117,7 +117,7 @@ def test_problems_of_more_than_one_shot_come_first():
     assert "none was written" in passages["Journal"]
     assert (
         "none was solved"
-        in dict(summary(LiveBook(), TwinWords(60635.125), None, seconds=1.0, rangers=1, told=0))["Epochs"]
+        in dict(summary(RunSummary(), TwinWords(60635.125), None, seconds=1.0, rangers=1, told=0))["Epochs"]
     )
 
 
@@ -149,7 +149,7 @@ def test_doubtful_epochs_make_a_doubtful_verdict():
 
 def test_shot_counts_once_in_any_number_of_epochs():
     """1 used, 2 overruled by its epoch, 3 blocked and named by it again, 4 of the next epoch, 5 of none yet."""
-    book = LiveBook()
+    book = RunSummary()
     for number, status in ((1, "used"), (2, "used"), (3, "blocked"), (4, "used")):
         book.entry(shot(number, status=status))
     book.entry(epoch(1, used=[1], of={"2": "reflected: +1 mm off", "3": "blocked: return 0.001 V"}))

@@ -6,7 +6,7 @@ import pytest
 
 from catseye.coordinator.parts import TICKS_PER_SECOND
 from catseye.records.night.live import TICKS_PER_DAY, Happening
-from catseye.service.book import LiveBook
+from catseye.service.book import RunSummary
 from catseye.service.found import SIGNS, FaultFinder
 from catseye.service.objects import simulation_object, summary
 from catseye.service.screen import LinesView
@@ -64,7 +64,7 @@ def test_fault_is_detected_by_an_event_at_its_place_and_time(fault, by, after):
 
 def test_first_event_counts_in_text_and_json():
     world = TwinWords(START, faults=("dead-ranger ZY104 40 60", "lying-station WX2 30 90 0.2", "dew ZBM01 500"))
-    book = LiveBook(finder=FaultFinder(world.faults, START))
+    book = RunSummary(finder=FaultFinder(world.faults, START))
     said = []
     view = LinesView(said.append)
     view.begin(book, None)

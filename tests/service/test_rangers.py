@@ -8,7 +8,7 @@ import pytest
 
 from catseye.errors import InputError
 from catseye.ranger.status import StatusWord
-from catseye.service.rangers import LateSockets, RangersServed, ServedAt
+from catseye.service.rangers import DeferredSockets, ListenAddresses, RangersServed
 from catseye.service.warm import WarmingClock
 from catseye.service.world import TwinWords, twin_heads
 from catseye.simulator.clock.virtual_time import MemoryNetwork
@@ -18,7 +18,7 @@ from simulator.living_scene import site
 
 def test_ports_are_bound_at_once_and_answer_after_open():
     async def story():
-        sockets = LateSockets()
+        sockets = DeferredSockets()
         listener = await sockets.serve(asyncio.Protocol, "127.0.0.1", 0)
         with pytest.raises(ConnectionRefusedError):
             await asyncio.open_connection("127.0.0.1", listener.port)
@@ -36,7 +36,7 @@ def test_ports_are_bound_at_once_and_answer_after_open():
 
 def test_port_taken_meanwhile_is_named():
     async def story():
-        sockets = LateSockets()
+        sockets = DeferredSockets()
         listener = await sockets.serve(asyncio.Protocol, "127.0.0.1", 0)
         taken, said = socket.create_server(("127.0.0.1", listener.port)), f"port {listener.port} is not available"
         with taken, pytest.raises(InputError, match=said):
@@ -55,7 +55,7 @@ def test_warmed_rangers_are_initialised_homed_and_have_sun_and_time():
 
     async def story():
         served = RangersServed(
-            site(), heads, clock=clock, twin=twin, network=MemoryNetwork(), warming=warming, at=ServedAt(24_100)
+            site(), heads, clock=clock, twin=twin, network=MemoryNetwork(), warming=warming, at=ListenAddresses(24_100)
         )
         heard = asyncio.Queue()
         task = asyncio.create_task(served.serve(heard.put_nowait))

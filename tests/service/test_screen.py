@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from catseye.ranger.status import StatusWord
-from catseye.service.book import LiveBook
+from catseye.service.book import RunSummary
 from catseye.service.comparison import EpochComparison
 from catseye.service.screen import ScreenView
 from coordinator.condition_scene import NAMES, ScenedSite, link
@@ -162,4 +162,4 @@ def test_screen_is_updated_without_durable_entries():
 def test_screen_works_before_any_entry():
     lines = pictured(ScenedSite(), 80, 24)
     assert lines[1].startswith(" STARTING ")
-    assert LiveBook().latest is None
+    assert RunSummary().latest is None

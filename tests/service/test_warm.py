@@ -12,7 +12,7 @@ from catseye.errors import InputError
 from catseye.gateways.examples import located
 from catseye.geometry.mirror.pointing import beam
 from catseye.ranger.line import Request
-from catseye.ranger.sun_watch import HALF_ANGLE, PARKED, SET, nearest_sun, own_sun, sun_leaves, way_out
+from catseye.ranger.sun_watch import HALF_ANGLE, PARKED, SET, nearest_sun, sun_departure_mjd, sun_of_site, way_out
 from catseye.records.night.live import LivePosture
 from catseye.records.site.folder import read_site
 from catseye.reduction.site.earth_rotation import place_of, sun_at
@@ -62,7 +62,7 @@ def worst(count):
 def test_sun_at_an_index_agrees_with_the_ranger():
     hour, name = worst(1)[0]
     vantage = vantages_of(gbt())[name]
-    own = own_sun(gbt().site.site)(YEAR + hour / 24.0)
+    own = sun_of_site(gbt().site.site)(YEAR + hour / 24.0)
     assert nearest_sun(vantage.station, INDEX, INDEX, suns=[own], exact=True) == pytest.approx(
         looks(name)[0][hour], abs=1e-4
     )
@@ -78,7 +78,10 @@ def test_mirror_behaviour_at_each_hour_of_a_year():
             end = way_out(vantage.station, INDEX, [seen[hour]], limits=vantage.stops)
             if end is None:
                 waiting += 1
-                assert sun_leaves(vantage.station, INDEX, own_sun(gbt().site.site), YEAR + hour / 24.0) is not None
+                assert (
+                    sun_departure_mjd(vantage.station, INDEX, sun_of_site(gbt().site.site), YEAR + hour / 24.0)
+                    is not None
+                )
                 continue
             left += 1
             assert 0.0 in end  # one axis alone

@@ -435,14 +435,14 @@ def plan(
     from catseye.estimation.network.plan import schedule
     from catseye.gateways.network.findings import findings
     from catseye.gateways.network.plan import PlanFindings, plan_verdict
-    from catseye.reduction.network import measured_on_paper
+    from catseye.reduction.network import monte_carlo_scatter
 
     read, path = _network_of(network, sigma_mm, sigma_ppm, planned=True)
     worth = planned(read, datum=datum, interest=interest, most=most)
     picked = () if budget_s is None else schedule(worth, budget_s=budget_s, shot_s=shot_s)
     scatter = None
     if runs:
-        scatter = measured_on_paper(
+        scatter = monte_carlo_scatter(
             worth.solution.network,
             runs=runs,
             seed=seed,

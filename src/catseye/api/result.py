@@ -159,7 +159,7 @@ def save(result: Result, directory: "str | Path", *, progress: Progress | None =
 
     Returns the directory. Raises InputError where another's files would be lost or nothing can be written.
     """
-    from catseye.gateways.writers.output import whole_directory
+    from catseye.gateways.writers.output import atomic_directory
     from catseye.processors import free_threads
 
     if not isinstance(result, Result):
@@ -167,7 +167,7 @@ def save(result: Result, directory: "str | Path", *, progress: Progress | None =
             f"save needs a result of catseye, not {type(result).__name__}; reduce, adjust and so on give one"
         )
     where = Path(directory)
-    with whole_directory(where, *result.sources()) as fresh, free_threads():
+    with atomic_directory(where, *result.sources()) as fresh, free_threads():
         result.write(fresh, progress)
     return where
 

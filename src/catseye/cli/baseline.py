@@ -190,7 +190,7 @@ def baseline(
     progress = ProgressLine(quiet)
     try:
         from catseye.api.laboratory import baseline as calibrated
-        from catseye.gateways.writers.output import whole_directory
+        from catseye.gateways.writers.output import atomic_directory
 
         result = calibrated(
             read.observations,
@@ -200,7 +200,7 @@ def baseline(
             progress=progress,
         )
         if out is not None:
-            with whole_directory(out, *read.files) as directory:
+            with atomic_directory(out, *read.files) as directory:
                 result.write(directory, progress)
                 _keep(result, write, origin)  # no directory without the record that was asked for, too
         else:

@@ -76,7 +76,7 @@ def _write(calibration: "Calibration", write: Path | None, certificate: Path | N
     from contextlib import ExitStack
     from datetime import UTC, datetime
 
-    from catseye.gateways.writers.output import refuse_suffix, whole_file
+    from catseye.gateways.writers.output import atomic_file, refuse_suffix
 
     pages = []
     if write is not None:
@@ -91,4 +91,4 @@ def _write(calibration: "Calibration", write: Path | None, certificate: Path | N
         pages.append((certificate, "--certificate", PAGE_MARK, drawn(calibration, datetime.now(UTC))))
     with ExitStack() as files:
         for path, option, mark, text in pages:
-            files.enter_context(whole_file(path, option, mark)).append(text)
+            files.enter_context(atomic_file(path, option, mark)).append(text)

@@ -61,12 +61,12 @@ def _write(report: "Report", out: Path, record: Path | None) -> None:
     from datetime import UTC, datetime
 
     from catseye.gateways.calibrations.field_report import field_report, mark
-    from catseye.gateways.writers.output import refuse_suffix, whole_file
+    from catseye.gateways.writers.output import atomic_file, refuse_suffix
 
     if record is not None and out.resolve() == record.resolve():
         raise InputError(f"--out {out}: is the record that fills the page (expected another name)")
     refuse_suffix(out, "--out")
-    with whole_file(out, "--out", mark(report.kind)) as pieces:
+    with atomic_file(out, "--out", mark(report.kind)) as pieces:
         pieces.append(field_report(report, datetime.now(UTC)))
 
 

@@ -74,10 +74,10 @@ def _page(page: Path | None) -> AbstractContextManager[list[str]]:
     if page is None:
         return nullcontext([])
     from catseye.gateways.epoch.explain_page import MARK
-    from catseye.gateways.writers.output import refuse_suffix, whole_file
+    from catseye.gateways.writers.output import atomic_file, refuse_suffix
 
     refuse_suffix(page, "--page")
-    return whole_file(page, "--page", MARK)
+    return atomic_file(page, "--page", MARK)
 
 
 def _page_of(explanation: "Explanation", night: "Campaign") -> str:

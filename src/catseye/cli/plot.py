@@ -219,14 +219,14 @@ def _finish(
     """Write the figure whole or not at all, and say what it says."""
     from catseye.gateways.writers.drawing import picture_file
     from catseye.gateways.writers.objects import json_line
-    from catseye.gateways.writers.output import write_whole
+    from catseye.gateways.writers.output import write_atomically
 
     text, summary = drawn
     for given in inputs:
         if given is not None and given.resolve() == out.resolve():
             raise InputError(f"--out {out}: is an input of this figure (expected another name)")
     content = picture_file(text, out, "--out", mark=f"{MARK} {kind}")
-    write_whole(out, content, option="--out", ours=lambda there: MARK.encode() in there)
+    write_atomically(out, content, option="--out", ours=lambda there: MARK.encode() in there)
     if json:
         verdict = {"word": "good", "why": "the figure is drawn from these inputs"}
         say(json_line({"verdict": verdict, "kind": kind, "written": str(out), **summary}))

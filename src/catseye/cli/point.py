@@ -202,9 +202,9 @@ def point(  # noqa: PLR0913 - its options are its command line
     )
     if write is not None:
         from catseye.gateways.steering.pointing_objects import MARK, output_dat
-        from catseye.gateways.writers.output import whole_file
+        from catseye.gateways.writers.output import atomic_file
 
-        with whole_file(write, "--write", MARK) as page:
+        with atomic_file(write, "--write", MARK) as page:
             page.append(output_dat(result.pointings, f"{result.names['mirror']} on {result.names['monument']}"))
     if json:
         from catseye.gateways.writers.objects import json_line

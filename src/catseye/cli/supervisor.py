@@ -15,7 +15,12 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import NoReturn
 
-from catseye.gateways.writers.interruption import LONGEST_DEFERRAL, UnfinishedWork, leave_on_signals, tell_supervisor
+from catseye.gateways.writers.interruption import (
+    LONGEST_DEFERRAL,
+    UnfinishedWork,
+    exit_on_signals,
+    report_to_supervisor,
+)
 
 GRACE = LONGEST_DEFERRAL + 0.5  # s that the child has to leave by itself: the contract allows five
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -41,9 +46,9 @@ def work_in_child(stopped: Callable[[int], None]) -> None:
         _watch(child, reports, stopped)
     if child == 0:
         os.close(reports)
-        tell_supervisor(ours)
+        report_to_supervisor(ours)
         _end_with(parent)
-    leave_on_signals()
+    exit_on_signals()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, HEARD)
 
 
@@ -110,6 +115,6 @@ def _woken_by_signals() -> int:
 
 def _complain_of(name: str, memory: int) -> None:
     from catseye.cli.terminal import complain
-    from catseye.memory import memory_of_a_killed
+    from catseye.memory import killed_process_message
 
-    complain(memory_of_a_killed(name, memory))
+    complain(killed_process_message(name, memory))

@@ -44,9 +44,9 @@ def attempt(command: Callable[[], None]) -> int:
         complain(str(problem))
         return 1
     except (MemoryError, ImportError, OSError) as problem:
-        from catseye.memory import lacks_memory, out_of_memory
+        from catseye.memory import is_memory_error, out_of_memory
 
-        if lacks_memory(problem):
+        if is_memory_error(problem):
             complain(out_of_memory(problem))
         elif isinstance(problem, OSError):
             complain(f"{problem.filename or 'input or output'}: {problem.strerror or problem}")

@@ -83,8 +83,8 @@ def _reduced(files: list[Path], out: Path | None, quiet: bool) -> "TripletsResul
 
 def _write_blank(path: Path) -> None:
     from catseye.gateways.triplet.form import MARK, blank_form
-    from catseye.gateways.writers.output import refuse_suffix, whole_file
+    from catseye.gateways.writers.output import atomic_file, refuse_suffix
 
     refuse_suffix(path, "--blank")
-    with whole_file(path, "--blank", MARK) as pieces:
+    with atomic_file(path, "--blank", MARK) as pieces:
         pieces.append(blank_form())

@@ -15,7 +15,7 @@ from functools import partial
 from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.journal.entries import (
     CLOCK_CORRECTED,
-    EPOCH_BEGUN,
+    EPOCH_START,
     AnsweredShot,
     Document,
     Entry,
@@ -136,7 +136,7 @@ class Intake:
             self._event_log.tell("not-solved", f"the epoch was not solved: {self._live.failed}", "warning")
             return None
         self._fresh, self._solving = 0, True
-        self._write((Document(ticks, EPOCH_BEGUN, ""),))
+        self._write((Document(ticks, EPOCH_START, ""),))
         corrections = self._corrections
         try:
             epoch = await self._solver(job)

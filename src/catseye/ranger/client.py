@@ -12,7 +12,7 @@ from functools import partial
 
 from catseye.errors import InputError
 from catseye.ranger.commands import LONGEST_PAGE
-from catseye.ranger.door import answer_to, notice_death
+from catseye.ranger.door import answer_to, enable_keep_alive_probes
 from catseye.ranger.line import (
     FIRST_CLIENT_TID,
     LAST_TID,
@@ -164,7 +164,7 @@ class ZyClient(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
-        notice_death(transport)
+        enable_keep_alive_probes(transport)
 
     def connection_lost(self, exc: Exception | None) -> None:
         self.close("connection lost" if exc is None else f"connection lost: {exc}")

@@ -52,7 +52,7 @@ class Door:
     laser_at_boot: bool = False
 
 
-USUAL_DOOR = Door()
+DEFAULT_ACCESS = Door()
 
 
 def key_of(environment: Mapping[str, str] = os.environ) -> str | None:
@@ -114,7 +114,7 @@ def triviality(key: str) -> str | None:
     return None if word is None else f"it contains {word!a}"
 
 
-def refuse_open(what: str, host: str, door: Door) -> None:
+def refuse_exposed_port(what: str, host: str, door: Door) -> None:
     """Raise InputError for an exposed port without key or TLS."""
     if is_here(host):
         return
@@ -138,7 +138,7 @@ def answer_to(nonce: str, key: str) -> str:
     return hmac.new(key.encode(), nonce.encode(), "sha256").hexdigest()
 
 
-def notice_death(transport: asyncio.BaseTransport) -> None:
+def enable_keep_alive_probes(transport: asyncio.BaseTransport) -> None:
     """Enable TCP keep-alive probes, to detect a lost peer."""
     sock = transport.get_extra_info("socket")
     if sock is None or sock.family not in (socket.AF_INET, socket.AF_INET6):

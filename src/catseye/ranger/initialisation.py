@@ -62,7 +62,7 @@ def dish_centre(site: SiteFolder) -> NDArray[np.float64]:
     return np.array([x, y, (x**2 + y**2) / (4.0 * site.site.paraboloid.focal_length_mm * MILLIMETRE)])
 
 
-def own_station(site: SiteFolder, ranger: str) -> MirrorStation:
+def local_station(site: SiteFolder, ranger: str) -> MirrorStation:
     """The mirror on its mount, in the ranger's frame.
 
     For the feed arm that is the reflector frame.
@@ -132,7 +132,7 @@ def cubes_commands(
 
 def monument_commands(site: SiteFolder, ranger: str) -> list[Request]:
     """BP and ALPHA, in the ranger's frame."""
-    station = own_station(site, ranger)
+    station = local_station(site, ranger)
     return [
         _command("BP", *(f"{v:.4f}" for v in station.fixed_point / MILLIMETRE)),
         _command("ALPHA", *(f"{v:.9f}" for v in station.alpha)),

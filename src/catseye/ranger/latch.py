@@ -41,7 +41,7 @@ class Latch:
         return " and ".join(word for word, off in (("light", self.light), ("moves", self.moves)) if off)
 
 
-def stored_latch(folder: Path | None) -> Latch | None:
+def read_latch(folder: Path | None) -> Latch | None:
     """Order stored in a folder; an unreadable one forbids light and moves."""
     if folder is None:
         return None

@@ -17,7 +17,7 @@ from functools import partial
 
 from catseye.errors import InputError
 from catseye.ranger.commands import WORDS, stops
-from catseye.ranger.door import USUAL_DOOR, Door, notice_death, refuse_open
+from catseye.ranger.door import DEFAULT_ACCESS, Door, enable_keep_alive_probes, refuse_exposed_port
 from catseye.ranger.entrance import Doorway, Entrance
 from catseye.ranger.first_line import peer_of
 from catseye.ranger.line import LONGEST_REQUEST, Reply, format_reply, parse_request
@@ -69,7 +69,7 @@ class ClientConnection(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
         self.transport = transport
-        notice_death(transport)
+        enable_keep_alive_probes(transport)
         self.entrance = Entrance(self.server.gates[self.number], transport, self.say)
         self.entrance.begin()
         if self.admitted:
@@ -199,7 +199,7 @@ class ZyServer:
         host: str = LOOPBACK,
         ports: tuple[int, int] = PORTS,
         *,
-        door: Door = USUAL_DOOR,
+        door: Door = DEFAULT_ACCESS,
         clock: Callable[[], float] = time.monotonic,
         network: ConnectionMaker | None = None,
     ):
@@ -242,7 +242,7 @@ class ZyServer:
 
         Raises InputError if a port is not available, or would be exposed without a key.
         """
-        refuse_open(self.ranger.name, self.host, self.door)
+        refuse_exposed_port(self.ranger.name, self.host, self.door)
         self.rearm()
         for number, port in enumerate(self.ports):
             try:

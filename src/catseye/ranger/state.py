@@ -12,7 +12,7 @@ from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND
 from catseye.ranger.commands import COMMANDS, schedule_of
 from catseye.ranger.cubes import Cubes
 from catseye.ranger.head import Buffer, RangerHead, SamplingSettings
-from catseye.ranger.latch import Latch, store_latch, stored_latch
+from catseye.ranger.latch import Latch, read_latch, store_latch
 from catseye.ranger.line import TICK_NS, Reply, Request, nanoseconds_of, nanoseconds_to_ticks
 from catseye.ranger.ranging import NOMINAL_INDEX
 from catseye.ranger.schedule import Scheduler
@@ -134,7 +134,7 @@ class RangerState:
         self.guarded = False  # True if commands need the lease
         self.lease: Lease | None = None
         self.peers: dict[int, str] = {}  # peer of each connection, in words
-        self.latch: Latch | None = stored_latch(files)
+        self.latch: Latch | None = read_latch(files)
         self.times_off = 0  # times that the laser was switched off
         self.cleared_by = ""  # person who cleared the last one, and address
         self._head_interlock: Callable[[], str] | None = getattr(head, "interlock", None)  # optional in a head

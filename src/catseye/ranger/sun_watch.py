@@ -51,7 +51,7 @@ class OwnSun:
         return self._seen
 
 
-def own_sun(site: Location) -> OwnSun:
+def sun_of_site(site: Location) -> OwnSun:
     """Sun of a site record's table [site], for its ground rangers.
 
     The Earth rotation table is read now.
@@ -140,7 +140,7 @@ def way_out(
     return None
 
 
-def sun_leaves(station: MirrorStation, position: ArrayLike, sun: SunSource, mjd: float) -> float | None:
+def sun_departure_mjd(station: MirrorStation, position: ArrayLike, sun: SunSource, mjd: float) -> float | None:
     """MJD, to a minute, at which the Sun leaves a parked beam.
 
     None if that takes over a day.

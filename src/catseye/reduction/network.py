@@ -286,7 +286,7 @@ def _ranger_model(network: ObservationNetwork, solution: NetworkSolution) -> Row
     )
 
 
-def measured_on_paper(
+def monte_carlo_scatter(
     network: ObservationNetwork,
     *,
     runs: int,

@@ -43,7 +43,7 @@ class Troubles:
         self.texts[key] = what.text
 
 
-class LiveBook:
+class RunSummary:
     """Summary built from durable journal entries, in their order.
 
     comparison   with the twin's truth; None if there is none

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from contextlib import nullcontext, suppress
 
 from catseye.errors import InputError
-from catseye.gateways.writers.interruption import undone_when_interrupted
+from catseye.gateways.writers.interruption import undo_on_interruption
 
 PROGRAM = (sys.executable, "-P", "-m", "catseye")
 LONGEST_START = 120.0  # s until the child's first line: its kernels are compiled the first time
@@ -92,7 +92,7 @@ class LiveChild:
         Raises InputError if the first start fails, unless `patient`.
         """
         wait, loop = FIRST_WAIT, asyncio.get_running_loop()
-        with undone_when_interrupted(self.kill):
+        with undo_on_interruption(self.kill):
             try:
                 with suppress(InputError) if patient else nullcontext():  # its message has been passed on
                     await self.start()

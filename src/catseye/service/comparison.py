@@ -15,7 +15,7 @@ from catseye.constants import MILLIMETRE
 from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
 from catseye.estimation.shapes.motions import motions
 from catseye.records.site.folder import SiteFolder
-from catseye.reduction.site.bodies import bodies_of, lasting_names
+from catseye.reduction.site.bodies import bodies_of, tracked_names
 from catseye.reduction.site.motion import GROUND, frames_of, ground_from
 from catseye.simulator.twin.beam import TracedDish
 from catseye.simulator.twin.site import Twin
@@ -70,7 +70,7 @@ class TwinComparison:
     def __init__(self, site: SiteFolder, twin: Twin, *, reference_after: int):
         self._site, self._twin, self._reference_after = site, twin, reference_after
         self._frames, self._bodies = frames_of(site), bodies_of(site, frames_of(site))
-        self._lasting = frozenset(lasting_names(site))
+        self._lasting = frozenset(tracked_names(site))
         self._dish = TracedDish.of(site.site.paraboloid)
         self._middles: dict[int, float] = {}  # s since the twin's start, by number
         self._reference: dict[str, Array] = {}  # true positions in the reflector frame, at the reference epoch

@@ -31,7 +31,7 @@ LIKE = 3.0  # factor within which a reported size matches the fault's
 
 
 @dataclass
-class FoundFault:
+class DetectedFault:
     """An injected fault and the first event that detected it, or None."""
 
     fault: Fault
@@ -52,7 +52,7 @@ class FoundFault:
     def line(self, ticks: int) -> str:
         """State of the fault at a time in ticks, for people.
 
-        >>> FoundFault(Fault.parse("dead-ranger ZY104 40"), "dead-ranger ZY104 40", 0).line(0)
+        >>> DetectedFault(Fault.parse("dead-ranger ZY104 40"), "dead-ranger ZY104 40", 0).line(0)
         'dead-ranger ZY104 40: not detected'
         """
         if self.by is not None:
@@ -72,7 +72,7 @@ class FaultFinder:
     def __init__(self, faults: Sequence[str] = (), start_mjd: float = 0.0):
         start = round(start_mjd * TICKS_PER_DAY)
         self.found = [
-            FoundFault(fault, text, start + round(fault.start * TICKS_PER_SECOND))
+            DetectedFault(fault, text, start + round(fault.start * TICKS_PER_SECOND))
             for text in faults
             for fault in (Fault.parse(text),)
         ]
@@ -88,13 +88,13 @@ class FaultFinder:
             first.by = what
 
 
-def _exactness(fault: FoundFault) -> int:
+def _exactness(fault: DetectedFault) -> int:
     """Specificity: 2 for a part of a device, 1 for a device, 0 for all."""
     whom, _, part = fault.fault.whom.partition(":")
     return 0 if whom == "*" else 1 + bool(part)
 
 
-def _names(what: Happening, fault: FoundFault) -> bool:
+def _names(what: Happening, fault: DetectedFault) -> bool:
     """True for an event that indicates a fault on its device and in time."""
     whom, _, part = fault.fault.whom.partition(":")
     late = LATE * TICKS_PER_SECOND
@@ -109,7 +109,7 @@ def _names(what: Happening, fault: FoundFault) -> bool:
     return (whom == "*" or whom in named) and not elsewhere
 
 
-def _says_the_bias(what: Happening, fault: FoundFault) -> bool:
+def _says_the_bias(what: Happening, fault: DetectedFault) -> bool:
     """True if a suspicion matches the fault in readings, sign and size."""
     if what.kind == DOUBTED:
         return what.ticks < fault.ends

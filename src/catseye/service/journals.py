@@ -13,7 +13,7 @@ from typing import Any, Literal
 from urllib.parse import quote
 
 from catseye.coordinator.journal.chain import Head
-from catseye.coordinator.journal.check import ChainReport, check_whole, held_by, parted
+from catseye.coordinator.journal.check import ChainReport, has_head, parted, verify_run
 from catseye.coordinator.journal.place import place_of, refuse_foreign
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.recovery import recover
@@ -21,7 +21,7 @@ from catseye.errors import InputError
 from catseye.gateways.journal.campaign import export_campaign
 from catseye.gateways.journal.chain import export_verdict
 from catseye.gateways.journal.export import export_tables
-from catseye.gateways.writers.interruption import Unfinished, undone_when_interrupted
+from catseye.gateways.writers.interruption import Unfinished, undo_on_interruption
 from catseye.verdict import Verdict
 
 STEP = 500  # SQLite VM steps between checks for signals and progress: some ms, 2 MB of buffers
@@ -49,7 +49,7 @@ def checked(
         reports = []
         for run in runs:
             run_heads = [head for head in given_heads if holders[head] == run.run or which is not None]
-            reports.append(check_whole(reader, run.run, heads=run_heads, progress=progress))
+            reports.append(verify_run(reader, run.run, heads=run_heads, progress=progress))
         for head in given_heads if which is None else ():
             if holders[head] is None:
                 text = f"no run has the given head {head}: a run was deleted, cut or rewritten"
@@ -76,7 +76,7 @@ def _holder(reader: JournalReader, runs: Sequence[int], head: Head) -> int | Non
     """The run that has a head, None if none has."""
     for run in runs:
         with suppress(InputError):  # reported by that run's check
-            if held_by(reader, run, head):
+            if has_head(reader, run, head):
                 return run
     return None
 
@@ -101,7 +101,7 @@ def copied(journal: str, copy: Path, *, progress: Progress) -> list[ChainReport]
     new = folder / copy.name
     _forget_dead(copy)
     try:
-        with undone_when_interrupted(Unfinished(str(folder))):
+        with undo_on_interruption(Unfinished(str(folder))):
             folder.mkdir()
             _copy(place.path, new, progress)
             if os.path.lexists(copy):
@@ -116,7 +116,7 @@ def copied(journal: str, copy: Path, *, progress: Progress) -> list[ChainReport]
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     with JournalReader(copy) as reader:
-        return [check_whole(reader, run.run, progress=progress) for run in reader.runs()]
+        return [verify_run(reader, run.run, progress=progress) for run in reader.runs()]
 
 
 def _copy(source: Path, new: Path, progress: Progress) -> None:
@@ -206,7 +206,7 @@ def exported(
     """
     with _readable(journal, out, damaged=damaged, progress=progress) as (reader, notes):
         number = reader.run(which).run
-        chain = check_whole(reader, number, progress=progress)
+        chain = verify_run(reader, number, progress=progress)
         if chain.count and not damaged:
             raise InputError(
                 f"journal {reader.place}: run {number} fails verification: {chain.problems[0]} (use its "
@@ -242,7 +242,7 @@ def _readable(
     parent = out.absolute().parent
     with (
         TemporaryDirectory(prefix=".catseye-recovered-", dir=parent) as folder,
-        undone_when_interrupted(Unfinished(folder)),
+        undo_on_interruption(Unfinished(folder)),
     ):
         notes = _recovered(place.path, Path(folder), progress)
         with JournalReader(Path(folder) / place.path.name) as reader:

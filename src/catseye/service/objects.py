@@ -10,7 +10,7 @@ from catseye.coordinator.firing import GOOD, OF_THE_LINE
 from catseye.coordinator.journal.chain import Head
 from catseye.gateways.writers.verdict import Verdict
 from catseye.records.night.live import TICKS_PER_DAY
-from catseye.service.book import LiveBook
+from catseye.service.book import RunSummary
 from catseye.service.comparison import EpochComparison
 from catseye.service.world import TwinWords
 
@@ -23,7 +23,7 @@ OFFSETS = (
 )
 
 
-def simulation_verdict(book: LiveBook) -> Verdict:
+def simulation_verdict(book: RunSummary) -> Verdict:
     """Verdict on a simulation: epochs against truth and their own doubts."""
     if not book.epochs:
         return Verdict("failed", "no epoch was solved: the run was too short (expected at least half a minute)")
@@ -41,7 +41,7 @@ def simulation_verdict(book: LiveBook) -> Verdict:
 
 
 def simulation_object(
-    book: LiveBook,
+    book: RunSummary,
     world: TwinWords,
     journal: str | None,
     *,
@@ -142,7 +142,7 @@ def beam_lines(compared: EpochComparison) -> Iterator[str]:
 
 
 def summary(
-    book: LiveBook,
+    book: RunSummary,
     world: TwinWords,
     journal: str | None,
     *,

@@ -14,7 +14,7 @@ from typing import Any
 from catseye.clock import Clock
 from catseye.errors import CatseyeError, InputError
 from catseye.ranger.addresses import PORT_BASE, Address, Addresses, feed_address
-from catseye.ranger.door import USUAL_DOOR, Door
+from catseye.ranger.door import DEFAULT_ACCESS, Door
 from catseye.ranger.head import RangerHead
 from catseye.ranger.network import NO_TLS, ConnectionMaker, SocketListener, Sockets, TlsFiles
 from catseye.ranger.ranger import Ranger
@@ -46,7 +46,7 @@ class Listening:
         }
 
 
-class LateSockets(Sockets):
+class DeferredSockets(Sockets):
     """TCP listeners whose ports are bound at once and answer after `open`.
 
     Nobody can connect to rangers that are not ready.
@@ -79,7 +79,7 @@ class LateSockets(Sockets):
 
 
 @dataclass(frozen=True)
-class ServedAt:
+class ListenAddresses:
     """Addresses for rangers to listen at.
 
     addresses   "loopback", a port base, 0 for any free ports
@@ -91,10 +91,10 @@ class ServedAt:
     addresses: Addresses = PORT_BASE
     host: str | None = None
     ports: tuple[int, int] | None = None
-    door: Door = USUAL_DOOR
+    door: Door = DEFAULT_ACCESS
 
 
-USUAL_PORTS = ServedAt()
+USUAL_PORTS = ListenAddresses()
 
 
 class RangersServed:
@@ -116,13 +116,13 @@ class RangersServed:
         *,
         clock: Clock,
         twin: Twin | None = None,
-        at: ServedAt = USUAL_PORTS,
+        at: ListenAddresses = USUAL_PORTS,
         files: Path | None = None,
         network: ConnectionMaker | None = None,
         warming: WarmingClock | None = None,
     ):
         self._site, self._twin, self._warming = site, twin, warming
-        self._late = LateSockets(at.door.tls) if network is None else None
+        self._late = DeferredSockets(at.door.tls) if network is None else None
         network = network or self._late
         start_ns = clock.now_ns()
         self._served = TwinSite(

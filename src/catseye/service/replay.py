@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.coordinator.journal.check import ChainReport, check_whole
+from catseye.coordinator.journal.check import ChainReport, verify_run
 from catseye.coordinator.journal.movement import Movement, Movements, Moving, in_u, places, point_moves
 from catseye.coordinator.journal.reader import JournalReader, StoredRun
 from catseye.coordinator.journal.replay import Replayed, replay
@@ -164,7 +164,7 @@ def replayed(journal: str, which: int | str | None, calibrations: Path | None, *
             movements.stations = [station.name for station in site.site.weather_station]
             return Live(site if records is None else records, settings)
 
-        chain = check_whole(reader, run.run, progress=progress)
+        chain = verify_run(reader, run.run, progress=progress)
         if chain.bad:  # altered entries are skipped: the differences show their weight
             reader.left_out = {run.run: chain.bad}
         total = sum(1 for _ in reader.solutions(run.run))

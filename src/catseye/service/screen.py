@@ -17,9 +17,9 @@ from catseye.constants import DEGREE
 from catseye.coordinator.condition import SIGNS, WRONG, SiteCondition
 from catseye.coordinator.journal.entries import EpochSolution
 from catseye.coordinator.parts import ticks_now
-from catseye.gateways.writers.interruption import undone_when_interrupted
+from catseye.gateways.writers.interruption import undo_on_interruption
 from catseye.records.night.live import Happening
-from catseye.service.book import GOOD, LiveBook
+from catseye.service.book import GOOD, RunSummary
 from catseye.service.logs import one_line, time_text
 from catseye.service.objects import beam_lines, epoch_line
 
@@ -54,7 +54,7 @@ class SilentView:
     def tell(self, text: str) -> None:
         """Do nothing: there is no screen."""
 
-    def begin(self, book: LiveBook, running: "LiveCoordinator") -> None:
+    def begin(self, book: RunSummary, running: "LiveCoordinator") -> None:
         """Do nothing: there is no screen."""
 
     def entry(self, entry: Any) -> None:
@@ -72,13 +72,13 @@ class LinesView(SilentView):
 
     def __init__(self, say: Callable[[str], None]):
         self._say = say
-        self._book: LiveBook | None = None
+        self._book: RunSummary | None = None
         self._found: set[str] = set()  # detected faults already shown
 
     def tell(self, text: str) -> None:
         self._say(one_line(text))
 
-    def begin(self, book: LiveBook, running: "LiveCoordinator") -> None:
+    def begin(self, book: RunSummary, running: "LiveCoordinator") -> None:
         self._book = book
 
     def entry(self, entry: Any) -> None:
@@ -108,7 +108,7 @@ class ScreenView(SilentView):
         self._console = console or Console(stderr=True, highlight=False)
         self._stack = ExitStack()
         self._live: Any = None
-        self._book: LiveBook | None = None
+        self._book: RunSummary | None = None
         self._running: LiveCoordinator | None = None
         self._next = 0.0
         self._timer: asyncio.TimerHandle | None = None
@@ -117,12 +117,12 @@ class ScreenView(SilentView):
         if self._live is None:
             self._console.print(one_line(text), style="dim", markup=False)
 
-    def begin(self, book: LiveBook, running: "LiveCoordinator") -> None:
+    def begin(self, book: RunSummary, running: "LiveCoordinator") -> None:
         from rich.live import Live
 
         self._book, self._running = book, running
         self._live = Live(console=self._console, auto_refresh=False, redirect_stdout=False, redirect_stderr=False)
-        self._stack.enter_context(undone_when_interrupted(_show_cursor))
+        self._stack.enter_context(undo_on_interruption(_show_cursor))
         self._stack.enter_context(self._live)
         self._timer = asyncio.get_running_loop().call_later(IDLE_PERIOD, self._tick)
 

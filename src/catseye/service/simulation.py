@@ -12,7 +12,7 @@ from catseye.coordinator.link.settings import Address
 from catseye.errors import InputError
 from catseye.ranger.addresses import PORT_BASE
 from catseye.records.site.folder import SiteFolder
-from catseye.service.book import LiveBook
+from catseye.service.book import RunSummary
 from catseye.service.child import LiveChild
 from catseye.service.comparison import TwinComparison
 from catseye.service.coordinator import LiveCoordinator, Orders, Peers
@@ -34,7 +34,7 @@ class View(Protocol):
         """Show a message during the start."""
         ...
 
-    def begin(self, book: LiveBook, running: LiveCoordinator) -> None:
+    def begin(self, book: RunSummary, running: LiveCoordinator) -> None:
         """Begin to show a coordinator."""
         ...
 
@@ -73,7 +73,7 @@ class Simulation:
 
     def __post_init__(self) -> None:
         self._twin = self.world.twin(self.site)
-        self.book = LiveBook()
+        self.book = RunSummary()
 
     @property
     def totals(self) -> dict[str, Any]:
@@ -150,7 +150,7 @@ class Simulation:
         )
         after = running.settings.reference_after
         finder = FaultFinder(self.world.faults, self.world.start_mjd)
-        self.book = LiveBook(TwinComparison(self.site, self._twin, reference_after=after), finder)
+        self.book = RunSummary(TwinComparison(self.site, self._twin, reference_after=after), finder)
         running.ziy.listeners.append(self._entry)
         self.view.begin(self.book, running)
         coordinator = asyncio.create_task(running.run())

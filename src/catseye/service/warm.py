@@ -16,7 +16,7 @@ from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND, utc_text
 from catseye.ranger.initialisation import cubes_commands, head_commands, monument_commands
 from catseye.ranger.line import FIRST_CLIENT_TID, Reply, Request, format_request, nanoseconds_to_ticks
 from catseye.ranger.ranger import Ranger
-from catseye.ranger.sun_watch import sun_leaves
+from catseye.ranger.sun_watch import sun_departure_mjd
 from catseye.records.night.live import LivePosture
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.site.places import places_of
@@ -140,7 +140,7 @@ def _lit_from(ranger: Ranger) -> str:
     """Time at which the Sun leaves a ranger's parked beam, in words."""
     if not ranger.in_sun or ranger.sun is None:
         return ""
-    mjd = sun_leaves(ranger.cubes.station, ranger.here, ranger.sun, ranger.now_ns() / PER_DAY)
+    mjd = sun_departure_mjd(ranger.cubes.station, ranger.here, ranger.sun, ranger.now_ns() / PER_DAY)
     return "; the Sun does not leave it within a day" if mjd is None else f"; the Sun leaves it at {utc_text(mjd)}"
 
 

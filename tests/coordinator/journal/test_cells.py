@@ -5,7 +5,7 @@ import sqlite3
 
 import pytest
 
-from catseye.coordinator.journal.check import check_whole
+from catseye.coordinator.journal.check import verify_run
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.tables import EVENTS, JOURNAL, METADATA, RUN_FILES, RUNS, TEXTS
 from catseye.coordinator.journal.writer import Journal
@@ -80,7 +80,7 @@ def again(path):
 def exported(path, write, **which):
     with JournalReader(path) as reader:
         number = reader.run().run
-        return write(reader, path.with_name("out"), chain=check_whole(reader, number), number=number, **which)
+        return write(reader, path.with_name("out"), chain=verify_run(reader, number), number=number, **which)
 
 
 READERS = {

@@ -8,7 +8,7 @@ import pytest
 
 from catseye.coordinator.journal import writer as journal_writer
 from catseye.coordinator.journal.chain import Head
-from catseye.coordinator.journal.check import check_run, check_whole, parted
+from catseye.coordinator.journal.check import check_run, parted, verify_run
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.writer import Journal, JournalSettings
 from catseye.errors import InputError
@@ -33,7 +33,7 @@ def written(path, entries, *, together=5, **settings):
 
 def report_of(path, heads=(), run=1):
     with JournalReader(path) as reader:
-        return check_whole(reader, run, heads=heads)
+        return verify_run(reader, run, heads=heads)
 
 
 def altered(path, copy, script):
@@ -312,7 +312,7 @@ def test_rotated_run_is_read_as_one(rotated):
             assert [plainly(e) for _, e in reader.events(1)] == [plainly(e) for e in entries]
             assert [seq for seq, _ in reader.events(1, after=30, until=90)] == list(range(31, 91))
             assert reader.last(1) == len(entries)
-            report = check_whole(reader, 1, heads=heads)
+            report = verify_run(reader, 1, heads=heads)
             assert report.intact
             assert report.ended
             assert (report.events, report.heads) == (len(entries), len(heads))

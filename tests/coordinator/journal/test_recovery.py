@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catseye.coordinator.journal.check import check_whole
+from catseye.coordinator.journal.check import verify_run
 from catseye.coordinator.journal.entries import AnsweredShot
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.recovery import recover
@@ -62,7 +62,7 @@ def stored(path):
 def read(path):
     """What a recovered journal holds, by seq, and what its chain says."""
     with JournalReader(path) as reader:
-        return {seq: plainly(entry) for seq, entry in reader.events(1)}, check_whole(reader, 1)
+        return {seq: plainly(entry) for seq, entry in reader.events(1)}, verify_run(reader, 1)
 
 
 def test_intact_journal_is_recovered_to_the_last_bit(whole, tmp_path):
@@ -189,7 +189,7 @@ def test_old_journal_keeps_its_version(tmp_path):
         assert new.version == 1
         assert [run.uuid for run in new.runs()] == [run.uuid for run in old.runs()]
         assert [plainly(e) for _, e in new.events(1)] == [plainly(e) for _, e in old.events(1)]
-        report = check_whole(new, 1)
+        report = verify_run(new, 1)
     assert (report.chained, report.count) == (False, 0)
 
 

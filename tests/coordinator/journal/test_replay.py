@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from catseye.coordinator.journal.entries import CLOCK_CORRECTED, EPOCH_BEGUN, AnsweredShot, Document, EpochSolution
+from catseye.coordinator.journal.entries import CLOCK_CORRECTED, EPOCH_START, AnsweredShot, Document, EpochSolution
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.replay import replay
 from catseye.coordinator.journal.sameness import Sameness
@@ -91,7 +91,7 @@ def recorded(path, solves=6, gain=1.1):
             shot = scene_shot(k)
             journal.append(AnsweredShot.of(shot, live.shot(shot)), Happening(when, "ZY105", "x", "y"))
             if k % 7 == 6:
-                journal.append(Document(when, EPOCH_BEGUN, ""), EpochSolution.of(when, live.solve(when)))
+                journal.append(Document(when, EPOCH_START, ""), EpochSolution.of(when, live.solve(when)))
         journal.append().result(MOST_WAIT)
     return path
 
@@ -153,7 +153,7 @@ def test_failed_solution_is_replayed_too(tmp_path):
             except InputError as problem:
                 journal.append(AnsweredShot(shot, "refused", str(problem)))
             if k % 3 == 2:
-                begun = Document(shot.ticks, EPOCH_BEGUN, "")
+                begun = Document(shot.ticks, EPOCH_START, "")
                 journal.append(begun, EpochSolution.of(shot.ticks, live.solve(shot.ticks)))
     with JournalReader(tmp_path / "j.db") as reader:
         found = list(replay(reader, 1, lambda site, run: Failing(site, 1.1)))
@@ -200,7 +200,7 @@ def test_shots_during_a_solution_belong_to_the_next_epoch(tmp_path):
             shot = scene_shot(k)
             if k % 10 == 5:
                 job = live.begin(shot.ticks)
-                journal.append(Document(shot.ticks, EPOCH_BEGUN, ""))
+                journal.append(Document(shot.ticks, EPOCH_START, ""))
             journal.append(AnsweredShot.of(shot, live.shot(shot)))
             if k % 10 == 8:
                 journal.append(EpochSolution.of(shot.ticks, live.accept(job, job.solve())))
@@ -223,7 +223,7 @@ def test_clock_correction_is_replayed_and_discards_the_epoch_under_way(tmp_path)
             shot = scene_shot(k)
             journal.append(AnsweredShot.of(shot, live.shot(shot)))
             if k in (6, 16, 26):
-                journal.append(Document(shot.ticks, EPOCH_BEGUN, ""))
+                journal.append(Document(shot.ticks, EPOCH_START, ""))
                 if k == 16:  # corrected while it is solved: what it found was not taken in
                     live.clock_corrected(shot.ticks)
                     journal.append(Document(shot.ticks, CLOCK_CORRECTED, '{"gained_s": 3600.0}'))
@@ -247,7 +247,7 @@ def test_shots_after_the_last_epoch_are_compared_and_unanswered_ones_counted(tmp
                 answered = AnsweredShot(scene_shot(k), "used", "", 1.0)  # not what is said now
             journal.append(answered)
             if k == 2:
-                journal.append(Document(1, EPOCH_BEGUN, ""), EpochSolution.of(1, live.solve(1)))
+                journal.append(Document(1, EPOCH_START, ""), EpochSolution.of(1, live.solve(1)))
     first, rest = again(tmp_path / "j.db")
     assert first.same
     assert (rest.stored, rest.shots.count, rest.shots.differing, rest.shots.unasked) == (None, 3, [8], [7])

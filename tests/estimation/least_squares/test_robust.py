@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catseye.estimation.least_squares.adjustment import CONVERGED, adjust
-from catseye.estimation.least_squares.conflict import LocalConflict, MeetingLines, contradicted, search
+from catseye.estimation.least_squares.conflict import LocalConflict, PointObservations, contradicted, search
 from catseye.estimation.least_squares.robust import OutlierSearch, adjust_robustly
 from catseye.estimation.observations.kinds import Distances, Linear
 from draws import examples
@@ -211,7 +211,7 @@ def test_of_two_ranges_that_explain_a_typed_place_as_well_neither_is_left_out():
     field.observed[0][1] += 0.02
     everything = [np.ones(len(g.observed), dtype=bool) for g in field.groups()]
     agreed = adjust(field.x0, field.groups(), free=field.free).require_converged()
-    meeting = MeetingLines.of(field.groups(), agreed, [on & (k < 3) for k, on in enumerate(everything)], ())
+    meeting = PointObservations.of(field.groups(), agreed, [on & (k < 3) for k, on in enumerate(everything)], ())
     assert [p[0] for p in contradicted(field.points, meeting)] == [field.points[1][0]]
     local, wrong = search(field.points[1], meeting)
     assert wrong

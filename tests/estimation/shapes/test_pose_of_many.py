@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 import catseye.estimation.shapes.rigid_body as module
 from catseye.estimation.least_squares.covariance import Dense, JointPoints
-from catseye.estimation.shapes.place_covariances import PlaceCovariances, TurnedPoints
+from catseye.estimation.shapes.place_covariances import PlaceCovariances, RotatedPoints
 from catseye.estimation.shapes.pose import fit_pose
 
 
@@ -166,7 +166,7 @@ def test_points_of_a_larger_covariance_in_other_axes_are_the_matrix_turned():
     one, other = (
         fit_pose(names, x, y, frame="g", covariance=PlaceCovariances(first=design, second=each), robust=robust)
         for robust in ("igg3",)
-        for each in (TurnedPoints(joint, turn), matrix)
+        for each in (RotatedPoints(joint, turn), matrix)
     )
     np.testing.assert_allclose(one.translation, other.translation, rtol=0, atol=1e-12)
     np.testing.assert_allclose(one.covariance, other.covariance, rtol=1e-9, atol=1e-20)

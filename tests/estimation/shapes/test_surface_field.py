@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import EstimationError
-from catseye.estimation.shapes.surface_field import MeasuredField, Roughness, find_roughness, foretell
+from catseye.estimation.shapes.surface_field import MeasuredField, Roughness, estimate_roughness, foretell
 from draws import draws, same_sigmas
 
 ROUGH = Roughness(smooth=2e-4, length=25.0, own=7e-5)
@@ -45,7 +45,7 @@ def test_prediction_error_scatters_as_claimed(runs):
         rng, places, field, trend = scene(seed, 80, 60)
         noise = 9e-10 * np.eye(80)
         measured = field[:80] + 3e-5 * rng.normal(size=80)
-        rough = find_roughness(places[:80], measured, noise, trend=trend[:80])
+        rough = estimate_roughness(places[:80], measured, noise, trend=trend[:80])
         found = foretell(MeasuredField(places[:80], measured, noise, trend[:80]), places[80:], trend[80:],
                          roughness=rough, same=np.full(60, -1))  # fmt: skip
         ratios.append(np.mean((found.value - field[80:]) ** 2 / np.diag(found.covariance)))
@@ -59,7 +59,7 @@ def test_the_roughness_that_was_planted_is_found(runs):
     for seed in range(runs):
         rng, places, field, trend = scene(100 + seed, 250, 0)
         measured = field + 3e-5 * rng.normal(size=250)
-        found.append(find_roughness(places, measured, 9e-10 * np.eye(250), trend=trend))
+        found.append(estimate_roughness(places, measured, 9e-10 * np.eye(250), trend=trend))
     assert np.median([f.own for f in found]) == pytest.approx(ROUGH.own, rel=same_sigmas(0.15, 8, runs))
     assert np.median([f.length for f in found]) == pytest.approx(ROUGH.length, rel=same_sigmas(0.4, 8, runs))
     assert np.median([f.smooth for f in found]) == pytest.approx(ROUGH.smooth, rel=same_sigmas(0.3, 8, runs))
@@ -76,7 +76,7 @@ def test_noise_free_measured_point_is_predicted_exactly():
 def test_what_cannot_be_is_refused():
     _, places, field, trend = scene(3, 8, 0)
     with pytest.raises(EstimationError, match="8 points for 3 coefficients"):
-        find_roughness(places, field, np.zeros((8, 8)), trend=trend)
+        estimate_roughness(places, field, np.zeros((8, 8)), trend=trend)
     same = np.column_stack([np.ones(8), np.ones(8)])
     with pytest.raises(EstimationError, match="do not determine the 2 coefficients"):
         foretell(

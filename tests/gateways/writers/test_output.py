@@ -6,7 +6,7 @@ import json
 import pytest
 
 from catseye.errors import InputError
-from catseye.gateways.writers.output import FORMAT, whole_directory
+from catseye.gateways.writers.output import FORMAT, atomic_directory
 
 
 @pytest.fixture
@@ -17,7 +17,7 @@ def campaign(tmp_path):
 
 
 def write(out, campaign, text, *, fail=None):
-    with whole_directory(out, campaign) as directory:
+    with atomic_directory(out, campaign) as directory:
         (directory / "table.csv").write_text(text)
         if fail is not None:
             raise fail

@@ -15,8 +15,8 @@ from catseye.geometry.antenna.deformation import (
     TelescopePosture,
     Validity,
     carried,
-    carried_jacobian,
     left_jacobian,
+    motion_jacobian,
 )
 
 SMALL = st.floats(-0.3, 0.3)
@@ -120,7 +120,7 @@ def test_derivatives_are_the_slopes_of_what_is_carried(six, pivot):
         return rotation @ x + translation
 
     slopes = np.stack([(point(six + h) - point(six - h)) / 2e-6 for h in 1e-6 * np.eye(6)], axis=-1)
-    np.testing.assert_allclose(carried_jacobian(six, pivot, x), slopes, rtol=0, atol=2e-9)  # rounding over the step
+    np.testing.assert_allclose(motion_jacobian(six, pivot, x), slopes, rtol=0, atol=2e-9)  # rounding over the step
 
 
 @given(st.tuples(*[st.floats(-1.5, 1.5)] * 3))

@@ -19,7 +19,7 @@ from catseye.reduction.budget.inputs import items_of
 from catseye.reduction.budget.scene import Assumptions, scene_of, walk_of
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
 from catseye.reduction.epoch.settings import ReductionSettings
-from catseye.reduction.epoch.settling import settle_network
+from catseye.reduction.epoch.settling import iterate_adjustment
 from catseye.reduction.epoch.shots import shot_group
 from catseye.reduction.epoch.unknowns import build_network
 from catseye.signal.detection.buffers import inspect_buffers
@@ -379,7 +379,7 @@ def test_the_coarse_length_is_that_of_an_adjustment_without_the_shot(night_01, r
     found = explain_shot(night_01, 120, reduction=reduced_night_01)
     r = reduced_night_01
     network = build_network(night_01, r.phases, r.electronics, settings=r.settings)
-    _, solution, shots = settle_network(network.with_strength(r.coordinates.strength), {})
+    _, solution, shots = iterate_adjustment(network.with_strength(r.coordinates.strength), {})
     active = [fit.active.copy() for fit in solution.fits]
     row = int(np.flatnonzero(night_01.shots.shot == 120)[0])
     number = network.rangers.index(found.ranger)

@@ -13,7 +13,7 @@ from catseye.reduction.epoch.common_errors import ALIKE_M, CommonError, _smooth,
 from catseye.reduction.epoch.cycles import resolve_cycles
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
 from catseye.reduction.epoch.settings import ReductionSettings
-from catseye.reduction.epoch.settling import settle_network
+from catseye.reduction.epoch.settling import iterate_adjustment
 from catseye.reduction.epoch.unknowns import BENCHMARKS, MONUMENTS, OFFSETS, TRIPLET_BALLS, ZEROS, build_network
 
 
@@ -22,7 +22,7 @@ def settled(night_01):
     settings = ReductionSettings()
     electronics, _ = follow_electronics(night_01, phases := measure_phases(night_01, settings), settings.dense_shots)
     network = build_network(night_01, phases, electronics, settings=settings)
-    found = settle_network(network, resolve_cycles(network).starts)
+    found = iterate_adjustment(network, resolve_cycles(network).starts)
     # Once more with the rows as last seen: of 18 zeros' common error little is left, and that to 6 % only otherwise.
     groups = [*(group for group, _ in found.shots), *found.network.priors]
     active, free = [f.active for f in found.solution.fits], np.array(found.network.layout.free)

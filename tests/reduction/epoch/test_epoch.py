@@ -6,7 +6,7 @@ import pytest
 from catseye.atmosphere.index.air import group_refractivity
 from catseye.estimation.least_squares.adjustment import CONVERGED
 from catseye.records.night.campaign import REFERENCE
-from catseye.reduction.epoch.dish import dish_advice, dish_prisms
+from catseye.reduction.epoch.dish import dish_prior, dish_prisms
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.reduction.site.places import nominal_frame
 
@@ -173,17 +173,17 @@ def test_the_dish_speaks_of_its_prisms_to_a_millimetre(network_01, reduced_night
     x, covariance = np.array(layout.start), np.full((len(layout.start),) * 2, 1e-10)
     for row, name in enumerate(c.points):
         x[layout.columns(name)] = c.x[row]
-    honest = dish_advice(network_01, x, covariance)
+    honest = dish_prior(network_01, x, covariance)
     names = dish_prisms(network_01.campaign)
     assert [a.name for a in honest] == [f"dish at {n}" for n in names]
     off = np.array([float(a.observed[0] - a.predict(x)[0][0]) for a in honest])
     assert np.max(np.abs(off)) < 0.5e-3  # the surface is 0.14 mm rms
     x[layout.columns("DP043")] += 0.035 * honest[names.index("DP043")].matrix[0]
-    spoilt = dish_advice(network_01, x, covariance)
+    spoilt = dish_prior(network_01, x, covariance)
     planes = np.array([[float(b.observed[0] - a.observed[0]) for a, b in zip(honest, spoilt, strict=True)]])
     assert np.max(np.abs(planes)) < 0.1e-3
 
 
 def test_a_dish_of_few_prisms_gives_no_advice(network_01):
     size = len(network_01.layout.start)
-    assert dish_advice(network_01, np.array(network_01.layout.start), np.eye(size)) == []  # none is well known
+    assert dish_prior(network_01, np.array(network_01.layout.start), np.eye(size)) == []  # none is well known

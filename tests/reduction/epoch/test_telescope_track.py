@@ -11,7 +11,7 @@ from catseye.records.night.live import TICKS_PER_DAY, LivePosture
 from catseye.reduction.epoch.coordinates import adjust_coordinates
 from catseye.reduction.epoch.ranges import follow_electronics
 from catseye.reduction.epoch.settings import ReductionSettings
-from catseye.reduction.epoch.telescope_track import as_in_the_middle
+from catseye.reduction.epoch.telescope_track import at_middle_posture
 
 KAPPA = 4 * np.pi * 1.5e9 / SPEED_OF_LIGHT  # rad a metre of range, in vacuum
 RATES = np.radians([2e-5, -1.2e-5])  # rad/s: 0.07 deg in the night, 60 mm at the rim; faces turn by nothing that counts
@@ -91,7 +91,7 @@ def test_a_night_of_tracking_has_the_coordinates_of_its_middle(few_01, reduced_f
 
 def test_it_stands_as_in_the_middle_of_its_shots(few_01, moved):
     before = few_01.site.campaign
-    stands = as_in_the_middle(moved[0]).site.campaign
+    stands = at_middle_posture(moved[0]).site.campaign
     assert stands.azimuth_deg == pytest.approx(before.azimuth_deg, abs=1e-9)
     assert stands.elevation_deg == pytest.approx(before.elevation_deg, abs=1e-9)
-    assert as_in_the_middle(few_01) is few_01
+    assert at_middle_posture(few_01) is few_01

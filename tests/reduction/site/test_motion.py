@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from catseye.errors import InputError
 from catseye.records.night.live import TICKS_PER_DAY, LivePosture
-from catseye.reduction.site.motion import CarriedMotion, PostureTrack, carried_point, frames_of, ground_from
+from catseye.reduction.site.motion import PostureTrack, TelescopeCarrier, carried_point, frames_of, ground_from
 from live_scene import site
 
 ARCSECOND = np.pi / 648000
@@ -235,7 +235,7 @@ def test_points_are_carried_from_the_epoch_to_their_shots(seed):
     followed = track(np.arange(0.0, 3.0, 0.1), lambda t: a + va * t, lambda t: e + ve * t, lambda t: (va, ve))
     names, own = ("DP01C", "G", "ALI", "ARM"), rng.uniform(-50, 50, (4, 3))
     frames = dict(zip(names, ("reflector", "ground", "alidade", "reflector"), strict=True))
-    motion = CarriedMotion(site(), followed, frames, float(mjd(1.234)))
+    motion = TelescopeCarrier(site(), followed, frames, float(mjd(1.234)))
     t = rng.uniform(0.0, 2.9, 4)
     turn, shift = motion.carried(names, mjd(t))
     for k, name in enumerate(names):
@@ -246,7 +246,7 @@ def test_points_are_carried_from_the_epoch_to_their_shots(seed):
 
 def test_ranges_shake_only_where_their_ends_shake_apart():
     bodies, jitter = {"A": "arm", "B": "arm", "D": "dish"}, {"arm": 0.3, "dish": 0.4}
-    motion = CarriedMotion(site(), PostureTrack(), {}, 60635.0, bodies, jitter)
+    motion = TelescopeCarrier(site(), PostureTrack(), {}, 60635.0, bodies, jitter)
     np.testing.assert_allclose(motion.jitter("A", ("B", "D", "G")), [0.0, 0.25e-6, 0.09e-6], rtol=1e-12, atol=0)
     np.testing.assert_allclose(motion.jitter("G", ("D", "G")), [0.16e-6, 0.0], rtol=1e-12, atol=0)
 

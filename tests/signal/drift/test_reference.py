@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from catseye.signal.drift.reference import drift_along, drift_at, reference_surprise
+from catseye.signal.drift.reference import drift_along, drift_at, reference_prediction_error
 
 WALK = 3e-4  # rad per square root of a second, some ten times what ZY rangers show
 
@@ -164,7 +164,7 @@ def test_the_claimed_covariance_is_the_scatter():
 @pytest.mark.parametrize("seed", range(3))
 def test_the_surprise_of_a_reference_is_its_distance_from_the_smoother_without_it(seed):
     t, phase, variance = references(seed)
-    difference, uncertainty = reference_surprise(t, phase, variance, random_walk=WALK)
+    difference, uncertainty = reference_prediction_error(t, phase, variance, random_walk=WALK)
     for k in range(6):
         rest = np.arange(6) != k
         mean, spread = smoothed(t[rest], phase[rest], variance[rest], t[[k]], WALK)
@@ -173,7 +173,7 @@ def test_the_surprise_of_a_reference_is_its_distance_from_the_smoother_without_i
 
 
 def test_a_single_reference_has_no_prediction_error():
-    difference, uncertainty = reference_surprise(np.zeros(1), np.zeros(1), np.ones(1), random_walk=WALK)
+    difference, uncertainty = reference_prediction_error(np.zeros(1), np.zeros(1), np.ones(1), random_walk=WALK)
     assert np.isnan(difference).all()
     assert np.isnan(uncertainty).all()
 

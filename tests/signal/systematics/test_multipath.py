@@ -13,7 +13,7 @@ from catseye.signal.systematics.multipath import (
     cats_eye_error,
     largest_share,
     multipath_error,
-    share_a_pass,
+    returned_share_of_pass,
     two_retroreflectors,
 )
 
@@ -107,7 +107,7 @@ def test_a_share_within_the_limit_keeps_ten_micrometres_and_ten_percent_more_doe
 
 def test_the_detector_may_reflect_the_limit_over_the_rest_of_the_way():
     reflectance = float(largest_share(10e-6, WAVELENGTH)) / (0.25 * 0.6 * 0.9)
-    assert float(share_a_pass(reflectance, 0.25, 0.6, mirrors=0.9)) == pytest.approx(6.289e-4, rel=1e-3)
+    assert float(returned_share_of_pass(reflectance, 0.25, 0.6, mirrors=0.9)) == pytest.approx(6.289e-4, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def test_the_detector_may_reflect_the_limit_over_the_rest_of_the_way():
         (lambda: multipath_error([0.6, 0.5], [0.1, 0.2], 0.2), "sum to 1 or more"),
         (lambda: multipath_error([-0.1], [0.1], 0.2), "below 0"),
         (lambda: cats_eye_error(1.0, 1.0, 0.2), "sum to 1 or more"),
-        (lambda: share_a_pass(0.1, 1.2, 0.5), r"recollected part 1\.2 is not within 0 to 1"),
+        (lambda: returned_share_of_pass(0.1, 1.2, 0.5), r"recollected part 1\.2 is not within 0 to 1"),
         (lambda: largest_share(0.0, 0.2), "not within 0 to an eighth of a wavelength"),
     ],
 )

@@ -54,7 +54,7 @@ def acoustic(  # noqa: PLR0913 - its options are its command line
         path_temperatures_csv,
         words,
     )
-    from catseye.gateways.writers.output import refuse_output, whole_directory, whole_file
+    from catseye.gateways.writers.output import atomic_directory, atomic_file, refuse_output
     from catseye.reduction.air.acoustic_recording import reduce_acoustic
 
     _refuse_outputs(files, sheet, out, write)
@@ -64,11 +64,11 @@ def acoustic(  # noqa: PLR0913 - its options are its command line
     paths = reduce_acoustic(files, sheet, model=model, air_model=air_model)
     with ExitStack() as stack:  # both or none: what cannot be written is refused first
         if write is not None:
-            stack.enter_context(whole_file(write, "--write", MARK)).append(path_temperatures_csv(paths))
+            stack.enter_context(atomic_file(write, "--write", MARK)).append(path_temperatures_csv(paths))
         if out is not None:
             from catseye.gateways.air.acoustic_report import write_acoustic
 
-            with whole_directory(out, files[0]) as directory:
+            with atomic_directory(out, files[0]) as directory:
                 write_acoustic(paths, directory)
     if json:
         from catseye.gateways.writers.objects import json_line

@@ -81,7 +81,7 @@ def refractometer(  # noqa: PLR0913 - its options are its command line
     strict: Strict = False,
 ) -> None:
     """The group index along a fixed path: calibrated by a night of phases and weather, then from each phase."""
-    from catseye.gateways.writers.output import refuse_output, whole_directory
+    from catseye.gateways.writers.output import atomic_directory, refuse_output
 
     given = {
         "path_length_m": path_length_m,
@@ -109,7 +109,7 @@ def refractometer(  # noqa: PLR0913 - its options are its command line
         if out is not None:
             from catseye.gateways.air.refractometer_report import write_refractometer
 
-            with whole_directory(out, readings) as directory:
+            with atomic_directory(out, readings) as directory:
                 write_refractometer(calibration, directory, progress)
     finally:
         progress.clear()

@@ -80,7 +80,7 @@ def run_coordinator(
     """
     from catseye.clock import SystemClock
     from catseye.errors import CatseyeError
-    from catseye.service.book import LiveBook
+    from catseye.service.book import RunSummary
     from catseye.service.coordinator import LiveCoordinator
     from catseye.service.logs import LiveLog, logging_to
     from catseye.service.running import LiveRun
@@ -93,7 +93,7 @@ def run_coordinator(
     shown = told.screen and terminal and not told.log_json and not told.quiet
     silent = told.quiet or shown
     log = LiveLog(lambda line: None if silent else tell_people(line), clock=clock, json=told.log_json, colour=coloured)
-    view, book = ScreenView() if shown else SilentView(), LiveBook()
+    view, book = ScreenView() if shown else SilentView(), RunSummary()
 
     ran: list[LiveCoordinator] = []
 

@@ -101,11 +101,11 @@ def zy(  # noqa: PLR0913 - its options are its command line
     from catseye.clock import SystemClock
     from catseye.ranger.door import Door, key_of
     from catseye.ranger.network import TlsFiles
-    from catseye.service.rangers import RangersServed, ServedAt, heads_of
+    from catseye.service.rangers import ListenAddresses, RangersServed, heads_of
     from catseye.service.running import LiveRun
 
     door = Door(key=key_of(), tls=TlsFiles.of(), laser_at_boot=laser_at_boot)
-    at = ServedAt("loopback" if loopback else port_base, host, None if ports is None else _pair(ports), door)
+    at = ListenAddresses("loopback" if loopback else port_base, host, None if ports is None else _pair(ports), door)
     if laser_at_boot:
         tell_people("warning: --laser-at-boot: lasers shine from power-up on, where nobody has the lease and unhomed")
     if head is not None:

@@ -58,7 +58,7 @@ def panels(  # noqa: PLR0913 - its options are its command line
 ) -> None:
     """Panel corners from the panel setting instrument: heights, turns of screws, a crew's statistics."""
     from catseye.gateways.panels.objects import panels_object, panels_verdict, passages
-    from catseye.gateways.writers.output import refuse_output, whole_directory
+    from catseye.gateways.writers.output import atomic_directory, refuse_output
     from catseye.reduction.panels.job import PanelFiles, panel_work
 
     files = PanelFiles(readings, instrument, survey, cmm, as_left, survey_left)
@@ -71,7 +71,7 @@ def panels(  # noqa: PLR0913 - its options are its command line
         if out is not None:
             from catseye.gateways.panels.report import write_panels
 
-            with whole_directory(out, readings) as directory:
+            with atomic_directory(out, readings) as directory:
                 write_panels(work, directory, progress)
     finally:
         progress.clear()

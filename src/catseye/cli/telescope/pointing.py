@@ -96,7 +96,7 @@ def fit(  # noqa: PLR0913 - its options are its command line
     """The eight-term series by least squares, with covariance and what it cannot tell apart."""
     from catseye.gateways.pose.pointing_series_files import write_fit, write_model
     from catseye.gateways.pose.pointing_series_objects import fit_object
-    from catseye.gateways.writers.output import refuse_output, whole_directory
+    from catseye.gateways.writers.output import atomic_directory, refuse_output
     from catseye.reduction.pose.verdicts import fit_verdict
 
     if out is not None:
@@ -111,7 +111,7 @@ def fit(  # noqa: PLR0913 - its options are its command line
         raise InputError(f"--write-stars {write_stars}: there are no stars in poses (expected a TPOINT file)")
     if out is not None:
         asked = {"terms": chosen, "u_arcsec": u_arcsec, "reject": reject, "against": against}
-        with whole_directory(out, files[0]) as directory:
+        with atomic_directory(out, files[0]) as directory:
             write_fit(pointing_fit, observed, compared, directory=directory, settings=asked)
     if write is not None:
         write_model(pointing_fit, write)
@@ -183,14 +183,14 @@ def _fitted(
 def _write_stars(pointing_fit: "PointingFit", observed: "Observed", path: Path) -> None:
     from dataclasses import replace
 
-    from catseye.gateways.writers.output import whole_file
+    from catseye.gateways.writers.output import atomic_file
     from catseye.records.laboratory.star_offsets import MARK, star_offsets_text
 
     stars, keep = observed.stars, pointing_fit.used
     assert stars is not None
     columns = ("azimuth", "elevation", "azimuth_encoder", "elevation_encoder", "auxiliary")
     kept = replace(stars, **{name: getattr(stars, name)[keep] for name in columns})
-    with whole_file(path, "--write-stars", MARK) as pieces:
+    with atomic_file(path, "--write-stars", MARK) as pieces:
         pieces.append(star_offsets_text(kept))
 
 
@@ -263,7 +263,7 @@ def track(
     from catseye.gateways.pose.objects import tilt_of_pose
     from catseye.gateways.pose.pointing_series_files import track_rows, track_words, write_track
     from catseye.gateways.pose.pointing_series_objects import track_object, track_verdict
-    from catseye.gateways.writers.output import refuse_output, whole_directory
+    from catseye.gateways.writers.output import atomic_directory, refuse_output
     from catseye.records.files.reading import Folder
     from catseye.records.laboratory.tilts import read_tilts
     from catseye.reduction.pose.track_profile import track_profile
@@ -294,7 +294,7 @@ def track(
     )
     profile = replace(profile, sources={str(p): t.verdict for p, t in zip(poses or [], tilts_of_poses, strict=True)})
     if out is not None:
-        with whole_directory(out, sources[0]) as directory:
+        with atomic_directory(out, sources[0]) as directory:
             write_track(profile, directory, hashes)
     if json:
         from catseye.gateways.writers.objects import json_line

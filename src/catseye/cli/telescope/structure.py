@@ -201,9 +201,9 @@ def _structure(
     answer = structure_object(fit, check, predicted, asked=asked, notes=(*doubts, *notes), verdict=verdict)
     if to.out is not None:
         from catseye.gateways.structure.files import write_structure
-        from catseye.gateways.writers.output import whole_directory
+        from catseye.gateways.writers.output import atomic_directory
 
-        with whole_directory(to.out, source) as directory:
+        with atomic_directory(to.out, source) as directory:
             write_structure(
                 fit,
                 directory,
@@ -296,9 +296,9 @@ def _vibration(
     vibration = found_in(series, stretch=stretch_s)
     if to.out is not None:
         from catseye.gateways.structure.files import write_vibration
-        from catseye.gateways.writers.output import whole_directory
+        from catseye.gateways.writers.output import atomic_directory
 
-        with whole_directory(to.out, Path(journal)) as directory:
+        with atomic_directory(to.out, Path(journal)) as directory:
             write_vibration(vibration, directory, zero_mjd=zero_mjd, inputs=inputs, progress=to.progress)
     to.progress.clear()
     if to.json:

@@ -168,7 +168,7 @@ def surface(  # noqa: PLR0913 - its options are its command line
     progress = ProgressLine(quiet)
     try:
         from catseye.api.telescope import surface as surfaced
-        from catseye.gateways.writers.output import whole_directory
+        from catseye.gateways.writers.output import atomic_directory
 
         result = surfaced(
             *inputs,
@@ -181,7 +181,7 @@ def surface(  # noqa: PLR0913 - its options are its command line
             progress=progress,
         )
         if out is not None:
-            with whole_directory(out, *inputs) as directory:
+            with atomic_directory(out, *inputs) as directory:
                 result.write(directory, progress)
                 _keep(result, wanted.actuators)  # no directory without the table that was asked for, too
         else:

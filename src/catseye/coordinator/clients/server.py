@@ -21,7 +21,7 @@ from catseye.coordinator.journal.entries import Entry
 from catseye.coordinator.parts import ticks_now
 from catseye.coordinator.ziy import Coordinator
 from catseye.errors import CatseyeError, InputError
-from catseye.ranger.door import USUAL_DOOR, Door, notice_death, refuse_open
+from catseye.ranger.door import DEFAULT_ACCESS, Door, enable_keep_alive_probes, refuse_exposed_port
 from catseye.ranger.entrance import Doorway, Entrance
 from catseye.ranger.first_line import peer_of
 from catseye.ranger.line import LONGEST_REQUEST, Reply, Request, parse_request, stamp_text
@@ -77,7 +77,7 @@ class Client(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
         self.transport = transport
-        notice_death(transport)
+        enable_keep_alive_probes(transport)
         self._entrance = Entrance(self.server.gate, transport, self._say)
         self._entrance.begin()
         if self._entrance.admitted:
@@ -208,7 +208,7 @@ class ZiyServer:
         port: int = PORT,
         *,
         network: ConnectionMaker | None = None,
-        door: Door = USUAL_DOOR,
+        door: Door = DEFAULT_ACCESS,
     ):
         self.coordinator, self.host, self.port, self.door = coordinator, host, port, door
         self.holder: Client | None = None  # holder of the lease
@@ -224,7 +224,7 @@ class ZiyServer:
 
         Raises InputError if the port is not available, or would be exposed without a key.
         """
-        refuse_open("ZIY", self.host, self.door)
+        refuse_exposed_port("ZIY", self.host, self.door)
         try:
             self._listener = await self._network.serve(partial(Client, self), self.host, self.port)
         except OSError as problem:

@@ -83,7 +83,7 @@ class ChainReport:
             self.bad.add(seq)
 
 
-def check_whole(
+def verify_run(
     reader: JournalReader, run: int, *, heads: Sequence[Head] = (), progress: Progress = lambda what, done, of: None
 ) -> ChainReport:
     """Verify a run in all its files and their continuity; one report.
@@ -241,7 +241,7 @@ def _numbers(reader: JournalReader, report: ChainReport) -> int:
     return most
 
 
-def held_by(reader: JournalReader, run: int, head: Head) -> bool:
+def has_head(reader: JournalReader, run: int, head: Head) -> bool:
     """True if a run, in any of its files, has the link of a head."""
     for part in reader.parts(run):
         if CHAIN.name not in part.tables:

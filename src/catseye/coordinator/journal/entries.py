@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from catseye.reduction.live.shots import ShotAnswer
 
 NAN = float("nan")
-EPOCH_BEGUN = "epoch-begun"  # name of the document that marks when an epoch's shots were taken out
+EPOCH_START = "epoch-begun"  # name of the document that marks when an epoch's shots were taken out
 CLOCK_CORRECTED = "clock-corrected"  # of the one that marks a correction of the count of UTC, and its size
 
 

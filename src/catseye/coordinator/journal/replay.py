@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from catseye.coordinator.journal.entries import CLOCK_CORRECTED, EPOCH_BEGUN, AnsweredShot, Document, EpochSolution
+from catseye.coordinator.journal.entries import CLOCK_CORRECTED, EPOCH_START, AnsweredShot, Document, EpochSolution
 from catseye.coordinator.journal.reader import JournalReader, Kind, StoredRun
 from catseye.coordinator.journal.sameness import (
     Sameness,
@@ -124,7 +124,7 @@ def replay(
             live.weather(entry)
         elif isinstance(entry, LivePosture):
             live.posture(entry)
-        elif isinstance(entry, Document) and entry.name == EPOCH_BEGUN:
+        elif isinstance(entry, Document) and entry.name == EPOCH_START:
             job = live.begin(entry.ticks)
         elif isinstance(entry, Document) and entry.name == CLOCK_CORRECTED:
             live.clock_corrected(entry.ticks)

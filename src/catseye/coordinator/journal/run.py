@@ -12,7 +12,7 @@ from sqlalchemy import Connection, insert, select
 from catseye.coordinator.journal.chain import LinkKind, run_link
 from catseye.coordinator.journal.entries import Run, plain
 from catseye.coordinator.journal.place import JournalAddress, reading_engine, writing_engine
-from catseye.coordinator.journal.tables import CHAIN, PARTS, RUN_FILES, RUNS, TEXTS, create_or_carry, version_of
+from catseye.coordinator.journal.tables import CHAIN, PARTS, RUN_FILES, RUNS, TEXTS, create_or_convert, version_of
 from catseye.coordinator.parts import Clock, ticks_now
 from catseye.errors import InputError
 from catseye.version import __version__
@@ -34,7 +34,7 @@ def begin(place: JournalAddress, run: Run, clock: Clock, *, buffers: bool) -> tu
     with engine.begin() as connection:
         if connection.dialect.name == "postgresql":
             connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({OURS})")
-        create_or_carry(connection, place.shown)
+        create_or_convert(connection, place.shown)
         stored = set(
             connection.scalars(select(TEXTS.c.sha256).where(TEXTS.c.sha256.in_([f[0] for f in files.values()])))
         )
@@ -94,7 +94,7 @@ def go_on(old: Connection, place: JournalAddress, run: int, *, seq: int, link: b
     digests = {file["sha256"] for file in files}
     texts = [dict(row) for row in old.execute(select(TEXTS).where(TEXTS.c.sha256.in_(digests))).mappings()]
     with writing_engine(place, create=True).begin() as connection:
-        create_or_carry(connection, place.shown)
+        create_or_convert(connection, place.shown)
         for table, rows in ((RUNS, [record]), (TEXTS, texts), (RUN_FILES, files)):
             if rows:
                 connection.execute(insert(table), rows)

@@ -180,7 +180,7 @@ def _with_chain(connection: Connection) -> None:
 STEPS: tuple[Step, ...] = (_with_chain,)  # STEPS[n - 1] converts version n to n + 1
 
 
-def create_or_carry(connection: Connection, place: str) -> None:
+def create_or_convert(connection: Connection, place: str) -> None:
     """Create the tables or convert an older journal, in the caller's transaction.
 
     place   for messages

@@ -16,7 +16,7 @@ from catseye.geometry.frames.frame import Transform
 from catseye.geometry.mirror.encoder import prime_counts, turned_within, within
 from catseye.geometry.mirror.pointing import MirrorStation, counts
 from catseye.geometry.mirror.slew import Pace
-from catseye.ranger.initialisation import frame_of, own_station
+from catseye.ranger.initialisation import frame_of, local_station
 from catseye.ranger.motion_units import acceleration_counts, pace_of, velocity_counts
 from catseye.ranger.state import AxisSettings
 from catseye.records.night.live import TICK_SECONDS, LivePosture
@@ -110,7 +110,7 @@ def vantages_of(site: SiteFolder) -> dict[str, Vantage]:
     Mounts without a record as in `ranger.initialisation`.
     """
     return {
-        name: Vantage(name, frame_of(site, name), own_station(site, name), mirror, pace_by(mirror))
+        name: Vantage(name, frame_of(site, name), local_station(site, name), mirror, pace_by(mirror))
         for name in site.rangers
         for mirror in [site.mirror_of(name)]
     }

@@ -22,7 +22,7 @@ from catseye.estimation.deformation.deformation import Deformation, moved_points
 from catseye.estimation.deformation.deletion import DeletionSearch
 from catseye.estimation.deformation.epoch_model import EpochModel
 from catseye.estimation.network.model import NetworkSolution
-from catseye.estimation.shapes.place_covariances import turned_covariance
+from catseye.estimation.shapes.place_covariances import rotated_covariance
 from catseye.estimation.shapes.rigid_body import motion_columns
 
 TOO_MANY = "{n} frame points are too many for one joint test (limit {limit}); name fewer (frame=)"
@@ -255,5 +255,5 @@ def _across(model: EpochModel, other_points: np.ndarray, inside: np.ndarray, tur
     """Covariance (3k, 3f) of the differences of other and frame points, the second epoch rotated."""
     rows = (3 * other_points[:, None] + np.arange(3)).ravel()
     q1, q2, ahead, back = model.parts(rows, (3 * inside[:, None] + np.arange(3)).ravel())
-    q2, ahead = turned_covariance(q2, turn, columns=True), turned_covariance(ahead, turn, columns=True)
-    return q1 - ahead + turned_covariance(q2 - back, turn, columns=False)
+    q2, ahead = rotated_covariance(q2, turn, columns=True), rotated_covariance(ahead, turn, columns=True)
+    return q1 - ahead + rotated_covariance(q2 - back, turn, columns=False)

@@ -15,7 +15,7 @@ from catseye.errors import EstimationError
 from catseye.estimation.least_squares.singular import LinearEstimate, best_linear_estimate
 from catseye.estimation.network.datum import to_datum
 from catseye.estimation.shapes.motions import MOTIONS
-from catseye.estimation.shapes.place_covariances import turned_covariance
+from catseye.estimation.shapes.place_covariances import rotated_covariance
 from catseye.estimation.shapes.rigid_body import motion_columns
 
 DATUMS: dict[str, tuple[int, ...]] = {
@@ -286,8 +286,8 @@ def differences(epochs: Epochs, datum: str, stable: np.ndarray) -> Differences:
     if combination.shape[1] and on.any():
         smallest = float(np.sqrt(variance[on & (variance > 0.0)].min(initial=np.inf)))
         aligned, turned = _aligned(x, y, on, pivot, combination=combination, limit=smallest if partial else np.inf)
-        cross = turned_covariance(cross, turned, columns=True)
-        qy = turned_covariance(turned_covariance(qy, turned, columns=True), turned, columns=False)
+        cross = rotated_covariance(cross, turned, columns=True)
+        qy = rotated_covariance(rotated_covariance(qy, turned, columns=True), turned, columns=False)
     return Differences(
         names=epochs.names,
         datum=datum,

@@ -115,7 +115,7 @@ class SharedErrors:
         return np.asarray(residual + np.sum(slopes * value(x, columns), axis=1))
 
 
-def whole_residuals(
+def total_residuals(
     fits: Sequence[GroupFit], x: np.ndarray, shared: Sequence[SharedErrors | None]
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Residuals and sigmas of each group, shared errors included."""
@@ -127,7 +127,7 @@ def whole_residuals(
 
 
 @dataclass(frozen=True, eq=False)
-class MeetingLines:
+class PointObservations:
     """Index of observations and prior information by the parameters they depend on.
 
     groups, removable   as of `adjust_robustly`
@@ -162,15 +162,15 @@ class MeetingLines:
         advice: Sequence[ObservationGroup],
         shared: Sequence[SharedErrors | None] = (),
         settled: Sequence[int] = (),
-    ) -> "MeetingLines":
+    ) -> "PointObservations":
         """Index the groups of a solution."""
         advice_at: dict[int, list[int]] = {}
         for i, prior_group in enumerate(advice):
             for column in np.unique(prior_group.columns).tolist():
                 advice_at.setdefault(column, []).append(i)
         jacobians = [g.predict(solution.x)[1] for g in groups]
-        totals = whole_residuals(solution.fits, solution.x, shared)
-        return MeetingLines(
+        totals = total_residuals(solution.fits, solution.x, shared)
+        return PointObservations(
             groups,
             removable,
             advice,
@@ -192,7 +192,7 @@ class MeetingLines:
         groups = group[near]
         return [(int(i), np.unique(row[near[groups == i]])) for i in np.unique(groups)]
 
-    def at(self, x: np.ndarray, columns: np.ndarray) -> "MeetingLines":
+    def at(self, x: np.ndarray, columns: np.ndarray) -> "PointObservations":
         """Linearised at other parameters, valid only for observations of the given columns."""
         residual, jacobians = list(self.residual), list(self.jacobians)
         for i, near in self.rows(columns):
@@ -243,7 +243,7 @@ def _part(group: ObservationGroup, rows: np.ndarray) -> ObservationGroup:
     return replace(group, **cut)
 
 
-def search(columns: np.ndarray, meeting: MeetingLines) -> tuple[LocalConflict, tuple[int, ...] | None]:
+def search(columns: np.ndarray, meeting: PointObservations) -> tuple[LocalConflict, tuple[int, ...] | None]:
     """Smallest conflict at a point, searched again at the likeliest position if there is none.
 
     A wrong range of half a metre moves its point so far that derivatives there are not accurate to 25 um.
@@ -262,7 +262,7 @@ def search(columns: np.ndarray, meeting: MeetingLines) -> tuple[LocalConflict, t
     return local, None
 
 
-def at_point(columns: np.ndarray, meeting: MeetingLines, *, slack: float) -> LocalConflict:
+def at_point(columns: np.ndarray, meeting: PointObservations, *, slack: float) -> LocalConflict:
     """Observations that meet in a point.
 
     Removable ones are those that depend on it; others, and advice, count if they depend on it alone.
@@ -303,7 +303,7 @@ def _slopes(
     return slope, np.any(slope != 0.0, axis=1) & ~np.any(remainder != 0.0, axis=1)
 
 
-def contradicted(points: Sequence[np.ndarray], meeting: MeetingLines) -> list[np.ndarray]:
+def contradicted(points: Sequence[np.ndarray], meeting: PointObservations) -> list[np.ndarray]:
     """Points far from their prior information although their observations agree."""
     far = [
         ~may & (np.abs(v) > FAR * sigma)
@@ -318,7 +318,9 @@ def contradicted(points: Sequence[np.ndarray], meeting: MeetingLines) -> list[np
     return [p for p in near if np.any(np.abs(at_point(p, meeting, slack=SLACK).prior) > FAR)]
 
 
-def touched(points: Sequence[np.ndarray], meeting: MeetingLines, *, chosen: Sequence[np.ndarray]) -> list[np.ndarray]:
+def touched(
+    points: Sequence[np.ndarray], meeting: PointObservations, *, chosen: Sequence[np.ndarray]
+) -> list[np.ndarray]:
     """Points that the chosen observations depend on."""
     columns = {
         int(c)

@@ -17,13 +17,13 @@ from catseye.estimation.least_squares.bordered import Border
 from catseye.estimation.least_squares.conflict import (
     LARGEST_SEARCH,
     MOST_AT_ONE_POINT,
-    MeetingLines,
+    PointObservations,
     SharedErrors,
     at_point,
     contradicted,
     search,
+    total_residuals,
     touched,
-    whole_residuals,
 )
 from catseye.estimation.least_squares.influence import Influence
 from catseye.estimation.observations.kinds import ObservationGroup
@@ -103,7 +103,7 @@ def adjust_robustly(
     if active is None:
         careful = [np.ones(len(g.observed), dtype=bool) for g in groups]
         solution = _reweighted(x0, groups, removable, free, names, border)
-        whole = whole_residuals(solution.fits, solution.x, outliers.shared)
+        whole = total_residuals(solution.fits, solution.x, outliers.shared)
         large = [may & (np.abs(v) > SUSPECT * sigma) for (v, sigma), may in zip(whole, removable, strict=True)]
         active = [~may | (np.abs(v) < WRONG * sigma) for (v, sigma), may in zip(whole, removable, strict=True)]
     else:
@@ -190,7 +190,7 @@ def _without_undecided(
     rejected = [may & ~f.active for f, may in zip(solution.fits, removable, strict=True)]
     if not any(r.any() for r in rejected):
         return solution
-    meeting = MeetingLines.of(groups, solution, removable, outliers.advice, outliers.shared, outliers.settled)
+    meeting = PointObservations.of(groups, solution, removable, outliers.advice, outliers.shared, outliers.settled)
     for columns in touched(outliers.points, meeting, chosen=rejected):
         local = at_point(columns, meeting, slack=1.0)
         out = [index for index, (i, k) in enumerate(local.rows) if not solution.fits[i].active[k]]
@@ -278,7 +278,7 @@ def _searched(
         return [np.ones(len(g.observed), dtype=bool) for g in groups]
     if not (outliers.points or any(s.any() for s in suspects)):
         return active
-    meeting = MeetingLines.of(groups, solution, removable, outliers.advice, outliers.shared, outliers.settled)
+    meeting = PointObservations.of(groups, solution, removable, outliers.advice, outliers.shared, outliers.settled)
     for columns in touched(outliers.points, meeting, chosen=suspects):
         local, wrong = search(columns, meeting)
         if wrong is not None:

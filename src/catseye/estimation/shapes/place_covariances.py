@@ -13,7 +13,7 @@ SYMMETRIC = 1e-9  # of the largest entry: tolerance of a covariance's asymmetry
 
 
 @dataclass(frozen=True, eq=False)
-class TurnedPoints:
+class RotatedPoints:
     """Covariance (3n, 3n) of some points in rotated axes, without a matrix of its own.
 
     points   n of them
@@ -30,11 +30,11 @@ class TurnedPoints:
 
     def times(self, a: np.ndarray) -> np.ndarray:
         """Product of the covariance with a (3n, k)."""
-        inside = turned_covariance(a, self.turn.T, columns=False)
-        return turned_covariance(self.points.times(inside), self.turn, columns=False)
+        inside = rotated_covariance(a, self.turn.T, columns=False)
+        return rotated_covariance(self.points.times(inside), self.turn, columns=False)
 
 
-Known = np.ndarray | TurnedPoints
+Known = np.ndarray | RotatedPoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class PlaceCovariances:
         size = (3 * count, 3 * count)
         validated: list[Any] = []
         for name, item in inputs.items():
-            if isinstance(item, TurnedPoints):
+            if isinstance(item, RotatedPoints):
                 item.points.check_size()
                 validated.append(replace(item, points=item.points.held()))
                 continue
@@ -95,7 +95,7 @@ class PlaceCovariances:
                     rows = q[k : k + ROWS] if isinstance(q, np.ndarray) else q.rows(k // 3, k // 3 + ROWS // 3)
                     total[k : k + ROWS] += rows if turn is None else turned_rows(rows, turn)
         if self.cross is not None:
-            shared = turned_covariance(self.cross, matrix, columns=False)
+            shared = rotated_covariance(self.cross, matrix, columns=False)
             total -= shared
             total -= shared.T
         if extra is not None:
@@ -111,26 +111,26 @@ class PlaceCovariances:
     def difference_times(self, matrix: np.ndarray, a: np.ndarray, extra: np.ndarray | None = None) -> np.ndarray:
         """Product of `difference` with a (3n, k), without a matrix of its size."""
         total = np.zeros(a.shape) if extra is None else extra[:, None] * a
-        turned = turned_covariance(a, matrix.T, columns=False)
+        turned = rotated_covariance(a, matrix.T, columns=False)
         if self.first is not None:
-            total += turned_covariance(_times(self.first, turned), matrix, columns=False)
+            total += rotated_covariance(_times(self.first, turned), matrix, columns=False)
         if self.second is not None:
             total += _times(self.second, a)
         if self.cross is not None:
-            total -= turned_covariance(self.cross @ a, matrix, columns=False) + self.cross.T @ turned
+            total -= rotated_covariance(self.cross @ a, matrix, columns=False) + self.cross.T @ turned
         return total
 
     def pull(self, matrix: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Shift (3n,) m of the first places by weighted residuals a (3n,): (Q_x L' - C) a."""
         total = np.zeros(len(a))
         if self.first is not None:
-            total += _times(self.first, turned_covariance(a[:, None], matrix.T, columns=False))[:, 0]
+            total += _times(self.first, rotated_covariance(a[:, None], matrix.T, columns=False))[:, 0]
         if self.cross is not None:
             total -= self.cross @ a
         return total
 
 
-def turned_covariance(q: np.ndarray, matrix: np.ndarray, *, columns: bool) -> np.ndarray:
+def rotated_covariance(q: np.ndarray, matrix: np.ndarray, *, columns: bool) -> np.ndarray:
     """q L' (columns) or L q (rows) of a covariance q (3n, 3m), L block-diagonal of the matrix (3, 3)."""
     if columns:
         return (q.reshape(len(q), -1, 3) @ matrix.T).reshape(q.shape)
@@ -139,10 +139,10 @@ def turned_covariance(q: np.ndarray, matrix: np.ndarray, *, columns: bool) -> np
 
 def turned_rows(q: np.ndarray, matrix: np.ndarray) -> np.ndarray:
     """Rows L q L' (3k, 3n) of a rotated covariance."""
-    return turned_covariance(turned_covariance(q, matrix, columns=True), matrix, columns=False)
+    return rotated_covariance(rotated_covariance(q, matrix, columns=True), matrix, columns=False)
 
 
-def turn_in_place(q: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+def rotate_in_place(q: np.ndarray, matrix: np.ndarray) -> np.ndarray:
     """Rotated covariance L q L', overwriting q (3n, 3n) without a temporary of its size."""
     for k in range(0, len(q), ROWS):
         q[k : k + ROWS] = turned_rows(q[k : k + ROWS], matrix)
@@ -152,7 +152,7 @@ def turn_in_place(q: np.ndarray, matrix: np.ndarray) -> np.ndarray:
 def _blocks(q: Known | None, count: int) -> np.ndarray:
     if q is None:
         return np.zeros((count, 3, 3))
-    if isinstance(q, TurnedPoints):
+    if isinstance(q, RotatedPoints):
         return np.asarray(q.turn @ q.points.blocks @ q.turn.T)
     at = np.arange(count)
     return q if q.ndim == 3 else q.reshape(count, 3, count, 3)[at, :, at]
@@ -161,7 +161,7 @@ def _blocks(q: Known | None, count: int) -> np.ndarray:
 def _of(q: Known | None, mask: np.ndarray) -> Known | None:
     if q is None:
         return None
-    if isinstance(q, TurnedPoints):
+    if isinstance(q, RotatedPoints):
         return replace(q, points=q.points.of_points(np.flatnonzero(mask)))
     if q.ndim == 3:
         return q[mask]
@@ -170,7 +170,7 @@ def _of(q: Known | None, mask: np.ndarray) -> Known | None:
 
 
 def _times(q: Known, a: np.ndarray) -> np.ndarray:
-    if isinstance(q, TurnedPoints):
+    if isinstance(q, RotatedPoints):
         return q.times(a)
     return (q @ a.reshape(-1, 3, a.shape[1])).reshape(a.shape) if q.ndim == 3 else q @ a
 

@@ -16,7 +16,7 @@ from catseye.errors import EstimationError, FrameError
 from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit
 from catseye.estimation.least_squares.singular import LinearEstimate
 from catseye.estimation.quality.robustness import RobustOptions, estimate_robustly
-from catseye.estimation.shapes.place_covariances import PlaceCovariances, turned_covariance
+from catseye.estimation.shapes.place_covariances import PlaceCovariances, rotated_covariance
 from catseye.estimation.shapes.rigid_body import (
     CONVERGED,
     POINTS,
@@ -105,7 +105,7 @@ class Pose:
             covariance=blocks @ m.covariance @ blocks.T,
             residual=m.residual @ turn.T,
         )
-        gain = turned_covariance(blocks @ self.gain, turn, columns=True)
+        gain = rotated_covariance(blocks @ self.gain, turn, columns=True)
         return replace(self, frame=to_from.to, motion=moved, gain=gain)
 
     def displacement(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -44,7 +44,7 @@ class Roughness:
 
 
 @dataclass(frozen=True, eq=False)
-class Foretold:
+class FieldPrediction:
     """Predicted field at m places, from k measured ones.
 
     value        (m,) m
@@ -59,7 +59,7 @@ class Foretold:
     roughness: Roughness
 
 
-def find_roughness(places: np.ndarray, values: np.ndarray, noise: np.ndarray, *, trend: np.ndarray) -> Roughness:
+def estimate_roughness(places: np.ndarray, values: np.ndarray, noise: np.ndarray, *, trend: np.ndarray) -> Roughness:
     """Smooth part, length and own part by restricted maximum likelihood.
 
     places   (k, 2) m
@@ -142,7 +142,7 @@ def foretell(
     design: np.ndarray | None = None,
     gain: np.ndarray | None = None,
     wanted_design: np.ndarray | None = None,
-) -> Foretold:
+) -> FieldPrediction:
     """Best linear unbiased prediction (universal kriging), with the prediction error's covariance.
 
     measured       field at k points
@@ -185,4 +185,4 @@ def foretell(
     crossed = weights @ between.T
     missed = weights @ smooth @ weights.T - crossed - crossed.T + prior_covariance
     noise_gain = weights if design is None or gain is None or wanted_design is None else weights - wanted_design @ gain
-    return Foretold(weights @ values, missed + noise_gain @ noise @ noise_gain.T, weights, roughness)
+    return FieldPrediction(weights @ values, missed + noise_gain @ noise @ noise_gain.T, weights, roughness)

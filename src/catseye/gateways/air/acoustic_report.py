@@ -40,7 +40,7 @@ def write_acoustic(paths: Sequence["AcousticPath"], directory: Path) -> None:
     """Write tables, JSON, report, and the provenance with their hashes.
 
     paths       as reduced
-    directory   existing, from `writers.output.whole_directory`
+    directory   existing, from `writers.output.atomic_directory`
     """
     when = datetime.now(UTC)
     files: Files = {

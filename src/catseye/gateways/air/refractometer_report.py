@@ -354,7 +354,7 @@ def write_refractometer(
     """Write table, JSON, figure, report, and last the provenance with their hashes.
 
     calibration   a calibrated path
-    directory     existing, from `writers.output.whole_directory`
+    directory     existing, from `writers.output.atomic_directory`
     progress      called for each file
     """
     when = datetime.now(UTC)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from catseye.gateways.baseline.objects import baseline_object
 from catseye.gateways.baseline.tables import distances_csv, observations_csv, pillars_csv
 from catseye.gateways.writers.objects import json_page
-from catseye.gateways.writers.output import whole_file
+from catseye.gateways.writers.output import atomic_file
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.records.laboratory.baseline import FORMAT, Baseline, baseline_text
 from catseye.reduction.baseline.instrument import record_values
@@ -27,7 +27,7 @@ def write_calibration(
     """Write tables, JSON, report, and the provenance with their hashes.
 
     calibration   a calibration
-    directory     existing, from `writers.output.whole_directory`
+    directory     existing, from `writers.output.atomic_directory`
     inputs        SHA-256 of each input file, by name
     progress      called for each file
     """
@@ -75,5 +75,5 @@ def write_record(
         inputs_sha256=dict(inputs),
         **record_values(calibration),
     )
-    with whole_file(path, "--write", MARK) as pieces:
+    with atomic_file(path, "--write", MARK) as pieces:
         pieces.append(baseline_text(record))

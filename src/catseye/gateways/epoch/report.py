@@ -11,7 +11,7 @@ from catseye.gateways.epoch.figures import crowded, figures
 from catseye.gateways.epoch.objects import benchmark_object, matrix_file
 from catseye.gateways.epoch.summary import feed_arm_rows, passages, pointing, trust_limits, verdict
 from catseye.gateways.epoch.tables import kinds_of
-from catseye.gateways.epoch.ways import ways_table
+from catseye.gateways.epoch.ways import dish_estimates_table
 from catseye.gateways.writers.drawing import svg
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
@@ -176,7 +176,7 @@ def _dish(reduction: Reduction, drawn: dict[str, str]) -> str:
         table(("against the nominal posture", "value", "u"), motion, "tnn"),
         table(("in the ground frame (m)", "x", "y", "z"), places, "tnnn"),
         paragraph(f"Not observed: {UNOBSERVED}.", "faint"),
-        ways_table(reduction),
+        dish_estimates_table(reduction),
         picture(
             drawn["dish"],
             "Normal deviations of the prisms from that paraboloid in millimetres, "

@@ -8,7 +8,7 @@ from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.pose.dish_ways import dish_ways
 
 
-def ways_table(reduction: Reduction) -> str:
+def dish_estimates_table(reduction: Reduction) -> str:
     """Dish poses of three commands, with the reasons why they differ."""
     ways = dish_ways(reduction)
     fitted = "".join(f"<li>{escape(estimate.command)}: {escape(estimate.fitted)}</li>" for estimate in ways)

@@ -25,10 +25,10 @@ from catseye.errors import InputError
 from catseye.gateways.journal.chain import chain_object, export_verdict
 from catseye.gateways.journal.export import seal, stamp
 from catseye.gateways.journal.motion import JournalMotion, MotionRows
-from catseye.gateways.writers.output import whole_directory
+from catseye.gateways.writers.output import atomic_directory
 from catseye.gateways.writers.written import origin
 from catseye.records.night.campaign import LONGEST_CAMPAIGN, WEATHER_MARGIN, read_campaign
-from catseye.records.night.doubt import DOUBTS, DoubtRow, believed_samples
+from catseye.records.night.doubt import DOUBTS, DoubtRow, trusted_samples
 from catseye.records.night.jitter import JITTER, JitterRow
 from catseye.records.night.live import TICKS_PER_DAY, LiveWeather
 from catseye.records.night.postures import POSTURES, PostureRow
@@ -129,7 +129,7 @@ def export_campaign(
     wrong += [motion_rows.wrong] * bool(motion_rows.wrong)
     site = _observed_site(site, chosen, readings, motion_rows, notes, wrong)
     verdict = export_verdict(chain, len(chosen) + len(readings), wrong)
-    with whole_directory(out, Path(reader.place)) as directory:
+    with atomic_directory(out, Path(reader.place)) as directory:
         for path, text in site_files(site).items():
             (directory / path).parent.mkdir(exist_ok=True)
             (directory / path).write_text(text, encoding="utf-8", newline="")
@@ -218,7 +218,7 @@ def _doubts(
     if rows:
         times = np.array([float(stamp(shot.ticks)) for shot in chosen])
         try:
-            messages = believed_samples([_sample(read) for read in readings], rows, times)[1]
+            messages = trusted_samples([_sample(read) for read in readings], rows, times)[1]
         except InputError:
             messages, rows = ["no weather station was trusted throughout: all readings are exported unmarked"], []
             wrong += messages

@@ -24,7 +24,7 @@ from catseye.errors import InputError
 from catseye.gateways.journal.chain import chain_object
 from catseye.gateways.writers.cells import harmless
 from catseye.gateways.writers.objects import json_page, plain
-from catseye.gateways.writers.output import PROVENANCE, whole_directory
+from catseye.gateways.writers.output import PROVENANCE, atomic_directory
 from catseye.gateways.writers.written import Progress, origin
 from catseye.records.files.verdicts import EXPORT
 from catseye.records.night.live import TICKS_PER_DAY
@@ -206,7 +206,7 @@ def export_tables(
         raise InputError(f"--out {out}: no run or no form given (expected at least one of each)")
     stored = [reader.run(run) for run in runs]
     counts = dict.fromkeys(TABLES, 0)
-    with whole_directory(out, Path(reader.place)) as directory:
+    with atomic_directory(out, Path(reader.place)) as directory:
         for count, (name, table) in enumerate(TABLES.items()):
             if progress is not None:
                 progress(f"writing {name}", count, len(TABLES))

@@ -39,7 +39,7 @@ def write_network(
     """Write tables, JSON, report, and the provenance with their hashes.
 
     findings    findings on a solution
-    directory   existing, from `writers.output.whole_directory`
+    directory   existing, from `writers.output.atomic_directory`
     inputs      SHA-256 of each input file, by name, see `input_hashes`
     progress    called for each file
     treated     treatment of the observations, if requested
@@ -60,7 +60,7 @@ def write_comparison(
     """Write the comparison, the files of each epoch with its number as prefix, and the provenance.
 
     compared    two epochs
-    directory   existing, from `writers.output.whole_directory`
+    directory   existing, from `writers.output.atomic_directory`
     inputs      SHA-256 of each input file, by name
     progress    called for each file
     """

@@ -244,7 +244,7 @@ def write_beam(beam_path: BeamPath, directory: Path, inputs: dict[str, str]) -> 
     """Write tables, figure, JSON, and the provenance with their hashes.
 
     beam_path   a reduced beam train
-    directory   existing, from `writers.output.whole_directory`
+    directory   existing, from `writers.output.atomic_directory`
     inputs      hashes of the input files
     """
     files: Files = {

@@ -13,7 +13,7 @@ from catseye.reduction.panels.heights import surface_rms
 from catseye.reduction.panels.job import verdicts
 
 if TYPE_CHECKING:
-    from catseye.reduction.panels.crew import CornerStanding, Reader, Setting
+    from catseye.reduction.panels.crew import CornerStatistics, Reader, Setting
     from catseye.reduction.panels.heights import Doubt, PanelHeights
     from catseye.reduction.panels.job import PanelWork
 
@@ -138,7 +138,7 @@ def micrometres(value: float, form: str = ".1f") -> str:
     return format(value * 1e6, form) if np.isfinite(value) else "-"
 
 
-def standing_text(one: "CornerStanding", goal_um: float) -> str:
+def standing_text(one: "CornerStatistics", goal_um: float) -> str:
     if not one.corners:
         return "no corner with two panels read"
     true = micrometres(one.rms_true)

@@ -47,7 +47,7 @@ def write_panels(work: "PanelWork", directory: Path, progress: Progress | None =
     """Write tables, JSON, report, and the provenance with their hashes.
 
     work        as reduced
-    directory   existing, from `writers.output.whole_directory`
+    directory   existing, from `writers.output.atomic_directory`
     progress    called for each file
     """
     when = datetime.now(UTC)

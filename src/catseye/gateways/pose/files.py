@@ -53,7 +53,7 @@ def write_pose(
     """Write the files, and last the provenance.
 
     result      a pose
-    directory   existing, from `writers.output.whole_directory`
+    directory   existing, from `writers.output.atomic_directory`
     inputs      SHA-256 of each input file, by name
     settings    settings of the command
     progress    called for each file

@@ -21,7 +21,7 @@ from catseye.gateways.pose.pointing_series_objects import (
     track_verdict,
 )
 from catseye.gateways.writers.objects import json_page, versions
-from catseye.gateways.writers.output import whole_file
+from catseye.gateways.writers.output import atomic_file
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
 from catseye.gateways.writers.verdict import verdict_line
@@ -70,7 +70,7 @@ def write_fit(
 
 def write_model(fit: PointingFit, path: Path) -> None:
     """Write the series alone, atomically."""
-    with whole_file(path, "--write", f'format = "{MODEL}"') as pieces:
+    with atomic_file(path, "--write", f'format = "{MODEL}"') as pieces:
         pieces.append(record_toml(model_record(fit, path.stem)))
 
 

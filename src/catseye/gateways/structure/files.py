@@ -38,7 +38,7 @@ def write_structure(
     """Write the files of a fit.
 
     fit, check, predicted   as for `structure_object`
-    directory               existing, from `writers.output.whole_directory`
+    directory               existing, from `writers.output.atomic_directory`
     answer                  object from `structure_object`
     inputs                  SHA-256 of each input file, by name
     progress                called for each file

@@ -26,7 +26,7 @@ from catseye.gateways.surface.tables import (
     zernike_csv,
 )
 from catseye.gateways.writers.objects import json_page
-from catseye.gateways.writers.output import whole_file
+from catseye.gateways.writers.output import atomic_file
 from catseye.gateways.writers.samplers_fits import join_tables, write_samplers
 from catseye.gateways.writers.written import Files, Progress, origin, write_files
 from catseye.reduction.surface.actuators import rows_of
@@ -51,7 +51,7 @@ def write_surface(
 ) -> None:
     """Write tables, JSON, report, and the provenance with their hashes.
 
-    directory   existing, from `writers.output.whole_directory`
+    directory   existing, from `writers.output.atomic_directory`
     inputs      SHA-256 of each input file, by name
     progress    called for each file
     """
@@ -88,7 +88,7 @@ def write_actuators(result: SurfaceFindings, path: Path) -> None:
     rows = rows_of(result.actuators)
     ending = path.suffix.lower()
     if ending == ".csv":
-        with whole_file(path, "--actuators", ACTUATOR_MARK) as pieces:
+        with atomic_file(path, "--actuators", ACTUATOR_MARK) as pieces:
             pieces.append(actuators_csv(rows))
     elif ending == ".fits":
         write_samplers(path, {"ACTUATORS": actuators_table(rows)}, option="--actuators")

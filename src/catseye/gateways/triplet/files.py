@@ -35,7 +35,7 @@ def write_triplets(
     """Write text, page and JSON for each sheet NAME.toml, triplets.csv, and the provenance.
 
     units       calibrations by the file of their sheet
-    directory   existing, from `writers.output.whole_directory`
+    directory   existing, from `writers.output.atomic_directory`
     hashes      SHA-256 of each file
     progress    called for each file
 

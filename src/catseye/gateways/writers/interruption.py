@@ -75,13 +75,13 @@ class UnfinishedWork:
                 output()
 
 
-def tell_supervisor(descriptor: int) -> None:
+def report_to_supervisor(descriptor: int) -> None:
     """Report unfinished output to this descriptor from now on."""
     global _supervisor
     _supervisor = descriptor
 
 
-def leave_on_signals() -> None:
+def exit_on_signals() -> None:
     """Exit with status 130 on SIGINT and 143 on SIGTERM from now on."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _handle)
@@ -94,7 +94,7 @@ def ignore_signals() -> None:
 
 
 @contextmanager
-def undone_when_interrupted(undo: Callable[[], None] | Unfinished) -> Iterator[None]:
+def undo_on_interruption(undo: Callable[[], None] | Unfinished) -> Iterator[None]:
     """Call `undo` if the process is interrupted in the block.
 
     `undo` must not raise if there is nothing to undo.

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from catseye.errors import InputError
-from catseye.gateways.writers.interruption import Unfinished, deferred, undone_when_interrupted
+from catseye.gateways.writers.interruption import Unfinished, deferred, undo_on_interruption
 
 PROVENANCE = "provenance.json"
 PAGES = (".html", ".htm")
@@ -87,7 +87,7 @@ def _written(where: Path) -> set[str]:
 
 
 @contextmanager
-def whole_directory(out: Path, *read: Path) -> Iterator[Path]:
+def atomic_directory(out: Path, *read: Path) -> Iterator[Path]:
     """Yield a directory to write into; it replaces `out` on success and is removed on failure.
 
     It lies beside `out`, so that a rename puts it in place.
@@ -96,7 +96,7 @@ def whole_directory(out: Path, *read: Path) -> Iterator[Path]:
     fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
     old = where.parent / f".catseye-{secrets.token_hex(6)}"
     undo = Unfinished(str(fresh), str(where), str(old))
-    with undone_when_interrupted(undo):
+    with undo_on_interruption(undo):
         try:
             fresh.mkdir()
             yield fresh
@@ -120,7 +120,7 @@ def new_directory(directory: Path) -> Iterator[Path]:
         raise InputError(f"{directory}: exists and is not an empty directory (expected a new or an empty one)")
     fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
     undo = Unfinished(str(fresh))
-    with undone_when_interrupted(undo):
+    with undo_on_interruption(undo):
         try:
             where.parent.mkdir(parents=True, exist_ok=True)
             fresh.mkdir()
@@ -151,7 +151,7 @@ def _replace(where: Path, fresh: Path, old: Path) -> None:
 
 
 @contextmanager
-def whole_file(path: Path, option: str, mark: str) -> Iterator[list[str]]:
+def atomic_file(path: Path, option: str, mark: str) -> Iterator[list[str]]:
     """Write a text file atomically from the pieces that the block appends to the list.
 
     path     as the user wrote it: new, or an earlier file of catseye, one that holds `mark` in its first 4096 bytes
@@ -163,7 +163,7 @@ def whole_file(path: Path, option: str, mark: str) -> Iterator[list[str]]:
     where = path.resolve()
     fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
     pieces: list[str] = []
-    with undone_when_interrupted(Unfinished(str(fresh))):
+    with undo_on_interruption(Unfinished(str(fresh))):
         try:
             if where.is_dir():
                 raise InputError(f"{option} {path}: is a directory (expected the name of a file)")
@@ -189,7 +189,7 @@ def refuse_suffix(path: Path, option: str) -> None:
         raise InputError(f"{option} {path}: a page is HTML (expected a name that ends in .html{hint})")
 
 
-def write_whole(path: Path, content: bytes, *, option: str, ours: Callable[[bytes], bool]) -> None:
+def write_atomically(path: Path, content: bytes, *, option: str, ours: Callable[[bytes], bool]) -> None:
     """Write a file atomically.
 
     path      new, or an earlier file of catseye
@@ -201,7 +201,7 @@ def write_whole(path: Path, content: bytes, *, option: str, ours: Callable[[byte
     """
     where = path.resolve()
     fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
-    with undone_when_interrupted(Unfinished(str(fresh))):
+    with undo_on_interruption(Unfinished(str(fresh))):
         try:
             if where.is_dir():
                 raise InputError(f"{option} {path}: is a directory (expected the name of a file)")

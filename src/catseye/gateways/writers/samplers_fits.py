@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.errors import InputError
 from catseye.gateways.writers.objects import json_page
-from catseye.gateways.writers.output import PROVENANCE, write_whole
+from catseye.gateways.writers.output import PROVENANCE, write_atomically
 from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD
 from catseye.version import __version__
 
@@ -120,13 +120,13 @@ def write_samplers(path: Path, tables: Mapping[str, SamplerTable], *, option: st
     Raises InputError where a foreign file would be overwritten, nothing can be written, or FITS cannot hold a value.
     """
     mark = f"{MARK:<8}=".encode()
-    write_whole(path, sampler_tables(tables), option=option, ours=lambda content: mark in content[:2880])
+    write_atomically(path, sampler_tables(tables), option=option, ours=lambda content: mark in content[:2880])
 
 
 def join_samplers(directory: Path, name: str, tables: Mapping[str, SamplerTable]) -> None:
     """Add the tables as a file to an output directory and to its provenance.
 
-    directory   from `output.whole_directory`, filled by `written.write_files`
+    directory   from `output.atomic_directory`, filled by `written.write_files`
     name        file name, such as "samplers.fits"
     tables      as for `sampler_tables`
     """

@@ -31,7 +31,7 @@ def write_files(
     """Write each file piece by piece, so that a large one needs little memory.
 
     files        name -> function that returns its text or bytes, whole or in pieces, in the order of writing
-    directory    existing, from `output.whole_directory`
+    directory    existing, from `output.atomic_directory`
     provenance   at least `format`; the files' hashes are added
     progress     called for each file
     """

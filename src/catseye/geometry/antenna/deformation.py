@@ -258,7 +258,7 @@ def carried(six: ArrayLike, pivot: ArrayLike) -> tuple[NDArray[np.float64], NDAr
     return rotation, p + motion[..., :3] - np.einsum("...ij,j->...i", rotation, p)
 
 
-def carried_jacobian(six: ArrayLike, pivot: ArrayLike, points: ArrayLike) -> NDArray[np.float64]:
+def motion_jacobian(six: ArrayLike, pivot: ArrayLike, points: ArrayLike) -> NDArray[np.float64]:
     """Derivatives (..., 3, 6) of moved points by shift (1) and turn (m/rad).
 
     six      (..., 6), m and rad
@@ -267,7 +267,7 @@ def carried_jacobian(six: ArrayLike, pivot: ArrayLike, points: ArrayLike) -> NDA
 
     Source: [SHUSTER93]; the turn's own change enters through the left Jacobian. Exact.
 
-    >>> carried_jacobian(np.zeros(6), np.zeros(3), [2.0, 0.0, 0.0])[:, 5].tolist()
+    >>> motion_jacobian(np.zeros(6), np.zeros(3), [2.0, 0.0, 0.0])[:, 5].tolist()
     [0.0, 2.0, 0.0]
     """
     motion = np.asarray(six, dtype=float)

@@ -11,7 +11,7 @@ from catseye.constants import SECONDS_PER_DAY
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import in_row, refusal, shown
 from catseye.records.files.verdicts import verdict_of_export
-from catseye.records.night.doubt import DOUBTS, DoubtRow, believed_samples, refuse_doubts
+from catseye.records.night.doubt import DOUBTS, DoubtRow, refuse_doubts, trusted_samples
 from catseye.records.night.jitter import JITTER, JitterRow, JitterTable, jitter_table
 from catseye.records.night.live import LivePosture
 from catseye.records.night.path_temperature import PathTemperature, PathTemperatureTable, path_temperature_columns
@@ -107,7 +107,7 @@ def _without_doubts(
     campaign: Campaign, doubts: Sequence[DoubtRow], samples: Sequence[WeatherSample], shots: Sequence[ShotRow]
 ) -> Campaign:
     """Campaign without rejected weather, with rejected shots in `doubted`."""
-    trusted, notes = believed_samples(samples, doubts, campaign.shots.mjd_utc)
+    trusted, notes = trusted_samples(samples, doubts, campaign.shots.mjd_utc)
     spoke = {sample.station for sample in trusted}
     stations = tuple(station for station in campaign.site.weather_station if station.name in spoke)
     reduced = replace(

@@ -45,7 +45,7 @@ def refuse_doubts(doubts: Sequence[DoubtRow], shots: Sequence[ShotRow], samples:
             raise in_row(DOUBTS, row, f"{doubt.what} {doubt.name} has a doubt in row {first} (expected one)")
 
 
-def believed_samples(
+def trusted_samples(
     samples: Sequence[WeatherSample], doubts: Sequence[DoubtRow], times: np.ndarray
 ) -> tuple[list[WeatherSample], list[str]]:
     """Trusted readings, and notes on the others.

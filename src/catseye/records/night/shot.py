@@ -87,7 +87,7 @@ def read_buffers(folder: Folder, file: str = "frames.npy") -> np.memmap:
         raise unreadable(file, problem) from problem
 
 
-def let_go(buffers: np.ndarray) -> None:
+def release_buffers(buffers: np.ndarray) -> None:
     """Release the memory of mapped buffers; later access reads the file again."""
     mapped = getattr(buffers, "_mmap", None)
     if mapped is not None and hasattr(mmap, "MADV_DONTNEED"):

@@ -20,7 +20,7 @@ from catseye.reduction.epoch.epoch import Reduction, reduce_epoch
 from catseye.reduction.epoch.ranges import Phases, Progress, follow_electronics, measure_phases
 from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
-from catseye.reduction.epoch.telescope_track import as_in_the_middle, carried_ends
+from catseye.reduction.epoch.telescope_track import at_middle_posture, moved_ends
 from catseye.reduction.site.places import RangedPoint, places_of
 from catseye.signal.cycles.whole import CycleDecision, decision, unwrapped_length
 
@@ -117,7 +117,7 @@ def explain_shot(
 
     Source: [PARKER04] eqs. 5.12-5.19; [JCGM100] clause 5 and annex G; [JCGM101] clause 7.
     """
-    settings, campaign = settings or ReductionSettings(), as_in_the_middle(campaign)
+    settings, campaign = settings or ReductionSettings(), at_middle_posture(campaign)
     rows = np.flatnonzero(campaign.shots.shot == shot)
     if not len(rows):
         low, high = int(campaign.shots.shot.min()), int(campaign.shots.shot.max())
@@ -144,7 +144,7 @@ def explain_shot(
     )
     if campaign.shots.target[row] == REFERENCE or phases.reason[row] or status is ShotStatus.NO_REFERENCE:
         return partial
-    ends, place = carried_ends(campaign, row, *_places(campaign, row, reduction))
+    ends, place = moved_ends(campaign, row, *_places(campaign, row, reduction))
     try:
         scene = scene_of(
             campaign, phases, wrong, row=row, ends=ends, place=place, settings=settings, assumptions=assumptions

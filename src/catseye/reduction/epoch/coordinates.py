@@ -28,9 +28,9 @@ from catseye.reduction.epoch.settling import (
     JUDGED,
     SettledNetwork,
     allowed,
+    iterate_adjustment,
     refuted_priors,
     selection_of,
-    settle_network,
 )
 from catseye.reduction.epoch.strengths import ProcessStrength
 from catseye.reduction.epoch.telescope_track import motion_of
@@ -143,7 +143,7 @@ def adjust_coordinates(
     if not network.rangers:
         why = next(iter(resolved.rejected.values()), "no shot on any target has a usable phase and reference")
         raise InputError(f"shots.csv: {why}; nothing to adjust")
-    settled = settle_network(network, resolved.starts, progress)
+    settled = iterate_adjustment(network, resolved.starts, progress)
     for _ in range(JUDGED):
         allowance, before = allowed(settled), settled.network.allowance
         settled = settled._replace(network=replace(settled.network, allowance=allowance))
@@ -153,14 +153,14 @@ def adjust_coordinates(
             campaign, phases, settled.network.electronics, settings=settings, motion=motion, allowance=allowance
         ).with_strength(settled.network.strength)
         starts = {name: settled.solution.x[network.layout.columns(name)] for name in network.places}
-        settled = settle_network(network, starts, progress, active=selection_of(settled, network))
+        settled = iterate_adjustment(network, starts, progress, active=selection_of(settled, network))
     return coordinates_of(settled, resolved=resolved)
 
 
 def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCoordinates:
     """Points, ranges, heads and air of an adjusted network.
 
-    settled    result of `settle_network`
+    settled    result of `iterate_adjustment`
     resolved   whole cycles resolved beforehand
     """
     network, solution, shots = settled

@@ -24,7 +24,7 @@ def dish_prisms(campaign: ObservedSite) -> list[str]:
     return sorted(n for n, t in campaign.targets.items() if t.type == "prism" and t.frame == "reflector")
 
 
-def dish_advice(network: CampaignNetwork, x: np.ndarray, covariance: Covariance) -> list[Linear]:
+def dish_prior(network: CampaignNetwork, x: np.ndarray, covariance: Covariance) -> list[Linear]:
     """Plane of the dish at each prism, as a prior.
 
     It may judge shots but not shape the result.

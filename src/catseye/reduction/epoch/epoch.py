@@ -18,7 +18,7 @@ from catseye.reduction.epoch.ranges import (
 from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.surface import DishFit, fit_surface
-from catseye.reduction.epoch.telescope_track import as_in_the_middle
+from catseye.reduction.epoch.telescope_track import at_middle_posture
 from catseye.reduction.site.places import sheet_notes
 
 
@@ -62,7 +62,7 @@ def reduce_epoch(
 
     Raises InputError where nothing can be adjusted and EstimationError where the adjustment finds no answer.
     """
-    settings, campaign = settings or ReductionSettings(), as_in_the_middle(campaign)
+    settings, campaign = settings or ReductionSettings(), at_middle_posture(campaign)
     phases = measure_phases(campaign, settings, progress)
     with one_thread():
         electronics, wrong = follow_electronics(campaign, phases, settings.dense_shots)

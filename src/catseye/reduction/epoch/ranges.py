@@ -12,14 +12,14 @@ import numpy as np
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import EstimationError
 from catseye.records.night.campaign import REFERENCE, Campaign, ObservedSite
-from catseye.records.night.shot import let_go
+from catseye.records.night.shot import release_buffers
 from catseye.records.site.mirror import Mirror
 from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.signal.cycles.whole import fraction
 from catseye.signal.detection.buffers import BufferStatus, inspect_buffers
 from catseye.signal.detection.cycle_scatter import FEWEST_FOR_BATCHES, CycleScatter
-from catseye.signal.drift.reference import drift_along, drift_at, reference_surprise
+from catseye.signal.drift.reference import drift_along, drift_at, reference_prediction_error
 from catseye.signal.drift.states import DriftStates, drift_states
 from catseye.signal.drift.walk import estimate_walk, walk_test
 from catseye.signal.systematics.leakage import subtract_leakage
@@ -199,7 +199,7 @@ def measure_phases(campaign: Campaign, settings: ReductionSettings, progress: Pr
             processed += len(rows)
             if progress is not None:
                 progress("samples to phases", processed, n)
-    let_go(campaign.frames)  # a third of a gigabyte for a whole dish
+    release_buffers(campaign.frames)  # a third of a gigabyte for a whole dish
     mirrors = [campaign.mirror_of(ranger) for ranger in shots.ranger]
     phases = judged_phases(
         detected,
@@ -520,6 +520,6 @@ def _prediction_errors(
     Two or more references in order of time; rad.
     """
     phase = np.unwrap(np.angle(phases.phasor[references]))
-    difference, u = reference_surprise(seconds[references], phase, variance[references], random_walk=walk)
+    difference, u = reference_prediction_error(seconds[references], phase, variance[references], random_walk=walk)
     at_an_end = np.isin(np.arange(len(references)), (0, len(references) - 1))
     return difference, LARGEST_ERROR * u + np.where(at_an_end, WARM_UP, BEND)

@@ -18,7 +18,7 @@ from catseye.estimation.least_squares.bordered import Border
 from catseye.estimation.least_squares.robust import OutlierSearch, adjust_robustly
 from catseye.estimation.observations.kinds import Linear, ObservationGroup
 from catseye.reduction.epoch.allowance import Allowance, for_families, for_the_air, refused
-from catseye.reduction.epoch.dish import dish_advice
+from catseye.reduction.epoch.dish import dish_prior
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import Progress
 from catseye.reduction.epoch.self_check import self_checks, sortings
@@ -55,7 +55,7 @@ class SettledNetwork(NamedTuple):
     shots: list[tuple[ShotGroup, ShotParts]]
 
 
-def settle_network(
+def iterate_adjustment(
     network: CampaignNetwork,
     starts: Mapping[str, np.ndarray],
     progress: Progress | None = None,
@@ -104,7 +104,7 @@ def settle_network(
         solution, predicted = state.solution, state.predicted
         x, active = solution.x, [f.active for f in solution.fits]
         if not turn:
-            advice = dish_advice(network, x, solution.q)
+            advice = dish_prior(network, x, solution.q)
         steady = True
         if turn < STRENGTHENED:
             strength = network.processes.estimated(solution, network.strength, [p.distance for _, p in shots])

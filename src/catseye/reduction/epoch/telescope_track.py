@@ -10,11 +10,11 @@ import numpy as np
 from catseye.constants import DEGREE, SECONDS_PER_DAY
 from catseye.records.night.campaign import Campaign, ObservedSite
 from catseye.reduction.epoch.unknowns import middle_of
-from catseye.reduction.site.motion import CarriedMotion, PostureTrack, frames_of
+from catseye.reduction.site.motion import PostureTrack, TelescopeCarrier, frames_of
 from catseye.reduction.site.places import RangedPoint
 
 
-def motion_of(campaign: ObservedSite) -> CarriedMotion | None:
+def motion_of(campaign: ObservedSite) -> TelescopeCarrier | None:
     """Motion of the telescope's points from the campaign's middle.
 
     To each shot; None of a telescope at rest.
@@ -22,10 +22,10 @@ def motion_of(campaign: ObservedSite) -> CarriedMotion | None:
     if not campaign.postures:
         return None
     track = PostureTrack.of(campaign.postures)
-    return CarriedMotion(campaign, track, frames_of(campaign), middle_of(campaign.shots.mjd_utc))
+    return TelescopeCarrier(campaign, track, frames_of(campaign), middle_of(campaign.shots.mjd_utc))
 
 
-def as_in_the_middle(campaign: Campaign) -> Campaign:
+def at_middle_posture(campaign: Campaign) -> Campaign:
     """Campaign at the posture of its middle.
 
     Its points hold for that; unchanged if the telescope was at rest.
@@ -51,7 +51,7 @@ def buffer_middles(campaign: ObservedSite, rows: np.ndarray) -> np.ndarray:
     return np.asarray(shots.mjd_utc[rows] + half / SECONDS_PER_DAY)
 
 
-def carried_ends(
+def moved_ends(
     campaign: ObservedSite, row: int, ends: tuple[np.ndarray, np.ndarray], place: RangedPoint
 ) -> tuple[tuple[np.ndarray, np.ndarray], RangedPoint]:
     """Scan point and target of one shot at its time.

@@ -24,7 +24,7 @@ from catseye.reduction.epoch.self_check import Sorting, sortings
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.strengths import Processes, ProcessStrength, with_processes
 from catseye.reduction.epoch.telescope_motion import PARTS, TelescopeKnots
-from catseye.reduction.site.motion import CarriedMotion
+from catseye.reduction.site.motion import TelescopeCarrier
 from catseye.reduction.site.places import RangedPoint, places_of, unit
 from catseye.signal.drift.states import DriftStates
 
@@ -122,7 +122,7 @@ class CampaignNetwork:
     layout: UnknownsLayout
     field: AirField
     priors: list[ObservationGroup]
-    motion: CarriedMotion | None
+    motion: TelescopeCarrier | None
     states: dict[str, DriftStates]
     processes: Processes
     strength: ProcessStrength
@@ -205,7 +205,7 @@ def build_network(
     electronics: dict[str, ElectronicsPhase],
     *,
     settings: ReductionSettings,
-    motion: CarriedMotion | None = None,
+    motion: TelescopeCarrier | None = None,
     also: Collection[str] = (),
     known: Collection[str] = (),
     allowance: Allowance = NOTHING,

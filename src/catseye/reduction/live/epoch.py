@@ -1,6 +1,6 @@
 """Solve one epoch of a live site from shots and state.
 
-The recipe is a campaign's (`coordinates.settle_network`), with two differences: each shot's ends are where the
+The recipe is a campaign's (`coordinates.iterate_adjustment`), with two differences: each shot's ends are where the
 telescope was at that shot, and the state of earlier epochs replaces the records' priors.
 """
 
@@ -27,12 +27,12 @@ from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import Phases, follow_electronics
 from catseye.reduction.epoch.reason import Reason
 from catseye.reduction.epoch.settings import ReductionSettings
-from catseye.reduction.epoch.settling import SettledNetwork, allowed, refuted_priors, settle_network
+from catseye.reduction.epoch.settling import SettledNetwork, allowed, iterate_adjustment, refuted_priors
 from catseye.reduction.epoch.unknowns import CampaignNetwork, build_network
 from catseye.reduction.live.shots import PhasedShot
 from catseye.reduction.live.state import Carried, from_ground, to_ground, update_correlated
 from catseye.reduction.live.thermometers import SuspectedBias, biases_of, prior_pulls, with_suspected_biases
-from catseye.reduction.site.motion import CarriedMotion, ground_from
+from catseye.reduction.site.motion import TelescopeCarrier, ground_from
 
 SHARED_BY_AN_EPOCH = (
     ParameterKind.ELECTRONICS,
@@ -116,7 +116,7 @@ def observed_site(
 def solve_epoch(
     observed: ObservedSite,
     rows: Sequence[PhasedShot],
-    motion: CarriedMotion,
+    motion: TelescopeCarrier,
     *,
     settings: ReductionSettings,
     state: Carried | None,
@@ -210,12 +210,12 @@ def _judged(
     covered by the claims (`_with_suspicions`), but not estimated: an epoch hardly determines a gradient, and the state
     knows the stations' offsets from hours.
     """
-    settled = settle_network(network, starts, keep=SETTLED, predicted=predicted)
+    settled = iterate_adjustment(network, starts, keep=SETTLED, predicted=predicted)
     allowance = allowed(settled)
     requested = replace(allowance, thermometers={}, profile=0.0)
     if not requested.same(settled.network.allowance):
         network = network_with(requested).with_strength(settled.network.strength)
-        settled = settle_network(network, starts, keep=SETTLED, predicted=predicted)
+        settled = iterate_adjustment(network, starts, keep=SETTLED, predicted=predicted)
     return settled._replace(network=replace(settled.network, allowance=replace(requested, profile=allowance.profile)))
 
 
@@ -228,12 +228,12 @@ def _with_suspicions(
     return settled._replace(network=replace(network, allowance=allowance))
 
 
-def frames_at(network: CampaignNetwork, motion: CarriedMotion) -> dict[str, Transform]:
+def frames_at(network: CampaignNetwork, motion: TelescopeCarrier) -> dict[str, Transform]:
     """Ground from the frame of each moving network point."""
     return {n: t for n, t in frames_of_points(motion, list(network.places)).items() if n in network.layout.points}
 
 
-def frames_of_points(motion: CarriedMotion, names: Sequence[str]) -> dict[str, Transform]:
+def frames_of_points(motion: TelescopeCarrier, names: Sequence[str]) -> dict[str, Transform]:
     """Ground from the frame of each moving point."""
     azimuth, elevation = motion.track.at(motion.epoch)
     kinds = {f: ground_from(motion.site, f, azimuth, elevation).single for f in ("alidade", "reflector")}

@@ -41,11 +41,11 @@ from catseye.reduction.live.state import (
 )
 from catseye.reduction.live.thermometers import SuspectedBias
 from catseye.reduction.live.weather import BiasedPeriod, StationWatch
-from catseye.reduction.site.bodies import bodies_of, lasting_names
+from catseye.reduction.site.bodies import bodies_of, tracked_names
 from catseye.reduction.site.motion import (
     LONGEST_GAP,
-    CarriedMotion,
     PostureTrack,
+    TelescopeCarrier,
     carried_point,
     frames_of,
     ground_from,
@@ -149,7 +149,7 @@ class EpochJob:
 
     rows: list[PhasedShot]
     weather: list[LiveWeather]
-    motion: CarriedMotion
+    motion: TelescopeCarrier
     places: dict[str, Array]
     index: float
     azimuth: float
@@ -197,7 +197,7 @@ class Live:
         self.site = _with_flexure(site, self.settings)
         self.frames = frames_of(site)
         self.bodies = bodies_of(site, self.frames)
-        self.lasting = lasting_names(site)
+        self.lasting = tracked_names(site)
         self.track = PostureTrack()
         self.stations = StationWatch.of(site)
         self._opened: frozenset[str] = frozenset()  # stations whose thermometer priors no longer affect the state
@@ -333,7 +333,7 @@ class Live:
         azimuth, elevation = (float(v) for v in self.track.at(mjd))
         times = [r.mjd for r in rows if r.shot.target != REFERENCE]
         track = self.track.between(min([mjd, *times]), max([mjd, *times]))
-        motion = CarriedMotion(
+        motion = TelescopeCarrier(
             self.site, track, self.frames, mjd, self.bodies, self._shaking(rows), self.settings.lasting_path
         )
         names = {name for r in rows for name in (r.shot.ranger, r.shot.target)} & self._local.keys()
@@ -374,7 +374,7 @@ class Live:
 
     # Inside ----------------------------------------------------------------------------------------------------------
 
-    def _accept(self, epoch: Epoch, motion: CarriedMotion, azimuth: float, elevation: float) -> EpochAnswer:
+    def _accept(self, epoch: Epoch, motion: TelescopeCarrier, azimuth: float, elevation: float) -> EpochAnswer:
         coordinates = epoch.coordinates
         self.number += 1
         self.jitter.learn(coordinates.ranges, self.bodies)

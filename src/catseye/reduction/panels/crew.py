@@ -15,7 +15,7 @@ FEWEST = 2  # least readings of a session for a control limit
 
 
 @dataclass(frozen=True)
-class CornerStanding:
+class CornerStatistics:
     """Distribution of corners about their neighbours' mean.
 
     corners            panel corners with a relative height
@@ -38,15 +38,15 @@ class CornerStanding:
     median_u: float
 
 
-def standing(heights: PanelHeights, chosen: np.ndarray | None = None) -> CornerStanding:
+def standing(heights: PanelHeights, chosen: np.ndarray | None = None) -> CornerStatistics:
     """Statistics of corners (p, 4) bool; of all measured ones if None."""
     selected = heights.known if chosen is None else heights.known & chosen
     h, u, p = heights.relative[selected], heights.u_relative[selected], heights.conforms[selected]
     if not len(h):
-        return CornerStanding(0, np.nan, np.nan, np.nan, np.nan, 0, 0, 0, np.nan)
+        return CornerStatistics(0, np.nan, np.nan, np.nan, np.nan, 0, 0, 0, np.nan)
     square = float(np.mean(h**2))
     surely, surely_not = int(np.sum(p >= SURE)), int(np.sum(p <= 1.0 - SURE))
-    return CornerStanding(
+    return CornerStatistics(
         corners=len(h),
         rms=square**0.5,
         rms_true=max(square - float(np.mean(u**2)), 0.0) ** 0.5,

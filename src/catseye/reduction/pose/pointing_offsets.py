@@ -15,7 +15,7 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import FrameError, InputError
-from catseye.estimation.shapes.place_covariances import turned_covariance
+from catseye.estimation.shapes.place_covariances import rotated_covariance
 from catseye.estimation.shapes.pose import Pose, pivot_change, relative_pose
 from catseye.geometry.antenna.beam_deviation import (
     ApertureNodes,
@@ -171,6 +171,6 @@ def cross_covariance(
             at = site if posture is None else at_posture(site, *posture)
             turn = frame_transform("reflector", at).inverse().rotation
             q = epoch.between(carried.pose.names, dish.pose.names)
-            q = turned_covariance(turned_covariance(q, turn, columns=True), turn, columns=False)
+            q = rotated_covariance(rotated_covariance(q, turn, columns=True), turn, columns=False)
             total += carried.pose.gain @ q @ dish.pose.gain.T
     return total

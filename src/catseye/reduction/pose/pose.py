@@ -19,7 +19,7 @@ import numpy as np
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import InputError
 from catseye.estimation.least_squares.covariance import JointPoints
-from catseye.estimation.shapes.place_covariances import Known, PlaceCovariances, TurnedPoints, turn_in_place
+from catseye.estimation.shapes.place_covariances import Known, PlaceCovariances, RotatedPoints, rotate_in_place
 from catseye.estimation.shapes.pose import Pose, fit_pose
 from catseye.geometry.antenna.frames import ground_from_alidade
 from catseye.geometry.frames.frame import Transform
@@ -204,8 +204,8 @@ def _into(to_from: Transform, epoch: SolvedPoints, names: Sequence[str]) -> tupl
     """Places (n, 3) of an epoch's points in another frame, with covariance."""
     x = to_from.points(epoch.places(names))
     if isinstance(epoch.covariance, JointPoints):
-        return x, TurnedPoints(epoch.covariance.of_points(epoch.rows(names)), to_from.rotation)
-    return x, turn_in_place(epoch.block(names), to_from.rotation)
+        return x, RotatedPoints(epoch.covariance.of_points(epoch.rows(names)), to_from.rotation)
+    return x, rotate_in_place(epoch.block(names), to_from.rotation)
 
 
 def _design(

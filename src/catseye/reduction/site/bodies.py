@@ -57,7 +57,7 @@ def high_of_ground(site: SiteFolder) -> dict[str, str]:
     return {n: "alidade" for n, (x, y, z) in places.items() if z > least and np.hypot(x, y) < most}
 
 
-def lasting_names(site: SiteFolder) -> tuple[str, ...]:
+def tracked_names(site: SiteFolder) -> tuple[str, ...]:
     """Rangers, triplets and single targets except dish prisms.
 
     The dish has too many prisms to track.

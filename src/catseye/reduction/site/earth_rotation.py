@@ -50,7 +50,7 @@ STATUSES = (RotationStatus.MEASURED, RotationStatus.PREDICTED, RotationStatus.UN
 
 
 @dataclass(frozen=True)
-class SunSeen:
+class SunDirection:
     """Direction (..., 3) of the Sun in the ground frame, with its status.
 
     The status says how certain the Earth's rotation is.
@@ -101,7 +101,7 @@ def rotation_at(mjd: ArrayLike) -> Rotation:
     return Rotation(np.where(covered, ut1_minus_tai - leaps, 0.0), code)
 
 
-def sun_at(mjd: ArrayLike, place: FramePlace | Location) -> SunSeen:
+def sun_at(mjd: ArrayLike, place: FramePlace | Location) -> SunDirection:
     """Direction of the Sun over a site, in its ground frame.
 
     `sun_direction` with UT1 - UTC by the tables.
@@ -123,7 +123,7 @@ def sun_at(mjd: ArrayLike, place: FramePlace | Location) -> SunSeen:
     direction = _interpolated(days, place) if days.size > WORTH_KNOTS else _directly(days, place)
     if place.pressure_hpa is not None:
         direction = refracted(direction, place.pressure_hpa, place.temperature_c)
-    return SunSeen(direction, rotation.status)
+    return SunDirection(direction, rotation.status)
 
 
 def place_of(site: Location, pressure_hpa: float | None = None, temperature_c: float = 10.0) -> FramePlace:

@@ -273,7 +273,7 @@ def shaken(body: str, other_bodies: Sequence[str], jitter_mm: Mapping[str, Array
 
 
 @dataclass(frozen=True, eq=False)
-class CarriedMotion:
+class TelescopeCarrier:
     """Motion of the telescope's points from an epoch to other instants.
 
     site        its constants

@@ -23,8 +23,8 @@ from catseye.geometry.antenna.deformation import (
     TelescopePosture,
     Validity,
     carried,
-    carried_jacobian,
     left_jacobian,
+    motion_jacobian,
 )
 from catseye.geometry.antenna.frames import alidade_from_elevation_at, ground_from_alidade_at
 from catseye.geometry.antenna.subreflector import turned
@@ -261,7 +261,7 @@ class Antenna:
         by_frame: dict[str, np.ndarray] = {}
         for name in self.chain(frame)[::-1]:
             six = self.six(name, posture, added)
-            slopes = carried_jacobian(six, self.pivot(name), x)
+            slopes = motion_jacobian(six, self.pivot(name), x)
             rotation, translation = carried(six, self.pivot(name))
             x = Transforms(name, name, rotation, translation).points(x)
             x = self.nominal(name, posture, subreflector).points(x)
@@ -299,7 +299,7 @@ class Antenna:
         slopes = self.derivatives(points_at_rest.frame, at, posture, added=added, subreflector=subreflector)
         if group in self.motions:
             out = self.ground_from(points_at_rest.frame, posture, added=added, subreflector=subreflector).rotation
-            slopes[group] = out @ carried_jacobian(
+            slopes[group] = out @ motion_jacobian(
                 self.six(group, posture, added), self.pivot(group), points_at_rest.position
             )
         return slopes

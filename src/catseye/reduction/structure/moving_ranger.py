@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.errors import InputError
-from catseye.geometry.antenna.deformation import TelescopePosture, carried_jacobian
+from catseye.geometry.antenna.deformation import TelescopePosture, motion_jacobian
 from catseye.geometry.antenna.frames import ground_from_alidade_at
 from catseye.geometry.frames.frame import Transform, Transforms
 from catseye.geometry.frames.rotation import skew
@@ -188,7 +188,7 @@ def _displaced(antenna: Antenna, target: str, frame: str) -> np.ndarray:
     points = antenna.groups[group_of(antenna, target)]
     if points.frame != frame:
         raise InputError(f"target {target!r} stands on {points.frame!r}, the vibration is of {frame!r}: track another")
-    return carried_jacobian(np.zeros(6), antenna.pivot(frame), points.position[points.names.index(target)])
+    return motion_jacobian(np.zeros(6), antenna.pivot(frame), points.position[points.names.index(target)])
 
 
 def moving_ranger(

@@ -15,7 +15,13 @@ import numpy as np
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.shapes.paraboloid import cosine, design_rows
-from catseye.estimation.shapes.surface_field import Foretold, MeasuredField, Roughness, find_roughness, foretell
+from catseye.estimation.shapes.surface_field import (
+    FieldPrediction,
+    MeasuredField,
+    Roughness,
+    estimate_roughness,
+    foretell,
+)
 from catseye.optics.zernike import terms, zernike
 from catseye.records.files.refusal import shown
 from catseye.records.panels.actuators import LIMIT_MM, STEP_MM, ActuatorCorrection
@@ -106,9 +112,9 @@ def corrections(
     local, targets = shape.fit.local[:, :2], places[:, :2]
     trend, wanted_trend = _trend(shape, local, targets)
     values, noise = shape.fit.deviation, shape.fit.along
-    rough = roughness or find_roughness(local, values, noise, trend=trend)
+    rough = roughness or estimate_roughness(local, values, noise, trend=trend)
     nominal_design = _parameter_rows(shape, targets)
-    foretold: Foretold = foretell(
+    foretold: FieldPrediction = foretell(
         MeasuredField(local, values, noise, trend),
         targets,
         wanted_trend,

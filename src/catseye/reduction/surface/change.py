@@ -13,7 +13,7 @@ import numpy as np
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.covariance import JointPoints
 from catseye.estimation.shapes.paraboloid import cosine
-from catseye.estimation.shapes.place_covariances import turn_in_place
+from catseye.estimation.shapes.place_covariances import rotate_in_place
 from catseye.geometry.frames.rotation import from_vector, skew, to_vector
 from catseye.optics.aperture import cells
 from catseye.optics.zernike import zernike
@@ -161,11 +161,11 @@ def _own_frame(prisms: Prisms, rows: list[int]) -> tuple[np.ndarray, np.ndarray]
     points = (prisms.points[rows] - prisms.nominal.translation) @ turn
     covariance = prisms.covariance
     if isinstance(covariance, JointPoints):
-        return points, turn_in_place(covariance.block(np.array(rows)), turn.T)
+        return points, rotate_in_place(covariance.block(np.array(rows)), turn.T)
     if covariance.ndim == 3:
         return points, turn.T @ covariance[rows] @ turn
     at = (3 * np.array(rows)[:, None] + np.arange(3)).ravel()
-    return points, turn_in_place(covariance[np.ix_(at, at)], turn.T)
+    return points, rotate_in_place(covariance[np.ix_(at, at)], turn.T)
 
 
 def _sum(first: np.ndarray, second: np.ndarray) -> np.ndarray:

@@ -90,14 +90,14 @@ def drift_along(
     return _joined(mean[lower], before, back_mean[upper], after)
 
 
-def reference_surprise(
+def reference_prediction_error(
     reference_time: np.ndarray, reference_phase: np.ndarray, reference_variance: np.ndarray, *, random_walk: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Leave-one-out prediction error of each reference shot, with uncertainty.
 
     Arguments as for `drift_at`; at least two references; (r,) rad each; a single one gives (nan, nan).
 
-    >>> d, u = reference_surprise(np.array([0.0, 1.0, 2.0]), np.array([0.0, 0.5, 0.0]), np.full(3, 1e-6),
+    >>> d, u = reference_prediction_error(np.array([0.0, 1.0, 2.0]), np.array([0.0, 0.5, 0.0]), np.full(3, 1e-6),
     ...                           random_walk=1e-3)
     >>> int(np.argmax(np.abs(d) / u))
     1

@@ -63,7 +63,7 @@ def cats_eye_error(path: ArrayLike, share: ArrayLike, wavelength: ArrayLike) -> 
     Positive where too long; the detector is at the focus (cat's-eye).
 
     path         m, one way from detector to target, optical path over the index that is in the wavelength
-    share        returned once more for each return, 0 to below 1: see `share_a_pass`
+    share        returned once more for each return, 0 to below 1: see `returned_share_of_pass`
     wavelength   m, the modulation's group wavelength in air
 
     Each further round turns by -psi, psi = 4 pi path/wavelength, with the share q: the geometric series sums to
@@ -109,7 +109,7 @@ def cats_eye_cyclic(share: float, wavelength: float, orders: int, *, extra_path:
     return size * np.sin(turn), -size * np.cos(turn)
 
 
-def share_a_pass(
+def returned_share_of_pass(
     detector_reflectance: ArrayLike, recollected: ArrayLike, path_transmission: ArrayLike, *, mirrors: ArrayLike = 1.0
 ) -> Array:
     """Share of a return that comes back once more.
@@ -124,7 +124,7 @@ def share_a_pass(
 
     Raises ValidityError for a number outside 0 to 1.
 
-    >>> float(share_a_pass(0.04, 0.02, 0.5)).__round__(6)
+    >>> float(returned_share_of_pass(0.04, 0.02, 0.5)).__round__(6)
     0.0004
     """
     product = np.ones(())

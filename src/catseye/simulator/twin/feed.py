@@ -20,7 +20,7 @@ from catseye.clock import Clock
 from catseye.constants import DEGREE
 from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import PER_SECOND
-from catseye.ranger.door import USUAL_DOOR, Door, notice_death, refuse_open
+from catseye.ranger.door import DEFAULT_ACCESS, Door, enable_keep_alive_probes, refuse_exposed_port
 from catseye.ranger.entrance import Doorway, Entrance
 from catseye.ranger.line import LONGEST_REQUEST, TICK_NS, Reply, format_reply, nanoseconds_to_ticks
 from catseye.ranger.network import ConnectionMaker, Listener, Sockets
@@ -74,7 +74,7 @@ class SiteFeed:
         *,
         weather_every: float = WEATHER_EVERY,
         network: ConnectionMaker | None = None,
-        door: Door = USUAL_DOOR,
+        door: Door = DEFAULT_ACCESS,
     ):
         if weather_every <= 0.0:
             raise InputError(f"weather every {weather_every:g} s (expected more than 0)")
@@ -92,7 +92,7 @@ class SiteFeed:
 
         Unsafe: open to other hosts without a key.
         """
-        refuse_open("feed", host, self.door)
+        refuse_exposed_port("feed", host, self.door)
         try:
             self._listener = await self._network.serve(self._joining, host, port)
         except OSError as problem:
@@ -192,7 +192,7 @@ class FeedConnection(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
-        notice_death(transport)
+        enable_keep_alive_probes(transport)
         self._entrance = Entrance(self._feed.gate, transport, self.say)
         self._entrance.begin()
         if self._entrance.admitted:

@@ -14,14 +14,14 @@ from pathlib import Path
 
 from catseye.errors import InputError
 from catseye.ranger.addresses import PORT_BASE, Address, Addresses, ranger_addresses
-from catseye.ranger.door import USUAL_DOOR, Door
+from catseye.ranger.door import DEFAULT_ACCESS, Door
 from catseye.ranger.handlers.table import file_names, replace_file
 from catseye.ranger.head import RangerHead
 from catseye.ranger.initialisation import RangedPoint, files_of_ranger, places_of
 from catseye.ranger.network import ConnectionMaker, Sockets
 from catseye.ranger.ranger import Ranger
 from catseye.ranger.server import LOOPBACK, ZyServer
-from catseye.ranger.sun_watch import OwnSun, own_sun
+from catseye.ranger.sun_watch import OwnSun, sun_of_site
 from catseye.records.site.folder import SiteFolder
 from catseye.simulator.twin.faults import FaultBoard
 from catseye.simulator.twin.faulty_network import FaultyNetwork, Gate
@@ -66,7 +66,7 @@ class TwinSite:
         addresses: Addresses = PORT_BASE,
         files: Path | None = None,
         network: ConnectionMaker | None = None,
-        door: Door = USUAL_DOOR,
+        door: Door = DEFAULT_ACCESS,
     ):
         unknown = sorted(set(heads) - set(site.rangers))
         if unknown:
@@ -80,7 +80,7 @@ class TwinSite:
         )
         self._folder, self._door = files, door
         self._temporary: tempfile.TemporaryDirectory[str] | None = None
-        self._sun: OwnSun = own_sun(site.site.site)
+        self._sun: OwnSun = sun_of_site(site.site.site)
         self.served: dict[str, Served] = {}
 
     @property
