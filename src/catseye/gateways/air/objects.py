@@ -12,7 +12,7 @@ from catseye.gateways.writers.verdict import Verdict
 if TYPE_CHECKING:
     from catseye.atmosphere.index.air import AirState
 
-FORMULA_ALONE = "u is that of the formula only: no uncertainty of a sensor was given"
+FORMULA_ALONE = "u is that of the formula only; those of the sensors are not given"
 WEATHER = ("temperature", "pressure", "humidity")  # inputs of every index and every speed of sound
 
 
