@@ -77,7 +77,7 @@ def test_what_is_written_is_never_an_example(catseye, tmp_path):
     ]
     status, _, complaint = catseye("adjust", "--template", "networks/template")
     assert status == 1
-    assert "is there and not empty" in complaint
+    assert "exists and is not empty" in complaint
     assert catseye("adjust", "networks/template", "--strict", "--quiet")[0] == 0
 
 

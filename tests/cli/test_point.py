@@ -164,7 +164,7 @@ def test_without_uncertainties_u_is_unknown_and_with_them_it_is_given(catseye, t
         (["--file", "nowhere.dat"], 1, "nowhere.dat: missing"),
         (["--to=1,2,3", "--at", "yesterday"], 2, "is neither an MJD nor a time"),
         (["--to=1,2,3", "--sun-cone-deg", "0"], 2, "is not 0.5 to 60 degrees"),
-        (["--to=1,2,3", "--at", "52892.5"], 1, "needs latitude_deg, which the record of ZY3 does not have"),
+        (["--to=1,2,3", "--at", "52892.5"], 1, "needs latitude_deg, which the record of ZY3 lacks"),
         (["--to=1,2,3", "--keep-out", "none.toml"], 1, "none.toml: missing"),
         (["--to=1,2,3", "--keep-out", "."], 1, "catseye: .: is not a file (expected one)"),
         (["--to=1e200,2,3"], 1, "m is too far (expected within 20000 m)"),

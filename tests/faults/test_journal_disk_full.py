@@ -146,7 +146,7 @@ def test_removed_file_stops_acknowledgements(tmp_path):
     journal.append(scene_answer(0)).result(MOST_WAIT)
     for name in ("j.db", "j.db-wal", "j.db-shm"):
         (tmp_path / name).rename(tmp_path / f"away-{name}")
-    with pytest.raises(InputError, match="kept"):
+    with pytest.raises(InputError, match="not durable yet; queued for retry"):
         journal.append(scene_answer(1)).result(MOST_WAIT)
     assert "the file was moved or removed" in told.said[0][1]
     for name in ("j.db", "j.db-wal", "j.db-shm"):

@@ -145,7 +145,7 @@ def server_killed(server, name, times, seed):
         assert [seq for seq, _ in reader.shots(1)] == [number + 1 for number in appended]
     assert acknowledged == Counter(appended)
     assert [kind for kind, _ in told] == ["alarm", "back"] * times
-    assert all("nothing is durable" in text for kind, text in told if kind == "alarm")
+    assert all("writing failed, retrying" in text for kind, text in told if kind == "alarm")
 
 
 def test_killed_server_loses_nothing(server):

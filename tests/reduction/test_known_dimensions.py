@@ -106,7 +106,7 @@ def test_sigmas_in_millimetres_are_doubtful_and_name_the_unit(catseye):
 
 def test_reasons_of_known_mistakes():
     mirrored = adjust(HERE / "mirrored-sense.gkf").status
-    assert "sense of the horizontal angles is mirrored: counted the other way the variance factor is 0.628" in mirrored
+    assert "sense of the horizontal angles is mirrored: reversed, the variance factor is 0.628" in mirrored
     opposite = adjust(HERE / "half-turn.dat")
     assert "angle Q - C - P, line 16 is half a turn off" in opposite.status
     unmeasured = adjust(HERE / "height-unmeasured.dat").status

@@ -313,7 +313,7 @@ def test_a_ground_ranger_has_its_own_sun_and_one_of_the_feed_arm_asks_for_it(few
         for command in ("INITZY", "AXIS 0, 1", "AXIS 1, 1", "FHM 0", "FHM 1"):
             word, _, rest = command.partition(" ")
             assert (await world.ask(client, word, *rest.split(", ") if rest else ())).ok
-        assert "not told" in (await world.ask(client, "CIL", 0)).text
+        assert "no Sun vector received" in (await world.ask(client, "CIL", 0)).text
         assert (await world.ask(client, "SUN", 0, 0, 1)).ok
         assert (await world.ask(client, "CIL", 0)).ok
         client.close()

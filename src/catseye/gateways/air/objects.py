@@ -31,7 +31,7 @@ def uncertainty_words(stated: Sequence[str]) -> str:
     stated   of `stated_inputs`
 
     >>> uncertainty_words(("temperature",))
-    "u includes the formula and temperature; not given: pressure, humidity"
+    'u includes the formula and temperature; not given: pressure, humidity'
     """
     missing = [name for name in WEATHER if name not in stated]
     if not stated:
