@@ -144,6 +144,15 @@ def test_solution_from_a_distant_start_is_the_dense_one():
     np.testing.assert_allclose(bordered.q.diagonal(), u**2, rtol=2e-3, atol=1e-25)
 
 
+def test_rough_tests_are_good_to_a_hundredth():
+    """An elimination that is a tenth off would be off by 0.3 here."""
+    problem = Problem()
+    border = Border(problem.border, np.zeros(problem.n, dtype=bool))
+    rough = adjust(problem.start, problem.groups, free=problem.free, solver=SolverSettings(border=border, rough=True))
+    for fit, exact in zip(rough.fits, problem.solve().fits, strict=True):
+        np.testing.assert_allclose(fit.standardised, exact.standardised, atol=0.01)
+
+
 def test_rows_that_go_and_come_back_update_an_elimination(problem):
     """After one step from one place: rows are as they were, but for those that went or came."""
     border = problem.bordered()
