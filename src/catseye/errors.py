@@ -2,7 +2,7 @@
 
 CatseyeError
 ├── InputError        a file, table or record that cannot be used
-│   └── ArgumentError arguments that do not fit together
+│   └── ArgumentError arguments that are invalid or do not fit together
 ├── ValidityError     a value outside the range of validity of a formula
 ├── FrameError        transforms or points with mismatched frames
 └── EstimationError   an adjustment without a result, raised only when the result is required
@@ -20,7 +20,7 @@ class InputError(CatseyeError):
 
 
 class ArgumentError(InputError):
-    """Arguments of a call that do not fit together; the command line names its options and exits with 2.
+    """Arguments that are invalid or do not fit together; a command names its options instead and exits with 2.
 
     names   of the arguments that the text names
     """

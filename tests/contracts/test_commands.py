@@ -1,5 +1,6 @@
 """The command line keeps its contract: statuses, streams, keys, and an example in every help."""
 
+import inspect
 import json
 import os
 import re
@@ -13,6 +14,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+import catseye as catseye_package
 from catseye import __version__
 from catseye.atmosphere.index.air import MODELS
 from catseye.cli.commands import app
@@ -241,3 +243,14 @@ def test_quick_answers_spare_the_heavy_imports(arguments):
     )
     done = subprocess.run([sys.executable, "-c", code, *arguments], check=True, capture_output=True, text=True)
     assert done.stderr.strip() == "[]"
+
+
+ONE_CALL = ["air", "beam", "explain", "glass", "link", "night", "plan", "reduce", "replay", "safety", "sound"]
+OF_THE_TERMINAL = {"json", "out", "quiet", "strict", "page", "threads"}
+
+
+@pytest.mark.parametrize("name", ONE_CALL)
+def test_function_takes_every_option_of_its_command(name):
+    command = next(each.callback for each in app.registered_commands if each.callback.__name__ == name)
+    options = set(inspect.signature(command).parameters) - OF_THE_TERMINAL
+    assert options <= set(inspect.signature(getattr(catseye_package, name)).parameters)

@@ -135,7 +135,7 @@ def test_verdict_and_lines_count_epochs_alike():
 
 
 def test_doubtful_epochs_make_a_doubtful_verdict():
-    """As near the truth as claimed, since the claim covers the doubt."""
+    """Epochs agree with their claim, since it covers the doubt."""
     book, _ = filled()
     doubted = epoch(2)
     doubted.answer["doubts"] = ["WX2's thermometer is biased by about +2.5 °C, or the air is unusual"]

@@ -11,7 +11,7 @@ from catseye.api.reading import place_of
 from catseye.api.result import Progress, Result, quantities
 from catseye.api.units import In, with_units
 from catseye.constants import DEGREE, MILLIMETRE
-from catseye.errors import ValidityError
+from catseye.errors import ArgumentError
 from catseye.reduction.optics.link import Link, LinkReflector
 
 if TYPE_CHECKING:
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from catseye.reduction.optics.link_budget import LinkBudget
 
 DISTANCES = (0.01, 1e6)  # m, of a beam's reflector
+HEIGHTS_MM = (1.0, 1000.0)  # of a prism: metres typed as millimetres are below
 SAFETY_ROWS = {  # column -> key of a duration's row, and unit
     "duration": ("duration", "s"),
     "mpe_eye": ("mpe_eye", "W / m2"),
@@ -90,7 +91,7 @@ def glass(
     temperature_c   of the glass, °C
     height_mm       of a prism at 20 °C, face to corner, mm
 
-    Raises ValidityError: unknown glass, a value outside its formula.
+    Raises ValidityError: unknown glass, a value outside its formula; ArgumentError: no height of a prism.
 
     >>> round(float(glass("BK7-old", height_mm=38.4).values["notes_group_index"]), 8)
     1.52746375
@@ -98,8 +99,10 @@ def glass(
     from catseye.gateways.optics.glass_objects import glass_object, table_object
     from catseye.verdict import Verdict
 
-    if not (math.isfinite(height_mm) and height_mm > 0.0):
-        raise ValidityError(f"height_mm = {height_mm} is not the height of a prism (expected above 0)")
+    if not HEIGHTS_MM[0] <= height_mm <= HEIGHTS_MM[1]:
+        low, high = HEIGHTS_MM
+        text = f"height_mm = {height_mm} is not a prism's height (expected {low:g} to {high:g})"
+        raise ArgumentError(text, "height_mm")
     if name is None:
         values = table_object()
     else:
@@ -296,7 +299,7 @@ def safety(
     subtense_mrad     angle of the apparent source at the eye, mrad; up to 1.5 a point
     edition           of the limits: iec2014 or ansi2014
 
-    Raises ValidityError: values outside the limits' tables; a period without a rate.
+    Raises ValidityError: values outside the limits' tables; ArgumentError: a period without a rate.
 
     >>> safety(10.0, 0.780, 20.0, 0.05).values["class"]
     '3B'
@@ -306,7 +309,7 @@ def safety(
     from catseye.verdict import Verdict
 
     if scan_period_s is not None and scan_rad_per_s is None:
-        raise ValidityError(f"scan_period_s = {scan_period_s} has no rate (expected scan_rad_per_s with it)")
+        raise ArgumentError("scan_period_s needs scan_rad_per_s", "scan_period_s", "scan_rad_per_s")
     values = safety_object(
         Question(
             LaserBeam(power_mw * 1e-3, wavelength_um, diameter_mm * MILLIMETRE, divergence_mrad * 1e-3, waist_distance),
@@ -410,14 +413,14 @@ def beam(file: "str | os.PathLike[str]", *, distance_m: Annotated[Any, In("m", o
     file         record of the beam's elements, laser to detector (docs/formats/beam.md)
     distance_m   to the reflector, m; None: that of the file
 
-    Raises InputError: a bad record; ValidityError: a distance outside 0.01 to 1e6 m.
+    Raises InputError: an invalid record; ArgumentError: a distance outside 0.01 to 1e6 m.
     """
     from catseye.gateways.optics.beam_figures import beam_object, read_beam
     from catseye.verdict import Verdict
 
-    if distance_m is not None and not (math.isfinite(distance_m) and DISTANCES[0] <= distance_m <= DISTANCES[1]):
+    if distance_m is not None and not DISTANCES[0] <= distance_m <= DISTANCES[1]:
         low, high = DISTANCES
-        raise ValidityError(f"distance_m = {distance_m} is not within {low:g} to {high:g} m")
+        raise ArgumentError(f"distance_m = {distance_m} is not within {low:g} to {high:g} m", "distance_m")
     source = place_of(file)
     path, hashes = read_beam(source, distance_m)
     return BeamResult(Verdict(**beam_object(path)["verdict"]), path, source, hashes)

@@ -5,6 +5,8 @@ from functools import partial
 
 import pytest
 
+from catseye.api.optics import glass as catseye_glass
+from catseye.errors import ArgumentError
 from catseye.optics.glass import GLASSES, group_index, reference_air
 from catseye.optics.retroreflector import prism
 
@@ -123,3 +125,12 @@ def test_a_glass_beyond_the_notes_air_is_told_in_the_makers_air(catseye):
     assert told["phase_index"] == pytest.approx(1.50745 + 3.7e-5, abs=2e-5)
     assert told["prism"]["group_index_over_air"] == pytest.approx(told["group_index"], abs=2e-4)
     assert json.loads(catseye("glass", "N-BK7", "--json")[1])["prism"]["air"] == "20 °C, 933 hPa, 50 %"
+
+
+def test_metres_typed_as_millimetres_are_refused_by_command_and_call(asked):
+    """A prism of 0.0381 mm was "good"."""
+    status, out, err = asked("N-BK7", "--height-mm", 0.0381)
+    assert (status, out) == (2, "")
+    assert "--height-mm = 0.0381 is not a prism's height (expected 1 to 1000)" in err
+    with pytest.raises(ArgumentError, match=r"^height_mm = 0\.0381 is not"):
+        catseye_glass("N-BK7", height_mm=0.0381)

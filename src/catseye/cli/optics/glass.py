@@ -1,18 +1,11 @@
 """The command of the glasses."""
 
-import math
 from typing import Annotated
 
 import typer
 
 from catseye.cli.commands import Json, app
 from catseye.cli.results import tell
-
-
-def _height(value: float) -> float:
-    if not (math.isfinite(value) and value > 0.0):
-        raise typer.BadParameter(f"{value} mm is not a prism's height (expected above 0).")
-    return value
 
 
 @app.command(
@@ -25,7 +18,7 @@ def glass(
     temperature_c: Annotated[float, typer.Option("--temperature-c", help="Temperature of the glass, °C.")] = 20.0,
     height_mm: Annotated[
         float,
-        typer.Option("--height-mm", callback=_height, help="Height of a prism of it at 20 °C, face to corner, mm."),
+        typer.Option("--height-mm", help="Height of a prism of it at 20 °C, face to corner, mm."),
     ] = 38.1,
     json: Json = False,
 ) -> None:

@@ -51,8 +51,6 @@ def safety(  # noqa: PLR0913 - its options are its command line
     """Laser safety of a beam: limits of exposure, class with reasons, hazard distances."""
     from catseye.api.optics import safety as safety_of
 
-    if scan_period_s is not None and scan_rad_per_s is None:
-        raise typer.BadParameter("needs --scan-rad-per-s.", param_hint="'--scan-period-s'")
     result = safety_of(
         power_mw,
         wavelength_um,
