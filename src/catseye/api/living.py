@@ -8,8 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
+from catseye.aliases import Progress
 from catseye.api.reading import DATABASES, place_of
-from catseye.api.result import Progress, Result, quantities
+from catseye.api.result import Result, quantities
 from catseye.api.units import In, with_units
 from catseye.errors import InputError
 

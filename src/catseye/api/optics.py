@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from catseye.aliases import Progress
 from catseye.api.reading import place_of
-from catseye.api.result import Progress, Result, quantities
+from catseye.api.result import Result, quantities
 from catseye.api.units import In, with_units
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import ArgumentError

@@ -9,6 +9,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from catseye.aliases import Progress
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from catseye.gateways.writers.passage import Passage
     from catseye.gateways.writers.verdict import Verdict
 
-Progress = Callable[[str, int, int], None]
 
 WIDTH = 100  # columns of a paragraph
 FORMAT = "catseye-result-1"  # of what `save` writes of a result that has no files of its own

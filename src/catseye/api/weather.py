@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
+from catseye.aliases import Progress
 from catseye.api.reading import place_of
-from catseye.api.result import Progress, Result, quantities
+from catseye.api.result import Result, quantities
 from catseye.api.units import In, with_units
 from catseye.atmosphere.index.model import IndexSensitivity
 from catseye.errors import ArgumentError

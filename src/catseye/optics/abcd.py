@@ -10,9 +10,9 @@ the wavelength that of vacuum. The two planes of an elliptical or astigmatic bea
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.errors import ValidityError
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 

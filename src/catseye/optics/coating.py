@@ -18,11 +18,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
 from catseye.optics.glass import GLASSES, phase_index
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Polarization = Literal["s", "p"]
 Material = str | complex

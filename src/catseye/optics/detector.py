@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.constants import SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import ValidityError
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 RINGS = 64  # nodes of the quadrature over a spot
 REACH = 3.5  # radii of a spot: exp(-24) of the light is outside

@@ -15,8 +15,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.constants import SPEED_OF_LIGHT
 from catseye.errors import ValidityError
 from catseye.optics.glass_table import GLASSES, SUPPORT_C, Glass
@@ -39,7 +40,6 @@ __all__ = [
     "wavelength_in_air_um",
 ]
 
-Array = NDArray[np.float64]
 STEP_C = 0.5  # of the central difference by temperature: the formula is a cubic, its error is 1e-11 a kelvin
 
 

@@ -8,11 +8,11 @@ Limits are a turn other than 45 degrees (wavelength, temperature), and leakage o
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.errors import ValidityError
 
-Array = NDArray[np.float64]
 RESONANCE_UM = 0.258  # of terbium gallium garnet, whose 4f-5d transitions make its rotation
 DESIGN_TURN = 0.25 * np.pi
 

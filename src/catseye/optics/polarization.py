@@ -10,10 +10,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.errors import ValidityError
 from catseye.optics.coating import Coating, response
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Surface = Callable[[Array], tuple[Complex, Complex]]  # cosine of incidence -> r_s, r_p
 STRAIGHT = 1e-9  # sine of an incidence below which any s does: r_p = -r_s there

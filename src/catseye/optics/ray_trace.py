@@ -14,11 +14,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.errors import ValidityError
 
-Array = NDArray[np.float64]
 AWAY = 1e-12  # m: a ray that starts on a surface does not hit it again immediately
 
 

@@ -10,11 +10,11 @@ The electric signal grows with the power. Amplitudes in volt therefore have the 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.constants import SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import ValidityError
 from catseye.optics.gaussian_beam import radius as beam_radius
 
-Array = NDArray[np.float64]
 FEWEST_NODES, MOST_NODES = 32, 400
 NODES_PER_RADIAN = 0.85  # of phase from middle to edge; the angle of a chord runs pi/2 faster, which needs 0.8
 NEGLIGIBLE = 6.0  # beam radii from its axis: exp(-72) of the light

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from catseye.aliases import Progress
 from catseye.constants import PPM
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import CONVERGED, GroupFit
@@ -33,7 +34,6 @@ FEW = 300  # points up to which a dense solution beside an existing one is the q
 NEAR = 1e4  # variance factor of the plain solution up to which the search for wrong observations starts from it
 START = (5e-5, 0.5 * PPM)  # of the constant and the scale part of a ranger, m and ratio: any positive start will do
 
-Progress = Callable[[str, int, int], None]
 Placed = tuple[
     tuple[str, ...], tuple[str, ...]
 ]  # names of points with approximate places, and of those on an assumed side

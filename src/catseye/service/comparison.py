@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.constants import MILLIMETRE
 from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
 from catseye.estimation.shapes.motions import motions
@@ -20,7 +20,6 @@ from catseye.reduction.site.motion import GROUND, frames_of, ground_from
 from catseye.simulator.twin.beam import TracedDish
 from catseye.simulator.twin.site import Twin
 
-Array = NDArray[np.float64]
 FEWEST_SHOTS = 3
 INSTANTS = 32  # of an epoch's shots at which the truth is sampled: vibrations average over ten seconds
 MOST_SHOTS = 50_000  # remembered while nothing is solved

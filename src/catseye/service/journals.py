@@ -4,7 +4,7 @@ import glob
 import os
 import shutil
 import sqlite3
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +12,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, Literal
 from urllib.parse import quote
 
+from catseye.aliases import Progress
 from catseye.coordinator.journal.chain import Head
 from catseye.coordinator.journal.check import ChainReport, has_head, parted, verify_run
 from catseye.coordinator.journal.place import place_of, refuse_foreign
@@ -25,7 +26,6 @@ from catseye.gateways.writers.interruption import Unfinished, undo_on_interrupti
 from catseye.verdict import Verdict
 
 STEP = 500  # SQLite VM steps between checks for signals and progress: some ms, 2 MB of buffers
-Progress = Callable[[str, int, int], None]
 Span = tuple[int, int]  # ticks
 Format = Literal["csv", "fits", "campaign"]
 

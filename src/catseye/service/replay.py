@@ -3,7 +3,6 @@
 import math
 import platform
 from collections import Counter, defaultdict
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from catseye.aliases import Progress
 from catseye.constants import MILLIMETRE
 from catseye.coordinator.journal.check import ChainReport, verify_run
 from catseye.coordinator.journal.movement import Movement, Movements, Moving, in_u, places, point_moves
@@ -28,7 +28,6 @@ from catseye.version import __version__
 
 SHOWN_POINTS = 20  # points shown to people: those that move most
 LEAST_SHOWN_MM = 5e-4  # a smaller change is zero in three decimals
-Progress = Callable[[str, int, int], None]
 
 
 class Cause(StrEnum):

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.constants import DEGREE, SECONDS_PER_DAY
 from catseye.coordinator.guard.memory import Memory
 from catseye.coordinator.guard.parked import AHEAD, Alarm, in_words, parked_alarms
@@ -30,7 +30,6 @@ from catseye.records.site.folder import SiteFolder
 from catseye.records.site.interlock import Act, Interlock, Interlocks
 from catseye.reduction.steering.tracking import AZIMUTH_SLEW, ELEVATION_SLEW, SLEW_ACCELERATION
 
-Array = NDArray[np.float64]
 MOVES = frozenset(["STT", "CIL", "CMEAS", "TRK", "SCN", "FHM"])  # CMEAS 1 only
 SHINES = frozenset(["PS", "TRG", "CMEAS", "SCN", "STM"])  # PS 1, SCN 1 only
 HARMLESS = frozenset(

@@ -6,8 +6,8 @@ A guard updates it from the requests that it let pass, and from the replies.
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.coordinator.visibility.vantage import Vantage
 from catseye.errors import InputError
 from catseye.geometry.mirror.pointing import MirrorStation
@@ -20,7 +20,6 @@ from catseye.ranger.status import StatusWord
 from catseye.ranger.values import Value
 from catseye.records.site.folder import REFERENCE
 
-Array = NDArray[np.float64]
 GEOMETRY = ("BP", "ALPHA", "BETA", "MO", "EZ")
 
 

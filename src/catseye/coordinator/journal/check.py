@@ -1,11 +1,12 @@
 """Verification of a journal against its chain."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import sha256
 
 from sqlalchemy import Connection, func, select
 
+from catseye.aliases import Progress
 from catseye.coordinator.journal.chain import Head, LinkKind, event_cells, link_of, run_link
 from catseye.coordinator.journal.reader import PIECE, JournalReader, highest_seq, next_seq
 from catseye.coordinator.journal.rows import LARGEST_INTEGER
@@ -26,7 +27,6 @@ from catseye.errors import InputError
 
 STORED = (*EVENTS, BUFFERS)
 MOST_PROBLEMS = 20  # problems reported in words
-Progress = Callable[[str, int, int], None]
 Stored = list[tuple[JournalTable, Mapping[str, object]]]
 
 

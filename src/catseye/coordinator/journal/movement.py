@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.coordinator.journal.entries import EpochSolution, Json
 from catseye.coordinator.journal.replay import Replayed
 
-Array = NDArray[np.float64]
 LEAST_U = 1e-15  # m, rad, °C: a smaller stored u is rounding of zero, as of a pose at its own reference
 
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.coordinator.visibility.surroundings import BOX, FREE, PERHAPS, SUN, Surroundings
 from catseye.geometry.mirror.encoder import HALF_TURN
 from catseye.geometry.mirror.slew import trapezoid
 
-Array = NDArray[np.float64]
 AZIMUTH, ELEVATION = 1, 2
 HALT = 0.1  # s, at a corner
 WHY = {FREE: None, SUN: "the Sun", BOX: "a box"}

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.constants import MILLIMETRE
 from catseye.coordinator.parts import PlannedShot, SiteState
 from catseye.coordinator.visibility.surroundings import later
@@ -14,7 +15,6 @@ from catseye.geometry.antenna.frames import ground_from_reflector_at
 from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
 from catseye.records.site.folder import REFERENCE, SiteFolder
 
-Array = NDArray[np.float64]
 RECORD_TOLERANCE = 0.005  # m: a target this near to its record needs no new coordinates; half a beam's radius
 
 

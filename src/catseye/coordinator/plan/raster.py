@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.coordinator.visibility.surroundings import FREE, Surroundings
 from catseye.coordinator.visibility.vantage import SeenRetroreflector, Vantage
 from catseye.geometry.mirror.slew import trapezoid
 
-Array = NDArray[np.float64]
 BAND = 400.0  # counts of elevation of a pass in azimuth: 5.8 deg of the beam
 WINDOW = 120  # prisms considered in a round
 MOST_PASSED = 12  # skipped ones of them, before the others wait for the next round

@@ -13,6 +13,7 @@ from heapq import heapify, heappop, heappush
 import numpy as np
 from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.coordinator.parts import PlannedShot, Round, SiteState
 from catseye.coordinator.plan.candidates import ShotCandidates, candidates
 from catseye.coordinator.plan.places import ChosenTarget, Places
@@ -28,7 +29,6 @@ from catseye.records.night.live import TICK_SECONDS
 from catseye.records.site.folder import REFERENCE, SiteFolder
 from catseye.records.site.solids import Solids
 
-Array = NDArray[np.float64]
 HOUR_TICKS = 100_000_000 // 24
 RANGERS_GRID = servo_margin([0.5 * LARGEST_STEP] * 2)  # rad by which a ranger's own check of the Sun may be too strict
 

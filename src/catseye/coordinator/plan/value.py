@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from catseye.aliases import Array
+
 SIGMA = 30e-6  # m, of a range
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.constants import DEGREE
 from catseye.coordinator.visibility.sweep import chords, nearest
 from catseye.coordinator.visibility.vantage import Vantage, reflector_at, seconds_between
@@ -23,7 +24,6 @@ from catseye.records.site.keep_out import KeepOut
 from catseye.reduction.site.earth_rotation import FramePlace, place_of, sun_at
 from catseye.reduction.steering.guard import Guard, guard_of
 
-Array = NDArray[np.float64]
 NODES = 5  # instants for the positions of a ranger on the telescope
 FREE, SUN, PERHAPS, BOX = 0, 1, 2, 3  # PERHAPS: possibly a box; BOX: certainly
 PIECE = 5.0  # m: no piece of a box is longer

@@ -12,10 +12,10 @@ each of these along Phi at atan2(sin Phi_s c, cos Phi_s) or at an end. No grid, 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.geometry.mirror.encoder import BEAM_PER_COUNT
 from catseye.geometry.mirror.pointing import MirrorStation
 
-Array = NDArray[np.float64]
 TWO_PI = 2.0 * np.pi
 
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.geometry.antenna.frames import ground_from_reflector
 from catseye.geometry.frames.frame import Transform
@@ -24,7 +25,6 @@ from catseye.records.site.folder import SiteFolder
 from catseye.records.site.mirror import Mirror
 from catseye.records.site.target import FrameName
 
-Array = NDArray[np.float64]
 Frame = Literal["ground", "reflector"]
 TYPED = 0.010  # m: u of a coordinate without a stated one, as in the reduction
 

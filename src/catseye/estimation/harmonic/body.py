@@ -1,9 +1,9 @@
 """Rigid design of a body's points, and rigid part of their displacements."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from catseye.aliases import Array
+
 FLAT = 1e-9  # of the points' extent: a smaller singular value is an undetermined motion
 
 

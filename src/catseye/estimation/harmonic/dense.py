@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.errors import EstimationError, ValidityError
 from catseye.estimation.harmonic.body import arms_of, rigid_part
 
-Array = NDArray[np.float64]
 FLOATING = 1e-12  # of the normal matrix of unit diagonal: a smaller eigenvalue is an undetermined direction
 
 

@@ -11,13 +11,12 @@ covariance of s is S^-1, that of a is N^-1 + H S^-1 H', of both together -H S^-1
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.errors import EstimationError, ValidityError
 from catseye.estimation.harmonic.body import arms_of, moved, rigid_part
 from catseye.estimation.harmonic.dense import FLOATING, Solved, inverse_of
 
-Array = NDArray[np.float64]
 MOST_REMAINING = 8000  # remaining unknowns: their matrix takes 0.5 GB
 PIECE = 128  # points per batch, with shared unknowns per epoch
 

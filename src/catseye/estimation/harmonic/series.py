@@ -17,14 +17,13 @@ thousands of points in thousands of epochs are a few matrix products.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.errors import EstimationError, ValidityError
 from catseye.estimation.harmonic.body import moved, rigid_design, rigid_part
 from catseye.estimation.harmonic.dense import solved_together
 from catseye.estimation.harmonic.eliminated import solved_by_elimination
 
-Array = NDArray[np.float64]
 TOGETHER = 3000  # unknowns: limit with a full covariance
 
 

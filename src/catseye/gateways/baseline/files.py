@@ -1,11 +1,12 @@
 """Files of an EDM baseline, and its record of pillars."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from catseye.aliases import Progress
 from catseye.gateways.baseline.objects import baseline_object
 from catseye.gateways.baseline.tables import distances_csv, observations_csv, pillars_csv
 from catseye.gateways.writers.objects import json_page
@@ -17,7 +18,6 @@ from catseye.reduction.baseline.instrument import record_values
 if TYPE_CHECKING:
     from catseye.reduction.baseline.instrument import BaselineCalibration
 
-Progress = Callable[[str, int, int], None]
 MARK = f'format = "{FORMAT}"'
 
 

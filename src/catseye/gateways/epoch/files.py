@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from catseye.aliases import Progress
 from catseye.gateways.epoch.objects import COVARIANCE, coordinates_object, matrix_file, pose_object, provenance_object
 from catseye.gateways.epoch.report import report
 from catseye.gateways.epoch.tables import coordinates_csv, ranges_csv, surface_csv
@@ -14,7 +15,6 @@ from catseye.gateways.writers.matrix_fits import matrix_pages
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.written import Files, write_files
 from catseye.reduction.epoch.epoch import Reduction
-from catseye.reduction.epoch.ranges import Progress
 
 STEP = 150  # points whose rows are computed together
 

@@ -6,6 +6,7 @@ from html import escape
 
 import numpy as np
 
+from catseye.aliases import Progress
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.gateways.epoch.figures import crowded, figures
 from catseye.gateways.epoch.objects import benchmark_object, matrix_file
@@ -18,7 +19,6 @@ from catseye.gateways.writers.page import card, folded, page, paragraph, picture
 from catseye.gateways.writers.verdict import verdict_line
 from catseye.reduction.air.group_index import benchmark_refractometers
 from catseye.reduction.epoch.epoch import Reduction
-from catseye.reduction.epoch.ranges import Progress
 from catseye.reduction.epoch.reason import ShotStatus
 from catseye.reduction.epoch.surface import UNOBSERVED
 

@@ -16,6 +16,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from catseye.aliases import Progress
 from catseye.constants import DEGREE, MILLIMETRE, ZERO_CELSIUS_K
 from catseye.coordinator.journal.check import ChainReport
 from catseye.coordinator.journal.entries import Entry, EpochSolution
@@ -25,7 +26,7 @@ from catseye.gateways.journal.chain import chain_object
 from catseye.gateways.writers.cells import harmless
 from catseye.gateways.writers.objects import json_page, plain
 from catseye.gateways.writers.output import PROVENANCE, atomic_directory
-from catseye.gateways.writers.written import Progress, origin
+from catseye.gateways.writers.written import origin
 from catseye.records.files.verdicts import EXPORT
 from catseye.records.night.live import TICKS_PER_DAY
 

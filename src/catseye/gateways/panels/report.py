@@ -1,6 +1,5 @@
 """Files of panel setting: list of screws, tables, JSON and an HTML report."""
 
-from collections.abc import Callable
 from datetime import UTC, datetime
 from html import escape
 from pathlib import Path
@@ -8,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from catseye.aliases import Progress
 from catseye.gateways.panels.objects import (
     FORMAT,
     doubt_text,
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from catseye.reduction.panels.crew import Reader
     from catseye.reduction.panels.job import PanelWork
 
-Progress = Callable[[str, int, int], None]
 MOST_LISTED = 200  # screws in the report; screws.csv has all
 CAPTIONS = {
     "corners": "Each quarter of a panel shows the height of its corner above the mean of those that meet there, which "

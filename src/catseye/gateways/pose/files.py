@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from catseye.aliases import Progress
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.estimation.shapes.pose import Pose
 from catseye.gateways.pose.objects import (
@@ -23,7 +24,7 @@ from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
 from catseye.gateways.writers.verdict import verdict_line
-from catseye.gateways.writers.written import Files, Progress, origin, write_files
+from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.pose.pointing_offsets import PointingOffset
 from catseye.reduction.pose.verdicts import PoseFindings, pose_verdict
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from catseye.aliases import Progress
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.gateways.structure.figures import motion_figure, residual_figure, spectrum_figure
 from catseye.gateways.structure.objects import (
@@ -19,7 +20,7 @@ from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import SAMPLERS, join_samplers
 from catseye.gateways.writers.verdict import Verdict, verdict_line
-from catseye.gateways.writers.written import Files, Progress, cell, csv_text, origin, write_files
+from catseye.gateways.writers.written import Files, cell, csv_text, origin, write_files
 from catseye.reduction.structure.check import LeaveOut
 from catseye.reduction.structure.series import Prediction, StructureFit
 from catseye.reduction.structure.vibration import Vibration

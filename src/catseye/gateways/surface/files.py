@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from catseye.aliases import Progress
 from catseye.errors import InputError
 from catseye.gateways.surface.objects import (
     FORMAT,
@@ -28,7 +29,7 @@ from catseye.gateways.surface.tables import (
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.output import atomic_file
 from catseye.gateways.writers.samplers_fits import join_tables, write_samplers
-from catseye.gateways.writers.written import Files, Progress, origin, write_files
+from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.surface.actuators import rows_of
 from catseye.reduction.surface.verdict import SurfaceFindings, surface_verdict
 

@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from catseye.aliases import Progress
 from catseye.errors import InputError
 from catseye.gateways.calibrations.certificate_record import FORMAT
 from catseye.gateways.triplet.objects import triplet_object
@@ -22,7 +23,6 @@ COLUMNS = (
     "file", "triplet", "h_corr_mm", "u_h_corr_mm", "l_mpbc_mm", "u_l_mpbc_mm", "difference_mm", "u_difference_mm",
     "accepted", "conformity_probability", "placements", "p",
 )  # fmt: skip
-Progress = Callable[[str, int, int], None]
 
 
 def write_triplets(

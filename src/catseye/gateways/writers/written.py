@@ -9,11 +9,11 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from catseye.aliases import Progress
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.output import PROVENANCE
 
 Files = Mapping[str, Callable[[], str | Iterable[str] | Iterable[bytes]]]
-Progress = Callable[[str, int, int], None]
 
 
 def origin(when: datetime, inputs: Mapping[str, str]) -> dict[str, Any]:

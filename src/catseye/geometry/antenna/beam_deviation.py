@@ -15,12 +15,12 @@ x and y. The feed's taper is not included.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.errors import ValidityError
 from catseye.geometry.frames.rotation import skew
 
-Array = NDArray[np.float64]
 RINGS, SPOKES = 24, 64  # rings and spokes of the aperture: quadrature good to 1e-10
 
 

@@ -31,12 +31,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.constants import ARCSECOND
 from catseye.errors import ValidityError
-
-Array = NDArray[np.float64]
 
 TERMS = ("IA", "IE", "CA", "NPAE", "AW", "AN", "HZCZ", "HZSZ")
 PUBLISHED_ARCSEC = (-14.18, 758.10, -27.00, -4.71, -2.18, -2.96, 680.72, 794.33)  # fit of 28-30 December 2001

@@ -16,10 +16,9 @@ sight is parallel to the normal but need not pass through the pivot; it is the s
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.errors import ValidityError
 from catseye.geometry.frames.rotation import rx, ry
-
-Array = NDArray[np.float64]
 
 
 def base_from_unit(swing: ArrayLike, tip: ArrayLike) -> Array:

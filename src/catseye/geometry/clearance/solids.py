@@ -13,12 +13,11 @@ others.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.errors import ValidityError
 from catseye.geometry.frames.rotation import rz
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.errors import ValidityError
 from catseye.geometry.clearance.solids import Solid
 
-Array = NDArray[np.float64]
 CLEAR = -1  # in the result of `first_obstruction`
 
 

@@ -29,12 +29,11 @@ sin psi, which changes its sign in the prime pointing.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.geometry.frames.rotation import rx, ry, rz
 from catseye.geometry.mirror.mount import lambda_
-
-Array = NDArray[np.float64]
 
 
 def face_normal(theta: ArrayLike, shaft: ArrayLike, face_tilt: ArrayLike = 0.0, *, axis_tilt: ArrayLike = 0.0) -> Array:

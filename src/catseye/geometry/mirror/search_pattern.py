@@ -11,8 +11,9 @@ along increasing Phi', on the sphere along great circles from the centre.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
 from catseye.geometry.mirror.encoder import (
@@ -25,7 +26,6 @@ from catseye.geometry.mirror.encoder import (
 )
 from catseye.geometry.mirror.mirror_path import direction_angles
 
-Array = NDArray[np.float64]
 PITCH_OVER_REACH = 1.35  # pitch of the spiral; sqrt(2) for straight turns, less for the curvature near the centre
 HALF_DIAGONAL = 0.5 * float(np.hypot(*BEAM_PER_COUNT))  # rad, of a count at sin Phi = 1, where it is largest
 LEAST_REACH = 1.5 * HALF_DIAGONAL  # rad, of a spiral that is rounded to whole counts

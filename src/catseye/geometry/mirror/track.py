@@ -20,11 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.errors import ValidityError
 from catseye.geometry.mirror.encoder import BEAM_PER_COUNT, COUNTS_PER_TURN
 from catseye.geometry.mirror.pointing import MirrorStation, ray
-
-Array = NDArray[np.float64]
 
 HALVINGS = 60  # of an interval: its last bit
 

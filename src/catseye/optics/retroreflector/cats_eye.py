@@ -21,10 +21,10 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.errors import ValidityError
 from catseye.optics.retroreflector.kinds import (
     RIGHT,
-    Array,
     Sectors,
     fresnel,
     incidences,

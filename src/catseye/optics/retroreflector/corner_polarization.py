@@ -18,12 +18,12 @@ from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.errors import ValidityError
 from catseye.optics.polarization import Complex, Surface, reflection_matrix, surface, transfer
 
-Array = NDArray[np.float64]
 ORDERS = tuple(permutations(range(3)))  # faces in the order met
 REVERSED = tuple(ORDERS.index(order[::-1]) for order in ORDERS)
 THIRDS = 2.0 * np.pi / 3.0 * np.arange(3)

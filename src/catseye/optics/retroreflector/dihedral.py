@@ -16,12 +16,12 @@ beams has `pupil_offset`.
 from itertools import permutations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.errors import ValidityError
 from catseye.optics.gaussian_beam import share_within
 
-Array = NDArray[np.float64]
 LEVER = 4.0 * np.sqrt(6.0) / 3.0  # deviation over equal dihedral errors, in air
 ORDERS = tuple(permutations(range(3)))
 SMALL = 1e-2  # rad: the formula's next order is a hundredth of it

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.optics.retroreflector.corner_polarization import hollow_corner, sector_jones, sector_shares
-from catseye.optics.retroreflector.kinds import RIGHT, Array, Sectors, incidences, refuse_shares, refuse_sizes
+from catseye.optics.retroreflector.kinds import RIGHT, Sectors, incidences, refuse_shares, refuse_sizes
 from catseye.optics.retroreflector.prism import clear_share
 
 

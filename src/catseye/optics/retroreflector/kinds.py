@@ -14,9 +14,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.errors import ValidityError
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 RIGHT = 0.5 * np.pi
 

@@ -21,9 +21,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.errors import ValidityError
-
-Array = NDArray[np.float64]
 
 COSINE_TOLERANCE = 1e-9  # a dot product of unit vectors may exceed 1 by rounding
 

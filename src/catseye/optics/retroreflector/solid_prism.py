@@ -18,11 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.optics.retroreflector import prism
 from catseye.optics.retroreflector.corner_polarization import sector_jones, sector_shares, solid_corner
 from catseye.optics.retroreflector.kinds import (
     RIGHT,
-    Array,
     Sectors,
     fresnel,
     incidences,

@@ -9,12 +9,12 @@ are one function, the slope its difference.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.optics.glass import difference_ends, glass_named, index_over_air
 from catseye.optics.retroreflector import prism
 
-Array = NDArray[np.float64]
 DIMENSION_C = 20.0  # °C, at which lengths are stated [ISO22]
 EXPANSION_C = (-30.0, 70.0)  # °C, for which makers give the mean expansion that the table holds
 

@@ -12,6 +12,7 @@ from typing import TypedDict
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from catseye.aliases import Progress
 from catseye.atmosphere.weather.humidity import humidity_doubts
 from catseye.constants import MILLIMETRE, PPM
 from catseye.errors import EstimationError, InputError
@@ -20,7 +21,7 @@ from catseye.estimation.baseline.iso17123 import FullTest
 from catseye.estimation.baseline.model import KnownPlaces
 from catseye.records.files.refusal import shown
 from catseye.records.laboratory.baseline import Baseline, BaselineShots, Heights, numbers_of
-from catseye.reduction.baseline.job import BaselineJob, Progress
+from catseye.reduction.baseline.job import BaselineJob
 from catseye.reduction.baseline.lengths import BaselineSettings, Lengths, reduce_lengths
 from catseye.reduction.baseline.statistical_tests import FOLLOWS, SuspectShot, decisions_of
 from catseye.reduction.calibrations.check_outcome import CheckOutcome

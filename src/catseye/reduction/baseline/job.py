@@ -3,11 +3,11 @@
 With and without suspects, cyclic terms, the weather, against known pillars.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
+from catseye.aliases import Progress
 from catseye.constants import ARCSECOND, MILLIMETRE, PPM, TWO_PI
 from catseye.errors import EstimationError
 from catseye.estimation.baseline.adjustment import (
@@ -23,8 +23,6 @@ from catseye.estimation.baseline.model import BaselineSights, Claim, Extra, Know
 from catseye.records.laboratory.baseline import BaselineShots
 from catseye.reduction.baseline.lengths import BaselineSettings, Lengths
 from catseye.reduction.baseline.statistical_tests import SuspectShot, suspects_of
-
-Progress = Callable[[str, int, int], None]  # task, steps done, steps in total
 
 
 class BaselineJob:

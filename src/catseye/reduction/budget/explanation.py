@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from catseye.aliases import Progress
 from catseye.constants import MILLIMETRE, TWO_PI
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.quality.propagation import STUDENT, Budget, Scattered, monte_carlo, propagate
@@ -17,7 +18,7 @@ from catseye.reduction.budget.inputs import Item, correlation_of, items_of
 from catseye.reduction.budget.scene import Assumptions, ShotScene, scene_of
 from catseye.reduction.epoch.coordinates import AdjustedCoordinates
 from catseye.reduction.epoch.epoch import Reduction, reduce_epoch
-from catseye.reduction.epoch.ranges import Phases, Progress, follow_electronics, measure_phases
+from catseye.reduction.epoch.ranges import Phases, follow_electronics, measure_phases
 from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.telescope_track import at_middle_posture, moved_ends

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from catseye.aliases import Progress
 from catseye.constants import PPM
 from catseye.errors import InputError
 from catseye.estimation.least_squares.adjustment import (
@@ -21,7 +22,7 @@ from catseye.reduction.epoch.head import head_unknowns
 from catseye.reduction.epoch.notes import cycle_notes, doubts_of, loss_notes, record_notes, sound_notes, wrong_records
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.range_shots import RangeShots, ranges_of
-from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases, Progress
+from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases
 from catseye.reduction.epoch.reason import Reason
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.settling import (

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from catseye.aliases import Progress
 from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT
 from catseye.estimation.ambiguity.search import AmbiguityStatus, Located
 from catseye.estimation.least_squares.adjustment import (
@@ -25,7 +26,7 @@ from catseye.estimation.least_squares.rows import full_jacobian
 from catseye.estimation.observations.kinds import ObservationGroup
 from catseye.reduction.epoch.cycle_search import CycleScene, search, spread
 from catseye.reduction.epoch.parameter import ParameterKind
-from catseye.reduction.epoch.ranges import ElectronicsPhase, Progress
+from catseye.reduction.epoch.ranges import ElectronicsPhase
 from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.shots import ShotGroup, shot_group

@@ -2,19 +2,13 @@
 
 from dataclasses import dataclass, replace
 
+from catseye.aliases import Progress
 from catseye.processors import one_thread
 from catseye.records.night.campaign import REFERENCE, Campaign
 from catseye.records.site.validity import expired_of_site
 from catseye.reduction.epoch.coordinates import AdjustedCoordinates, adjust_coordinates
 from catseye.reduction.epoch.dew import dew_risk
-from catseye.reduction.epoch.ranges import (
-    ElectronicsPhase,
-    Phases,
-    Progress,
-    follow_electronics,
-    measure_phases,
-    walk_notes,
-)
+from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases, follow_electronics, measure_phases, walk_notes
 from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.surface import DishFit, fit_surface

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from catseye.aliases import Progress
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import EstimationError
 from catseye.records.night.campaign import REFERENCE, Campaign, ObservedSite
@@ -23,8 +24,6 @@ from catseye.signal.drift.reference import drift_along, drift_at, reference_pred
 from catseye.signal.drift.states import DriftStates, drift_states
 from catseye.signal.drift.walk import estimate_walk, walk_test
 from catseye.signal.systematics.leakage import subtract_leakage
-
-Progress = Callable[[str, int, int], None]  # task, number done, total
 
 MRAD_PER_ROOT_HOUR = 1e-3 / 60.0  # rad per root second
 LARGEST_ERROR = 5.0  # largest error of a reference's prediction by its neighbours, in standard uncertainties

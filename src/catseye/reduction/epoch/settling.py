@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catseye.aliases import Progress
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import (
@@ -20,7 +21,6 @@ from catseye.estimation.observations.kinds import Linear, ObservationGroup
 from catseye.reduction.epoch.allowance import Allowance, for_families, for_the_air, refused
 from catseye.reduction.epoch.dish import dish_prior
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
-from catseye.reduction.epoch.ranges import Progress
 from catseye.reduction.epoch.self_check import self_checks, sortings
 from catseye.reduction.epoch.shots import ShotGroup, ShotParts, shot_group
 from catseye.reduction.epoch.unknowns import (

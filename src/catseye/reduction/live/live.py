@@ -11,9 +11,10 @@ from statistics import median
 from typing import Literal, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
+from catseye.aliases import Array
 from catseye.constants import DEGREE, MILLIMETRE, SECONDS_PER_DAY, SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import CatseyeError
 from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
@@ -52,7 +53,6 @@ from catseye.reduction.site.motion import (
 )
 from catseye.reduction.site.places import places_of
 
-Array = NDArray[np.float64]
 Typed = TypeVar("Typed", TargetRow, TripletRecord, FeedArmRanger)  # records with a typed position
 FIRST_INDEX = 1.00028  # group index before the first epoch, good to 5e-5: 6 mm at 120 m, enough for whole cycles
 

@@ -16,8 +16,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
 from catseye.estimation.shapes.motions import motions
@@ -26,7 +26,6 @@ from catseye.records.site.folder import SiteFolder
 from catseye.reduction.epoch.parameter import ParameterKind, point_parameters
 from catseye.reduction.live.state import Carried
 
-Array = NDArray[np.float64]
 FEWEST = 3  # points of a body
 BISECTIONS = 30
 

@@ -9,14 +9,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.constants import MILLIMETRE, SECONDS_PER_DAY, SPEED_OF_LIGHT, TWO_PI
 from catseye.records.site.folder import REFERENCE
 from catseye.reduction.epoch.ranges import ShotPhase
 from catseye.reduction.live.shots import PhasedShot
 
-Array = NDArray[np.float64]
 Lengths = Callable[[str, str, Array], Array]  # ranger, target, MJD (m,) to predicted distances (m,), m
 RESTING = 10.0  # s from the first to the last repeat of a line of constant distance
 MOVING = 2.0  # s, of a line of changing distance

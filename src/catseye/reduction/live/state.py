@@ -15,11 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.geometry.frames.frame import Transform
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind, point_parameters
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

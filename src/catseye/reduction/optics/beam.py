@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.constants import DEGREE, MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import InputError, ValidityError
 from catseye.optics import abcd, coating, detector, gaussian_beam, glass, isolator, receiver
 from catseye.records.site.beam import BeamElement, BeamTrain, Laser
 from catseye.signal.systematics.feedback import fringe_contrast
 
-Array = NDArray[np.float64]
 WIDE = 5.0  # beam radii: size of a missing aperture
 UNCLIPPED = 1e-5  # of the power lost: the beam then stays Gaussian, to 1e-3 of a share, 5e-3 through a pinhole
 ALL_LIGHT = 30.0  # rad of diffraction beyond the rays, see `gaussian_beam.SPREADS`

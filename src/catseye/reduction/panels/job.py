@@ -1,12 +1,12 @@
 """Recipe for a crew's files: heights as found and as left, turns, notes."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
 
+from catseye.aliases import Progress
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.errors import InputError
 from catseye.records.files.reading import read_record
@@ -16,8 +16,6 @@ from catseye.records.panels.readings import digest_of_maps, read_maps, read_pane
 from catseye.reduction.panels.crew import SURE, Setting, setting
 from catseye.reduction.panels.heights import PanelHeights, conformity, reduce_panels
 from catseye.reduction.panels.maps import FittedMap, fitted_map
-
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.constants import MILLIMETRE, SECONDS_PER_DAY, TWO_PI
 from catseye.errors import InputError
 from catseye.geometry.antenna.frames import ground_from_alidade_at, ground_from_reflector_at
@@ -19,7 +20,6 @@ from catseye.geometry.frames.frame import Transforms
 from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
 from catseye.records.site.folder import SiteFolder
 
-Array = NDArray[np.float64]
 RETENTION = 3600.0  # s, retention of postures
 UNTHINNED = 300.0  # s with all readings: a shot comes within two minutes
 THINNED = 1.0  # s between older readings: used only for the age of a reference shot's posture

@@ -11,8 +11,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.errors import ValidityError
 from catseye.geometry.mirror.pointing import MirrorStation, ray, ray_jacobian
 from catseye.geometry.mirror.search_pattern import LEAST_REACH, Pattern, count_size, offsets_of_counts, raster, spiral
@@ -20,7 +21,6 @@ from catseye.geometry.sky.time_tag import TimeTag
 from catseye.optics.spot import reach
 from catseye.reduction.steering.spot_fit import SearchHead, Spot, fit_spot
 
-Array = NDArray[np.float64]
 Measure = Callable[[Array], float]  # amplitude, V, at (2,) counts; NaN without a reading
 Allowed = Callable[[Array, Array], bool]  # from counts (2,) to counts (2,), now
 

@@ -9,11 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.errors import ValidityError
 from catseye.geometry.mirror.search_pattern import count_size, counts_of_offsets, offsets_of_counts
 from catseye.optics.spot import gaussian_spot
-
-Array = NDArray[np.float64]
 
 FOUND = "found"
 UNIFORM = 1.0 / np.sqrt(12.0)  # standard uncertainty of a value rounded to a whole count

@@ -13,6 +13,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.constants import DEGREE, TWO_PI
 from catseye.errors import InputError, ValidityError
 from catseye.geometry.antenna.frames import ELEVATION_AXIS_HEIGHT, REFLECTOR_TO_ELEVATION
@@ -21,8 +22,6 @@ from catseye.geometry.mirror.encoder import COUNTS_PER_TURN, HALF_TURN, within
 from catseye.geometry.mirror.pointing import MirrorStation, counts, in_mirror_axes
 from catseye.geometry.mirror.track import CountLine, longest_interval, miss
 from catseye.geometry.sky.time_tag import PER_SECOND, TimeTag
-
-Array = NDArray[np.float64]
 
 AZIMUTH_SLEW = 35.2 * DEGREE / 60.0  # rad/s, the GBT's, site facts
 ELEVATION_SLEW = 17.6 * DEGREE / 60.0  # rad/s

@@ -14,6 +14,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.constants import DEGREE
 from catseye.geometry.antenna.frames import (
     ELEVATION_AXIS_HEIGHT,
@@ -28,7 +29,6 @@ from catseye.records.night.campaign import Campaign
 from catseye.records.site.solids import Solids
 from catseye.reduction.site.places import places_of
 
-Array = NDArray[np.float64]
 CLEAR_START = 0.6  # m: the ranger's own head and mount
 CLEAR_END = 0.15  # m: the retroreflector's own seat, and a cat's-eye's other half
 BEAM_RADIUS = 0.0125  # m: the GBT's beam at 120 to 230 m, 1/e^2, and a little

@@ -3,12 +3,12 @@
 Epochs left out, measured minus predicted.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from catseye.aliases import Array, Progress
 from catseye.errors import EstimationError, InputError
 from catseye.reduction.structure.series import (
     EpochScatter,
@@ -19,9 +19,7 @@ from catseye.reduction.structure.series import (
     widened,
 )
 
-Array = NDArray[np.float64]
 FOLDS = 5
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 import numpy as np
-from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.constants import DEGREE
 from catseye.errors import InputError
 from catseye.estimation.harmonic.series import Spread
@@ -21,7 +21,6 @@ from catseye.geometry.frames.frame import Transforms
 from catseye.reduction.structure.series import GroupSeries
 from catseye.verdict import Verdict
 
-Array = NDArray[np.float64]
 FRAMES = ("ground", "alidade", "reflector")
 MOST = 2e8  # numbers of all covariances: 1.6 GB
 MOVED = 0.05 * DEGREE  # of elevation: less is no move, and the previous direction holds

@@ -18,13 +18,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.constants import DEGREE
 from catseye.errors import EstimationError, InputError, ValidityError
 from catseye.estimation.harmonic.body import rigid_design, rigid_part
 from catseye.estimation.harmonic.series import HarmonicFit, Spread, fit_harmonics
 from catseye.geometry.antenna.deformation import PostureTerms, TelescopePosture
 
-Array = NDArray[np.float64]
 Own = Literal["place", "each"]
 ROUNDING = 1e-9  # of an eigenvalue of a covariance scaled to ones
 PASSES = 3  # of fit and scatter; the second changes a scatter by some percent, the third by less than one

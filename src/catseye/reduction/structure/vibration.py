@@ -11,8 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.errors import CatseyeError, InputError
 from catseye.signal.vibration.filter import Mode
 from catseye.signal.vibration.modes import find_modes
@@ -27,7 +28,6 @@ from catseye.signal.vibration.spectrum import (
     spectrum,
 )
 
-Array = NDArray[np.float64]
 LEAST = 64  # samples of a series: 8 s at full rate
 STRETCHES = 8  # segments of the shortest series by default, half overlapping
 HIGHEST_HZ = 12.0  # highest frequency of a structure's modes when aliases are named

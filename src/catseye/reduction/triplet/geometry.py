@@ -21,11 +21,11 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.constants import SPEED_OF_LIGHT, TWO_PI
 from catseye.optics.retroreflector import prism
 from catseye.signal.cycles.whole import whole_cycles
 
-Array = NDArray[np.float64]
 Values = float | Array
 
 

@@ -7,13 +7,11 @@ the median (3.19b), D_0 from D_TOPPL (3.20) instead of from the ranges.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.constants import TWO_PI
 from catseye.reduction.triplet.geometry import TripletCycles, TripletLengths, TripletReadings, half_wavelengths
 from catseye.signal.cycles.whole import memo_whole_cycles
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,16 +6,11 @@ H_corr and L_MPBC with uncertainty, and the acceptance of the unit.
 import math
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from catseye.aliases import Array
 from catseye.records.laboratory.triplet_measurement import TripletMeasurement
 from catseye.reduction.triplet.geometry import TripletCycles, TripletLengths, TripletReadings
 from catseye.reduction.triplet.memo import MemoNumbers
 from catseye.reduction.triplet.plate import PlatePoints
-
-Array = NDArray[np.float64]
-
 
 TOLERANCE = 0.15e-3  # m, the memo's limit of |H_corr - L_MPBC|
 

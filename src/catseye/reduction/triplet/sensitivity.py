@@ -18,15 +18,15 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.constants import DEGREE, SPEED_OF_LIGHT, TWO_PI
 from catseye.optics.retroreflector.prism import obliquity_correction
 from catseye.reduction.triplet.geometry import TripletReadings, Values, triplet_cycles, triplet_lengths
 from catseye.reduction.triplet.tolerances import D_12, RATIO, TOLERANCE, ratio_change
 from catseye.reduction.triplet.use import ball_distance, median
 
-Array = NDArray[np.float64]
 INCH = 0.0254
 HEIGHT, R_1, R_2, POST = 1.5 * INCH, 1.969 * INCH, 3.799 * INCH, 3.5 * INCH  # m: prism, ball, fixture
 INDEX, MODULATION = 1.000253247, 1500e6  # of air at 20 deg C, 933 hPa, 50 %; Hz

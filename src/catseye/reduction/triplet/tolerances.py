@@ -24,12 +24,12 @@ per degree (the memo prints -0.985e-6), and D.3's temperature is 20.0 deg C, not
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.atmosphere.index.air import air
 from catseye.errors import ValidityError
 
-Array = NDArray[np.float64]
 TOLERANCE = 0.15e-3  # m: of the spacing, the ball's place, and of H_corr against the surface plate
 D_12 = 0.635  # m: the design's spacing
 RATIO = 1.527077  # D.1

@@ -10,13 +10,12 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.atmosphere.index.air import air
 from catseye.records.laboratory.triplet_measurement import TripletMeasurement
 from catseye.reduction.triplet.geometry import TripletCycles, TripletLengths, TripletReadings, triplet_lengths
 
-Array = NDArray[np.float64]
 Moves = dict[str, Array]
 FEW = 0.1  # of u_phase: coarser steps make two readings agree to the last digit more often than one in 35
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.atmosphere.index.air import group_refractivity
 from catseye.records.laboratory.triplet_measurement import TripletMeasurement
 from catseye.reduction.triplet.geometry import (
@@ -18,7 +19,7 @@ from catseye.reduction.triplet.geometry import (
 from catseye.reduction.triplet.memo import memo_numbers
 from catseye.reduction.triplet.notes import triplet_notes
 from catseye.reduction.triplet.plate import plate_points
-from catseye.reduction.triplet.result import TOLERANCE, Array, TripletReduction, conformity_probability
+from catseye.reduction.triplet.result import TOLERANCE, TripletReduction, conformity_probability
 from catseye.reduction.triplet.uncertainty import TripletShares, triplet_shares
 
 LEVEL = 0.05  # of the tests of consistency and of single placements together

@@ -23,8 +23,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError, ValidityError
 from catseye.estimation.least_squares.adjustment import LeastSquaresSolution, adjust
@@ -33,7 +34,6 @@ from catseye.geometry.frames.frame import Transform
 from catseye.optics.retroreflector.prism import obliquity_correction, obliquity_slope
 from catseye.records.site.triplet import TripletRecord
 
-Array = NDArray[np.float64]
 SQUARE = 1e-9  # of unit vectors: their dot product and their lengths
 
 

@@ -8,13 +8,12 @@ model is tested, not assumed: see `AmplitudeFit.probability`.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.constants import TWO_PI
 from catseye.errors import EstimationError, ValidityError
 from catseye.signal.systematics.columns import LinearFit, fit_columns
-
-Array = NDArray[np.float64]
 
 
 def amplitude_phase(

@@ -3,13 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.errors import EstimationError, ValidityError
 
 WORST_CONDITION = 1e8  # of columns scaled to unit length: beyond it half of the digits are lost
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

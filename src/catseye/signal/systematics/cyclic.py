@@ -10,13 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.constants import TWO_PI
 from catseye.errors import EstimationError, ValidityError
 from catseye.signal.systematics.columns import LinearFit, fit_columns
 
 WORST_INFLATION = 5.0  # of a coefficient's standard uncertainty over that of evenly spread phases
-
-Array = NDArray[np.float64]
 
 
 def cyclic_range(phase_fraction: ArrayLike, cosine: ArrayLike, sine: ArrayLike) -> Array:

@@ -9,12 +9,11 @@ its power by a phase in proportion (`regulation_phase`), and [LANG80]'s laser (`
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
 
 HALVINGS = 60  # halvings of the interval of a fringe's phase: below rounding
-
-Array = NDArray[np.float64]
 
 
 def optical_phase(distance: ArrayLike, optical_wavelength: ArrayLike) -> Array:

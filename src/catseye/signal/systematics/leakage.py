@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.constants import TWO_PI
 from catseye.errors import EstimationError, ValidityError
 
 ITERATIONS = 50  # of the circle fit; it needs three to six
 SETTLED = 1e-10  # of the radius: the last step of the circle fit
 
-Array = NDArray[np.float64]
 Phasors = NDArray[np.complex128]
 
 

@@ -7,12 +7,11 @@ modulation wavelength, too short for a longer one.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
-
-Array = NDArray[np.float64]
 
 
 def multipath_error(shares: ArrayLike, excess_paths: ArrayLike, wavelength: ArrayLike) -> Array:

@@ -26,10 +26,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
-
-Array = NDArray[np.float64]
 
 PARTS = 8  # of a window, for the force within it
 ROUNDING = 1e-9  # s: rounding overlap of adjacent windows

@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.constants import TWO_PI
 from catseye.errors import EstimationError, ValidityError
-from catseye.signal.vibration.filter import Array, Mode, decay_of, driven, driven_within, start, window_gain
+from catseye.signal.vibration.filter import Mode, decay_of, driven, driven_within, start, window_gain
 
 DAMPING_PRIOR = (0.01, 1.5)  # ratio, and standard deviation of its logarithm: structures have 0.2 to 5 percent
 PASSES = 30  # scoring steps; it takes some ten

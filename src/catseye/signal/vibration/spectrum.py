@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
 
-Array = NDArray[np.float64]
 LEAST = 8  # samples of a channel in a segment
 LEAST_GAIN = 0.2  # of a buffer's mean: below it a wave is not corrected for averaging
 EVEN = 1e-6  # of the interval, rms: times this even have a strict Nyquist frequency

@@ -11,9 +11,9 @@ synthetic reference plane. Axes of the laboratory: x right, y up (gravity), z fr
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from catseye.aliases import Array
+
 LIGHT = 299_792_458.0  # m/s
 INCH = 0.0254
 POST = 3.5 * INCH  # the fixture's half-length

@@ -6,8 +6,9 @@ Its effects on paths, readings and wet glass.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.constants import DEGREE, PPM, SECONDS_PER_DAY, TWO_PI
 from catseye.records.site.folder import SiteFolder
 from catseye.simulator.night.air import PRESSURE_LAPSE_HPA_PER_M, group_refractivity_ppm
@@ -16,7 +17,6 @@ from catseye.simulator.twin.conditions import LivingConditions
 from catseye.simulator.twin.passing import PassingAir
 from catseye.simulator.twin.waves import Waves, correlated, joined, walk
 
-Array = NDArray[np.float64]
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)  # below 1e-10 of the index on a profile of 10 m scale height
 SHARES, WEIGHTS = 0.5 * (NODES + 1.0), 0.5 * WEIGHTS
 WARMEST_HOUR, BRIGHTEST_HOUR = 15.0, 12.5  # local mean time

@@ -7,13 +7,12 @@ beam. All in the reflector frame at rest: x to the right when looking along the 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.constants import MILLIMETRE
 from catseye.geometry.frames.rotation import from_vector
 from catseye.records.site.site import ParaboloidRecord
 
-Array = NDArray[np.float64]
 RINGS, SPOKES = 20, 50
 
 

@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from catseye.aliases import Array
+
 SLOT = 7200.0  # s: a front in two hours, as `simulator.night.nature` has at most
 SLOTS = 480  # 40 days; then they repeat
 RISE = (120.0, 900.0)  # s, as `simulator.night.nature` has it

@@ -1,15 +1,14 @@
 """Return of a living ranger: optical path, amplitude, electronics phase."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.constants import DEGREE, TWO_PI
 from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.night.head import DRIFT_RAD_PER_ROOT_HOUR
 from catseye.simulator.twin.targets import BodyRetroreflector
 from catseye.simulator.twin.waves import Waves, correlated, joined, walk
 
-Array = NDArray[np.float64]
 SPOT = 0.014  # m: amplitude exp(-d^2 / 2 SPOT^2) for a beam at d from the middle: 10 mm of beam and the receiver
 CUBE_RADIUS = 0.005  # m, acceptance of the internal cube: some hundred counts
 PRISM_END = 45.0 * DEGREE  # incidence at which a prism's aperture vanishes

@@ -17,12 +17,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.constants import DEGREE, SECONDS_PER_DAY, TWO_PI
 from catseye.errors import InputError
 
-Array = NDArray[np.float64]
 LOWEST_DEG, HIGHEST_DEG = 5.0, 95.0
 TRACK_CLEARANCE_DEG = 1.0  # of the zenith: azimuth then turns at 11 degrees a minute at most
 SIDEREAL_DAY = 86_164.098_903_69  # s of UT1: a turn of the Earth against the stars, IAU 2000

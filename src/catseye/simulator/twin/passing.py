@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.constants import TWO_PI
 from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.night.fields import AirWave, PressureWave, Turbulence
@@ -13,7 +13,6 @@ from catseye.simulator.night.nature import PRESSURE_WAVES, WAVES, air_wave, pres
 from catseye.simulator.twin.conditions import LivingConditions
 from catseye.simulator.twin.fronts import LivingFronts
 
-Array = NDArray[np.float64]
 STILLEST = 0.5  # m/s: still air moves too
 
 

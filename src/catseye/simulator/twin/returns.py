@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.constants import SPEED_OF_LIGHT, TWO_PI
 from catseye.records.site.folder import REFERENCE
 from catseye.records.site.site import Ranging
@@ -19,7 +20,6 @@ from catseye.simulator.twin.stations import TrueStation, reference_cube
 from catseye.simulator.twin.telescope import TelescopeState
 from catseye.simulator.twin.waves import Waves
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 FARTHEST = 200.0  # m: a beam that sweeps by more than `SWEEP` there is checked three times
 SWEEP = 0.1  # m

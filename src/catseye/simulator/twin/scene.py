@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.errors import InputError
 from catseye.records.site.folder import SiteFolder
 from catseye.simulator.night.faults import Planted, Streams
@@ -15,7 +15,6 @@ from catseye.simulator.twin.stations import BeamAtMirror, TrueStation, stations
 from catseye.simulator.twin.targets import PRISM_RADIUS, BodyRetroreflector, drawing, retroreflectors
 from catseye.simulator.twin.telescope import TelescopeState, low_orders, turning
 
-Array = NDArray[np.float64]
 ASIDE = PRISM_RADIUS + 0.15  # m: distance from the beam within which a target is checked closely; bending is far below
 NEAREST = 0.5  # m: nearer objects belong to the ranger
 

@@ -18,6 +18,7 @@ from typing import TypedDict
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.aliases import Array
 from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND
 from catseye.ranger.head import SamplingSettings
@@ -35,7 +36,6 @@ from catseye.simulator.twin.scene import Beam, StationFrame, TwinPlaces
 from catseye.simulator.twin.telescope import TelescopeState, telescope
 from catseye.simulator.twin.thermometers import thermometers
 
-Array = NDArray[np.float64]
 NS_PER_TICK = PER_DAY // TICKS_PER_DAY
 READ_SCATTER = (0.05, 0.05, 0.5)  # °C, hPa, %: one sigma of a reading, as the night's stations have
 POINTS, POINTS_A_SECOND = 17, 125.0  # points in a buffer for a shot's return: 8 ms apart

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.constants import MILLIMETRE, TWO_PI
 from catseye.errors import InputError
 from catseye.records.site.folder import SiteFolder
@@ -21,7 +22,6 @@ from catseye.simulator.night.world import kelvin_from_ground
 from catseye.simulator.twin.targets import Drawing
 from catseye.simulator.twin.telescope import turning
 
-Array = NDArray[np.float64]
 COUNTS_PER_TURN = 100_000.0
 U_MOUNT, U_ZERO = 30e-6, 0.3  # rad, counts: of orientation and encoder zeros without a sheet value; chosen
 SINK, SWAY, LEAN = 2e-6 / 3600.0, 15e-6, 5e-6  # m/s, one sigma; m and rad through a day: how monuments settle, chosen

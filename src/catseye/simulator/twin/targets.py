@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.records.site.folder import SiteFolder
 from catseye.records.site.target import FrameName
@@ -19,7 +19,6 @@ from catseye.simulator.night.head import BENCHMARK_VOLT, USUAL_VOLT
 from catseye.simulator.night.structure import tilted, unit
 from catseye.simulator.twin.telescope import low_orders
 
-Array = NDArray[np.float64]
 TYPING_MM, MOST_TYPING = 8.0, 2.0  # of each coordinate without a record; clipped at so many sigma
 SURFACE_MM, ROUGH_MM = 0.25, 0.15  # normal deviations of the dish: low orders, and from prism to prism
 NEAR_SURFACE, BEYOND_RIM = 2.0, 3.0  # m: points nearer to the paraboloid belong to the dish, others to the feed arm

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from catseye.aliases import Array
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.records.site.folder import SiteFolder
 from catseye.simulator.night.faults import Planted, Streams
@@ -21,7 +21,6 @@ from catseye.simulator.twin.air import LivingAir
 from catseye.simulator.twin.motion import AxisAngles, AxisMotion
 from catseye.simulator.twin.waves import Waves, band, joined
 
-Array = NDArray[np.float64]
 ARM_FOOT, ARM_LENGTH = np.array([0.0, -8.0, 10.0]), 55.0  # m, reflector frame; chosen, as `simulator.night.posture`
 GRAVITY_DISH = 0.6 * MILLIMETRE  # rms of the surface's low orders for a unit of sine or cosine of elevation
 GRAVITY_SHIFT = 2.0 * MILLIMETRE

@@ -3,16 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.constants import SECONDS_PER_DAY
 from catseye.records.site.folder import SiteFolder
 from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.night.stations import AIRING_M_S
 from catseye.simulator.night.sun import sine_of_sun
 from catseye.simulator.twin.air import LivingAir
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

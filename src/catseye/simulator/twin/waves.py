@@ -9,11 +9,11 @@ Nothing is stepped or stored: two processes with equal draws agree, and rates of
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from catseye.aliases import Array
 from catseye.constants import TWO_PI
 
-Array = NDArray[np.float64]
 LONGEST = 40 * 86_400.0  # s: period of the slowest wave of a walk; its structure function holds for some days of lag
 WALK_BANDS, CORRELATED_BANDS, MODE_WAVES = 36, 18, 8
 
