@@ -203,3 +203,17 @@ def _csv_of(table: "QTable") -> str:
     heads = [f"{name} [{table[name].unit}]" if getattr(table[name], "unit", None) else name for name in table.colnames]
     columns = [getattr(table[name], "value", table[name]).tolist() for name in table.colnames]
     return csv_text(heads, zip(*columns, strict=True))
+
+
+def require_writable(out: "Path | None", *sources: "str | Path") -> None:
+    """Refuse an output that `save` would refuse, before the long work.
+
+    out       directory to be written; None: none
+    sources   files and directories that are read
+
+    Raises InputError where another's files would be lost or nothing can be written.
+    """
+    from catseye.gateways.writers.output import refuse_output
+
+    if out is not None:
+        refuse_output(out, *(Path(source) for source in sources))
