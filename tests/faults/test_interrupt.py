@@ -195,7 +195,7 @@ def held(out, code):
     return process
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_within_a_call_that_runs_no_handler(tmp_path, number):
     """The supervisor ends what cannot hear, and removes what it had half-made."""
     out = tmp_path / "work" / "out"
