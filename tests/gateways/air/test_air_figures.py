@@ -8,7 +8,7 @@ import pytest
 
 from catseye.atmosphere.index.air import MODELS, air, group_refractivity
 from catseye.errors import ValidityError
-from catseye.gateways.air.air_figures import NAMES, VARIABLES, StateUncertainty, _draw, air_plot
+from catseye.gateways.air.air_figures import VARIABLES, StateUncertainty, _draw, air_plot
 from catseye.gateways.writers.drawing import Figure
 
 USUAL = {"u_temperature_c": 0.2, "u_pressure_hpa": 0.3, "u_humidity_percent": 3.0}
@@ -24,7 +24,7 @@ def test_every_variable_and_every_model_is_named_in_the_figure(usual):
     ElementTree.fromstring(drawn)  # it is well formed
     for words in (
         *(variable.label for variable in VARIABLES),
-        *NAMES.values(),
+        *(model.label for model in MODELS.values()),
         "u of formula",
         "u with inputs",
         "group refractivity 253.319 ppm",
@@ -32,7 +32,7 @@ def test_every_variable_and_every_model_is_named_in_the_figure(usual):
     ):
         assert words in drawn
     assert told["not_drawn"] == []
-    assert set(MODELS) <= set(NAMES)
+    assert len({model.label for model in MODELS.values()}) == len(MODELS)
 
 
 def test_the_same_state_gives_the_same_figure(usual):
@@ -97,8 +97,8 @@ def test_bands_are_plus_minus_u_and_lines_are_other_minus_chosen():
     lines = {line.get_label(): line.get_ydata() for line in below.lines}
     for name in names:
         difference = 1e6 * (group_refractivity(x, 933.0, 50.0, model=name) - swept.group_refractivity)
-        assert np.allclose(lines[NAMES[name]], difference, atol=1e-9)
-    assert lines[NAMES["rueger1990"]][-1] < -0.1
+        assert np.allclose(lines[MODELS[name].label], difference, atol=1e-9)
+    assert lines[MODELS["rueger1990"].label][-1] < -0.1
 
 
 @pytest.mark.parametrize(
