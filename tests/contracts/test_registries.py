@@ -26,7 +26,7 @@ from repository import ROOT
 SOURCE = ROOT / "src" / "catseye"
 OTHER_THINGS = {"ball"}  # what a height gauge touches, in `reduction/calibrations/length/height_gauge.py`
 UP = np.array([0.0, 0.0, 1.0])
-SMR = replace(HOLLOW, name="smr", label="spherically mounted cube", has_axis=True)  # a kind that nobody registered
+UNREGISTERED = replace(HOLLOW, name="new", label="new cube", has_axis=True)
 
 
 @pytest.fixture(scope="module")
@@ -146,7 +146,7 @@ def retroreflector_in(room, kind, axis):
     }[room]()
 
 
-@pytest.mark.parametrize("kind", [*KINDS.values(), SMR], ids=lambda kind: kind.name)
+@pytest.mark.parametrize("kind", [*KINDS.values(), UNREGISTERED], ids=lambda kind: kind.name)
 @pytest.mark.parametrize("room", ["reduction", "coordinator", "visibility", "twin", "night"])
 def test_no_room_takes_a_kind_without_its_axis_or_with_one_that_it_lacks(room, kind):
     right, wrong = (UP, None) if kind.has_axis else (None, UP)
@@ -239,5 +239,5 @@ def test_each_kind_has_a_constant_an_acceptance_and_a_curve(name):
 
 def test_a_kind_that_is_unknown_is_refused_with_those_that_are_known():
     registry = import_module("catseye.optics.retroreflector.kinds.registry")
-    with pytest.raises(InputError, match=f"'smr' is unknown \\(expected one of {', '.join(KINDS)}\\)"):
-        registry.kind_named("smr")
+    with pytest.raises(InputError, match=f"'new' is unknown \\(expected one of {', '.join(KINDS)}\\)"):
+        registry.kind_named("new")
