@@ -169,13 +169,14 @@ def kinds_of(reduction: Reduction) -> dict[str, str]:
             return "fixed point"
         if name in campaign.monuments:
             return "ground ranger"
-        if places[name].kind == "ranger":
+        retroreflector = places[name].kind
+        if retroreflector is None:
             return "feed-arm ranger"
         if name in at_triplets:
-            return f"triplet {places[name].kind}"
+            return f"triplet {retroreflector.name}"
         if name in at_benchmarks:
             return "benchmark"
-        return "dish prism" if places[name].kind == "prism" else "structure"
+        return "dish prism" if retroreflector.shapes_dish else "structure"
 
     return {name: kind(name) for name in reduction.coordinates.points}
 

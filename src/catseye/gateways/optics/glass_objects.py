@@ -6,6 +6,7 @@ from catseye.atmosphere.index.air import air
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import ValidityError
 from catseye.gateways.writers.verdict import Verdict
+from catseye.names import NOTES_AIR_MODEL
 from catseye.optics.glass import (
     GLASSES,
     absolute_index,
@@ -82,7 +83,7 @@ def _air_about(wavelength_um: float) -> tuple[str, dict[str, float]]:
     The makers' reference air is taken where the notes' model is not valid.
     """
     try:
-        about = air(*AIR, wavelength_um=wavelength_um, model="rueger1990")
+        about = air(*AIR, wavelength_um=wavelength_um, model=NOTES_AIR_MODEL)
     except ValidityError:
         phase, group = reference_air(wavelength_um, AIR[0])
         return "20 °C, 1013.25 hPa, dry", {"air_phase": float(phase), "air_group": float(group)}

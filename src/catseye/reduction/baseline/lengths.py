@@ -16,6 +16,7 @@ from catseye.atmosphere.sound.velocity import (
     second_velocity_correction,
 )
 from catseye.errors import ValidityError
+from catseye.names import AIR_MODEL
 from catseye.records.files.refusal import refusal
 from catseye.records.laboratory.baseline import BaselineShots
 
@@ -41,7 +42,7 @@ class BaselineSettings:
     reference_height      m; None: the first pillar's, or the known baseline's
     """
 
-    air_model: str = "ciddor_hill1999"
+    air_model: str = AIR_MODEL
     wavelength_um: float = 0.658
     co2_ppm: float = 420.0
     reference_index: float = 1.000286338

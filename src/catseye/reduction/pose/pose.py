@@ -217,7 +217,7 @@ def _design(
     """
     settings = ReductionSettings()
     focal = site.site.paraboloid.focal_length_mm * MILLIMETRE
-    on_dish = {n for n, t in site.targets.items() if t.type == "prism" and t.frame == "reflector"}
+    on_dish = {n for n, t in site.targets.items() if t.shapes_dish}
     inside = nominal_frame(site)
     x, q = np.zeros((len(names), 3)), np.zeros((len(names), 3, 3))
     for k, name in enumerate(names):

@@ -13,6 +13,7 @@ from catseye.geometry.mirror.imperfect import imperfect_ray
 from catseye.geometry.mirror.pointing import MirrorStation, ray
 from catseye.geometry.mirror.slew import Pace
 from catseye.geometry.sky.sun import altitude_azimuth
+from catseye.optics.retroreflector.kinds.registry import kind_named
 from catseye.records.site.keep_out import KeepOut
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry
@@ -129,13 +130,13 @@ def seen_from(
 
     Points in the ground frame.
 
-    kind      of retroreflector, a key of ACCEPTANCE
+    kind      name of the retroreflectors' kind
     facing    (3,) of all of them, ground: outward normal; None: incidence is not judged
     solids    possible obstructions
     posture   azimuth, elevation, rad, of the telescope if it carries some of them
     reachable (n,) bool: within the azimuth stops in one of the pointings
 
-    Raises InputError for a solid on the telescope without a posture.
+    Raises InputError for an unknown kind, and for a solid on the telescope without a posture.
     """
     aboard = next((solid for solid in solids.all if solid.frame != "ground"), None)
     if posture is None and aboard is not None:
@@ -145,7 +146,7 @@ def seen_from(
     axis = np.full(3, np.nan) if facing is None else facing
     return visibility(
         {name: station.scan_point},
-        Retroreflectors(("",) * len(to), (kind,) * len(to), to, np.broadcast_to(axis, to.shape)),
+        Retroreflectors(("",) * len(to), (kind_named(kind),) * len(to), to, np.broadcast_to(axis, to.shape)),
         solids,
         frames=frames_at(*(posture or (0.0, 0.0))),
         reachable=None if reachable is None else reachable[None],
