@@ -16,7 +16,7 @@ from catseye.estimation.network.plan import Candidate, Plan
 from catseye.gateways.network.findings import Findings
 from catseye.gateways.network.objects import network_object
 from catseye.gateways.network.summary import direction_words, quantity
-from catseye.gateways.network.tables import coordinates_csv
+from catseye.gateways.network.tables import candidates_csv, coordinates_csv
 from catseye.gateways.writers.objects import json_page, plain
 from catseye.gateways.writers.page import card, page, paragraph, section, table
 from catseye.gateways.writers.passage import Passage
@@ -210,22 +210,6 @@ def scatter_words(s: MonteCarloScatter) -> str:
     if np.isfinite(s.found):
         text += f" {100 * s.found:.1f} % of the gross errors were left out, and {100 * s.false:.2f} % of the good ones."
     return text
-
-
-def candidates_csv(plan_findings: PlanFindings) -> Iterator[str]:
-    """Table of additional ranges, the best first, then the schedule."""
-    yield "list,from,to,u_mm,mean_u_mm,gain_um,at_s\n"
-    for name, rows in (("candidate", plan_findings.plan.candidates), ("schedule", plan_findings.picked)):
-        for c in rows:
-            at = f"{c.at_s:g}" if np.isfinite(c.at_s) else ""
-            yield (
-                f"{name},{_cell(c.from_)},{_cell(c.to)},{c.u / MILLIMETRE:.6f},{c.mean_u / MILLIMETRE:.6f},"
-                f"{c.gain * 1e6:.6f},{at}\n"
-            )
-
-
-def _cell(text: str) -> str:
-    return f'"{text.replace(chr(34), 2 * chr(34))}"' if any(c in text for c in ',"\n') else text
 
 
 def plan_report(plan_findings: PlanFindings, when: datetime, inputs: Mapping[str, str]) -> str:
