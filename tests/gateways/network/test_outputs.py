@@ -714,4 +714,4 @@ def test_every_column_of_further_ranges_has_the_unit_of_its_name():
         "gain_um": lambda c: c.gain,
         "at_s": lambda c: c.at_s,
     }
-    assert_columns(candidates_csv(plan), told, rows)
+    assert_columns(candidates_csv(plan.plan.candidates, plan.picked), told, rows)

@@ -176,12 +176,12 @@ class PointRows:
 
     @cached_property
     def covariance(self) -> np.ndarray:
-        """(n, 3, 3) mm²."""
+        """Covariance of each point, (n, 3, 3) mm²."""
         return self.reduction.coordinates.joint.blocks / MILLIMETRE**2
 
     @cached_property
     def u(self) -> np.ndarray:
-        """(n, 3) mm."""
+        """Standard uncertainties, (n, 3) mm."""
         return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
 
     @property

@@ -347,7 +347,7 @@ def write_plan(
     files: Files = {
         "report.html": lambda: plan_report(plan_findings, when, inputs),
         "points.csv": lambda: "".join(coordinates_csv(plan_findings.findings)),
-        "candidates.csv": lambda: "".join(candidates_csv(plan_findings)),
+        "candidates.csv": lambda: "".join(candidates_csv(plan_findings.plan.candidates, plan_findings.picked)),
         "plan.json": lambda: json_page(plan_object(plan_findings)),
     }
     provenance = {"format": FORMAT, "made_by": "catseye plan"}

@@ -14,7 +14,6 @@ from catseye.gateways.writers.columns import Column, Table, each
 
 if TYPE_CHECKING:
     from catseye.gateways.network.comparison import ComparedEpochs
-    from catseye.gateways.network.plan import PlanFindings
 
 PAGE = "network.md"
 IN_UNIT = "in `unit`"
@@ -83,7 +82,7 @@ class ObservationRows:
 
     @cached_property
     def where(self) -> list[tuple[int, int]]:
-        """Group and row in it."""
+        """Group of each observation and its row there."""
         return list(zip(self.measure("group").tolist(), self.measure("row").tolist(), strict=True))
 
     @property
@@ -93,7 +92,7 @@ class ObservationRows:
 
     @property
     def suspects(self) -> np.ndarray:
-        """Mask of the suspects."""
+        """Mask (m,) of the suspects."""
         suspect = np.zeros(len(self.findings.table), dtype=bool)
         suspect[self.findings.suspects] = True
         return suspect[self.order]
@@ -258,7 +257,7 @@ def displacements_csv(compared: "ComparedEpochs") -> Iterator[str]:
     return DISPLACEMENTS.pieces(compared)
 
 
-def candidates_csv(plan_findings: "PlanFindings") -> Iterator[str]:
+def candidates_csv(candidates: Sequence[Candidate], schedule: Sequence[Candidate]) -> Iterator[str]:
     """Table of additional ranges, the best first, then the schedule."""
-    lists = (("candidate", plan_findings.plan.candidates), ("schedule", plan_findings.picked))
+    lists = (("candidate", candidates), ("schedule", schedule))
     return CANDIDATES.pieces([(name, candidate) for name, rows in lists for candidate in rows])

@@ -51,7 +51,7 @@ SCREWS = Table[Sequence[Screw]](
 
 
 class CornerHeight(NamedTuple):
-    """Row of actuators.csv; m."""
+    """Row of actuators.csv, in metres."""
 
     corner: str
     x: float
@@ -118,12 +118,12 @@ class GaugeReading(NamedTuple):
 
     @property
     def tip(self) -> int:
-        """Index of the gauge's tip."""
+        """Index of the tip that touches the panel."""
         return int(self.heights.model.blocks[self.block][self.k])
 
     @property
     def row(self) -> int:
-        """Row of the placement."""
+        """Index of the placement in the file."""
         return int(self.heights.model.tips.row[self.tip])
 
     @property
@@ -183,7 +183,7 @@ READINGS = Table[Sequence[GaugeReading]](
 
 
 class CrewRow(NamedTuple):
-    """Row of crew.csv."""
+    """Row of crew.csv, of one reader."""
 
     when: str
     kind: str

@@ -20,7 +20,7 @@ PAGE = "surface.md"
 
 
 @dataclass(frozen=True, eq=False)
-class PrismRows:
+class WeightedPrisms:
     """Source of prisms.csv: n prisms of a shape or of a change; m.
 
     local                    (n, 3)
@@ -37,7 +37,7 @@ class PrismRows:
     weights: np.ndarray
 
 
-PRISMS = Table[PrismRows](
+PRISMS = Table[WeightedPrisms](
     "prisms.csv",
     PAGE,
     (
@@ -254,7 +254,7 @@ ACTUATOR_MARK = ACTUATORS.header  # identifies a file of catseye
 def prisms_csv(shape: SurfaceShape) -> str:
     """One row per prism, in the fitted paraboloid's frame; the weight is its share of illumination."""
     return PRISMS.csv(
-        PrismRows(
+        WeightedPrisms(
             names=shape.prisms.names,
             local=shape.fit.local,
             deviation=shape.fit.deviation,
@@ -271,7 +271,7 @@ def change_csv(change: Change) -> str:
     Places are those of the first epoch, in the nominal paraboloid's frame.
     """
     return PRISMS.csv(
-        PrismRows(
+        WeightedPrisms(
             names=change.names,
             local=change.local,
             deviation=change.deviation,

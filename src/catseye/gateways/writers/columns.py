@@ -42,7 +42,7 @@ class Column(Generic[Source]):
 
     @property
     def suffix(self) -> str:
-        """End of the name: the unit."""
+        """End of the name, which says the unit."""
         return f"_{SUFFIXES.get(self.unit, self.unit.lower())}" if self.unit else ""
 
     @property
