@@ -45,6 +45,10 @@ class Column(Generic[Source]):
         """End of the name, which says the unit."""
         return f"_{SUFFIXES.get(self.unit, self.unit.lower())}" if self.unit else ""
 
+    def cells(self, values: Values) -> list[str]:
+        """Values as texts."""
+        return texts(values, self.form)
+
     @property
     def label(self) -> str:
         """Name without its unit, for tables whose columns carry units."""
@@ -92,10 +96,13 @@ class Table(Generic[Source]):
         if len(set(lengths.values())) > 1:
             raise ValueError(f"{self.file}: columns of different lengths {lengths}")
         for low in range(0, len(present[0][1]), PIECE):
-            stream = io.StringIO(newline="")
-            cells = (texts(values[low : low + PIECE], column.form) for column, values in present)
-            csv.writer(stream, lineterminator="\n").writerows(zip(*cells, strict=True))
-            yield stream.getvalue()
+            yield _lines(column.cells(values[low : low + PIECE]) for column, values in present)
+
+    def stream(self, batches: Iterable[Source]) -> Iterator[str]:
+        """CSV text of batches of rows, which need not be in memory together."""
+        yield self.header + "\n"
+        for batch in batches:
+            yield _lines(column.cells(_sliceable(column.value(batch) or ())) for column in self.columns)
 
     def quantities(
         self, source: Source, names: Iterable[str], rows: np.ndarray | None = None
@@ -138,6 +145,12 @@ def texts(values: Values, form: str) -> list[str]:
     if isinstance(values, np.ndarray) and np.isfinite(values).all():
         return [code % value for value in plain]
     return ["" if value is None or not math.isfinite(value) else code % value for value in plain]
+
+
+def _lines(columns: Iterable[Sequence[str]]) -> str:
+    stream = io.StringIO(newline="")
+    csv.writer(stream, lineterminator="\n").writerows(zip(*columns, strict=True))
+    return stream.getvalue()
 
 
 def _sliceable(values: Values | Iterable[Any]) -> Values:
