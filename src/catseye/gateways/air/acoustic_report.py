@@ -16,7 +16,7 @@ from catseye.gateways.air.acoustic_objects import (
     mean,
     words,
 )
-from catseye.gateways.air.acoustic_tables import path_temperatures_csv, shots_csv
+from catseye.gateways.air.tables import path_temperatures_csv, shots_csv
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.verdict import verdict_line

@@ -11,7 +11,7 @@ import numpy as np
 
 from catseye.atmosphere.weather.humidity import humidity_doubts
 from catseye.constants import PPM, TWO_PI
-from catseye.gateways.air.refractometer_table import series_csv
+from catseye.gateways.air.tables import series_csv
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.passage import Passage

@@ -58,7 +58,7 @@ FORMS = {"m": ".7f", "mm": ".4f", "rad": ".7f", "deg": ".4f", "ppm": ".5f", "": 
 def _ranged(
     name: str, unit: str, doc: str, value: Callable[[RangeShots], np.ndarray], form: str = ""
 ) -> Column[ShotRows]:
-    """Column that is empty for shots without a phase or on the internal reference."""
+    """Column that is empty for shots without a phase or on the internal cube."""
     return Column(name, unit, doc, lambda r: r.adjusted(value(r.ranges)), form or FORMS[unit])
 
 
@@ -69,7 +69,12 @@ RANGES = Table[ShotRows](
         Column("shot", "", "number of the shot in shots.csv", lambda r: r.reduction.campaign.shots.shot),
         Column("mjd_utc", "d", "time, Modified Julian Date", lambda r: r.reduction.campaign.shots.mjd_utc, ".9f"),
         Column("ranger", "", "ranger", lambda r: r.reduction.campaign.shots.ranger),
-        Column("target", "", "retroreflector, or the internal reference", lambda r: r.reduction.campaign.shots.target),
+        Column(
+            "target",
+            "",
+            "retroreflector; `ZRG` is the ranger's internal cube",
+            lambda r: r.reduction.campaign.shots.target,
+        ),
         Column(
             "status",
             "",
@@ -128,7 +133,7 @@ RANGES = Table[ShotRows](
             lambda r: r.adjusted(r.vacuum * (1.0 / (1.0 + r.ranges.refractivity) - 1.0) / MILLIMETRE),
             ".4f",
         ),
-        Column("d0_mm", "mm", "constant of the mirror: scan point to reference surface", lambda r: r.d0_mm, ".4f"),
+        Column("d0_mm", "mm", "correction for the distance of the internal cube, D0", lambda r: r.d0_mm, ".4f"),
         _ranged("zero_mm", "mm", "correction for the ranger's zero, as estimated", lambda s: s.zero / MILLIMETRE),
         _ranged("glass_mm", "mm", "correction for the retroreflector's glass", lambda s: s.glass / MILLIMETRE),
         _ranged("incidence_deg", "deg", "angle of incidence on the retroreflector", lambda s: s.incidence / DEGREE),
@@ -201,9 +206,9 @@ COORDINATES = Table[PointRows](
             "what it is: `dish prism`, `structure`, `feed-arm ranger`, `ground ranger`, `triplet ball`, ...",
             lambda r: list(kinds_of(r.reduction).values()),
         ),
-        Column("x_m", "m", "place in the ground frame: x east", lambda r: r.reduction.coordinates.x[:, 0], ".7f"),
-        Column("y_m", "m", "y north", lambda r: r.reduction.coordinates.x[:, 1], ".7f"),
-        Column("z_m", "m", "z up", lambda r: r.reduction.coordinates.x[:, 2], ".7f"),
+        Column("x_m", "m", "place in the ground frame, east", lambda r: r.reduction.coordinates.x[:, 0], ".7f"),
+        Column("y_m", "m", "place in the ground frame, north", lambda r: r.reduction.coordinates.x[:, 1], ".7f"),
+        Column("z_m", "m", "place in the ground frame, up", lambda r: r.reduction.coordinates.x[:, 2], ".7f"),
         Column("u_x_mm", "mm", "standard uncertainty of x", lambda r: r.u[:, 0], ".4f"),
         Column("u_y_mm", "mm", "standard uncertainty of y", lambda r: r.u[:, 1], ".4f"),
         Column("u_z_mm", "mm", "standard uncertainty of z", lambda r: r.u[:, 2], ".4f"),
@@ -241,10 +246,16 @@ SURFACE = Table[PrismRows](
     (
         Column("point", "", "name", lambda r: r.surface.names),
         Column(
-            "x_dish_m", "m", "place in the fitted paraboloid's frame: x", lambda r: r.surface.fit.local[:, 0], ".7f"
+            "x_dish_m", "m", "place in the fitted paraboloid's frame, x", lambda r: r.surface.fit.local[:, 0], ".7f"
         ),
-        Column("y_dish_m", "m", "y", lambda r: r.surface.fit.local[:, 1], ".7f"),
-        Column("z_dish_m", "m", "z, along the paraboloid's axis", lambda r: r.surface.fit.local[:, 2], ".7f"),
+        Column("y_dish_m", "m", "place in that frame, y", lambda r: r.surface.fit.local[:, 1], ".7f"),
+        Column(
+            "z_dish_m",
+            "m",
+            "place in that frame, along the paraboloid's axis",
+            lambda r: r.surface.fit.local[:, 2],
+            ".7f",
+        ),
         Column(
             "deviation_mm",
             "mm",

@@ -22,7 +22,7 @@ PLACES = Table[Sequence[BeamPlace]](
             each(lambda p: p.radius[0]),
             EXACT,
         ),
-        Column("radius_y_m", "m", "the same in y", each(lambda p: p.radius[1]), EXACT),
+        Column("radius_y_m", "m", "beam radius in y", each(lambda p: p.radius[1]), EXACT),
         Column(
             "curvature_x_per_m",
             "1 / m",
@@ -30,7 +30,7 @@ PLACES = Table[Sequence[BeamPlace]](
             each(lambda p: p.curvature[0]),
             EXACT,
         ),
-        Column("curvature_y_per_m", "1 / m", "the same in y", each(lambda p: p.curvature[1]), EXACT),
+        Column("curvature_y_per_m", "1 / m", "curvature of the wavefront in y", each(lambda p: p.curvature[1]), EXACT),
         Column("aperture_m", "m", "radius of the aperture; empty without one", each(lambda p: p.aperture), EXACT),
         Column("clipped", "", "share of the arriving power that it blocks", each(lambda p: p.clipped), EXACT),
         Column("power_w", "W", "power behind the element", each(lambda p: p.power), EXACT),
@@ -43,7 +43,7 @@ RETURNED = Table[Sequence[Returned]](
     (
         Column("distance_m", "m", "distance of the reflector", each(lambda r: r.distance), EXACT),
         Column("radius_x_m", "m", "beam radius at the reflector in x", each(lambda r: r.radius[0]), EXACT),
-        Column("radius_y_m", "m", "the same in y", each(lambda r: r.radius[1]), EXACT),
+        Column("radius_y_m", "m", "beam radius at the reflector in y", each(lambda r: r.radius[1]), EXACT),
         Column("hit", "", "share of the beam that falls on the reflector", each(lambda r: r.hit), EXACT),
         Column(
             "collected",

@@ -29,8 +29,8 @@ SCREWS = Table[Sequence[Screw]](
     (
         Column("panel", "", "panel", each(lambda s: s.panel)),
         Column("corner", "", "corner of panels, an actuator", each(lambda s: s.corner)),
-        Column("x_m", "m", "place of the corner in the reflector frame", each(lambda s: s.x), ".4f"),
-        Column("y_m", "m", "the same", each(lambda s: s.y), ".4f"),
+        Column("x_m", "m", "place of the corner in the reflector frame, x", each(lambda s: s.x), ".4f"),
+        Column("y_m", "m", "place of the corner, y", each(lambda s: s.y), ".4f"),
         Column("readings", "", "number of readings used", each(lambda s: s.readings)),
         _um("height", "departure: height less design offset and map", each(lambda s: s.departure)),
         _um("u_height", "standard uncertainty of the departure", each(lambda s: s.u_departure)),
@@ -67,8 +67,8 @@ ACTUATORS = Table[Sequence[CornerHeight]](
     PAGE,
     (
         Column("corner", "", "corner that was read", each(lambda c: c.corner)),
-        Column("x_m", "m", "place in the reflector frame", each(lambda c: c.x), ".4f"),
-        Column("y_m", "m", "the same", each(lambda c: c.y), ".4f"),
+        Column("x_m", "m", "place in the reflector frame, x", each(lambda c: c.x), ".4f"),
+        Column("y_m", "m", "place in the reflector frame, y", each(lambda c: c.y), ".4f"),
         _um("mean_height", "mean departure of its panels, which the actuator removes", each(lambda c: c.actuator)),
         _um("u_mean_height", "standard uncertainty of the mean", each(lambda c: c.u_actuator)),
         _um("shaft_height", "height of the actuator's shaft", each(lambda c: c.shaft)),

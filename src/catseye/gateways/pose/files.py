@@ -16,7 +16,7 @@ from catseye.gateways.pose.objects import (
     pose_rows,
     pose_words,
 )
-from catseye.gateways.pose.tables import points_csv
+from catseye.gateways.pose.tables import POINTS, points_csv
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
@@ -63,7 +63,7 @@ def write_pose(
         frame=pose.frame,
         pivot=pivot,
     )
-    join_tables(directory, frame=pose.frame, pivot=pivot, tables={"POSE": six})
+    join_tables(directory, [POINTS], frame=pose.frame, pivot=pivot, tables={"POSE": six})
 
 
 def pose_report(result: PoseFindings, when: datetime, inputs: Mapping[str, str]) -> str:

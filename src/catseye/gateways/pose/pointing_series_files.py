@@ -20,7 +20,7 @@ from catseye.gateways.pose.pointing_series_objects import (
     track_object,
     track_verdict,
 )
-from catseye.gateways.pose.tables import observations_csv, tilt_csv
+from catseye.gateways.pose.tables import OBSERVATIONS, TILT, observations_csv, tilt_csv
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.output import atomic_file
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
@@ -61,7 +61,7 @@ def write_fit(
         },
         comment="pointing series, encoders minus sky",
     )
-    join_tables(directory, tables={"SERIES": series})
+    join_tables(directory, [OBSERVATIONS], tables={"SERIES": series})
 
 
 def write_model(fit: PointingFit, path: Path) -> None:
@@ -134,7 +134,7 @@ def write_track(profile: TrackProfile, directory: Path, hashes: Mapping[str, str
     settings = {"harmonics": profile.series.harmonics}
     provenance = {"format": TRACK, "made_by": "catseye pointing track", "settings": settings}
     write_files(files, directory, {**provenance, **origin(when, hashes)})
-    join_tables(directory, frame="alidade rotated about east and north of the ground")
+    join_tables(directory, [TILT], frame="alidade rotated about east and north of the ground")
 
 
 def track_rows(profile: TrackProfile) -> list[tuple[str, str, str]]:

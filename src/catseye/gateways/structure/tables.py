@@ -53,7 +53,7 @@ COEFFICIENTS = Table[FunctionRows](
     "coefficients.csv",
     PAGE,
     (
-        Column("function", "", "function of the model, such as `sin_elevation`", lambda f: f.fit.model.functions),
+        Column("function", "", "function of the model, such as `sinE`", lambda f: f.fit.model.functions),
         *(column(k) for column in (_shift, _turn, _u_shift, _u_turn) for k in range(3)),
     ),
 )
@@ -83,7 +83,7 @@ def _residual(k: int) -> Column[ResidualRows]:
 
 
 def _left_out(k: int) -> Column[ResidualRows]:
-    doc = f"the same with a model fitted without this epoch, along {'xyz'[k]}; if there are epochs enough"
+    doc = f"measured less a model fitted without this epoch, along {'xyz'[k]}; with `--folds`"
     return Column(
         f"left_out_{'xyz'[k]}_mm",
         "mm",
@@ -97,7 +97,7 @@ def _u_left_out(k: int) -> Column[ResidualRows]:
     return Column(
         f"u_left_out_{'xyz'[k]}_mm",
         "mm",
-        "its standard uncertainty",
+        f"standard uncertainty of `left_out_{'xyz'[k]}_mm`",
         lambda r: None if r.check is None else np.sqrt(r.check.covariance[r.cells][:, k, k]) / MILLIMETRE,
         ".4f",
     )

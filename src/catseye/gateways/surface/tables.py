@@ -45,11 +45,11 @@ PRISMS = Table[WeightedPrisms](
         Column(
             "x_dish_m",
             "m",
-            "place in the fitted paraboloid's frame, of a change in the nominal one's",
+            "place in the fitted paraboloid's frame, of a change in the nominal one's, x",
             lambda p: p.local[:, 0],
         ),
-        Column("y_dish_m", "m", "the same", lambda p: p.local[:, 1]),
-        Column("z_dish_m", "m", "the same", lambda p: p.local[:, 2]),
+        Column("y_dish_m", "m", "place in that frame, y", lambda p: p.local[:, 1]),
+        Column("z_dish_m", "m", "place in that frame, z", lambda p: p.local[:, 2]),
         Column(
             "deviation_mm",
             "mm",
@@ -68,7 +68,7 @@ PRISMS = Table[WeightedPrisms](
 
 @dataclass(frozen=True, eq=False)
 class TermRows:
-    """Source of zernike.csv."""
+    """Source of zernike.csv: a row per term."""
 
     expansion: Expansion
     numbering: Numbering
@@ -221,9 +221,9 @@ ACTUATORS = Table[Sequence[ActuatorCorrection]](
     PAGE,
     (
         _field("actuator", "", "name of the prism above it"),
-        _field("x_m", "m", "design place in the reflector frame"),
-        _field("y_m", "m", "the same"),
-        _field("z_m", "m", "the same"),
+        _field("x_m", "m", "design place in the reflector frame, x"),
+        _field("y_m", "m", "design place, y"),
+        _field("z_m", "m", "design place, z"),
         Column(
             "deviation_mm",
             "mm",

@@ -22,7 +22,7 @@ TRIPLETS = Table[Sequence[Unit]](
             ".6f",
         ),
         Column("u_h_corr_mm", "mm", "standard uncertainty of `h_corr_mm`", each(lambda t: 1e3 * t[1].u_h_corr), ".6f"),
-        Column("l_mpbc_mm", "mm", "the same from the surface plate", each(lambda t: 1e3 * t[1].l_mpbc), ".6f"),
+        Column("l_mpbc_mm", "mm", "that height from the surface plate", each(lambda t: 1e3 * t[1].l_mpbc), ".6f"),
         Column("u_l_mpbc_mm", "mm", "standard uncertainty of `l_mpbc_mm`", each(lambda t: 1e3 * t[1].u_l_mpbc), ".6f"),
         Column(
             "difference_mm",

@@ -2,7 +2,7 @@
 
 A `Table` at the top level of a module of `gateways` is all there is to say: its CSV file, the units of its FITS table,
 the columns that a result in Python repeats, and the table on its page of `docs/formats`, which a test compares
-(`tests/contracts/test_columns.py`; `python tests/table_scene.py` writes the pages anew).
+(`tests/contracts/test_columns.py`; `python tests/contracts/table_scene.py` writes the pages anew).
 """
 
 import csv
@@ -20,7 +20,7 @@ Values = np.ndarray | Sequence[Any]
 
 PIECE = 5_000  # rows of a piece
 PRINTED = {"um": "µm", "urad": "µrad", "deg": "°", "arcsec": "″", "deg_C": "°C", "mm2": "mm²", "percent": "%"}
-SUFFIXES = {"deg_C": "c", "deg / s": "deg_s", "m / s": "m_s", "1 / m": "per_m", "m2 / Hz": "m2_per_hz", "d": "utc"}
+SUFFIXES = {"deg_C": "c", "deg / s": "deg_s", "m / s": "m_per_s", "1 / m": "per_m", "m2 / Hz": "m2_per_hz", "d": "utc"}
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Column(Generic[Source]):
         return f"_{SUFFIXES.get(self.unit, self.unit.lower())}" if self.unit else ""
 
     def cells(self, values: Values) -> list[str]:
-        """Values as texts."""
+        """Texts of a column's values."""
         return texts(values, self.form)
 
     @property
@@ -123,7 +123,8 @@ class Table(Generic[Source]):
 
     def markdown(self) -> str:
         """Table of the columns on the page."""
-        rows = (f"| `{c.name}` | {PRINTED.get(c.unit, c.unit)} | {c.doc} |\n" for c in self.columns)
+        units = {c.unit: f" {PRINTED.get(c.unit, c.unit)} " if c.unit else " " for c in self.columns}
+        rows = (f"| `{c.name}` |{units[c.unit]}| {c.doc} |\n" for c in self.columns)
         return "| column | unit | meaning |\n|---|---|---|\n" + "".join(rows)
 
 

@@ -1,4 +1,4 @@
-"""Tables of acoustic paths: temperatures for a campaign, and every shot."""
+"""Tables of acoustic paths, and of a refractometer path."""
 
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
@@ -10,6 +10,7 @@ from catseye.gateways.writers.columns import Column, Table, each
 
 if TYPE_CHECKING:
     from catseye.reduction.air.acoustic_recording import AcousticPath
+    from catseye.reduction.air.refractometer_calibration import PathCalibration
 
 PAGE = "acoustic.md"
 
@@ -83,10 +84,8 @@ SHOTS = Table[Shots](
         Column("time_ba_s", "s", "travel time back; empty if not measured", each(lambda s: s.time(1)), ".9f"),
         Column("u_time_ab_us", "us", "standard uncertainty of `time_ab_s`", each(lambda s: s.u_time(0) * 1e6), ".3f"),
         Column("u_time_ba_us", "us", "standard uncertainty of `time_ba_s`", each(lambda s: s.u_time(1) * 1e6), ".3f"),
-        Column(
-            "snr_ab_db", "dB", "signal to noise ratio of the correlation, there", each(lambda s: s.decibel(0)), ".1f"
-        ),
-        Column("snr_ba_db", "dB", "the same, back", each(lambda s: s.decibel(1)), ".1f"),
+        Column("snr_ab_db", "dB", "signal to noise ratio of `time_ab_s`", each(lambda s: s.decibel(0)), ".1f"),
+        Column("snr_ba_db", "dB", "signal to noise ratio of `time_ba_s`", each(lambda s: s.decibel(1)), ".1f"),
         TEMPERATURE,
         U_TEMPERATURE,
         _air(
@@ -117,7 +116,46 @@ SHOTS = Table[Shots](
             lambda s: s.path.temperatures.u_group_refractivity[s.k] / PPM,
             ".4f",
         ),
-        Column("status", "", "`used`, or the reason of the rejection", each(lambda s: s.path.status(s.k))),
+        Column("status", "", "`good`, or what the table below says", each(lambda s: s.path.status(s.k))),
+    ),
+)
+
+
+def _ppm(name: str, doc: str, value: "Callable[[PathCalibration], np.ndarray]") -> "Column[PathCalibration]":
+    """Column in ppm of a refractivity."""
+    return Column(f"{name}_ppm", "ppm", doc, lambda c: value(c) / PPM, ".4f")
+
+
+GROUP_INDEX = Table["PathCalibration"](
+    "group_index.csv",
+    "refractometer.md",
+    (
+        Column("mjd_utc", "d", "time, Modified Julian Date", lambda c: np.asarray(c.readings.mjd_utc), ".8f"),
+        Column(
+            "section", "", "section without a loss of the phase, from 1", lambda c: np.asarray(c.followed.section) + 1
+        ),
+        Column("phase_rad", "rad", "phase, continuous within its section", lambda c: c.followed.phase, ".6f"),
+        _ppm("group_refractivity", "group refractivity by the phase", lambda c: c.refractivity),
+        _ppm("u_group_refractivity", "standard uncertainty of the group refractivity", lambda c: c.u_refractivity),
+        Column(
+            "temperature_c", "deg_C", "mean air temperature of the path by the phase", lambda c: c.temperature_c, ".4f"
+        ),
+        Column(
+            "u_temperature_c", "deg_C", "standard uncertainty of the temperature", lambda c: c.u_temperature_c, ".4f"
+        ),
+        _ppm(
+            "weather_refractivity",
+            "group refractivity by the weather, mean of the thermometers",
+            lambda c: c.weather.mean,
+        ),
+        _ppm("residual", "weather less path", lambda c: c.residual),
+        Column("standardised", "", "standardised residual of the reading, w", lambda c: c.standardised, ".4f"),
+        Column(
+            "status",
+            "",
+            "`good`, `stray`, `left out`, `weather off`, `no weather` or `uncalibrated`",
+            lambda c: c.status,
+        ),
     ),
 )
 
@@ -131,3 +169,8 @@ def path_temperatures_csv(paths: Sequence["AcousticPath"]) -> str:
 def shots_csv(paths: Sequence["AcousticPath"]) -> str:
     """Table of all shots, used or not."""
     return SHOTS.csv([AcousticShot(path, k) for path in paths for k in range(len(path.shots.mjd))])
+
+
+def series_csv(calibration: "PathCalibration") -> str:
+    """Table of readings as CSV; empty cells for missing numbers."""
+    return GROUP_INDEX.csv(calibration)
