@@ -78,9 +78,9 @@ class Table(Generic[Source]):
     def csv(self, source: Source | None) -> str:
         """CSV text; None for no rows.
 
-        >>> pillars = Table[dict]("pillars.csv", "p.md", (Column("x_m", "m", "along the line", dict.values, ".2f"),))
-        >>> pillars.csv({"A": 0.0, "B": float("nan")})
-        'x_m\\n0.00\\n\\n'
+        >>> x = Column[dict]("x_m", "m", "along the line", lambda p: list(p.values()), ".2f")
+        >>> Table("pillars.csv", "p.md", (Column("pillar", "", "name", list), x)).csv({"A": 0.0, "B": float("nan")})
+        'pillar,x_m\\nA,0.00\\nB,\\n'
         """
         return "".join(self.pieces(source))
 
@@ -102,7 +102,7 @@ class Table(Generic[Source]):
         """CSV text of batches of rows, which need not be in memory together."""
         yield self.header + "\n"
         for batch in batches:
-            yield _lines(column.cells(_sliceable(column.value(batch) or ())) for column in self.columns)
+            yield _lines(column.cells(_sliceable(column.value(batch))) for column in self.columns)
 
     def quantities(
         self, source: Source, names: Iterable[str], rows: np.ndarray | None = None
@@ -114,12 +114,12 @@ class Table(Generic[Source]):
         rows     indices of rows; None for all
         """
         columns = {column.name: column for column in self.columns}
-        chosen = {columns[name].label: (columns[name].value(source), columns[name].unit) for name in names}
-        return {
-            label: (values if rows is None else np.asarray(values)[rows], unit)
-            for label, (values, unit) in chosen.items()
-            if values is not None
-        }
+        chosen = {}
+        for name in names:
+            values = columns[name].value(source)
+            if values is not None:
+                chosen[columns[name].label] = (values if rows is None else _at(values, rows), columns[name].unit)
+        return chosen
 
     def markdown(self) -> str:
         """Table of the columns on the page."""
@@ -148,11 +148,15 @@ def texts(values: Values, form: str) -> list[str]:
     return ["" if value is None or not math.isfinite(value) else code % value for value in plain]
 
 
+def _at(values: Values, rows: np.ndarray) -> Values:
+    return values[rows] if isinstance(values, np.ndarray) else [values[k] for k in rows]
+
+
 def _lines(columns: Iterable[Sequence[str]]) -> str:
     stream = io.StringIO(newline="")
     csv.writer(stream, lineterminator="\n").writerows(zip(*columns, strict=True))
     return stream.getvalue()
 
 
-def _sliceable(values: Values | Iterable[Any]) -> Values:
-    return values if isinstance(values, np.ndarray | list | tuple) else list(values)
+def _sliceable(values: Values | Iterable[Any] | None) -> Values:
+    return values if isinstance(values, np.ndarray | list | tuple) else list(values or ())
