@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from catseye.constants import ARCSECOND
-from catseye.gateways.pose.files import points_csv
-from catseye.gateways.pose.pointing_series_files import observations_csv, tilt_csv
+from catseye.gateways.pose.tables import observations_csv, points_csv, tilt_csv
 from catseye.geometry.antenna.pointing_series import published
 from catseye.reduction.pose.pointing_fit import fit_pointing
 from catseye.reduction.pose.track_profile import track_profile

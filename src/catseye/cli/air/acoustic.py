@@ -47,13 +47,8 @@ def acoustic(  # noqa: PLR0913 - its options are its command line
     strict: Strict = False,
 ) -> None:
     """Temperature of the air along a path from the travel time of sound."""
-    from catseye.gateways.air.acoustic_objects import (
-        MARK,
-        acoustic_object,
-        acoustic_verdict,
-        path_temperatures_csv,
-        words,
-    )
+    from catseye.gateways.air.acoustic_objects import acoustic_object, acoustic_verdict, words
+    from catseye.gateways.air.tables import MARK, path_temperatures_csv
     from catseye.gateways.writers.output import atomic_directory, atomic_file, refuse_output
     from catseye.reduction.air.acoustic_recording import reduce_acoustic
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from catseye.constants import ARCSECOND, DEGREE
+from catseye.constants import ARCSECOND
 from catseye.gateways.pose.pointing_series_objects import (
     FORMAT,
     TRACK,
@@ -20,22 +20,18 @@ from catseye.gateways.pose.pointing_series_objects import (
     track_object,
     track_verdict,
 )
+from catseye.gateways.pose.tables import OBSERVATIONS, TILT, observations_csv, tilt_csv
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.output import atomic_file
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
 from catseye.gateways.writers.verdict import verdict_line
-from catseye.gateways.writers.written import Files, csv_text, origin, write_files
+from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.records.files.toml_text import record_toml
 from catseye.records.site.pointing_model import FORMAT as MODEL
 from catseye.reduction.pose.pointing_fit import PointingFit, SeriesComparison
 from catseye.reduction.pose.track_profile import TrackProfile
 from catseye.reduction.pose.verdicts import fit_verdict
-
-OBSERVATIONS = (
-    "place", "azimuth_deg", "elevation_deg", "correction_azimuth_cos_e_arcsec", "correction_elevation_arcsec",
-    "residual_azimuth_cos_e_arcsec", "residual_elevation_arcsec", "w_azimuth", "w_elevation", "used",
-)  # fmt: skip
 
 
 def write_fit(
@@ -65,29 +61,13 @@ def write_fit(
         },
         comment="pointing series, encoders minus sky",
     )
-    join_tables(directory, tables={"SERIES": series})
+    join_tables(directory, [OBSERVATIONS], tables={"SERIES": series})
 
 
 def write_model(fit: PointingFit, path: Path) -> None:
     """Write the series alone, atomically."""
     with atomic_file(path, "--write", f'format = "{MODEL}"') as pieces:
         pieces.append(record_toml(model_record(fit, path.stem)))
-
-
-def observations_csv(fit: PointingFit, observed: Observed) -> str:
-    """Table of observations with residuals."""
-    rows = [
-        (
-            where,
-            f"{fit.azimuth[k] / DEGREE:.7f}",
-            f"{fit.elevation[k] / DEGREE:.7f}",
-            *(f"{v / ARCSECOND:.4f}" for v in (*fit.observed[k], *fit.residual[k])),
-            *(f"{v:.2f}" if np.isfinite(v) else "" for v in fit.w[k]),
-            "yes" if fit.used[k] else "no",
-        )
-        for k, where in enumerate(observed.where)
-    ]
-    return csv_text(OBSERVATIONS, rows)
 
 
 def fit_report(fit: PointingFit, observed: Observed, compared: SeriesComparison | None, *, when: datetime) -> str:
@@ -154,20 +134,7 @@ def write_track(profile: TrackProfile, directory: Path, hashes: Mapping[str, str
     settings = {"harmonics": profile.series.harmonics}
     provenance = {"format": TRACK, "made_by": "catseye pointing track", "settings": settings}
     write_files(files, directory, {**provenance, **origin(when, hashes)})
-    join_tables(directory, frame="alidade rotated about east and north of the ground")
-
-
-def tilt_csv(profile: TrackProfile) -> str:
-    """Table of the tilt every five degrees; columns name undetermined parts, which are excluded."""
-    azimuth = np.arange(0.0, 360.0, 5.0)
-    tilt, spread = profile.series.at(azimuth * DEGREE)
-    rows = [
-        [f"{a:.1f}", *(f"{v / ARCSECOND:.4f}" for v in (*t, q[0, 0] ** 0.5, q[1, 1] ** 0.5))]
-        for a, t, q in zip(azimuth, tilt, spread, strict=True)
-    ]
-    part = "_without_wave_1" if profile.series.undetermined else ""
-    heads = ("azimuth_deg", *(f"{q}{part}_arcsec" for q in ("tilt_east", "tilt_north", "u_east", "u_north")))
-    return csv_text(heads, rows)
+    join_tables(directory, [TILT], frame="alidade rotated about east and north of the ground")
 
 
 def track_rows(profile: TrackProfile) -> list[tuple[str, str, str]]:
