@@ -19,10 +19,11 @@ if TYPE_CHECKING:
     from catseye.api.network import adjust, compare, locate, plan
     from catseye.api.night import explain, night, reduce
     from catseye.api.optics import beam, glass, link, safety
+    from catseye.api.pose import pose
     from catseye.api.reading import examples, load
     from catseye.api.result import save, show
     from catseye.api.steering import point, track
-    from catseye.api.telescope import pose, surface
+    from catseye.api.telescope import surface
     from catseye.api.weather import air, refractometer, sound
 
 FACE = {  # file of catseye.api -> its exported names
@@ -31,10 +32,11 @@ FACE = {  # file of catseye.api -> its exported names
     "network": ("adjust", "compare", "locate", "plan"),
     "night": ("explain", "night", "reduce"),
     "optics": ("beam", "glass", "link", "safety"),
+    "pose": ("pose",),
     "reading": ("examples", "load"),
     "result": ("save", "show"),
     "steering": ("point", "track"),
-    "telescope": ("pose", "surface"),
+    "telescope": ("surface",),
     "weather": ("air", "refractometer", "sound"),
 }
 
