@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from catseye.api.network import adjust, compare, locate, plan
     from catseye.api.night import explain, night, reduce
     from catseye.api.optics import beam, glass, link, safety
+    from catseye.api.pointing import fit_pointing, predict_pointing, track_pointing
     from catseye.api.pose import pose
     from catseye.api.reading import examples, load
     from catseye.api.result import save, show
@@ -32,6 +33,7 @@ FACE = {  # file of catseye.api -> its exported names
     "network": ("adjust", "compare", "locate", "plan"),
     "night": ("explain", "night", "reduce"),
     "optics": ("beam", "glass", "link", "safety"),
+    "pointing": ("fit_pointing", "predict_pointing", "track_pointing"),
     "pose": ("pose",),
     "reading": ("examples", "load"),
     "result": ("save", "show"),
@@ -56,6 +58,7 @@ __all__ = [
     "compare",
     "examples",
     "explain",
+    "fit_pointing",
     "glass",
     "link",
     "load",
@@ -64,6 +67,7 @@ __all__ = [
     "plan",
     "point",
     "pose",
+    "predict_pointing",
     "reduce",
     "refractometer",
     "replay",
@@ -74,6 +78,7 @@ __all__ = [
     "sound",
     "surface",
     "track",
+    "track_pointing",
     "triplet",
 ]
 

@@ -4,7 +4,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from catseye.api.reading import place_of
 from catseye.api.result import Result, quantities
 from catseye.api.units import In, with_units
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
-from catseye.errors import InputError
+from catseye.errors import ArgumentError
 from catseye.processors import free_threads
 
 if TYPE_CHECKING:
@@ -24,10 +24,9 @@ if TYPE_CHECKING:
     from catseye.gateways.writers.passage import Passage
     from catseye.records.network.solved_points import SolvedPoints
     from catseye.records.site.folder import SiteFolder
-    from catseye.reduction.pose.verdicts import PoseFindings
+    from catseye.reduction.pose.findings import PoseFindings
 
-Optics = Literal["prime", "gregorian"]
-CARRIED = {"prime": "feed-arm", "gregorian": "subreflector"}
+OPTICS = ("prime", "gregorian")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -88,6 +87,12 @@ class PoseResult(Result):
 
         return pose_result_object(self.found)
 
+    def lines(self) -> list[str]:
+        """Lines of numbers that the command prints: the six, and those of the beam."""
+        from catseye.gateways.pose.objects import pose_lines
+
+        return pose_lines(self.found)
+
     def tables(self) -> "dict[str, QTable]":
         """`pose`: a row a component, translations in mm and rotations in arc seconds; `points`: a row a point."""
         scale = np.array([MILLIMETRE] * 3 + [ARCSECOND] * 3)
@@ -138,12 +143,12 @@ def pose(
     frame: str | None = None,
     pivot: Annotated[Any, In("m", many=True)] = None,
     robust: str | None = None,
-    pointing: Optics | None = None,
+    pointing: str | None = None,
     tilt_arcsec: Annotated[Any, In("arcsec", many=True)] = None,
     posture_deg: Annotated[Any, In("deg", many=True)] = None,
     earlier_posture_deg: Annotated[Any, In("deg", many=True)] = None,
 ) -> PoseResult:
-    """Six degrees of freedom of a part of the antenna between two epochs or against design; beam and focus too.
+    """Pose of a part of the antenna between two epochs or against design; beam and focus too.
 
     epoch         what `reduce` gave or wrote, or its coordinates.json
     earlier       the epoch to count from; the site's design without
@@ -152,84 +157,99 @@ def pose(
     points        names of points that move as one
     frame         "ground" (usual), "alidade" or "reflector"
     pivot         (3,) m, of the rotation, in the frame; vertex, focus or mean of the points without
-    robust        how points that moved alone are left out, as `catseye pose --robust`
-    pointing      optics whose beam and focus are derived; then frame and group are the reflector's and the dish
+    robust        how points that moved alone are left out, "l1", "huber", "igg3" or "biweight"
+    pointing      "prime" or "gregorian": optics whose beam and focus are derived, of the dish in the reflector frame
     tilt_arcsec   x, y and their u of an inclinometer on the alidade, its zero taken out
     posture_deg, earlier_posture_deg   azimuth and elevation of the epochs, where their files do not say
 
-    Raises InputError where points, postures or files are missing and EstimationError where nothing can be fitted.
+    Raises ArgumentError for arguments that do not fit together, InputError where points, postures or files are missing
+    and EstimationError where nothing can be fitted.
     """
     from catseye.records.site.folder import SiteFolder, read_site
-    from catseye.reduction.pose.pose import at_posture
-    from catseye.reduction.pose.verdicts import pose_status, pose_verdict
+    from catseye.reduction.pose.findings import PoseSettings, find_pose
 
+    _refuse_mixtures(group, points, frame, pointing, tilt_arcsec)
+    postures = _posture("posture_deg", posture_deg), _posture("earlier_posture_deg", earlier_posture_deg)
     records = site if isinstance(site, SiteFolder) else read_site(place_of(site))
-    later, before = _solved(epoch, posture_deg), None if earlier is None else _solved(earlier, earlier_posture_deg)
-    if later.posture is None:
-        raise InputError(f"{later.file}: its posture is unknown (expected pose.json beside it, or --posture AZ,EL)")
-    chosen = {
-        "group": None if points is not None else group or "dish",
-        "points": None if points is None else list(points),
-        "frame": frame or ("reflector" if pointing else "alidade" if tilt_arcsec is not None else "ground"),
-        "pivot": None if pivot is None else np.array(pivot, dtype=float),
-        "robust": robust,
-    }
+    later, before = _solved(epoch, postures[0]), None if earlier is None else _solved(earlier, postures[1])
+    settings = PoseSettings(
+        group=None if points is not None else group or "dish",
+        points=None if points is None else tuple(points),
+        frame=frame or ("reflector" if pointing else "alidade" if tilt_arcsec is not None else "ground"),
+        pivot=None if pivot is None else np.array(pivot, dtype=float),
+        robust=robust,
+    )
+    tilt = None if tilt_arcsec is None else tuple(v * ARCSECOND for v in tilt_arcsec)
     with free_threads():
-        found = _posed(later, before, at_posture(records, *later.posture), chosen, pointing, tilt_arcsec)
+        found = find_pose(later, before, records, settings=settings, optics=pointing, tilt=tilt)
     fit = found.pose.pose
-    hashes = {**later.hashes, **({} if before is None else before.hashes), **records.hashes}
     read = [place_of(each, output=True) for each in (epoch, earlier) if isinstance(each, str | os.PathLike)]
     read += [place_of(site)] if isinstance(site, str | os.PathLike) else []
     return PoseResult(
-        pose_verdict(found),
-        fit.frame,
-        fit.pivot,
-        fit.translation,
-        fit.rotation,
-        fit.covariance,
-        fit.u,
-        tuple(fit.names),
-        fit.motion.residual,
-        pose_status(found),
-        None if found.beam is None else found.beam.offset,
-        None if found.beam is None else found.beam.covariance,
-        found,
-        {**chosen, "pivot": pivot, "pointing": pointing, "tilt": tilt_arcsec},
-        hashes,
-        tuple(read),
+        verdict=found.verdict,
+        frame=fit.frame,
+        pivot=fit.pivot,
+        translation=fit.translation,
+        rotation=fit.rotation,
+        covariance=fit.covariance,
+        u=fit.u,
+        names=tuple(fit.names),
+        residuals=fit.motion.residual,
+        status=found.status,
+        beam=None if found.beam is None else found.beam.offset,
+        beam_covariance=None if found.beam is None else found.beam.covariance,
+        found=found,
+        settings={
+            "group": settings.group,
+            "points": None if points is None else list(points),
+            "frame": settings.frame,
+            "pivot": pivot,
+            "robust": robust,
+            "pointing": pointing,
+            "tilt": tilt_arcsec,
+        },
+        hashes={**later.hashes, **({} if before is None else before.hashes), **records.hashes},
+        read=tuple(read),
     )
 
 
-def _posed(
-    later: "SolvedPoints",
-    before: "SolvedPoints | None",
-    site: "SiteFolder",
-    chosen: dict[str, Any],
-    optics: Optics | None,
+def _refuse_mixtures(
+    group: str | None,
+    points: Sequence[str] | None,
+    frame: str | None,
+    pointing: str | None,
     tilt_arcsec: Sequence[float] | None,
-) -> "PoseFindings":
-    """The pose, with an inclinometer joined or the beam derived where asked for."""
-    from catseye.reduction.pose.pointing_offsets import cross_covariance, pointing_offset
-    from catseye.reduction.pose.pose import pose_of_group
-    from catseye.reduction.pose.track_profile import pose_with_tilt
-    from catseye.reduction.pose.verdicts import PoseFindings
-
-    group_pose = pose_of_group(later, before, site, **chosen)
+) -> None:
+    """Raises ArgumentError for arguments that do not fit together."""
+    if group is not None and points is not None:
+        raise ArgumentError("give group or points, one of the two", "group", "points")
     if tilt_arcsec is not None:
-        x, y, u = (v * ARCSECOND for v in tilt_arcsec)
-        return PoseFindings(pose_with_tilt(group_pose, np.array([x, y]), u), None)
-    if optics is None:
-        return PoseFindings(group_pose, None)
-    robust = chosen["robust"]
-    carried = pose_of_group(later, before, site, group=CARRIED[optics], frame="reflector", robust=robust)
-    cross = cross_covariance(carried, group_pose, site, earlier=before)
-    return PoseFindings(group_pose, pointing_offset(group_pose.pose, carried.pose, site, cross=cross, optics=optics))
+        if group != "alidade" or frame not in (None, "alidade"):
+            raise ArgumentError("tilt_arcsec needs the group alidade in the frame alidade", "tilt_arcsec")
+        if len(tilt_arcsec) != 3 or not np.isfinite(tilt_arcsec).all() or tilt_arcsec[2] <= 0.0:
+            text = f"tilt_arcsec = {', '.join(f'{v:g}' for v in tilt_arcsec)} (expected x, y and u, u above 0)"
+            raise ArgumentError(text, "tilt_arcsec")
+    if pointing is not None:
+        if pointing not in OPTICS:
+            raise ArgumentError(f"pointing = {pointing!r} (expected one of {', '.join(OPTICS)})", "pointing")
+        if points is not None or frame not in (None, "reflector") or group not in (None, "dish"):
+            raise ArgumentError("pointing needs the dish in the frame reflector", "pointing")
+
+
+def _posture(name: str, posture_deg: Sequence[float] | None) -> tuple[float, float] | None:
+    """Posture (2,), rad. Raises ArgumentError beyond the telescope's."""
+    if posture_deg is None:
+        return None
+    if len(posture_deg) != 2 or not (abs(posture_deg[0]) <= 540.0 and -5.0 <= posture_deg[1] <= 95.0):
+        text = f"{name} = {', '.join(f'{v:g}' for v in posture_deg)} (expected azimuth -540 to 540, elevation -5 to 95)"
+        raise ArgumentError(text, name)
+    return posture_deg[0] * DEGREE, posture_deg[1] * DEGREE
 
 
 def _solved(
-    epoch: "str | os.PathLike[str] | SolvedPoints | NightResult", posture_deg: Sequence[float] | None
+    epoch: "str | os.PathLike[str] | SolvedPoints | NightResult", posture: tuple[float, float] | None
 ) -> "SolvedPoints":
-    """The points of an epoch, with the posture that was told for it."""
+    """Points of an epoch, with the posture given for it."""
     from catseye.records.network.solved_points import SolvedPoints, read_solved_points
     from catseye.reduction.pose.dish_ways import solved_points
 
@@ -237,7 +257,4 @@ def _solved(
         solved = replace(solved_points(epoch.reduction), verdict=epoch.verdict)
     else:
         solved = epoch if isinstance(epoch, SolvedPoints) else read_solved_points(place_of(epoch, output=True))
-    if posture_deg is None:
-        return solved
-    azimuth, elevation = posture_deg
-    return replace(solved, posture=(azimuth * DEGREE, elevation * DEGREE))
+    return solved if posture is None else replace(solved, posture=posture)
