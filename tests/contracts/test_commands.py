@@ -253,6 +253,7 @@ ONE_CALL = [
     "link",
     "night",
     "plan",
+    "point",
     "pointing fit",
     "pointing predict",
     "pointing track",
@@ -264,7 +265,7 @@ ONE_CALL = [
 ]
 OF_THE_TERMINAL = {"json", "out", "quiet", "strict", "page", "threads"}
 WRITERS = {"certificate", "template", "write", "write_stars"}  # files that are methods of the result
-OTHER_NAMES: dict[str, dict[str, str]] = {}  # command -> its option: the argument that takes its value
+OTHER_NAMES = {"point": {"file": "to"}}  # command -> its option: the argument that takes its value
 
 
 def callbacks():
