@@ -44,7 +44,7 @@ def test_a_model_is_saved_and_predicts_with_its_covariance(tmp_path):
     one = catseye.predict_pointing(145.3, 30.0, model=tmp_path / "m.toml")
     record = catseye.predict_pointing(145.3, 30.0, model=catseye.load(tmp_path / "m.toml"))
     np.testing.assert_array_equal(one.correction, record.correction)
-    rows = found.found.fit.series.covariance_of_correction(145.3 * DEGREE, 30 * DEGREE)
+    rows = found.findings.fit.series.covariance_of_correction(145.3 * DEGREE, 30 * DEGREE)
     np.testing.assert_allclose(one.u, np.sqrt(np.diag(rows)), rtol=1e-6)
     again = catseye.fit_pointing(STARS, against=catseye.load(tmp_path / "m.toml"), u_arcsec=5.2)
     np.testing.assert_allclose(again.difference, 0.0, atol=1e-6 * ARCSECOND)
@@ -68,7 +68,7 @@ def test_the_track_of_files_and_of_records_is_one(tmp_path):
     np.testing.assert_array_equal(file.values, record.values)
     assert len(file.undetermined) == 4
     assert set(file.figures()) == {"tilt", "residuals"}
-    assert len(file.to_table("observations")) == len(file.found.azimuth)
+    assert len(file.to_table("observations")) == len(file.profile.azimuth)
     catseye.save(file, tmp_path / "out")
     assert json.loads((tmp_path / "out" / "track.json").read_text())["harmonics"] == 3
 

@@ -1,4 +1,4 @@
-"""`fit_pointing`, `predict_pointing` and `track_pointing`: the antenna's pointing series and its track."""
+"""`fit_pointing` and `predict_pointing`: the antenna's pointing series."""
 
 import os
 from collections.abc import Sequence
@@ -22,13 +22,11 @@ if TYPE_CHECKING:
     from catseye.gateways.writers.passage import Passage
     from catseye.geometry.antenna.pointing_series import PointingSeries
     from catseye.records.laboratory.star_offsets import StarOffsets
-    from catseye.records.laboratory.tilts import TiltReadings
     from catseye.records.network.written_pose import WrittenPose
     from catseye.records.site.pointing_model import NamedSeries, PointingModel
     from catseye.reduction.pose.corrections import PointingObservations
     from catseye.reduction.pose.prediction import PointingPrediction
     from catseye.reduction.pose.series_comparison import PointingFindings
-    from catseye.reduction.pose.track_profile import TrackProfile
 
 ZENITH_DEG = 89.999  # nearer to the zenith azimuth is not defined
 AXES = ("azimuth_cos_e", "elevation")
@@ -45,7 +43,7 @@ class SeriesResult(Result):
     used        (n,) bool
     sky_rms     rad, root mean square of the used residuals' lengths
     difference  (m,) rad, of the terms common with the other series, this minus the other; None unless compared
-    found       everything else
+    findings    everything else
     settings    what was asked for
     read        files that were read
     """
@@ -57,7 +55,7 @@ class SeriesResult(Result):
     used: np.ndarray
     sky_rms: float
     difference: np.ndarray | None
-    found: "PointingFindings"
+    findings: "PointingFindings"
     settings: dict[str, Any] = field(default_factory=dict)
     read: tuple[Path, ...] = ()
 
@@ -66,30 +64,30 @@ class SeriesResult(Result):
         from catseye.gateways.pose.pointing_series_objects import fit_words
         from catseye.gateways.writers.passage import Passage
 
-        return [Passage(title, text) for title, text in fit_words(self.found)]
+        return [Passage(title, text) for title, text in fit_words(self.findings)]
 
     def to_object(self) -> dict[str, Any]:
         """JSON object of `catseye pointing fit --json`."""
         from catseye.gateways.pose.pointing_series_objects import fit_object
 
-        return fit_object(self.found)
+        return fit_object(self.findings)
 
     def lines(self) -> list[str]:
         """Lines of the terms that the command prints."""
         from catseye.gateways.pose.pointing_series_objects import fit_lines
 
-        return fit_lines(self.found)
+        return fit_lines(self.findings)
 
     def tables(self) -> "dict[str, QTable]":
         """`terms`: a row a term; `observations`: a row a direction."""
-        fit = self.found.fit
+        fit = self.findings.fit
         terms = {
             "term": (self.terms, ""),
             "value": (self.values / ARCSECOND, "arcsec"),
             "u": (np.sqrt(np.diag(self.covariance)) / ARCSECOND, "arcsec"),
         }
         observations = {
-            "place": (self.found.observations.where, ""),
+            "place": (self.findings.observations.where, ""),
             "azimuth": (fit.azimuth / DEGREE, "deg"),
             "elevation": (fit.elevation / DEGREE, "deg"),
             **{f"correction_{axis}": (fit.observed[:, k] / ARCSECOND, "arcsec") for k, axis in enumerate(AXES)},
@@ -103,31 +101,35 @@ class SeriesResult(Result):
         """Residuals, the same on the sky, and correlations of the terms."""
         from catseye.gateways.pose.pointing_series_figures import fit_figures
 
-        return fit_figures(self.found.fit)
+        return fit_figures(self.findings.fit)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye pointing fit --out`."""
         from catseye.gateways.pose.pointing_series_files import write_fit
 
-        write_fit(self.found, directory=directory, settings=self.settings)
+        write_fit(self.findings, directory=directory, settings=self.settings)
 
     def save_model(self, path: "str | os.PathLike[str]") -> None:
-        """Write the series with its covariance as MODEL.toml, new or written by catseye before.
+        """Write the series with its covariance as MODEL.toml.
+
+        path   new, or an earlier file of catseye
 
         Raises InputError for another's file, one that was read, or where nothing can be written.
         """
         from catseye.gateways.pose.pointing_series_files import write_model
 
-        write_model(self.found.fit, self._refuse_input("model", path))
+        write_model(self.findings.fit, self._refuse_input("model", path))
 
     def save_stars(self, path: "str | os.PathLike[str]") -> None:
-        """Write the stars used as TPOINT text, new or written by catseye before.
+        """Write the stars used as TPOINT text.
+
+        path   new, or an earlier file of catseye
 
         Raises InputError for another's file, one that was read, a fit of poses, or where nothing can be written.
         """
         from catseye.gateways.pose.pointing_series_files import write_used_stars
 
-        write_used_stars(self.found, self._refuse_input("stars", path))
+        write_used_stars(self.findings, self._refuse_input("stars", path))
 
     def _refuse_input(self, what: str, path: "str | os.PathLike[str]") -> Path:
         """Path of a file to be written; InputError for one that was read."""
@@ -137,7 +139,7 @@ class SeriesResult(Result):
 
     def inputs(self) -> dict[str, str]:
         """SHA-256 of each file read."""
-        return self.found.hashes
+        return self.findings.hashes
 
     def sources(self) -> tuple[Path, ...]:
         """Files that were read, which `save` leaves alone."""
@@ -164,8 +166,8 @@ def fit_pointing(
     Raises ArgumentError for invalid terms or u_arcsec, InputError for files that cannot be used, EstimationError where
     the observations do not determine the terms.
 
-    >>> found = fit_pointing("pointing/stars.dat", against="published")
-    >>> found.verdict.word, len(found.terms), bool(found.found.comparison.p > 0.01)
+    >>> fit = fit_pointing("pointing/stars.dat", against="published")
+    >>> fit.verdict.word, len(fit.terms), bool(fit.findings.comparison.p > 0.01)
     ('good', 8, True)
     """
     from catseye.geometry.antenna.pointing_series import TERMS
@@ -177,25 +179,25 @@ def fit_pointing(
     if u_arcsec is not None and not (np.isfinite(u_arcsec) and u_arcsec > 0.0):
         raise ArgumentError(f"u_arcsec = {u_arcsec} is not above zero", "u_arcsec")
     observations, read = _observations(files)
-    found = find_pointing(
+    findings = find_pointing(
         observations,
         None if against is None else _reference(against),
         terms=chosen,
         u=None if u_arcsec is None else u_arcsec * ARCSECOND,
         reject=reject,
     )
-    fit = found.fit
+    fit = findings.fit
     named = against if against is None or isinstance(against, str | os.PathLike) else against.name
     return SeriesResult(
-        verdict=found.verdict,
+        verdict=findings.verdict,
         terms=fit.series.terms,
         values=fit.series.values,
         covariance=fit.series.covariance,
         residuals=fit.residual,
         used=fit.used,
         sky_rms=fit.sky_rms,
-        difference=None if found.comparison is None else found.comparison.difference,
-        found=found,
+        difference=None if findings.comparison is None else findings.comparison.difference,
+        findings=findings,
         settings={
             "terms": chosen,
             "u_arcsec": u_arcsec,
@@ -248,7 +250,7 @@ class PredictionResult(Result):
     u           (..., 2) rad; None where the model has no covariance
     covariance  (..., 2, 2) rad^2; None likewise
     encoders    (..., 2) rad, azimuth and elevation that the encoders show
-    found       everything else
+    prediction  everything else
     hashes      SHA-256 of each file read, by its name
     read        files that were read
     """
@@ -257,7 +259,7 @@ class PredictionResult(Result):
     u: np.ndarray | None
     covariance: np.ndarray | None
     encoders: np.ndarray
-    found: "PointingPrediction"
+    prediction: "PointingPrediction"
     hashes: dict[str, str] = field(default_factory=dict)
     read: tuple[Path, ...] = ()
 
@@ -265,28 +267,28 @@ class PredictionResult(Result):
         """The model, and the number of directions."""
         from catseye.gateways.writers.passage import Passage
 
-        n = self.found.azimuth.size
-        return [Passage("Model", f"{self.found.model}; {n} direction{'' if n == 1 else 's'}")]
+        n = self.prediction.azimuth.size
+        return [Passage("Model", f"{self.prediction.model}; {n} direction{'' if n == 1 else 's'}")]
 
     def to_object(self) -> dict[str, Any]:
         """JSON object of `catseye pointing predict --json`."""
         from catseye.gateways.pose.pointing_series_objects import prediction_object
 
-        return prediction_object(self.found)
+        return prediction_object(self.prediction)
 
     def lines(self) -> list[str]:
         """Lines of corrections and encoders that the command prints."""
         from catseye.gateways.pose.pointing_series_objects import prediction_lines
 
-        return prediction_lines(self.found)
+        return prediction_lines(self.prediction)
 
     def tables(self) -> "dict[str, QTable]":
         """`corrections`: a row a direction."""
         correction, encoders = self.correction.reshape(-1, 2), self.encoders.reshape(-1, 2)
         u = np.full(correction.shape, np.nan) if self.u is None else self.u.reshape(-1, 2)
         columns = {
-            "azimuth": (self.found.azimuth.ravel() / DEGREE, "deg"),
-            "elevation": (self.found.elevation.ravel() / DEGREE, "deg"),
+            "azimuth": (self.prediction.azimuth.ravel() / DEGREE, "deg"),
+            "elevation": (self.prediction.elevation.ravel() / DEGREE, "deg"),
             **{f"correction_{axis}": (correction[:, k] / ARCSECOND, "arcsec") for k, axis in enumerate(AXES)},
             **{f"u_{axis}": (u[:, k] / ARCSECOND, "arcsec") for k, axis in enumerate(AXES)},
             "azimuth_encoder": (encoders[:, 0] / DEGREE, "deg"),
@@ -318,8 +320,8 @@ def predict_pointing(
 
     Raises ArgumentError for a direction outside, InputError for a model that cannot be used.
 
-    >>> found = predict_pointing(145.3, 30.0)
-    >>> (found.correction / ARCSECOND).round(2).tolist()
+    >>> prediction = predict_pointing(145.3, 30.0)
+    >>> (prediction.correction / ARCSECOND).round(2).tolist()
     [-41.58, 273.84]
     """
     from catseye.reduction.pose.prediction import predict_pointing as predict
@@ -332,14 +334,14 @@ def predict_pointing(
         for value in values[~((values >= low) & (values <= high))].ravel()[:1]:
             raise ArgumentError(f"{name} = {value:g} is not {low:g} to {high:g} degrees", name)
     series, read = _series(model)
-    found = predict(series, azimuth * DEGREE, elevation * DEGREE)
+    prediction = predict(series, azimuth * DEGREE, elevation * DEGREE)
     return PredictionResult(
-        verdict=found.verdict,
-        correction=found.correction,
-        u=found.u,
-        covariance=found.covariance,
-        encoders=np.stack(found.encoders, axis=-1),
-        found=found,
+        verdict=prediction.verdict,
+        correction=prediction.correction,
+        u=prediction.u,
+        covariance=prediction.covariance,
+        encoders=np.stack(prediction.encoders, axis=-1),
+        prediction=prediction,
         hashes=series.hashes,
         read=read,
     )
@@ -358,132 +360,3 @@ def _series(model: Any) -> "tuple[NamedSeries, tuple[Path, ...]]":
         return read_series(PUBLISHED), ()
     path = place_of(model)
     return replace(read_series(path), name=str(model)), (path,)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class TrackProfileResult(Result):
-    """Tilt of the alidade by azimuth as a Fourier series of c coefficients.
-
-    names       of the coefficients
-    values      (c,) rad, about east and north; nan where undetermined
-    covariance  (c, c) rad^2
-    axis        (2,) rad, AN and AW of the azimuth axis
-    axis_covariance   (2, 2)
-    undetermined      names of coefficients that the observations do not determine
-    found       everything else
-    hashes      SHA-256 of each file read, by its name
-    read        files that were read
-    """
-
-    names: tuple[str, ...]
-    values: np.ndarray
-    covariance: np.ndarray
-    axis: np.ndarray
-    axis_covariance: np.ndarray
-    undetermined: tuple[str, ...]
-    found: "TrackProfile"
-    hashes: dict[str, str] = field(default_factory=dict)
-    read: tuple[Path, ...] = ()
-
-    def passages(self) -> "Sequence[Passage]":
-        """Observations, the axis, the inclinometer's zero and the fit."""
-        from catseye.gateways.pose.pointing_series_files import track_words
-        from catseye.gateways.writers.passage import Passage
-
-        return [Passage(title, text) for title, text in track_words(self.found)]
-
-    def to_object(self) -> dict[str, Any]:
-        """JSON object of `catseye pointing track --json`."""
-        from catseye.gateways.pose.pointing_series_objects import track_object
-
-        return track_object(self.found)
-
-    def lines(self) -> list[str]:
-        """Lines of the coefficients that the command prints."""
-        from catseye.gateways.pose.pointing_series_files import track_lines
-
-        return track_lines(self.found)
-
-    def tables(self) -> "dict[str, QTable]":
-        """`coefficients`: a row a coefficient; `observations`: a row a pose or reading."""
-        found = self.found
-        coefficients = {
-            "coefficient": (self.names, ""),
-            "value": (self.values / ARCSECOND, "arcsec"),
-            "u": (np.sqrt(np.diag(self.covariance)) / ARCSECOND, "arcsec"),
-        }
-        observations = {
-            "azimuth": (found.azimuth / DEGREE, "deg"),
-            **{f"residual_{axis}": (found.residual[:, k] / ARCSECOND, "arcsec") for k, axis in enumerate("xy")},
-            **{f"w_{axis}": (found.w[:, k], "") for k, axis in enumerate("xy")},
-        }
-        return {"coefficients": quantities(coefficients), "observations": quantities(observations)}
-
-    def figures(self) -> "dict[str, Figure]":
-        """Tilt by azimuth, and residuals."""
-        from catseye.gateways.pose.pointing_series_figures import track_figures
-
-        return track_figures(self.found)
-
-    def write(self, directory: Path, progress: Progress | None = None) -> None:
-        """Write the files of `catseye pointing track --out`."""
-        from catseye.gateways.pose.pointing_series_files import write_track
-
-        write_track(self.found, directory, self.hashes)
-
-    def inputs(self) -> dict[str, str]:
-        """SHA-256 of each file read."""
-        return self.hashes
-
-    def sources(self) -> tuple[Path, ...]:
-        """Files that were read, which `save` leaves alone."""
-        return self.read
-
-
-@with_units
-def track_pointing(
-    poses: "Sequence[str | os.PathLike[str] | WrittenPose] | None" = None,
-    *,
-    tilts: "str | os.PathLike[str] | TiltReadings | None" = None,
-    harmonics: Annotated[Any, In("", whole=True)] = 2,
-) -> TrackProfileResult:
-    """Tilt of the alidade by azimuth: poses and inclinometer in one Fourier series.
-
-    poses       pose.json of the alidade in its own frame, at several azimuths (`pose` with group="alidade")
-    tilts       TILTS.csv of an inclinometer on the alidade, or its readings
-    harmonics   waves a turn, 0 to 36
-
-    Raises ArgumentError without poses and tilts, InputError for files that cannot be used, EstimationError where the
-    observations do not determine the coefficients.
-
-    >>> found = track_pointing(tilts="pointing/tilts.csv", harmonics=3)
-    >>> found.verdict.word, len(found.names), len(found.undetermined)
-    ('good', 14, 4)
-    """
-    from catseye.records.laboratory.tilts import TiltReadings, read_tilts
-    from catseye.records.network.written_pose import WrittenPose, read_written_pose
-    from catseye.reduction.pose.track_profile import track_of_poses
-
-    if not poses and tilts is None:
-        raise ArgumentError("a track profile needs poses, tilts or both", "tilts")
-    paths = [place_of(each) for each in poses or () if not isinstance(each, WrittenPose)]
-    records = [each if isinstance(each, WrittenPose) else read_written_pose(place_of(each)) for each in poses or ()]
-    hashes = {pose.file: pose.digest for pose in records}
-    if tilts is not None and not isinstance(tilts, TiltReadings):
-        paths.append(place_of(tilts))
-        tilts = read_tilts(paths[-1])
-        hashes[str(paths[-1])] = tilts.digest
-    found = track_of_poses(records, tilts=tilts, harmonics=harmonics)
-    axis, spread = found.series.axis
-    return TrackProfileResult(
-        verdict=found.verdict,
-        names=found.series.names,
-        values=found.series.values,
-        covariance=found.series.covariance,
-        axis=axis,
-        axis_covariance=spread,
-        undetermined=found.series.undetermined,
-        found=found,
-        hashes=hashes,
-        read=tuple(paths),
-    )

@@ -31,7 +31,9 @@ OPTICS = ("prime", "gregorian")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PoseResult(Result):
-    """Six degrees of freedom of a group of points: second = pivot + translation + rotation (first - pivot).
+    """Pose of a group of points, six degrees of freedom.
+
+    second = pivot + translation + rotation (first - pivot)
 
     frame         axes of the answer: "ground", "alidade" or "reflector"
     pivot         (3,) m, in that frame
@@ -148,7 +150,9 @@ def pose(
     posture_deg: Annotated[Any, In("deg", many=True)] = None,
     earlier_posture_deg: Annotated[Any, In("deg", many=True)] = None,
 ) -> PoseResult:
-    """Pose of a part of the antenna between two epochs or against design; beam and focus too.
+    """Pose of a part of the antenna, and its beam.
+
+    Six degrees of freedom between two epochs or against design; beam and focus on request.
 
     epoch         what `reduce` gave or wrote, or its coordinates.json
     earlier       the epoch to count from; the site's design without

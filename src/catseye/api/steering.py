@@ -1,4 +1,4 @@
-"""`point` and `track`: a mirror's encoder counts for points that stand still, and for points that move."""
+"""`point` and `track`: a mirror's encoder counts for points."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -43,7 +43,7 @@ class PointingResult(Result):
     prime          (n, 2) counts of the prime pointing
     autocollimation, back_retro   (n,) counts of elevation
     allowed, prime_allowed        (n,) bool: within the mirror's stops
-    found          everything else
+    aimed          everything else
     names          monument, mirror, and the mirror that the monument's record names
     read           files that were read
     """
@@ -57,24 +57,24 @@ class PointingResult(Result):
     back_retro: np.ndarray
     allowed: np.ndarray
     prime_allowed: np.ndarray
-    found: "AimedPoints"
+    aimed: "AimedPoints"
     names: dict[str, str | None] = field(default_factory=dict)
     read: tuple[Path, ...] = ()
 
     @property
     def pointings(self) -> "Pointings":
         """Counts, stops and uncertainties, and the rays they follow from."""
-        return self.found.pointings
+        return self.aimed.pointings
 
     @property
     def sightings(self) -> "list[Sighting]":
         """Sun and keep-out boxes, one a point, where they were asked for."""
-        return self.found.sightings
+        return self.aimed.sightings
 
     @property
     def visibility(self) -> "Visibility | None":
         """Visibility of each point's reflector, where that was asked for."""
-        return self.found.visibility
+        return self.aimed.visibility
 
     def passages(self) -> "Sequence[Passage]":
         """Number of points within reach, and remarks."""
@@ -83,7 +83,7 @@ class PointingResult(Result):
 
         reached = int(np.sum(self.allowed | self.prime_allowed))
         text = f"{self.names.get('mirror')} on {self.names.get('monument')} reaches {reached} of {len(self.to)} points."
-        remarks = pointing_remarks(self.found)
+        remarks = pointing_remarks(self.aimed)
         recorded, used = self.names.get("mirror_of_monument"), self.names.get("mirror")
         if recorded is not None and recorded != used:
             of = self.names.get("monument")
@@ -94,7 +94,7 @@ class PointingResult(Result):
         """JSON object of `catseye point --json`: a list, one object a point."""
         from catseye.gateways.steering.pointing_objects import pointing_objects
 
-        return [{**item, **self.names} for item in pointing_objects(self.found)]
+        return [{**item, **self.names} for item in pointing_objects(self.aimed)]
 
     def lines(self) -> list[str]:
         """Lines of the table of counts that the command prints."""
@@ -103,7 +103,9 @@ class PointingResult(Result):
         return pointing_table(self.pointings).splitlines()
 
     def save_counts(self, path: "str | os.PathLike[str]") -> None:
-        """Write CAL.EQ's output.dat, new or written by catseye before.
+        """Write CAL.EQ's output.dat.
+
+        path   new, or an earlier file of catseye
 
         Raises InputError for another's file, and where nothing can be written.
         """
@@ -152,7 +154,9 @@ def point(
     solids: "str | os.PathLike[str] | Solids | None" = None,
     posture_deg: Annotated[Any, In("deg", many=True)] = None,
 ) -> PointingResult:
-    """Encoder counts of a mirror for points, both pointings, with stops, Sun, keep-out boxes and visibility.
+    """Encoder counts of a mirror for points: CAL.EQ.
+
+    Both pointings, with stops, Sun, keep-out boxes and visibility.
 
     monument, mirror   records, or their files
     to                 (n, 3) or (3,) m, ground; or a coord.dat of lines x y z in mm
@@ -199,10 +203,10 @@ def point(
         solids=None if solids is None else records.read(solids, Solids),
         posture=posture,
     )
-    found = aim_mirror(stands, mirrors, where, surroundings)
-    pointings = found.pointings
+    aimed = aim_mirror(stands, mirrors, where, surroundings)
+    pointings = aimed.pointings
     return PointingResult(
-        verdict=found.verdict,
+        verdict=aimed.verdict,
         to=pointings.to,
         range_=pointings.aim.range,
         counts=pointings.counts,
@@ -212,7 +216,7 @@ def point(
         back_retro=pointings.back_retro,
         allowed=pointings.allowed,
         prime_allowed=pointings.prime_allowed,
-        found=found,
+        aimed=aimed,
         names={"monument": stands.monument, "mirror": mirrors.zp, "mirror_of_monument": stands.zp},
         read=tuple(records.paths),
     )
@@ -296,14 +300,16 @@ def _within(azimuth_deg: float, elevation_deg: float) -> bool:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TrackResult(Result):
-    """Counts along which one mirror follows n points that move, over intervals between k + 1 times.
+    """Counts of one mirror that follows n points.
+
+    Over intervals between k + 1 times.
 
     seconds    (k + 1,) s, ends of the intervals
     counts     (k + 1, n, 2) azimuth and elevation at each, on one turn and in one pointing
     misses     (s, k, n) m, how far the beam passes its target at s instants of each interval
     worst      (n,) m, the largest of each
     status     (n,) text: "followed", or the reason against it
-    found      everything else
+    track      everything else
     """
 
     seconds: np.ndarray
@@ -311,7 +317,7 @@ class TrackResult(Result):
     misses: np.ndarray
     worst: np.ndarray
     status: tuple[str, ...]
-    found: "GroundTrack"
+    track: "GroundTrack"
 
     def passages(self) -> "Sequence[Passage]":
         """Number of points followed, and the beams' largest distances from them."""
@@ -344,7 +350,7 @@ class TrackResult(Result):
         from catseye.gateways.steering.tracking_figures import miss_figure
         from catseye.reduction.steering.tracking import SHARES
 
-        return {"misses": miss_figure(self.found.track, self.misses[:, :, None, :], SHARES)}
+        return {"misses": miss_figure(self.track.track, self.misses[:, :, None, :], SHARES)}
 
 
 @with_units
@@ -361,7 +367,9 @@ def track(
     azimuth_rate_deg_per_s: Annotated[Any, In("deg / s", one=True)] = None,
     elevation_rate_deg_per_s: Annotated[Any, In("deg / s", one=True)] = None,
 ) -> TrackResult:
-    """Counts at t0 and t1 of each interval for points that move with the telescope as it slews or tracks.
+    """Mirror counts for points that move with the telescope.
+
+    At t0 and t1 of each interval, as it slews or tracks.
 
     monument, mirror    records, or their files; of a ranger on the ground
     points              (n, 3) or (3,) m, fixed in the frame
@@ -398,7 +406,7 @@ def track(
     rates = [most if rate is None else rate * DEGREE for rate, most in fastest]
     ends = zip(start_deg, end_deg, rates, strict=True)
     azimuth, elevation = (Drive(a * DEGREE, b * DEGREE, rate=rate) for a, b, rate in ends)
-    found = follow_points(
+    followed = follow_points(
         stands,
         mirrors,
         where,
@@ -408,11 +416,11 @@ def track(
         interval=interval_s,
     )
     return TrackResult(
-        verdict=found.verdict,
-        seconds=found.track.since,
-        counts=found.counts,
-        misses=found.misses,
-        worst=found.worst,
-        status=found.status,
-        found=found,
+        verdict=followed.verdict,
+        seconds=followed.track.since,
+        counts=followed.counts,
+        misses=followed.misses,
+        worst=followed.worst,
+        status=followed.status,
+        track=followed,
     )

@@ -21,9 +21,9 @@ def _points(texts: list[str] | None) -> list[list[float]]:
 class _Forbidden(NamedTuple):
     """Time and place of the mirror, and its keep-out regions."""
 
-    at_mjd: Annotated[str | None, typer.Option("--at", metavar="TIME", help="UTC or MJD: is the Sun in the way?")] = (
-        None
-    )
+    at_mjd: Annotated[
+        str | None, typer.Option("--at", metavar="TIME", help="Time, UTC or MJD: is the Sun in the way?")
+    ] = None
     latitude_deg: Annotated[
         float | None, typer.Option("--latitude-deg", help="Latitude of the site; the monument's record without.")
     ] = None

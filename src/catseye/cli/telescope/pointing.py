@@ -114,8 +114,8 @@ def track(
     quiet: Quiet = False,
 ) -> None:
     """Tilt of the alidade against azimuth: poses and inclinometer in one Fourier series."""
-    from catseye.api.pointing import track_pointing
     from catseye.api.result import require_writable, save
+    from catseye.api.track_profile import track_pointing
 
     require_writable(out, *(poses or []), *([] if tilts is None else [tilts]))
     result = track_pointing(poses, tilts=tilts, harmonics=harmonics)

@@ -145,7 +145,7 @@ def prediction_object(prediction: PointingPrediction) -> dict[str, Any]:
 
 
 def prediction_lines(prediction: PointingPrediction) -> list[str]:
-    """Lines of the corrections with their u, and of the encoders; three a direction."""
+    """Lines of corrections and encoders, three a direction."""
     values, encoders = np.atleast_2d(prediction.correction), np.atleast_2d(np.stack(prediction.encoders, axis=-1))
     u = None if prediction.u is None else np.atleast_2d(prediction.u)
     lines = []

@@ -1,4 +1,4 @@
-"""Corrections to fit: star offsets of a TPOINT file, or poses with a beam."""
+"""Corrections to fit, from star offsets or from poses."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

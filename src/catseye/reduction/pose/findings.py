@@ -26,7 +26,7 @@ class PoseFindings:
 
     @property
     def rigid(self) -> bool:
-        """False where the test of the fit rejects that the group moved as one."""
+        """True unless its test rejects the group as one body."""
         pose = self.pose.pose
         return not (pose.motion.degrees_of_freedom and pose.p < RIGID)
 
@@ -103,7 +103,9 @@ def find_pose(
     optics: str | None = None,
     tilt: tuple[float, float, float] | None = None,
 ) -> PoseFindings:
-    """Find the pose of a group, joined with an inclinometer or with its beam.
+    """Find the pose of a group.
+
+    Joined with an inclinometer, or with its beam.
 
     later, earlier   epochs; None: against the site's design
     site       records, in any posture

@@ -1,4 +1,4 @@
-"""Comparison of two pointing series, and the recipe from observations to a compared series."""
+"""Pointing series of observations, and its comparison with another."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Counts of one mirror for points, with what stands in the beams: the recipe behind `catseye point`."""
+"""Counts of one mirror for points, and obstacles to its beams."""
 
 from dataclasses import dataclass, field
 

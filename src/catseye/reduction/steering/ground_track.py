@@ -1,4 +1,4 @@
-"""Points that move with the telescope, followed by one mirror on the ground: the recipe behind `catseye.track`."""
+"""Track of moving points by one mirror on the ground."""
 
 from dataclasses import dataclass
 
