@@ -19,10 +19,13 @@ if TYPE_CHECKING:
     from catseye.api.network import adjust, compare, locate, plan
     from catseye.api.night import explain, night, reduce
     from catseye.api.optics import beam, glass, link, safety
+    from catseye.api.pointing import fit_pointing, predict_pointing
+    from catseye.api.pose import pose
     from catseye.api.reading import examples, load
     from catseye.api.result import save, show
     from catseye.api.steering import point, track
-    from catseye.api.telescope import pose, surface
+    from catseye.api.telescope import surface
+    from catseye.api.track_profile import track_pointing
     from catseye.api.weather import air, refractometer, sound
 
 FACE = {  # file of catseye.api -> its exported names
@@ -31,10 +34,13 @@ FACE = {  # file of catseye.api -> its exported names
     "network": ("adjust", "compare", "locate", "plan"),
     "night": ("explain", "night", "reduce"),
     "optics": ("beam", "glass", "link", "safety"),
+    "pointing": ("fit_pointing", "predict_pointing"),
+    "pose": ("pose",),
     "reading": ("examples", "load"),
     "result": ("save", "show"),
     "steering": ("point", "track"),
-    "telescope": ("pose", "surface"),
+    "telescope": ("surface",),
+    "track_profile": ("track_pointing",),
     "weather": ("air", "refractometer", "sound"),
 }
 
@@ -54,6 +60,7 @@ __all__ = [
     "compare",
     "examples",
     "explain",
+    "fit_pointing",
     "glass",
     "link",
     "load",
@@ -62,6 +69,7 @@ __all__ = [
     "plan",
     "point",
     "pose",
+    "predict_pointing",
     "reduce",
     "refractometer",
     "replay",
@@ -72,6 +80,7 @@ __all__ = [
     "sound",
     "surface",
     "track",
+    "track_pointing",
     "triplet",
 ]
 

@@ -5,7 +5,6 @@ from typing import get_args
 import pytest
 import typer
 
-from catseye.api.telescope import CARRIED
 from catseye.atmosphere.index import air
 from catseye.atmosphere.sound import speed
 from catseye.cli import vocabularies
@@ -29,6 +28,7 @@ from catseye.reduction.calibrations import kinds
 from catseye.reduction.network import adjusted
 from catseye.reduction.pose import pointing_offsets
 from catseye.reduction.pose import pose as pose_recipe
+from catseye.reduction.pose.findings import CARRIED
 from catseye.reduction.structure.series import Own
 from catseye.reduction.surface.actuators import Travel
 from catseye.service import settings, world

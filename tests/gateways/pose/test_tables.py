@@ -52,7 +52,8 @@ def test_every_column_of_pointing_offsets_has_the_unit_of_its_name():
     }
     left = seen - fit.series.correction(a, e)
     np.testing.assert_allclose(np.abs(fit.residual), np.abs(left), rtol=0, atol=1e-12)  # rad
-    assert_columns(observations_csv(fit, SimpleNamespace(where=where)), told, range(40))
+    found = SimpleNamespace(fit=fit, observations=SimpleNamespace(where=where))
+    assert_columns(observations_csv(found), told, range(40))
 
 
 def test_every_column_of_the_tilt_has_the_unit_of_its_name():

@@ -10,7 +10,6 @@ from catseye.aliases import Progress
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.estimation.shapes.pose import Pose
 from catseye.gateways.pose.objects import (
-    FORMAT,
     beam_rows,
     pose_result_object,
     pose_rows,
@@ -22,8 +21,9 @@ from catseye.gateways.writers.page import card, page, paragraph, picture, sectio
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
 from catseye.gateways.writers.verdict import verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
+from catseye.records.network.written_pose import GROUP_POSE
+from catseye.reduction.pose.findings import PoseFindings
 from catseye.reduction.pose.pointing_offsets import PointingOffset
-from catseye.reduction.pose.verdicts import PoseFindings, pose_verdict
 
 
 def write_pose(
@@ -48,7 +48,7 @@ def write_pose(
         "pose.json": lambda: json_page(pose_result_object(result)),
         "report.html": lambda: pose_report(result, when, inputs),
     }
-    provenance = {"format": FORMAT, "made_by": "catseye pose", "settings": dict(settings)}
+    provenance = {"format": GROUP_POSE, "made_by": "catseye pose", "settings": dict(settings)}
     write_files(files, directory, {**provenance, **origin(when, inputs)}, progress=progress)
     pose = result.pose.pose
     pivot = f"{', '.join(f'{v:.6f}' for v in pose.pivot)} m"
@@ -82,7 +82,7 @@ def pose_report(result: PoseFindings, when: datetime, inputs: Mapping[str, str])
     words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in pose_words(result))
     body = [
         header,
-        verdict_line(pose_verdict(result)),
+        verdict_line(result.verdict),
         section("summary", "Summary", f'<div class="cards">{"".join(_cards(group.pose))}</div>', f"<dl>{words}</dl>"),
         section(
             "pose",

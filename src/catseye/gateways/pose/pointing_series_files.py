@@ -1,6 +1,7 @@
 """Files of a pointing fit and of a track profile."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from html import escape
 from pathlib import Path
@@ -9,16 +10,15 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import ARCSECOND
+from catseye.errors import InputError
 from catseye.gateways.pose.pointing_series_objects import (
     FORMAT,
     TRACK,
-    Observed,
     fit_object,
     fit_rows,
     fit_words,
     model_record,
     track_object,
-    track_verdict,
 )
 from catseye.gateways.pose.tables import OBSERVATIONS, TILT, observations_csv, tilt_csv
 from catseye.gateways.writers.objects import json_page, versions
@@ -28,30 +28,25 @@ from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, 
 from catseye.gateways.writers.verdict import verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.records.files.toml_text import record_toml
+from catseye.records.laboratory.star_offsets import MARK as STARS
+from catseye.records.laboratory.star_offsets import star_offsets_text
 from catseye.records.site.pointing_model import FORMAT as MODEL
-from catseye.reduction.pose.pointing_fit import PointingFit, SeriesComparison
+from catseye.reduction.pose.pointing_fit import PointingFit
+from catseye.reduction.pose.series_comparison import PointingFindings
 from catseye.reduction.pose.track_profile import TrackProfile
-from catseye.reduction.pose.verdicts import fit_verdict
 
 
-def write_fit(
-    fit: PointingFit,
-    observed: Observed,
-    compared: SeriesComparison | None,
-    *,
-    directory: Path,
-    settings: Mapping[str, Any],
-) -> None:
+def write_fit(result: PointingFindings, *, directory: Path, settings: Mapping[str, Any]) -> None:
     """Write table, JSON, model, report, and last the provenance."""
-    when = datetime.now(UTC)
+    when, fit = datetime.now(UTC), result.fit
     files: Files = {
-        "observations.csv": lambda: observations_csv(fit, observed),
-        "pointing.json": lambda: json_page(fit_object(fit, observed, compared)),
-        "pointing.toml": lambda: record_toml(model_record(fit, f"fit of {observed.where[0].split(' line ')[0]}")),
-        "report.html": lambda: fit_report(fit, observed, compared, when=when),
+        "observations.csv": lambda: observations_csv(result),
+        "pointing.json": lambda: json_page(fit_object(result)),
+        "pointing.toml": lambda: record_toml(model_record(fit, f"fit of {result.observations.name}")),
+        "report.html": lambda: fit_report(result, when),
     }
     provenance = {"format": FORMAT, "made_by": "catseye pointing fit", "settings": dict(settings)}
-    write_files(files, directory, {**provenance, **origin(when, observed.hashes)})
+    write_files(files, directory, {**provenance, **origin(when, result.hashes)})
     series = SamplerTable(
         "SERIES",
         {
@@ -66,30 +61,46 @@ def write_fit(
 
 def write_model(fit: PointingFit, path: Path) -> None:
     """Write the series alone, atomically."""
-    with atomic_file(path, "--write", f'format = "{MODEL}"') as pieces:
+    with atomic_file(path, "model", f'format = "{MODEL}"') as pieces:
         pieces.append(record_toml(model_record(fit, path.stem)))
 
 
-def fit_report(fit: PointingFit, observed: Observed, compared: SeriesComparison | None, *, when: datetime) -> str:
+def write_used_stars(result: PointingFindings, path: Path) -> None:
+    """Write the stars that were used as TPOINT text, atomically.
+
+    Raises InputError for observations without stars.
+    """
+    stars, used = result.observations.stars, result.fit.used
+    if stars is None:
+        raise InputError(f"stars {path}: there are no stars in poses (expected a TPOINT file)")
+    columns = ("azimuth", "elevation", "azimuth_encoder", "elevation_encoder", "auxiliary")
+    selected = replace(stars, **{name: getattr(stars, name)[used] for name in columns})
+    with atomic_file(path, "stars", STARS) as pieces:
+        pieces.append(star_offsets_text(selected))
+
+
+def fit_report(result: PointingFindings, when: datetime) -> str:
     """HTML report of a pointing fit."""
     from catseye.gateways.pose.pointing_series_figures import fit_figures  # matplotlib is heavy
+    from catseye.gateways.writers.drawing import svgs
 
-    drawn = fit_figures(fit)
-    words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in fit_words(fit, observed, compared))
+    fit = result.fit
+    drawn = svgs(fit_figures(fit))
+    words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in fit_words(result))
     u = np.sqrt(np.diag(fit.series.covariance)) / ARCSECOND
     cards = [
         card(term, f"{value:+.2f}″", f"u = {w:.2f}″")
         for term, value, w in zip(fit.series.terms, fit.series.values / ARCSECOND, u, strict=True)
     ]
-    heads = ["term", "arcsec", "u"] + (["minus the other", "u"] if compared is not None else [])
+    heads = ["term", "arcsec", "u"] + (["minus the other", "u"] if result.comparison is not None else [])
     body = [
-        _header(f"Pointing series from {observed.source}", when),
-        verdict_line(fit_verdict(fit)),
+        _header(f"Pointing series from {result.observations.source}", when),
+        verdict_line(fit.verdict),
         section("summary", "Summary", f'<div class="cards">{"".join(cards)}</div>', f"<dl>{words}</dl>"),
         section(
             "terms",
             "Terms",
-            table(heads, fit_rows(fit, compared), "t" + "n" * (len(heads) - 1)),
+            table(heads, fit_rows(result), "t" + "n" * (len(heads) - 1)),
             paragraph("ΔA cos E = CA + NPAE sin E + IA cos E + AW cos A sin E + AN sin A sin E;"),
             paragraph("ΔE = −IE − AW sin A + AN cos A + HZCZ sin E + HZSZ cos E: encoders minus sky."),
             picture(drawn["correlation"], "Correlations: terms near ±1 cannot be separated by these directions."),
@@ -100,7 +111,7 @@ def fit_report(fit: PointingFit, observed: Observed, compared: SeriesComparison 
             picture(drawn["residuals"], "Residuals by azimuth and elevation."),
             picture(drawn["sky"], "The same on the sky, the zenith in the middle."),
         ),
-        _provenance(observed.hashes, when),
+        _provenance(result.hashes, when),
     ]
     return page("catseye: pointing", "\n".join(body))
 
@@ -146,6 +157,11 @@ def track_rows(profile: TrackProfile) -> list[tuple[str, str, str]]:
     ]
 
 
+def track_lines(profile: TrackProfile) -> list[str]:
+    """Lines of the coefficients."""
+    return [f"{'':<14}{name:<16}{value:>10} arcsec   u {u}" for name, value, u in track_rows(profile)]
+
+
 def track_words(profile: TrackProfile) -> list[tuple[str, str]]:
     """Title and text of each passage, in order."""
     (an, aw), spread = profile.series.axis
@@ -185,19 +201,20 @@ def _tilt_caption(profile: TrackProfile) -> str:
 def track_report(profile: TrackProfile, hashes: Mapping[str, str], when: datetime) -> str:
     """HTML report of a track profile."""
     from catseye.gateways.pose.pointing_series_figures import track_figures  # matplotlib is heavy
+    from catseye.gateways.writers.drawing import svgs
 
-    drawn = track_figures(profile)
+    drawn = svgs(track_figures(profile))
     words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in track_words(profile))
     body = [
         _header("Track and azimuth bearing", when),
-        verdict_line(track_verdict(profile)),
+        verdict_line(profile.verdict),
         section("summary", "Summary", f"<dl>{words}</dl>"),
         section(
             "tilt",
             "Tilt by azimuth",
             picture(drawn["tilt"], _tilt_caption(profile)),
             table(("coefficient", "arcsec", "u"), track_rows(profile), "tnn"),
-            picture(drawn["left"], "Residuals of poses and inclinometer."),
+            picture(drawn["residuals"], "Residuals of poses and inclinometer."),
         ),
         _provenance(hashes, when),
     ]

@@ -8,11 +8,10 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.estimation.shapes.pose import Pose
-from catseye.gateways.pose.pointing_series_objects import Observed
 from catseye.gateways.writers.columns import Column, Table
-from catseye.reduction.pose.pointing_fit import PointingFit
+from catseye.reduction.pose.series_comparison import PointingFindings
 from catseye.reduction.pose.track_profile import TrackProfile
-from catseye.reduction.pose.verdicts import PoseFindings
+from catseye.reduction.pose.findings import PoseFindings
 
 PAGE = "star-offsets.md"
 
@@ -61,22 +60,11 @@ POINTS = Table[PosePoints](
 )
 
 
-@dataclass(frozen=True, eq=False)
-class OffsetRows:
-    """Source of observations.csv: pointing offsets.
-
-    where   places in the file, one per observation
-    """
-
-    fit: PointingFit
-    where: tuple[str, ...]
-
-
-OBSERVATIONS = Table[OffsetRows](
+OBSERVATIONS = Table[PointingFindings](
     "observations.csv",
     PAGE,
     (
-        Column("place", "", "file and line", lambda o: o.where),
+        Column("place", "", "file and line", lambda o: o.observations.where),
         Column("azimuth_deg", "deg", "azimuth on the sky", lambda o: o.fit.azimuth / DEGREE, ".7f"),
         Column("elevation_deg", "deg", "elevation on the sky", lambda o: o.fit.elevation / DEGREE, ".7f"),
         Column(
@@ -170,9 +158,9 @@ def points_csv(result: PoseFindings) -> str:
     return POINTS.csv(PosePoints(result.pose.pose, result.pose.places))
 
 
-def observations_csv(fit: PointingFit, observed: Observed) -> str:
+def observations_csv(result: PointingFindings) -> str:
     """Table of observations with residuals."""
-    return OBSERVATIONS.csv(OffsetRows(fit, tuple(observed.where)))
+    return OBSERVATIONS.csv(result)
 
 
 def tilt_csv(profile: TrackProfile) -> str:

@@ -194,9 +194,7 @@ def _posture_of(epoch: SolvedPoints, site: SiteFolder, carrier: str) -> SiteFold
     if carrier == "ground":
         return site
     if epoch.posture is None:
-        raise InputError(
-            f"{epoch.file}: its posture is unknown (expected pose.json beside coordinates.json, or --earlier-posture)"
-        )
+        raise InputError(f"{epoch.file}: its posture is unknown (expected pose.json beside it, or earlier_posture_deg)")
     return at_posture(site, *epoch.posture)
 
 

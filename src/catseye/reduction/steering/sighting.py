@@ -60,11 +60,11 @@ def place_of_monument(
     for key, limits in (("latitude_deg", (-90.0, 90.0)), ("longitude_deg", (-180.0, 360.0))):
         value = angles[key]
         if value is not None and not limits[0] <= value <= limits[1]:
-            raise InputError(f"--{key.replace('_', '-')} {value:g} is outside {limits[0]:g} to {limits[1]:g} (degrees)")
+            raise InputError(f"{key} = {value:g} is outside {limits[0]:g} to {limits[1]:g} (degrees)")
         if value is None:
             raise InputError(
                 f"the Sun's place needs {key}, which the record of {monument.monument} lacks (expected it "
-                f"there, or --{key.replace('_', '-')})"
+                f"there, or as an argument)"
             )
     height = monument.elevation_m or 0.0
     latitude, longitude = float(angles["latitude_deg"]) * DEGREE, float(angles["longitude_deg"]) * DEGREE
@@ -141,7 +141,7 @@ def seen_from(
     aboard = next((solid for solid in solids.all if solid.frame != "ground"), None)
     if posture is None and aboard is not None:
         raise InputError(
-            f"solid {aboard.name!r} stands in the frame {aboard.frame}: its position is unknown (expected --posture)"
+            f"solid {aboard.name!r} stands in the frame {aboard.frame}: its position is unknown (expected posture_deg)"
         )
     axis = np.full(3, np.nan) if facing is None else facing
     return visibility(
