@@ -8,6 +8,7 @@ from importlib import import_module
 import numpy as np
 import pytest
 
+import catseye
 from catseye import names
 from catseye.atmosphere.index.air import MODELS
 from catseye.coordinator.visibility.vantage import SeenRetroreflector, retros_of
@@ -71,6 +72,11 @@ def test_the_page_of_a_sites_files_lists_the_kinds_and_their_axes():
         axis, glass = KINDS[name].has_axis, KINDS[name].glass is not HOLLOW.glass
         assert ("`normal`" in keys, incidence) == (axis, "judged" if axis else "not judged"), name
         assert all((f"`{key}`" in keys) == glass for key in GLASS_KEYS), name
+
+
+def test_the_documentation_of_air_lists_every_model():
+    listed = re.search(r"^ +model +(\w.*)$", catseye.air.__doc__, re.MULTILINE)
+    assert re.findall(r"\w*\d{4}\w*", listed[1]) == list(names.AIR_MODELS)
 
 
 # No name is compared
