@@ -8,6 +8,7 @@ CatseyeError
 └── EstimationError   an adjustment without a result, raised only when the result is required
 """
 
+from enum import Enum
 from typing import Any
 
 
@@ -46,4 +47,11 @@ class FrameError(CatseyeError, ValueError):
 
 
 class EstimationError(CatseyeError):
-    """Adjustment without a result, raised only when the result is required."""
+    """Adjustment without a result, raised only when the result is required.
+
+    reason   member of the estimation's enum of statuses; None without one
+    """
+
+    def __init__(self, text: str, reason: Enum | None = None) -> None:
+        super().__init__(text)
+        self.reason = reason

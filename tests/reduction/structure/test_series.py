@@ -152,7 +152,7 @@ def test_unknown_or_floating_quantities_are_refused_by_name():
     still = replace(series, way=np.zeros(40))
     with pytest.raises(EstimationError, match=r"arm by 'up' floats"):
         fit_structure(still, SeriesModel(hysteresis=True))
-    with pytest.raises(EstimationError, match=r"group 'arm'.*3 epochs"):
+    with pytest.raises(EstimationError, match=r"group 'arm'.* of [A-Z]\w+ by '.*3 epochs"):
         fit_structure(series.part(np.arange(3)), SeriesModel(own="each", scatter=False))
     with pytest.raises(InputError, match="stretches"):
         left_out(series, folds=1)

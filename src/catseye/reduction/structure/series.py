@@ -22,6 +22,7 @@ from catseye.aliases import Array
 from catseye.constants import DEGREE
 from catseye.errors import EstimationError, InputError, ValidityError
 from catseye.estimation.harmonic.body import rigid_design, rigid_part
+from catseye.estimation.harmonic.labels import HarmonicLabels
 from catseye.estimation.harmonic.series import HarmonicFit, Spread, fit_harmonics
 from catseye.geometry.antenna.deformation import PostureTerms, TelescopePosture
 
@@ -290,16 +291,23 @@ def fit_structure(series: GroupSeries, model: SeriesModel | None = None) -> Stru
     reference_c = float(np.mean(np.asarray(series.posture.temperature_c, dtype=float))) if what.temperature else 0.0
     rows = what.rows(fitted_posture(series, what), series.way, reference_c)
     m = what.own_count
+    labels = HarmonicLabels(series.group, series.names, what.functions, m)
     scatter = EpochScatter(np.zeros((6, 6)), 0.0)
 
     def fitted() -> StructureFit:
         spread = widened(series.spread, middle - series.pivot, scatter)
         try:
             harmonics = fit_harmonics(
-                series.places - middle, middle - series.pivot, body=rows[:, m:], own=rows[:, :m], spread=spread
+                series.places - middle,
+                middle - series.pivot,
+                body=rows[:, m:],
+                own=rows[:, :m],
+                spread=spread,
+                labels=labels,
             )
         except EstimationError as problem:
-            raise EstimationError(_named(str(problem), series, what)) from problem
+            functions = f"functions {', '.join(what.functions)}; {len(series)} epochs"
+            raise EstimationError(f"group {series.group!r}: {problem} ({functions})") from problem
         return StructureFit(series, what, middle, reference_c, harmonics, scatter)
 
     fit = fitted()
@@ -422,14 +430,3 @@ def refuse_unknown(series: GroupSeries, model: SeriesModel) -> None:
         if len(bad):
             label = series.labels[bad[0]] if series.labels else f"{bad[0]} (counted from 0)"
             raise InputError(f"epoch {label}: its {name} is unknown (expected {hint})")
-
-
-def _named(text: str, series: GroupSeries, model: SeriesModel) -> str:
-    """Error text with names of points and functions for their numbers."""
-    import re
-
-    m, functions = model.own_count, model.functions
-    text = re.sub(r"the body's function (\d+)", lambda f: f"{series.group} by {functions[m + int(f[1]) - 1]!r}", text)
-    text = re.sub(r"by its function (\d+)", lambda f: f"by {functions[int(f[1]) - 1]!r}", text)
-    text = re.sub(r"point (\d+)( \(counted from 0\))?", lambda f: series.names[int(f[1])], text)
-    return f"group {series.group!r}: {text} (functions {', '.join(functions)}; {len(series)} epochs)"
