@@ -19,10 +19,13 @@ if TYPE_CHECKING:
     from catseye.api.network import adjust, compare, locate, plan
     from catseye.api.night import explain, night, reduce
     from catseye.api.optics import beam, glass, link, safety
+    from catseye.api.panels import panels
     from catseye.api.reading import examples, load
     from catseye.api.result import save, show
     from catseye.api.steering import point, track
-    from catseye.api.telescope import pose, surface
+    from catseye.api.structure import structure
+    from catseye.api.surface import surface
+    from catseye.api.telescope import pose
     from catseye.api.weather import air, refractometer, sound
 
 FACE = {  # file of catseye.api -> its exported names
@@ -31,10 +34,13 @@ FACE = {  # file of catseye.api -> its exported names
     "network": ("adjust", "compare", "locate", "plan"),
     "night": ("explain", "night", "reduce"),
     "optics": ("beam", "glass", "link", "safety"),
+    "panels": ("panels",),
     "reading": ("examples", "load"),
     "result": ("save", "show"),
     "steering": ("point", "track"),
-    "telescope": ("pose", "surface"),
+    "structure": ("structure",),
+    "surface": ("surface",),
+    "telescope": ("pose",),
     "weather": ("air", "refractometer", "sound"),
 }
 
@@ -59,6 +65,7 @@ __all__ = [
     "load",
     "locate",
     "night",
+    "panels",
     "plan",
     "point",
     "pose",
@@ -70,6 +77,7 @@ __all__ = [
     "show",
     "simulate",
     "sound",
+    "structure",
     "surface",
     "track",
     "triplet",

@@ -246,6 +246,7 @@ def test_quick_answers_spare_the_heavy_imports(arguments):
 
 
 ONE_CALL = ["air", "beam", "explain", "glass", "link", "night", "plan", "reduce", "replay", "safety", "sound"]
+ONE_CALL += ["panels", "structure", "surface"]
 OF_THE_TERMINAL = {"json", "out", "quiet", "strict", "page", "threads"}
 
 

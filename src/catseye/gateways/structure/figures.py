@@ -3,7 +3,7 @@
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
-from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl
 from catseye.reduction.structure.check import LeaveOut
 from catseye.reduction.structure.series import StructureFit
 from catseye.reduction.structure.vibration import Vibration
@@ -12,7 +12,7 @@ AXES = ("x", "y", "z")
 BAND = 2.0  # standard uncertainties shown
 
 
-def motion_figure(fit: StructureFit) -> str:
+def motion_figure(fit: StructureFit) -> Figure:
     """Shift and rotation of the group with elevation, with u and each epoch's residual motion."""
     from catseye.estimation.harmonic.body import rigid_part
 
@@ -40,10 +40,10 @@ def motion_figure(fit: StructureFit) -> str:
             panel.set_title(f"{'shift' if c < 3 else 'turn about'} {AXES[c % 3]}, {unit}")
             if c >= 3:
                 panel.set_xlabel("elevation, degrees")
-        return svg(figure)
+        return figure
 
 
-def residual_figure(fit: StructureFit, check: LeaveOut | None) -> str:
+def residual_figure(fit: StructureFit, check: LeaveOut | None) -> Figure:
     """Map of residuals, points downwards, epochs by elevation; and left-out epochs over their claim."""
     order = np.argsort(np.asarray(fit.series.posture.elevation))
     residual = fit.fit.residual[order] / MILLIMETRE
@@ -81,10 +81,10 @@ def residual_figure(fit: StructureFit, check: LeaveOut | None) -> str:
             )
         below.set_yticks([])
         below.set_title("Claims are correct if the bars match the red curve" if check is not None else "Residuals")
-        return svg(figure)
+        return figure
 
 
-def spectrum_figure(vibration: Vibration) -> str:
+def spectrum_figure(vibration: Vibration) -> Figure:
     """Densities of all series with the first one's confidence band, peaks named."""
     f, density = vibration.spectrum.frequency_hz, vibration.spectrum.density / MILLIMETRE**2
     with mpl.rc_context(STYLE):
@@ -108,4 +108,4 @@ def spectrum_figure(vibration: Vibration) -> str:
         panel.set_ylabel("density of the range, mm²/Hz")
         if len(vibration.series) <= 12:
             panel.legend(loc="upper right", ncols=2)
-        return svg(figure)
+        return figure

@@ -34,6 +34,8 @@ class SolvedPoints:
     posture      azimuth and elevation, rad, from pose.json, if there
     hashes       SHA-256 of the files read, by name
     verdict      of the reduction; None if the file has none
+    dish         names of the prisms of its surface, if it has one
+    focal_length of that surface, m
     """
 
     file: str
@@ -44,6 +46,8 @@ class SolvedPoints:
     posture: tuple[float, float] | None
     hashes: dict[str, str]
     verdict: Verdict | None = None
+    dish: tuple[str, ...] = ()
+    focal_length: float | None = None
 
     def __repr__(self) -> str:
         where = Path(self.file).name
@@ -71,10 +75,11 @@ class SolvedPoints:
         return np.array([at[n] for n in names], dtype=int)
 
 
-def read_solved_points(path: Path | str) -> SolvedPoints:
+def read_solved_points(path: Path | str, *, averaged: bool = True) -> SolvedPoints:
     """Points of a coordinates.json, or of a directory from `catseye reduce --out`.
 
-    path   the file, or the directory
+    path       the file, or the directory
+    averaged   mean of a printed covariance's two triangles, which differ by rounding; False: as printed
 
     Raises InputError with file, place, value and expectation.
     """
@@ -90,12 +95,46 @@ def read_solved_points(path: Path | str) -> SolvedPoints:
     if document.get("frame") != "ground":
         raise refusal(name, f"frame = {shown(document.get('frame'))} (expected 'ground')")
     x = np.array([[_number(name, n, points[n], axis) for axis in "xyz"] for n in names])
-    covariance = _covariance(name, stored_covariance(document, folder.directory, len(order)), len(order))
-    pose_file = folder.directory / POSE_FILE
-    posture = _posture(_object(folder, POSE_FILE)) if pose_file.is_file() else None
-    hashes = {f"{path.name}/{f}" if path.is_dir() else f: digest for f, digest in folder.hashes.items()}
-    judged = stored_verdict(name, document)
-    return SolvedPoints(str(path), str(document.get("campaign", "")), names, x, covariance, posture, hashes, judged)
+    printed = stored_covariance(document, folder.directory, len(order))
+    covariance = _covariance(name, printed, len(order), averaged=averaged)
+    posture_deg = read_posture_deg(folder)
+    dish, focal_length = _dish(name, document, names)
+    return SolvedPoints(
+        file=str(path),
+        campaign=str(document.get("campaign", "")),
+        names=names,
+        x=x,
+        covariance=covariance,
+        posture=None if posture_deg is None else (posture_deg[0] * DEGREE, posture_deg[1] * DEGREE),
+        hashes={f"{path.name}/{f}" if path.is_dir() else f: digest for f, digest in folder.hashes.items()},
+        verdict=stored_verdict(name, document),
+        dish=dish,
+        focal_length=focal_length,
+    )
+
+
+def read_posture_deg(folder: Folder) -> tuple[float, float] | None:
+    """Azimuth and elevation of a pose.json, degrees; None without one."""
+    if not (folder.directory / POSE_FILE).is_file():
+        return None
+    posture = _object(folder, POSE_FILE).get("nominal_posture")
+    if not isinstance(posture, dict):
+        return None
+    angles: list[Any] = [posture.get(key) for key in ("azimuth_deg", "elevation_deg")]
+    if any(isinstance(v, bool) or not isinstance(v, int | float) or not math.isfinite(v) for v in angles):
+        raise refusal(POSE_FILE, f"nominal_posture = {shown(posture)} (expected azimuth_deg and elevation_deg)")
+    return float(angles[0]), float(angles[1])
+
+
+def _dish(file: str, document: dict[str, Any], names: tuple[str, ...]) -> tuple[tuple[str, ...], float | None]:
+    """Names of a dish's prisms and its focal length; nothing where the reduction has no dish."""
+    surface = document.get("surface")
+    if surface is None:
+        return (), None
+    deviations = surface.get("deviations") if isinstance(surface, dict) else None
+    if not isinstance(deviations, dict) or not deviations.keys() <= set(names):
+        raise refusal(file, "surface.deviations is missing or names no point (expected as catseye reduce writes it)")
+    return tuple(deviations), _number(file, "surface", surface, "focal_length")
 
 
 def _object(folder: Folder, name: str) -> dict[str, Any]:
@@ -117,7 +156,7 @@ def _number(file: str, point: str, row: Any, axis: str) -> float:
     return float(value)
 
 
-def _covariance(file: str, rows: Any, size: int) -> np.ndarray:
+def _covariance(file: str, rows: Any, size: int, *, averaged: bool) -> np.ndarray:
     if isinstance(rows, np.ndarray):  # mapped: checked when used
         if not np.all(np.diag(rows) >= 0.0):
             raise refusal(file, "its covariance file has a negative variance (expected a covariance, m^2)")
@@ -131,14 +170,4 @@ def _covariance(file: str, rows: Any, size: int) -> np.ndarray:
     scale = np.sqrt(np.abs(np.outer(np.diag(q), np.diag(q))))
     if np.any(np.diag(q) < 0.0) or np.any(np.abs(q - q.T) > DRAWN * scale + 1e-30):
         raise refusal(file, "covariance is not symmetric or has a negative variance (expected a covariance, m^2)")
-    return 0.5 * (q + q.T)
-
-
-def _posture(document: dict[str, Any]) -> tuple[float, float] | None:
-    posture = document.get("nominal_posture")
-    if not isinstance(posture, dict):
-        return None
-    angles: list[Any] = [posture.get(key) for key in ("azimuth_deg", "elevation_deg")]
-    if any(isinstance(v, bool) or not isinstance(v, int | float) or not math.isfinite(v) for v in angles):
-        raise refusal(POSE_FILE, f"nominal_posture = {shown(posture)} (expected azimuth_deg and elevation_deg)")
-    return float(angles[0]) * DEGREE, float(angles[1]) * DEGREE
+    return 0.5 * (q + q.T) if averaged else q

@@ -98,7 +98,7 @@ def group_series(
     if correlated and len(used) * (3 * len(names)) ** 2 > MOST:
         raise InputError(
             f"{len(names)} points in {len(used)} epochs with a covariance of all in each are too many (expected "
-            f"{MOST:.0e} numbers at most): name fewer, or take them as independent (--independent)"
+            f"{MOST:.0e} numbers at most): name fewer, or take them as independent"
         )
     places = np.full((len(used), len(names), 3), np.nan)
     # of absent points: ones, never used

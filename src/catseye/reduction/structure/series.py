@@ -13,7 +13,7 @@ and for hysteresis `up`: 1 after the elevation rose, -1 after it fell. The scatt
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,6 +54,8 @@ class SeriesModel:
     def __post_init__(self) -> None:
         if self.harmonics not in (1, 2):
             raise ValidityError(f"{self.harmonics} harmonics of elevation (expected 1 or 2)")
+        if self.own not in get_args(Own):
+            raise ValidityError(f"own = {self.own!r} (expected {' or '.join(get_args(Own))})")
 
     @property
     def functions(self) -> tuple[str, ...]:
@@ -423,7 +425,7 @@ def refuse_unknown(series: GroupSeries, model: SeriesModel) -> None:
     """Raise InputError where a function needs a quantity that an epoch lacks."""
     requirements = [("elevation", np.asarray(series.posture.elevation, dtype=float), "a posture")]
     if model.temperature:
-        hint = "a temperature of the structure, or a model without (--no-temperature)"
+        hint = "a temperature of the structure, or a model without"
         requirements.append(("temperature", np.asarray(series.posture.temperature_c, dtype=float), hint))
     for name, values, hint in requirements:
         bad = np.flatnonzero(~np.isfinite(values))

@@ -159,7 +159,7 @@ def _elevations(shapes: Sequence[SurfaceShape]) -> np.ndarray:
     result: list[float] = []
     for shape in shapes:
         if shape.prisms.elevation_deg is None:
-            raise EstimationError(f"{shape.prisms.source}: unknown elevation; set it by --elevation-deg")
+            raise EstimationError(f"{shape.prisms.source}: unknown elevation; set it by elevation_deg")
         result.append(shape.prisms.elevation_deg)
     return np.array(result)
 
