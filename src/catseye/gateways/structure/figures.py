@@ -14,13 +14,11 @@ BAND = 2.0  # standard uncertainties shown
 
 def motion_figure(fit: StructureFit) -> Figure:
     """Shift and rotation of the group with elevation, with u and each epoch's residual motion."""
-    from catseye.estimation.harmonic.body import rigid_part
-
     series = fit.series
     e = np.asarray(series.posture.elevation, dtype=float)
     grid = np.linspace(e.min(), e.max(), 121)
     predicted = fit.predict(grid)
-    at = fit.predict(e)  # without temperature and direction terms
+    at, motion = fit.predict(e), fit.residual_motion  # without temperature and direction terms
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9.2, 5.4), layout="constrained")
         axes = figure.subplots(2, 3, sharex=True)
@@ -30,13 +28,7 @@ def motion_figure(fit: StructureFit) -> Figure:
             u = BAND * np.sqrt(np.maximum(predicted.six_covariance[:, c, c], 0.0)) / scale
             panel.fill_between(grid / DEGREE, value - u, value + u, color=SERIES[0], alpha=0.18, linewidth=0)
             panel.plot(grid / DEGREE, value, color=SERIES[0])
-            residual_motion = np.full(len(e), np.nan)
-            for t, residual in enumerate(fit.fit.residual):
-                measured = np.isfinite(residual).all(axis=1)
-                part = rigid_part(fit.arms[measured]) if measured.sum() >= 3 else None
-                if part is not None:
-                    residual_motion[t] = float(np.einsum("ni,ni->", part[c], residual[measured])) / scale
-            panel.plot(e / DEGREE, at.six[:, c] / scale + residual_motion, "o", color=INK, markersize=2.6)
+            panel.plot(e / DEGREE, at.six[:, c] / scale + motion[:, c] / scale, "o", color=INK, markersize=2.6)
             panel.set_title(f"{'shift' if c < 3 else 'turn about'} {AXES[c % 3]}, {unit}")
             if c >= 3:
                 panel.set_xlabel("elevation, degrees")

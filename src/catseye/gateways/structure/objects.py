@@ -120,12 +120,10 @@ def _range(values: Any) -> list[float]:
 
 
 def _check(check: LeaveOut) -> dict[str, Any]:
-    inside = ~check.extrapolated
-    ratios = check.normalised
     return {
         "rms": check.rms,
         "ratio": check.ratio,
-        "ratio_inside": float(np.sqrt(np.nanmean(ratios[inside]) / 3.0)) if inside.any() else float("nan"),
+        "ratio_inside": check.ratio_inside,
         "folds": int(check.fold.max()) + 1,
         "extrapolated_epochs": int(check.extrapolated.sum()),
     }

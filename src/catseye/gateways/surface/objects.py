@@ -85,12 +85,11 @@ def _square(square: MeanSquare) -> dict[str, Any]:
 
 
 def _gain(gain: Gain) -> dict[str, Any]:
-    loss = -10.0 * np.log10(gain.ruze) if gain.ruze > 0.0 else float("inf")
     return {
         "frequency": gain.frequency,
         "gain": gain.ruze,
         "u_gain": gain.u_ruze,
-        "loss_db": loss,
+        "loss_db": gain.loss_db,
         "gain_noise_included": gain.measured,
         "gain_coherent_noise_included": gain.coherent,
     }

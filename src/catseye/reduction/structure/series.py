@@ -219,6 +219,17 @@ class StructureFit:
         six = np.concatenate([self.fit.six, self.fit.rigid], axis=1)
         return six, self.fit.six_covariance[np.ix_(at, at)]
 
+    @property
+    def residual_motion(self) -> Array:
+        """Shift and turn (T, 6) of each epoch's residuals, m and rad; nan where they determine none."""
+        motion = np.full((len(self.series), 6), np.nan)
+        for t, residual in enumerate(self.fit.residual):
+            measured = np.isfinite(residual).all(axis=1)
+            part = rigid_part(self.arms[measured]) if measured.sum() >= 3 else None
+            if part is not None:
+                motion[t] = [float(np.einsum("ni,ni->", one, residual[measured])) for one in part]
+        return motion
+
     def predict(
         self, elevation: ArrayLike, *, temperature_c: ArrayLike | None = None, way: ArrayLike = 0.0
     ) -> Prediction:

@@ -199,6 +199,11 @@ class Gain:
     measured: float
     coherent: float
 
+    @property
+    def loss_db(self) -> float:
+        """Loss by Ruze, dB; infinite where no gain is left."""
+        return -10.0 * float(np.log10(self.ruze)) if self.ruze > 0.0 else float("inf")
+
 
 @dataclass(frozen=True, eq=False)
 class SurfaceShape:
