@@ -124,5 +124,14 @@ def read_range_series(
         seconds = (ranges[:, 0] - zero) * (SECONDS_PER_DAY / TICKS_PER_DAY) + ranges[:, 1]
         good = np.isfinite(ranges[:, 2:]).all(axis=1) & np.concatenate([[True], np.diff(seconds) > 0.0])
         window = 2.0 * float(np.median(ranges[:, 1]))
-        series.append(RangeSeries(ranger, target, seconds[good], ranges[good, 2], ranges[good, 3], window))
+        series.append(
+            RangeSeries(
+                ranger=ranger,
+                target=target,
+                seconds=seconds[good],
+                ranges=ranges[good, 2],
+                u=ranges[good, 3],
+                window=window,
+            )
+        )
     return tuple(series), hashes, zero / TICKS_PER_DAY

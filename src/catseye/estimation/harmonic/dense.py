@@ -79,15 +79,15 @@ def solved_together(
         to_six[6 * k :, 6 * k :] = np.einsum("jni,fg->fjngi", part, np.eye(m)).reshape(6 * m, 3 * n * m)
         link = to_six @ inverse @ to_six.T
     return Solved(
-        c.reshape(k, 6).T,
-        a.transpose(0, 2, 1),
-        inverse[local_columns[:, :, None], local_columns[:, None, :]],
-        inverse[local_columns][:, :, : 6 * k],
-        inverse[: 6 * k, : 6 * k],
-        link,
-        np.zeros((epochs, 0)),
-        max(pvv - float(right @ x), 0.0),
-        inverse,
+        rigid=c.reshape(k, 6).T,
+        own=a.transpose(0, 2, 1),
+        own_covariance=inverse[local_columns[:, :, None], local_columns[:, None, :]],
+        cross=inverse[local_columns][:, :, : 6 * k],
+        rigid_covariance=inverse[: 6 * k, : 6 * k],
+        six_link=link,
+        shared=np.zeros((epochs, 0)),
+        pvv=max(pvv - float(right @ x), 0.0),
+        full_covariance=inverse,
     )
 
 

@@ -251,4 +251,13 @@ def _answer(
     if u.shape[-1]:
         residual -= np.einsum("tniq,tq->tni", np.broadcast_to(u, (epochs, *u.shape[1:])), z, optimize=True)
     pvv = float(np.einsum("tni,tnij,tnj->", residual, weights, residual, optimize=True)) + float(np.sum(z**2))
-    return Solved(rigid, shifts, covariance, cross, core[: 6 * k, : 6 * k], link, z, pvv)
+    return Solved(
+        rigid=rigid,
+        own=shifts,
+        own_covariance=covariance,
+        cross=cross,
+        rigid_covariance=core[: 6 * k, : 6 * k],
+        six_link=link,
+        shared=z,
+        pvv=pvv,
+    )

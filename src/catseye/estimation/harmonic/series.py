@@ -178,18 +178,18 @@ def fit_harmonics(
     residual[~measured] = np.nan
     unknown = 6 * body.shape[1] + 3 * len(arms) * own.shape[1]
     return HarmonicFit(
-        solved.rigid,
-        solved.own,
-        solved.own_covariance,
-        solved.cross,
-        solved.rigid_covariance,
-        six,
-        six_covariance,
-        solved.shared,
-        residual,
-        solved.pvv,
-        3 * int(measured.sum()) - unknown,
-        solved.full_covariance,
+        rigid=solved.rigid,
+        own=solved.own,
+        own_covariance=solved.own_covariance,
+        cross=solved.cross,
+        rigid_covariance=solved.rigid_covariance,
+        six=six,
+        six_covariance=six_covariance,
+        shared=solved.shared,
+        residual=residual,
+        pvv=solved.pvv,
+        degrees_of_freedom=3 * int(measured.sum()) - unknown,
+        whole=solved.full_covariance,
     )
 
 

@@ -113,12 +113,12 @@ def _plainly(
     p = sum(PARAMETERS[name] for name in free)
     local = (points - nominal.translation) @ nominal.rotation
     series = SurfaceSeries(
-        free,
-        np.full((epochs, p), np.nan),
-        np.full((epochs, p, p), np.nan),
-        np.full((epochs, k), np.nan),
-        np.isfinite(local).all(axis=2).sum(axis=1),
-        np.zeros(epochs, dtype=np.int64),
+        free=free,
+        parameters=np.full((epochs, p), np.nan),
+        covariance=np.full((epochs, p, p), np.nan),
+        deviation=np.full((epochs, k), np.nan),
+        points=np.isfinite(local).all(axis=2).sum(axis=1),
+        status=np.zeros(epochs, dtype=np.int64),
     )
     for epoch in range(epochs):
         finite = np.isfinite(local[epoch]).all(axis=1)

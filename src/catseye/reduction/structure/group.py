@@ -126,7 +126,18 @@ def group_series(
     mjd = np.array([epoch.mjd for epoch in used])
     sorted_labels = tuple(epoch.label for epoch in used)
     spread = Spread(full=full) if correlated else Spread(points=alone)
-    return GroupSeries(group, frame, names, mjd, posture, ways(e), places, spread, middle, sorted_labels)
+    return GroupSeries(
+        group=group,
+        frame=frame,
+        names=names,
+        mjd=mjd,
+        posture=posture,
+        way=ways(e),
+        places=places,
+        spread=spread,
+        pivot=middle,
+        labels=sorted_labels,
+    )
 
 
 def carrier_of(frame: str, azimuth: float, elevation: float, *, nominal: Nominal) -> Transforms:

@@ -257,7 +257,14 @@ class StructureFit:
         k = rows.shape[1]
         shared = np.einsum("pa,aibj,pb->pij", change, q.reshape(k, 6, k, 6), change, optimize=True)
         spread = shared + self.scatter.covariance
-        return Prediction(self.series.names, place, covariance, change @ six.T, spread, self.outside(posture, way))
+        return Prediction(
+            names=self.series.names,
+            place=place,
+            covariance=covariance,
+            six=change @ six.T,
+            six_covariance=spread,
+            outside=self.outside(posture, way),
+        )
 
     def outside(self, posture: TelescopePosture, way: ArrayLike = 0.0) -> tuple[str, ...]:
         """Quantities of a posture outside the fitted range, as texts."""
@@ -321,7 +328,9 @@ def fit_structure(series: GroupSeries, model: SeriesModel | None = None) -> Stru
         except EstimationError as problem:
             functions = f"functions {', '.join(what.functions)}; {len(series)} epochs"
             raise EstimationError(f"group {series.group!r}: {problem} ({functions})") from problem
-        return StructureFit(series, what, middle, reference_c, harmonics, scatter)
+        return StructureFit(
+            series=series, model=what, rest=middle, reference_c=reference_c, fit=harmonics, scatter=scatter
+        )
 
     fit = fitted()
     if what.scatter:

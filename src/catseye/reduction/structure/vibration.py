@@ -187,7 +187,14 @@ def _found_peak(
     likely, share = likely_alias(times, values, may_be, stretch=length)
     decided = len(may_be) == 1 or (len(times) > 1 and float(np.diff(np.sort(share)[-2:])[0]) > CLEAR)
     shape = shape_at(spectra, peak.frequency_hz) if len(times) > 1 else None
-    return FoundPeak(peak, may_be, likely if decided else peak.frequency_hz, share, decided, shape)
+    return FoundPeak(
+        peak=peak,
+        may_be_hz=may_be,
+        likely_hz=likely if decided else peak.frequency_hz,
+        share=share,
+        decided=decided,
+        shape=shape,
+    )
 
 
 def _modes(
@@ -260,12 +267,12 @@ def difference(one: RangeSeries, second: RangeSeries, *, scale: float = 1.0, lon
     value = (1.0 - part) * second.ranges[at - 1] + part * second.ranges[at]
     spread = ((1.0 - part) * second.u[at - 1]) ** 2 + (part * second.u[at]) ** 2
     return RangeSeries(
-        one.name,
-        f"less {second.name}" if scale == 1.0 else f"less {scale:.6g} {second.name}",
-        one.seconds[usable],
-        (one.ranges - scale * value)[usable],
-        np.sqrt(one.u**2 + scale**2 * spread)[usable],
-        one.window,
+        ranger=one.name,
+        target=f"less {second.name}" if scale == 1.0 else f"less {scale:.6g} {second.name}",
+        seconds=one.seconds[usable],
+        ranges=(one.ranges - scale * value)[usable],
+        u=np.sqrt(one.u**2 + scale**2 * spread)[usable],
+        window=one.window,
     )
 
 

@@ -274,7 +274,17 @@ def shape_of(prisms: Prisms, aperture: LitAperture, settings: ShapeSettings | No
     )
     square = mean_square(fit.half_path, fit.half_path_covariance, weights)
     gains = gains_of(fit.half_path, weights, square, frequencies=settings.frequencies)
-    return SurfaceShape(prisms, aperture, settings, fit, weights, places, expansion, square, gains)
+    return SurfaceShape(
+        prisms=prisms,
+        aperture=aperture,
+        settings=settings,
+        fit=fit,
+        weights=weights,
+        places=places,
+        expansion=expansion,
+        square=square,
+        gains=gains,
+    )
 
 
 def expansion_of(
@@ -311,15 +321,15 @@ def expansion_of(
     value = gain @ error
     share, joint, joint_covariance = _joint_terms(values, error, along, shares, design, selected, settings.free)
     return Expansion(
-        selected,
-        value,
-        _rounded(gain @ covariance @ gain.T),
-        share,
-        joint,
-        joint_covariance,
-        ortho_gain @ error,
-        np.sqrt(np.maximum(np.diag(ortho_gain @ covariance @ ortho_gain.T), 0.0)),  # rounding may be below it
-        error - values @ value,
+        terms=selected,
+        value=value,
+        covariance=_rounded(gain @ covariance @ gain.T),
+        share=share,
+        joint=joint,
+        joint_covariance=joint_covariance,
+        orthonormal=ortho_gain @ error,
+        u_orthonormal=np.sqrt(np.maximum(np.diag(ortho_gain @ covariance @ ortho_gain.T), 0.0)),  # rounding below 0
+        rest=error - values @ value,
     )
 
 
