@@ -1,6 +1,7 @@
 """Structure and its vibration from Python: models of epochs, predictions, spectra of ranges."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import catseye
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.coordinator.journal.entries import AnsweredShot
 from catseye.coordinator.journal.writer import Journal
-from catseye.errors import ArgumentError, InputError, ValidityError
+from catseye.errors import ArgumentError, EstimationError, InputError, ValidityError
 from catseye.geometry.antenna.frames import ground_from_reflector
 from catseye.geometry.frames.rotation import from_vector
 from catseye.records.network.solved_points import FORMAT
@@ -86,6 +87,22 @@ def test_folders_one_by_one_give_the_model_of_the_folder_that_holds_them(found, 
     where = catseye.save(again, tmp_path / "out")
     assert {"structure.json", "samplers.fits", "prediction.csv"} <= {path.name for path in where.iterdir()}
     assert len(again.inputs()) == 20
+
+
+def test_solved_points_are_epochs(found, nights):
+    points = [catseye.load(night) for night in sorted(nights.iterdir())]
+    points = [replace(each, campaign=f"night {k}") for k, each in enumerate(points)]
+    again = catseye.structure(*points, points="ZEG*", pivot=FOOT)
+    np.testing.assert_allclose(again.coefficients, found.coefficients, rtol=1e-9, atol=1e-12)
+    assert "night 3/night-3/coordinates.json" in again.inputs()
+    with pytest.raises(InputError, match="night 3: its posture is unknown"):
+        catseye.structure(*points[:3], replace(points[3], posture=None), points="ZEG*")
+
+
+def test_a_night_is_an_epoch():
+    night = catseye.reduce("night-01")
+    with pytest.raises(EstimationError, match=r"group 'group'.* 1 epochs"):
+        catseye.structure(night, points="DP00*", folds=0)
 
 
 def test_a_claim_without_a_check_is_doubtful(nights):

@@ -2,13 +2,14 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from catseye.aliases import Progress
+from catseye.api.night import NightResult
 from catseye.api.reading import place_of
 from catseye.api.result import Result, quantities
 from catseye.api.units import In, with_units
@@ -20,10 +21,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
+    from catseye.records.network.solved_points import SolvedPoints
     from catseye.reduction.structure.epochs import ReadEpochs
     from catseye.reduction.structure.findings import StructureFindings
     from catseye.reduction.structure.series import Own
     from catseye.reduction.structure.vibration import Vibration
+
+    Source = str | os.PathLike[str] | NightResult | SolvedPoints
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -233,7 +237,7 @@ class VibrationResult(Result):
 
 @with_units
 def structure(
-    *sources: "str | os.PathLike[str]",
+    *sources: "Source",
     points: str | Sequence[str] = (),
     epochs: "str | os.PathLike[str] | None" = None,
     journal: "str | os.PathLike[str] | None" = None,
@@ -257,9 +261,9 @@ def structure(
     less: str | None = None,
     progress: Progress | None = None,
 ) -> StructureResult | VibrationResult:
-    """Motion of a group of points with gravity and temperature, predicted; or its vibration.
+    """Flexible model of a group of points, or its vibration.
 
-    sources         what `reduce` wrote, or folders that hold it; or `epochs`, or `journal`
+    sources         what `reduce` gave or wrote, or folders that hold it; or `epochs`, or `journal`
     points          names of points, or patterns such as "ZEG*"
     epochs          table of reductions and the telescope's postures (docs/formats/structure.md)
     journal         journal whose solutions are the epochs
@@ -313,7 +317,7 @@ def _pivot(pivot: Sequence[float] | None) -> np.ndarray | None:
 
 
 def _read(
-    sources: "Sequence[str | os.PathLike[str]]",
+    sources: "Sequence[Source]",
     epochs: "str | os.PathLike[str] | None",
     journal: "str | os.PathLike[str] | None",
     run: int | str | None,
@@ -321,6 +325,7 @@ def _read(
 ) -> "tuple[ReadEpochs, tuple[Path, ...]]":
     """Epochs of reductions or of a journal, and the files and folders read."""
     from catseye.coordinator.journal.structure import read_journal_epochs
+    from catseye.records.network.solved_points import SolvedPoints
     from catseye.reduction.structure.epochs import read_epochs
 
     if journal is not None:
@@ -328,8 +333,21 @@ def _read(
             raise InputError("journal stands alone (expected no reductions and no epochs beside it)")
         return read_journal_epochs(str(journal), run=run, every_s=every_s), (Path(journal),)
     listed = None if epochs is None else place_of(epochs)
-    places = tuple(place_of(source, output=True) for source in sources)
-    return read_epochs(places, listed), (*places, *([] if listed is None else [listed]))
+    found = [
+        _solved(each) if isinstance(each, NightResult | SolvedPoints) else place_of(each, output=True)
+        for each in sources
+    ]
+    places = [each for each in (*found, listed) if isinstance(each, Path)]
+    return read_epochs(found, listed), tuple(places)
+
+
+def _solved(source: "NightResult | SolvedPoints") -> "SolvedPoints":
+    """Points of a night, or themselves."""
+    from catseye.reduction.pose.dish_ways import solved_points
+
+    if isinstance(source, NightResult):
+        return replace(solved_points(source.reduction), verdict=source.verdict)
+    return source
 
 
 def _vibration(

@@ -12,9 +12,8 @@ from catseye.constants import DEGREE
 from catseye.errors import InputError
 from catseye.records.files.columns import columns_of
 from catseye.records.files.reading import Folder
-from catseye.records.files.refusal import refusal
 from catseye.records.files.verdicts import PROVENANCE
-from catseye.records.network.solved_points import FILE, POSE_FILE, read_solved_points
+from catseye.records.network.solved_points import FILE, POSE_FILE, SolvedPoints, read_solved_points
 from catseye.reduction.structure.group import PlacesEpoch
 from catseye.verdict import Verdict
 
@@ -42,17 +41,23 @@ class ReadEpochs:
         return {epoch.label: epoch.verdict for epoch in self.epochs}
 
 
-def read_epochs(sources: Sequence[Path], listed: Path | None = None) -> ReadEpochs:
+def read_epochs(sources: Sequence[Path | SolvedPoints], listed: Path | None = None) -> ReadEpochs:
     """Read epochs of reductions.
 
-    sources   output directories of `catseye reduce`, or directories of these; coordinates.json files
+    sources   output directories of `catseye reduce`, or directories of these; coordinates.json files; solved points
     listed    CSV with the columns reduction, azimuth_deg, elevation_deg and optionally temperature_c and mjd_utc: a
               directory or file, relative to it, and the telescope's position; it overrides the files'
 
     Raises InputError for a file that is missing, not a reduction, or without posture.
     """
     inputs: dict[str, str] = {}
-    epochs = [_epoch(place, {}, inputs) for source in sources for place in _results(source)]
+    epochs: list[PlacesEpoch] = []
+    for source in sources:
+        if isinstance(source, SolvedPoints):
+            epochs.append(_epoch_of(source, source.campaign or source.file, {}))
+            inputs |= {f"{epochs[-1].label}/{name}": digest for name, digest in source.hashes.items()}
+        else:
+            epochs += [_epoch(place, {}, inputs) for place in _results(source)]
     if listed is not None:
         try:
             raw = listed.read_bytes()
@@ -88,34 +93,39 @@ def _results(source: Path) -> list[Path]:
 
 
 def _epoch(place: Path, numbers: Mapping[str, float], inputs: dict[str, str], label: str = "") -> PlacesEpoch:
-    """Epoch of one reduction, with its posture."""
-    posture = dict(numbers)
+    """Epoch of one reduction's file, with its posture."""
+    numbers = dict(numbers)
     try:
         solved = read_solved_points(place, averaged=False)
-        covariance = solved.block(solved.names)
-        if not np.isfinite(covariance).all():
-            raise refusal(place.name, "has a covariance that is not a number (expected m^2)")
+        hashes = dict(solved.hashes)
+        if "azimuth_deg" in numbers:
+            hashes.pop(POSE_FILE, None)  # the list's posture counts
+        if np.isnan(numbers.get("mjd_utc", np.nan)):
+            folder = Folder(place.parent)
+            numbers["mjd_utc"] = _start_mjd(folder)
+            hashes |= folder.hashes
+        inputs |= {f"{place.parent.name}/{name}": digest for name, digest in hashes.items()}
+        return _epoch_of(solved, label or place.parent.name, numbers)
     except InputError as problem:
         raise InputError(f"{place.parent}: {problem}") from problem
-    hashes = dict(solved.hashes)
-    if "azimuth_deg" in posture:
-        hashes.pop(POSE_FILE, None)  # the list's posture counts
-        azimuth, elevation = posture["azimuth_deg"] * DEGREE, posture["elevation_deg"] * DEGREE
-    elif solved.posture is not None:
-        azimuth, elevation = solved.posture
-    else:
-        raise InputError(f"{place}: no {POSE_FILE} with a posture beside it (expected one, or a list of epochs)")
-    if np.isnan(posture.get("mjd_utc", np.nan)):
-        folder = Folder(place.parent)
-        posture["mjd_utc"] = _start_mjd(folder)
-        hashes |= folder.hashes
-    inputs |= {f"{place.parent.name}/{name}": digest for name, digest in hashes.items()}
+
+
+def _epoch_of(solved: SolvedPoints, label: str, numbers: Mapping[str, float]) -> PlacesEpoch:
+    """Epoch of solved points; a list's numbers count before their own posture."""
+    posture = solved.posture
+    if "azimuth_deg" in numbers:
+        posture = numbers["azimuth_deg"] * DEGREE, numbers["elevation_deg"] * DEGREE
+    if posture is None:
+        raise InputError(f"{label}: its posture is unknown (expected {POSE_FILE} with one, or a list of epochs)")
+    covariance = solved.block(solved.names)
+    if not np.isfinite(covariance).all():
+        raise InputError(f"{label}: has a covariance that is not a number (expected m^2)")
     return PlacesEpoch(
-        label=label or place.parent.name,
-        mjd=posture["mjd_utc"],
-        azimuth=azimuth,
-        elevation=elevation,
-        temperature_c=posture.get("temperature_c", float("nan")),
+        label=label,
+        mjd=numbers.get("mjd_utc", float("nan")),
+        azimuth=posture[0],
+        elevation=posture[1],
+        temperature_c=numbers.get("temperature_c", float("nan")),
         names=solved.names,
         coordinates=solved.x,
         covariance=covariance,
@@ -130,6 +140,6 @@ def _start_mjd(folder: Folder) -> float:
     try:
         campaign = json.loads(folder.text(PROVENANCE)).get("campaign")
     except (ValueError, RecursionError, AttributeError) as problem:
-        raise InputError(f"{folder.directory}/{PROVENANCE}: is no JSON object: {problem}") from problem
+        raise InputError(f"{PROVENANCE}: is no JSON object: {problem}") from problem
     start = campaign.get("start_mjd_utc") if isinstance(campaign, dict) else None
     return start if isinstance(start, float) else float("nan")
