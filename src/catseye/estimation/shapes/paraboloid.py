@@ -130,7 +130,7 @@ def fit_paraboloid(
     weights = np.ones(k) if weights is None else np.asarray(weights, dtype=float)
     if (available := int(np.count_nonzero(weights))) < count:
         what = "a paraboloid of known focal length" if free == POSE else f"a paraboloid of free {', '.join(free)}"
-        raise EstimationError(f"{what} needs {count} points, {available} given", ParaboloidStatus.TOO_FEW)
+        raise EstimationError(f"{what} needs {count} points, {available} given", reason=ParaboloidStatus.TOO_FEW)
     tilts = nominal.rotation[:, :2]  # its x and y axes in the outer frame
     root = np.sqrt(weights)[:, None]
     translation, turn, focal = np.zeros(3), np.zeros(2), focal_length
@@ -153,7 +153,7 @@ def fit_paraboloid(
     else:
         raise EstimationError(
             f"the paraboloid did not settle in {ITERATIONS} iterations; last step {step} m, rad",
-            ParaboloidStatus.UNSETTLED,
+            reason=ParaboloidStatus.UNSETTLED,
         )
     local, normal, deviation, _ = _deviation(points, nominal, translation, tilts @ turn, focal)
     along = covariance_along(covariance, normal)
@@ -254,7 +254,7 @@ def _gain(design: np.ndarray, scaled: np.ndarray, k: int) -> np.ndarray:
     if np.min(np.abs(np.diag(triangle))) < DEPENDENT:
         raise EstimationError(
             f"{k} points do not hold the paraboloid: they lie on one line or circle about its axis",
-            ParaboloidStatus.UNDETERMINED,
+            reason=ParaboloidStatus.UNDETERMINED,
         )
     return np.linalg.solve(triangle, (orthogonal * scaled).T) / scale[:, None]
 

@@ -50,7 +50,7 @@ class SurfaceSeries:
             raise EstimationError(
                 f"epoch {bad[0] + 1} of {len(self.status)}: {TEXTS[status]}, "
                 f"{self.points[bad[0]]} points measured; {len(bad)} epochs failed",
-                status,
+                reason=status,
             )
         return self
 
