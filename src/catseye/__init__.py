@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from catseye.api.night import explain, night, reduce
     from catseye.api.optics import beam, glass, link, safety
     from catseye.api.panels import panels
+    from catseye.api.pose import pose
     from catseye.api.reading import examples, load
     from catseye.api.result import save, show
     from catseye.api.steering import point, track
     from catseye.api.structure import structure
     from catseye.api.surface import surface
-    from catseye.api.telescope import pose
     from catseye.api.weather import air, refractometer, sound
 
 FACE = {  # file of catseye.api -> its exported names
@@ -35,12 +35,12 @@ FACE = {  # file of catseye.api -> its exported names
     "night": ("explain", "night", "reduce"),
     "optics": ("beam", "glass", "link", "safety"),
     "panels": ("panels",),
+    "pose": ("pose",),
     "reading": ("examples", "load"),
     "result": ("save", "show"),
     "steering": ("point", "track"),
     "structure": ("structure",),
     "surface": ("surface",),
-    "telescope": ("pose",),
     "weather": ("air", "refractometer", "sound"),
 }
 

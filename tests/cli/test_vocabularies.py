@@ -5,7 +5,7 @@ from typing import get_args
 import pytest
 import typer
 
-from catseye.api.telescope import CARRIED
+from catseye.api.pose import CARRIED
 from catseye.atmosphere.index import air
 from catseye.atmosphere.sound import speed
 from catseye.cli import vocabularies

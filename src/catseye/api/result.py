@@ -43,6 +43,12 @@ class Result:
         """JSON object of the command, in Python's and numpy's own types."""
         raise NotImplementedError
 
+    def to_json(self) -> str:
+        """JSON object of the command, on one line."""
+        from catseye.gateways.writers.objects import json_line
+
+        return json_line(self.to_object())
+
     def tables(self) -> "dict[str, QTable]":
         """Every table of the answer by its name, the main one first; columns have units where they have one."""
         raise NotImplementedError

@@ -139,8 +139,8 @@ def pose(  # noqa: PLR0913 - its options are its command line
     progress = ProgressLine(quiet)
     try:
         progress("fitting", 0, 1)
+        from catseye.api.pose import pose as posed
         from catseye.api.result import save
-        from catseye.api.telescope import pose as posed
 
         result = posed(
             epoch,

@@ -146,7 +146,7 @@ def fit_paraboloid(
         if not 0.0 < focal < np.inf:
             raise EstimationError(
                 f"the paraboloid's focal length ran to {focal:g} m; hold it, or begin nearer",
-                ParaboloidStatus.UNSETTLED,
+                reason=ParaboloidStatus.UNSETTLED,
             )
         if count == 0 or np.max(np.abs(step)) < CONVERGED_STEP:
             break

@@ -9,16 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from catseye.constants import DEGREE
 from catseye.estimation.least_squares.covariance import JointPoints
 from catseye.records.files.covariance_file import part_of, stored_covariance
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import refusal, shown
 from catseye.records.files.verdicts import stored_verdict
+from catseye.records.network.written_pose import FILE as POSE_FILE
+from catseye.records.network.written_pose import NIGHT_POSE, read_written_pose
 from catseye.verdict import Verdict
 
-FORMAT = "catseye-reduction-1"  # of coordinates.json and pose.json
-FILE, POSE_FILE = "coordinates.json", "pose.json"
+FORMAT = "catseye-reduction-1"  # of coordinates.json
+FILE = "coordinates.json"
 DRAWN = 1e-6  # of two standard uncertainties' product: largest asymmetry of a printed covariance
 
 
@@ -97,7 +98,8 @@ def read_solved_points(path: Path | str, *, averaged: bool = True) -> SolvedPoin
     x = np.array([[_number(name, n, points[n], axis) for axis in "xyz"] for n in names])
     printed = stored_covariance(document, folder.directory, len(order))
     covariance = _covariance(name, printed, len(order), averaged=averaged)
-    posture_deg = read_posture_deg(folder)
+    pose_file = folder.directory / POSE_FILE
+    pose = read_written_pose(pose_file, expected=(NIGHT_POSE,), folder=folder) if pose_file.is_file() else None
     dish, focal_length = _dish(name, document, names)
     return SolvedPoints(
         file=str(path),
@@ -105,25 +107,12 @@ def read_solved_points(path: Path | str, *, averaged: bool = True) -> SolvedPoin
         names=names,
         x=x,
         covariance=covariance,
-        posture=None if posture_deg is None else (posture_deg[0] * DEGREE, posture_deg[1] * DEGREE),
+        posture=None if pose is None else pose.posture,
         hashes={f"{path.name}/{f}" if path.is_dir() else f: digest for f, digest in folder.hashes.items()},
         verdict=stored_verdict(name, document),
         dish=dish,
         focal_length=focal_length,
     )
-
-
-def read_posture_deg(folder: Folder) -> tuple[float, float] | None:
-    """Azimuth and elevation of a pose.json, degrees; None without one."""
-    if not (folder.directory / POSE_FILE).is_file():
-        return None
-    posture = _object(folder, POSE_FILE).get("nominal_posture")
-    if not isinstance(posture, dict):
-        return None
-    angles: list[Any] = [posture.get(key) for key in ("azimuth_deg", "elevation_deg")]
-    if any(isinstance(v, bool) or not isinstance(v, int | float) or not math.isfinite(v) for v in angles):
-        raise refusal(POSE_FILE, f"nominal_posture = {shown(posture)} (expected azimuth_deg and elevation_deg)")
-    return float(angles[0]), float(angles[1])
 
 
 def _dish(file: str, document: dict[str, Any], names: tuple[str, ...]) -> tuple[tuple[str, ...], float | None]:

@@ -13,7 +13,8 @@ from catseye.errors import InputError
 from catseye.records.files.columns import columns_of
 from catseye.records.files.reading import Folder
 from catseye.records.files.verdicts import PROVENANCE
-from catseye.records.network.solved_points import FILE, POSE_FILE, SolvedPoints, read_solved_points
+from catseye.records.network.solved_points import FILE, SolvedPoints, read_solved_points
+from catseye.records.network.written_pose import FILE as POSE_FILE
 from catseye.reduction.structure.group import PlacesEpoch
 from catseye.verdict import Verdict
 

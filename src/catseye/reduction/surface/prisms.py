@@ -15,7 +15,9 @@ from catseye.records.files.columns import TextColumns, columns_of
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import refusal, shown
 from catseye.records.files.verdicts import verdict_of_table
-from catseye.records.network.solved_points import FILE, POSE_FILE, read_posture_deg, read_solved_points
+from catseye.records.network.solved_points import FILE, read_solved_points
+from catseye.records.network.written_pose import FILE as POSE_FILE
+from catseye.records.network.written_pose import NIGHT_POSE, read_written_pose
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.surface.shape import Prisms
@@ -104,9 +106,9 @@ def _reduced(source: Path, site: SiteFolder, place: EpochPlace) -> tuple[Prisms,
     solved = read_solved_points(source, averaged=False)
     if not solved.dish:
         raise refusal(f"{source}/{FILE}", "the reduction found no dish (expected a surface)")
-    posture = read_posture_deg(Folder(source))
+    posture = read_written_pose(source / POSE_FILE, expected=(NIGHT_POSE,)).posture_deg
     if posture is None:
-        raise refusal(f"{source}/{POSE_FILE}", "missing, or without nominal_posture (expected catseye reduce's)")
+        raise refusal(f"{source}/{POSE_FILE}", "nominal_posture is missing (expected catseye reduce's)")
     block = solved.block(solved.dish)
     if not np.isfinite(block).all():
         raise refusal(f"{source}/{FILE}", "has a covariance that is not a number")

@@ -1,4 +1,4 @@
-"""`pose`: six degrees of freedom of the antenna's parts."""
+"""`pose`: where the antenna's parts are, and where its beam points."""
 
 import os
 from collections.abc import Sequence
