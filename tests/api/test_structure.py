@@ -50,7 +50,7 @@ def nights(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def found(nights):
-    return catseye.structure(nights, points="ZEG*", group="arm", pivot=FOOT, predict=(30.0, 45.0))
+    return catseye.structure(nights, points="ZEG*", group="arm", pivot=FOOT, predict_deg=(30.0, 45.0))
 
 
 def test_a_model_gives_its_coefficients_and_predictions(found):
@@ -81,7 +81,7 @@ def test_columns_of_a_model_are_in_their_units(found):
 
 
 def test_folders_one_by_one_give_the_model_of_the_folder_that_holds_them(found, nights, tmp_path):
-    again = catseye.structure(*sorted(nights.iterdir()), points=["ZEG*"], pivot=FOOT, predict=30.0)
+    again = catseye.structure(*sorted(nights.iterdir()), points=["ZEG*"], pivot=FOOT, predict_deg=30.0)
     np.testing.assert_array_equal(again.coefficients, found.coefficients)
     np.testing.assert_array_equal(again.predicted[0], found.predicted[0])
     where = catseye.save(again, tmp_path / "out")

@@ -242,7 +242,7 @@ def structure(
     epochs: "str | os.PathLike[str] | None" = None,
     journal: "str | os.PathLike[str] | None" = None,
     vibration: "str | os.PathLike[str] | None" = None,
-    run: int | str | None = None,
+    run: Annotated[Any, In("", whole=True, text=True)] = None,
     every_s: Annotated[Any, In("s", one=True)] = 0.0,
     group: str = "group",
     frame: str = "reflector",
@@ -254,7 +254,7 @@ def structure(
     scatter: bool = True,
     independent: bool = False,
     folds: Annotated[Any, In("", whole=True)] = 5,
-    predict: Annotated[Any, In("deg", many=True)] = (),
+    predict_deg: Annotated[Any, In("deg", many=True)] = (),
     temperature_c: Annotated[Any, In("deg_C", one=True)] = None,
     way: Annotated[Any, In("", one=True)] = 0.0,
     stretch_s: Annotated[Any, In("s", one=True)] = None,
@@ -279,8 +279,8 @@ def structure(
     scatter         estimate what is new in each epoch, as by wind
     independent     take points of an epoch as independent: for many hundred
     folds           stretches of epochs left out in turn, which check the model; 0: none
-    predict         elevations to predict, degrees, at temperature_c (the mean of the epochs without), after a way of
-                    1, risen, to -1, fallen
+    predict_deg     elevations to predict, at temperature_c (the mean of the epochs without), after a way of 1, risen,
+                    to -1, fallen
     stretch_s       length of a segment of a spectrum: resolution is 1.5 over it
     less            RANGER:TARGET, a series taken off each other one of its ranger
     progress        called with (what, done, of how many)
@@ -302,7 +302,7 @@ def structure(
     place, correlated = _pivot(pivot), not independent
     series = group_series(read.epochs, names, group=group, frame=frame, pivot=place, correlated=correlated)
     model = SeriesModel(harmonics, temperature, hysteresis, own, scatter)
-    request = PredictionRequest(tuple(np.atleast_1d(predict).tolist()), temperature_c, way)
+    request = PredictionRequest(tuple(np.atleast_1d(predict_deg).tolist()), temperature_c, way)
     found = model_structure(series, read, model=model, folds=folds, request=request, progress=progress)
     return StructureResult(verdict=found.verdict, found=found, hashes=read.inputs, read=places)
 

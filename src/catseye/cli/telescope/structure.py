@@ -92,7 +92,7 @@ def structure(  # noqa: PLR0913 - its options are its command line
         bool, typer.Option("--independent", help="Points of an epoch are independent: for many hundred.")
     ] = False,
     folds: Annotated[int, typer.Option("--folds", min=0, help="Stretches of epochs left out in turn; 0: none.")] = 5,
-    predict: Annotated[
+    predict_deg: Annotated[
         list[float] | None,
         typer.Option("--predict", metavar="ELEVATION", help="Elevation of a prediction, degrees; repeats."),
     ] = None,
@@ -144,7 +144,7 @@ def structure(  # noqa: PLR0913 - its options are its command line
             scatter=scatter,
             independent=independent,
             folds=folds,
-            predict=predict or (),
+            predict_deg=predict_deg or (),
             temperature_c=temperature_c,
             way=way,
             stretch_s=stretch_s,
