@@ -19,12 +19,14 @@ if TYPE_CHECKING:
     from catseye.api.network import adjust, compare, locate, plan
     from catseye.api.night import explain, night, reduce
     from catseye.api.optics import beam, glass, link, safety
+    from catseye.api.panels import panels
     from catseye.api.pointing import fit_pointing, predict_pointing
     from catseye.api.pose import pose
     from catseye.api.reading import examples, load
     from catseye.api.result import save, show
     from catseye.api.steering import point, track
-    from catseye.api.telescope import surface
+    from catseye.api.structure import structure
+    from catseye.api.surface import surface
     from catseye.api.track_profile import track_pointing
     from catseye.api.weather import air, refractometer, sound
 
@@ -34,12 +36,14 @@ FACE = {  # file of catseye.api -> its exported names
     "network": ("adjust", "compare", "locate", "plan"),
     "night": ("explain", "night", "reduce"),
     "optics": ("beam", "glass", "link", "safety"),
+    "panels": ("panels",),
     "pointing": ("fit_pointing", "predict_pointing"),
     "pose": ("pose",),
     "reading": ("examples", "load"),
     "result": ("save", "show"),
     "steering": ("point", "track"),
-    "telescope": ("surface",),
+    "structure": ("structure",),
+    "surface": ("surface",),
     "track_profile": ("track_pointing",),
     "weather": ("air", "refractometer", "sound"),
 }
@@ -66,6 +70,7 @@ __all__ = [
     "load",
     "locate",
     "night",
+    "panels",
     "plan",
     "point",
     "pose",
@@ -78,6 +83,7 @@ __all__ = [
     "show",
     "simulate",
     "sound",
+    "structure",
     "surface",
     "track",
     "track_pointing",

@@ -1,4 +1,4 @@
-"""Pose, surface, pointing and the laboratory from Python: the numbers of the commands, without files between."""
+"""Pose, pointing and the laboratory from Python: the numbers of the commands, without files between."""
 
 from dataclasses import replace
 
@@ -51,32 +51,6 @@ def test_a_group_that_does_not_move_as_one_is_doubtful_in_its_status_too(night):
     assert found.verdict.word == "doubtful"
     assert "does not move as one" in found.to_object()["status"]
     assert "the beam that follows from it" in found.status
-
-
-def test_a_night_and_what_it_wrote_give_one_surface(night, written):
-    first, second = catseye.surface(night, site="night-01"), catseye.surface(written, site="night-01")
-    np.testing.assert_allclose(first.deviations, second.deviations, rtol=0, atol=1e-9)
-    assert first.covariance.shape == (60, 60)
-    assert first.u_focal_length > 0.0
-    held = catseye.surface(night, site="night-01", free=("vertex", "axis"))
-    assert held.u_focal_length == 0.0
-    assert "focal length held" in held.verdict.why
-    assert set(first.tables()) == {"prisms", "zernike"}
-    moved = catseye.surface(night, site="gbt", actuators=True)
-    assert len(moved.to_table("actuators")) > 2000
-    with pytest.raises(InputError, match="needs an epoch"):
-        catseye.surface()
-
-
-def test_a_surface_s_columns_are_in_their_units(night):
-    surface = catseye.surface(night)
-    prisms, told = surface.to_table("prisms"), surface.to_object()["deviations"]
-    for column in ("deviation", "u_deviation", "half_path"):
-        assert prisms[column].to_value("m").tolist() == pytest.approx([told[n][column] for n in prisms["point"]])
-    terms = surface.found.shapes[-1].expansion
-    zernike = surface.to_table("zernike")
-    assert zernike["value"].to_value("m") == pytest.approx(terms.value)
-    assert zernike["u"].to_value("m") == pytest.approx(np.sqrt(np.diag(terms.covariance)))
 
 
 def test_counts_of_many_points_are_those_of_each():

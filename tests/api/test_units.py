@@ -38,6 +38,7 @@ OTHER = {  # unit of ours -> another unit, and what one of ours is in it, by han
     "deg": ("arcmin", 60.0),
     "arcsec": ("mas", 1e3),
     "deg / s": ("arcmin / s", 60.0),
+    "m2": ("mm2", 1e6),
     "s": ("min", 1.0 / 60.0),
     "mrad": ("rad", 1e-3),
     "rad / s": ("mrad / s", 1e3),
@@ -107,7 +108,14 @@ def test_the_unit_declared_is_the_one_of_the_name(function, argument, unit):
     if said is not None:
         assert (unit.unit, unit.difference) == (said.unit, said.difference)
     else:
-        assert unit.unit in ("", "m", "s", "m / s2", "min")  # no ending: SI, or a pure number; `minutes` says it whole
+        assert unit.unit in (
+            "",
+            "m",
+            "m2",
+            "s",
+            "m / s2",
+            "min",
+        )  # no ending: SI, or a pure number; `minutes` says it whole
 
 
 def arguments(function, argument, value):

@@ -17,7 +17,6 @@ from catseye.estimation.quality.robustness import WEIGHTS
 from catseye.estimation.shapes import paraboloid, pose
 from catseye.gateways.calibrations.field_report_fields import FORMS
 from catseye.gateways.journal.export import Form
-from catseye.gateways.surface.inputs import Frame
 from catseye.geometry.antenna import pointing_series
 from catseye.optics import zernike
 from catseye.optics.retroreflector.kinds import registry
@@ -31,6 +30,7 @@ from catseye.reduction.pose import pose as pose_recipe
 from catseye.reduction.pose.findings import CARRIED
 from catseye.reduction.structure.series import Own
 from catseye.reduction.surface.actuators import Travel
+from catseye.reduction.surface.prisms import Frame
 from catseye.service import settings, world
 from catseye.service.coordinator import Filter
 

@@ -257,11 +257,14 @@ ONE_CALL = [
     "pointing fit",
     "pointing predict",
     "pointing track",
+    "panels",
     "pose",
     "reduce",
     "replay",
     "safety",
     "sound",
+    "structure",
+    "surface",
 ]
 OF_THE_TERMINAL = {"json", "out", "quiet", "strict", "page", "threads"}
 WRITERS = {"certificate", "template", "write", "write_stars"}  # files that are methods of the result

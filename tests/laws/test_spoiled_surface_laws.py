@@ -9,7 +9,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from catseye.api.telescope import surface
+from catseye.api.surface import surface
 from catseye.errors import CatseyeError
 from catseye.optics.zernike import Term
 from surface_scene import NAMES, SITE, half_path_of, prisms

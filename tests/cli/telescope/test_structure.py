@@ -12,6 +12,7 @@ from catseye.coordinator.journal.writer import Journal
 from catseye.gateways.writers.samplers_fits import read_samplers
 from catseye.geometry.antenna.frames import ground_from_reflector
 from catseye.geometry.frames.rotation import from_vector
+from catseye.records.network.solved_points import FORMAT
 from catseye.records.night.live import LiveShot, LiveWeather
 from catseye.simulator.clock.world_clock import ManualClock
 from journal_scene import START, scene_run
@@ -43,10 +44,16 @@ def nights(tmp_path):
         order = [f"{n} {a}" for n in points for a in "xyz"]
         night = folder / f"night-{k:02d}"
         night.mkdir(parents=True)
-        document = {"points": points, "covariance_order": order, "covariance": (2.5e-9 * np.eye(18)).tolist()}
+        document = {
+            "format": FORMAT,
+            "frame": "ground",
+            "points": points,
+            "covariance_order": order,
+            "covariance": (2.5e-9 * np.eye(18)).tolist(),
+        }
         (night / "coordinates.json").write_text(json.dumps(document))
         posture = {"azimuth_deg": 2.5 / DEGREE, "elevation_deg": e}
-        (night / "pose.json").write_text(json.dumps({"nominal_posture": posture}))
+        (night / "pose.json").write_text(json.dumps({"format": FORMAT, "nominal_posture": posture}))
         rows.append(f"night-{k:02d},{2.5 / DEGREE!r},{float(e)!r},{float(warm)!r},{60000 + k / 24!r}")
     (folder / "epochs.csv").write_text("\n".join(rows) + "\n")
     return folder

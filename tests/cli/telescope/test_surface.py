@@ -135,10 +135,10 @@ def test_a_reductions_directory_gives_its_dish_with_full_covariance(catseye, tmp
         (("DP01C,0.0,", "DP01C,x,"), (), "expected a finite number"),
         (("DP01C,0.0,", "DP01C,0.0,1.0,"), (), "6 fields"),
         (("DP01C,0.0,", "DP01C,4000,"), (), "looks like mm"),
-        ((), ("--frame", "ground"), "give the telescope's --azimuth-deg and --elevation-deg"),
-        ((), ("--elevation-deg", 10, "--elevation-deg", 20), "given 2 times for 1 inputs"),
+        ((), ("--frame", "ground"), "give the telescope's azimuth_deg and elevation_deg"),
+        ((), ("--elevation-deg", 10, "--elevation-deg", 20), "elevation_deg has 2 values for 1 epochs"),
         ((), ("--actuators", "a.txt"), "expected .csv or .fits"),
-        ((), ("--positions", "p.csv"), "goes with --actuators only"),
+        ((), ("--positions", "p.csv"), "goes with actuators only"),
         ((), ("--zernike", 400), "400 Zernike terms"),
         ((), ("--site", "nowhere"), "nowhere"),
     ],
@@ -169,7 +169,7 @@ def test_an_epoch_without_elevation_makes_no_table(catseye, tmp_path):
     paths = [table(tmp_path / f"{k}.csv", np.zeros(2209), k, np.arange(0, 2209, 60)) for k in range(3)]
     status, _, complaint = catseye(*paths)
     assert status == 1
-    assert "unknown elevation; set it by --elevation-deg" in complaint
+    assert "unknown elevation; set it by elevation_deg" in complaint
 
 
 def test_another_programs_file_is_not_overwritten(catseye, tmp_path):

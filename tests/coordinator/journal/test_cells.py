@@ -7,12 +7,12 @@ import pytest
 
 from catseye.coordinator.journal.check import verify_run
 from catseye.coordinator.journal.reader import JournalReader
+from catseye.coordinator.journal.structure import read_journal_epochs, read_range_series
 from catseye.coordinator.journal.tables import EVENTS, JOURNAL, METADATA, RUN_FILES, RUNS, TEXTS
 from catseye.coordinator.journal.writer import Journal
 from catseye.errors import InputError
 from catseye.gateways.journal.campaign import export_campaign
 from catseye.gateways.journal.export import export_tables
-from catseye.gateways.structure.epochs import read_journal_epochs, read_range_series
 from catseye.service.journals import checked, copied
 from catseye.service.replay import replayed
 from catseye.simulator.clock.world_clock import ManualClock

@@ -6,7 +6,7 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from catseye.errors import EstimationError
-from catseye.estimation.shapes.paraboloid import fit_paraboloid
+from catseye.estimation.shapes.paraboloid import ParaboloidStatus, fit_paraboloid
 from catseye.geometry.frames.frame import Transform
 from draws import draws, same_sigmas
 
@@ -161,8 +161,9 @@ def test_the_deviations_of_five_points_vanish_and_are_certain():
 
 
 def test_four_points_are_refused():
-    with pytest.raises(EstimationError, match="needs 5 points, 4 given"):
+    with pytest.raises(EstimationError, match="needs 5 points, 4 given") as refused:
         fit_paraboloid(OUTER.points(surface(np.random.default_rng(1), k=4)), zero(4), OUTER, focal_length=F)
+    assert refused.value.reason is ParaboloidStatus.TOO_FEW
 
 
 def circle(radius):
@@ -177,8 +178,9 @@ def line():
 
 @pytest.mark.parametrize("points", [circle(30.0), line()], ids=["circle", "meridian"])
 def test_points_that_do_not_determine_it_are_refused(points):
-    with pytest.raises(EstimationError, match="9 points do not hold the paraboloid"):
+    with pytest.raises(EstimationError, match="9 points do not hold the paraboloid") as refused:
         fit_paraboloid(OUTER.points(points), zero(9), OUTER, focal_length=F)
+    assert refused.value.reason is ParaboloidStatus.UNDETERMINED
 
 
 def test_the_same_point_five_times_is_refused():

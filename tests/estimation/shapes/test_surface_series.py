@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from catseye.errors import EstimationError
+from catseye.estimation.shapes.paraboloid import ParaboloidStatus
 from catseye.estimation.shapes.surface_series import fit_series
 from catseye.geometry.frames.frame import Transform
 
@@ -56,6 +57,17 @@ def test_failed_epoch_has_a_status_and_others_are_unaffected():
         assert np.isfinite(found.parameters[[0, 3]]).all()
         with pytest.raises(EstimationError, match="epoch 2 of 4: fewer points than parameters"):
             found.require_converged()
+
+
+def test_a_focal_length_that_runs_away_is_not_settled():
+    """Its message says "hold it": a status is no word of a message."""
+    points = scene(np.random.default_rng(2), 2, 40)
+    points[1] = OUTER.points(OUTER.inverse().points(points[1]) * [1.0, 1.0, -0.3])
+    found = fit_series(points, np.full(40, 1e-9), OUTER, focal_length=F, free=ALL, compiled=False)
+    assert found.status.tolist() == [ParaboloidStatus.CONVERGED, ParaboloidStatus.UNSETTLED]
+    with pytest.raises(EstimationError, match="epoch 2 of 2: not settled") as refused:
+        found.require_converged()
+    assert refused.value.reason is ParaboloidStatus.UNSETTLED
 
 
 def test_each_epochs_covariance_is_the_scatter():

@@ -18,7 +18,7 @@ from catseye.gateways.writers.drawing import svg
 from catseye.gateways.writers.matrix_fits import BLOCK
 from catseye.gateways.writers.objects import plain
 from catseye.records.network.solved_points import read_solved_points
-from kept_scene import reduction_of_example
+from kept_scene import reduction_directory, reduction_of_example
 
 
 @pytest.fixture(scope="module")
@@ -63,9 +63,19 @@ def test_solved_points_are_read_with_it(written):
     np.testing.assert_array_equal(points.places(names), expected.x[expected.rows(names)])
 
 
+def test_a_reduction_tells_its_dish_and_its_covariance_as_printed():
+    surface, written = reduction_of_example().surface, reduction_directory()
+    points, printed = read_solved_points(written), read_solved_points(written, averaged=False)
+    assert points.dish == surface.names
+    assert points.focal_length == surface.focal_length
+    q, stored = np.asarray(printed.covariance), json.loads((written / "coordinates.json").read_text())
+    np.testing.assert_array_equal(q, stored["covariance"])
+    np.testing.assert_array_equal(points.covariance, 0.5 * (q + q.T))
+
+
 def test_surface_and_pose_say_the_same_from_either_file(written, tmp_path):
     from catseye.api.pose import pose
-    from catseye.api.telescope import surface
+    from catseye.api.surface import surface
 
     inside = tmp_path / "inside"
     inside.mkdir()

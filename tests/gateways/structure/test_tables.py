@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from catseye.gateways.structure.tables import coefficients_csv, prediction_csv, residuals_csv, spectra_csv
+from catseye.reduction.structure.findings import PredictionRequest
 from column_scene import assert_columns
 
 RNG = np.random.default_rng(31)
@@ -69,9 +70,9 @@ def test_every_column_of_the_residuals_has_the_unit_of_its_name():
 def test_every_column_of_a_prediction_has_the_unit_of_its_name():
     place, covariance = RNG.normal(size=(2, POINTS, 3)) * 10.0, spreads(2, POINTS)
     predicted = SimpleNamespace(names=("P1", "P2"), place=place, covariance=covariance)
-    asked = {"elevation_deg": [20.5, 45.25], "temperature_c": 7.5}
+    asked = PredictionRequest((20.5, 45.25), 7.5)
     told = {
-        "elevation_deg": lambda at: np.radians(asked["elevation_deg"][at[0]]),
+        "elevation_deg": lambda at: np.radians(asked.elevation_deg[at[0]]),
         "temperature_c": lambda at: 7.5,
         "point": lambda at: predicted.names[at[1]],
         **{f"{'xyz'[a]}_m": lambda at, a=a: place[*at, a] for a in range(3)},

@@ -1,5 +1,7 @@
 """A group's flexible model: against planted coefficients, scatter and a bent body that the formulas do not know."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -120,8 +122,6 @@ def test_two_harmonics_and_points_of_their_own_are_nested():
 def test_points_alone_and_points_together_agree_where_they_are_independent():
     series, _ = planted(8, dense=False)
     q = np.einsum("nq,ij->niqj", np.eye(8), series.spread.points[0, 0]).reshape(24, 24)
-    from dataclasses import replace
-
     for model in (SeriesModel(scatter=False), SeriesModel(own="each", scatter=False), SeriesModel()):
         one = fit_structure(series, model)
         two = fit_structure(replace(series, spread=Spread(full=q[None])), model)
@@ -139,10 +139,19 @@ def test_predictions_outside_the_epochs_are_flagged():
     assert far > near
 
 
+def test_the_motion_of_an_epochs_residuals_is_that_of_a_body():
+    found = fit_structure(planted(1)[0], SeriesModel(scatter=False))
+    six = np.array([1e-3, -2e-3, 0.5e-3, 3e-5, -1e-5, 2e-5])
+    residual = np.full_like(found.fit.residual, np.nan)
+    residual[0] = six[:3] + np.cross(six[3:], found.arms)
+    residual[1, :2] = residual[0, :2]  # two points: a turn about their line is open
+    motion = replace(found, fit=replace(found.fit, residual=residual)).residual_motion
+    np.testing.assert_allclose(motion[0], six, rtol=1e-9, atol=1e-15)
+    assert np.isnan(motion[1:]).all()
+
+
 def test_unknown_or_floating_quantities_are_refused_by_name():
     series, _ = planted(1)
-    from dataclasses import replace
-
     warm = np.array(series.posture.temperature_c)
     warm[3] = np.nan
     blind = replace(series, posture=TelescopePosture(series.posture.azimuth, series.posture.elevation, warm))
@@ -152,7 +161,7 @@ def test_unknown_or_floating_quantities_are_refused_by_name():
     still = replace(series, way=np.zeros(40))
     with pytest.raises(EstimationError, match=r"arm by 'up' floats"):
         fit_structure(still, SeriesModel(hysteresis=True))
-    with pytest.raises(EstimationError, match=r"group 'arm'.*3 epochs"):
+    with pytest.raises(EstimationError, match=r"group 'arm'.* of [A-Z]\w+ by '.*3 epochs"):
         fit_structure(series.part(np.arange(3)), SeriesModel(own="each", scatter=False))
     with pytest.raises(InputError, match="stretches"):
         left_out(series, folds=1)

@@ -1,5 +1,7 @@
 """Vibration of the twin's feed arm, planted by the simulator, found in ranges; what cancels in differences."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -114,6 +116,11 @@ def test_one_ranger_alone_leaves_the_alias_undecided():
     assert top.likely_hz == top.peak.frequency_hz == pytest.approx(2.8, abs=0.01)
     assert any(abs(f - 5.0) < 0.01 for f in top.may_be_hz)
     assert any("2.8 Hz are aliases is open" in note for note in found.notes)
+    assert found.verdict.word == "doubtful"
+    assert "may be aliases" in found.verdict.why
+    alone = replace(found, peaks=(replace(top, decided=True),))
+    assert alone.verdict == ("doubtful", "peaks stand out from the background, but no mode converged")
+    assert replace(found, peaks=()).verdict.word == "good"
 
 
 def test_two_targets_of_one_ranger_share_its_errors():

@@ -30,6 +30,7 @@ def test_planted_astigmatism_is_found_with_the_axis_held(term):
     assert shape.expansion.value[k] == pytest.approx(3e-4, abs=1e-5)
     assert shape.expansion.joint[k] == pytest.approx(3e-4, abs=1e-5)
     assert shape.expansion.share[k] < 0.03
+    assert shape.absorbed == ()
 
 
 @pytest.mark.parametrize("term", [Term(2, 2), Term(2, -2)])
@@ -37,6 +38,8 @@ def test_with_the_axis_free_the_paraboloid_takes_most_and_the_joint_estimate_fin
     shape = shape_of(prisms(half_path_of(term, 3e-4)), APERTURE, ShapeSettings(terms=6))
     k = at(shape, term)
     assert shape.expansion.share[k] > 0.9
+    assert term in shape.absorbed
+    assert Term(2, 0) not in shape.absorbed  # the focal length stands for it
     assert abs(shape.expansion.value[k]) < 5e-5
     u = float(np.sqrt(shape.expansion.joint_covariance[k, k]))
     assert 2e-6 < u < 1e-5
@@ -116,6 +119,11 @@ def test_a_perfect_surface_has_no_mean_square_of_its_own():
     own = np.array([f.own for f in found])
     assert own.mean() == pytest.approx(0.0, abs=4 * own.std() / np.sqrt(3000))
     assert own.min() < 0.0 < own.max()
+    for one in found:
+        assert (one.rms is None, one.u_rms is None) == (one.own < 0.0,) * 2
+        assert one.stands_out == (one.own > 2.0 * one.u)
+        if one.rms is not None:
+            assert one.u_rms == pytest.approx(0.5 * one.u / np.sqrt(one.own))
     assert np.sqrt(np.mean([f.u**2 for f in found])) == pytest.approx(own.std(), rel=0.6)  # raised by the draw's own
 
 

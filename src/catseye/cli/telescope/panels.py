@@ -2,16 +2,13 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
-from catseye.cli.results import Strict, judge
-from catseye.cli.terminal import ProgressLine, say, wrapped
-
-if TYPE_CHECKING:
-    from catseye.records.panels.layout import PanelLayout
+from catseye.cli.results import Strict, tell
+from catseye.cli.terminal import ProgressLine
 
 
 def _focal(value: float) -> float:
@@ -44,10 +41,10 @@ def panels(  # noqa: PLR0913 - its options are its command line
         Path | None, typer.Option("--survey-left", metavar="SURVEY.csv", help="Survey as left; --survey if not given.")
     ] = None,
     focal_length_m: Annotated[
-        float, typer.Option("--focal-length-m", callback=_focal, help="Of the paraboloid of a LAYOUT.csv.")
+        float, typer.Option("--focal-length-m", callback=_focal, help="Focal length of a LAYOUT.csv's paraboloid.")
     ] = 60.0,
     reject: Annotated[
-        bool, typer.Option("--reject", help="Leave out readings that the tests reject; only named without.")
+        bool, typer.Option("--reject", help="Rejected readings are left out; without, named only.")
     ] = False,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Directory to write: report, list of screws, tables.")
@@ -57,44 +54,28 @@ def panels(  # noqa: PLR0913 - its options are its command line
     strict: Strict = False,
 ) -> None:
     """Panel corners from the panel setting instrument: heights, turns of screws, a crew's statistics."""
-    from catseye.gateways.panels.objects import panels_object, panels_verdict, passages
-    from catseye.gateways.writers.output import atomic_directory, refuse_output
-    from catseye.reduction.panels.job import PanelFiles, panel_work
+    from catseye.api.panels import panels as panels_of
+    from catseye.api.result import require_writable, save
 
-    files = PanelFiles(readings, instrument, survey, cmm, as_left, survey_left)
-    if out is not None:
-        for source in files.all:
-            refuse_output(out, source)
+    require_writable(out, *(each for each in (readings, instrument, survey, cmm, as_left, survey_left) if each))
     progress = ProgressLine(quiet)
     try:
-        work = panel_work(files, _layout(layout, focal_length_m), reject=reject, progress=progress)
+        result = panels_of(
+            readings,
+            instrument,
+            layout=layout,
+            survey=survey,
+            cmm=cmm,
+            as_left=as_left,
+            survey_left=survey_left,
+            focal_length_m=focal_length_m,
+            reject=reject,
+            progress=progress,
+        )
         if out is not None:
-            from catseye.gateways.panels.report import write_panels
-
-            with atomic_directory(out, readings) as directory:
-                write_panels(work, directory, progress)
+            save(result, out, progress=progress)
     finally:
         progress.clear()
-    if json:
-        from catseye.gateways.writers.objects import json_line
-
-        say(json_line(panels_object(work)))
-    elif not quiet:
-        say(wrapped("Verdict", panels_verdict(work).text))
-        for title, text in passages(work):
-            say(wrapped(title, text))
-        if out is not None:
-            files_written = "report.html, screws.csv, actuators.csv, panels.csv, readings.csv, crew.csv, panels.json"
-            say(wrapped("Written to", f"{out}/: {files_written}"))
-    judge(panels_verdict(work), strict=strict)
-
-
-def _layout(given: str, focal_length: float) -> "PanelLayout":
-    """The layout of a table, or of a site's prisms."""
-    from catseye.gateways.examples import located
-    from catseye.records.panels.layout import layout_of_site, read_layout
-    from catseye.records.site.folder import read_site
-
-    if given.endswith(".csv"):
-        return read_layout(located(given), focal_length)
-    return layout_of_site(read_site(located(given)))
+    files = "report.html, screws.csv, actuators.csv, panels.csv, readings.csv, crew.csv, panels.json"
+    written = [("Written to", None if out is None else f"{out}/: {files}")]
+    tell(result, json=json, quiet=quiet, strict=strict, written=written)

@@ -2,7 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
@@ -11,12 +11,8 @@ from catseye.cli.option_groups import grouped
 from catseye.cli.results import Strict, tell
 from catseye.cli.terminal import ProgressLine
 from catseye.cli.vocabularies import NUMBERINGS, PARABOLOID_PARTS, PRISM_FRAMES, TRAVELS, one_of
-from catseye.errors import InputError
 
-if TYPE_CHECKING:
-    from catseye.api.telescope import SurfaceResult
-
-TERMS_TOLD = 22  # on a terminal
+MOST_LINES = 22  # of Zernike terms on a terminal
 
 
 def _free(value: str) -> str:
@@ -46,18 +42,18 @@ class _Shape(NamedTuple):
     """Options of the surface fit."""
 
     free: Annotated[
-        str, typer.Option("--free", metavar="vertex,axis,focal-length|none", callback=_free, help="What is fitted.")
+        str, typer.Option("--free", metavar="vertex,axis,focal-length|none", callback=_free, help="Fitted parts.")
     ] = "vertex,axis,focal-length"
     taper_db: Annotated[
         float, typer.Option("--taper-db", min=0.0, max=60.0, help="Illumination's edge below its middle, dB.")
     ] = 0.0
     frequency_ghz: Annotated[
         list[float] | None,
-        typer.Option("--frequency-ghz", callback=_frequencies, help="Gain there, GHz; may repeat."),
+        typer.Option("--frequency-ghz", callback=_frequencies, help="Frequency of a gain, GHz; repeats."),
     ] = None
-    zernike: Annotated[int, typer.Option("--zernike", min=1, max=500, help="How many terms.")] = 15
+    zernike: Annotated[int, typer.Option("--zernike", min=1, max=500, help="Number of Zernike terms.")] = 15
     order: Annotated[
-        str, typer.Option("--order", metavar=NUMBERINGS, callback=one_of(NUMBERINGS), help="Their numbering.")
+        str, typer.Option("--order", metavar=NUMBERINGS, callback=one_of(NUMBERINGS), help="Numbering of the terms.")
     ] = "noll"
 
     def options(self) -> dict[str, Any]:
@@ -76,17 +72,19 @@ class _Reading(NamedTuple):
 
     frame: Annotated[
         str,
-        typer.Option("--frame", metavar=PRISM_FRAMES, callback=one_of(PRISM_FRAMES), help="Of tables."),
+        typer.Option("--frame", metavar=PRISM_FRAMES, callback=one_of(PRISM_FRAMES), help="Frame of tables."),
     ] = "reflector"
     azimuth_deg: Annotated[
-        float | None, typer.Option("--azimuth-deg", min=-540.0, max=540.0, help="Of tables in the ground frame.")
+        float | None,
+        typer.Option("--azimuth-deg", min=-540.0, max=540.0, help="Azimuth, for tables in the ground frame."),
     ] = None
     elevation_deg: Annotated[
         list[float] | None,
-        typer.Option("--elevation-deg", callback=_angles, help="Of each table, once for each input."),
+        typer.Option("--elevation-deg", callback=_angles, help="Elevation of a table, once for each input."),
     ] = None
     temperature_c: Annotated[
-        list[float] | None, typer.Option("--temperature-c", help="Of the structure, °C, once for each input.")
+        list[float] | None,
+        typer.Option("--temperature-c", help="Temperature of the structure, °C, once for each input."),
     ] = None
 
     def options(self) -> dict[str, Any]:
@@ -104,25 +102,28 @@ class _Corrections(NamedTuple):
 
     actuators: Annotated[
         Path | None,
-        typer.Option("--actuators", metavar="FILE.csv|.fits", help="Corrections of all actuators, last input."),
+        typer.Option(
+            "--actuators",
+            metavar="FILE.csv|.fits",
+            help="Table to write: corrections of all actuators, from the last input.",
+        ),
     ] = None
     positions: Annotated[
-        Path | None, typer.Option("--positions", metavar="FILE.csv", help="Where the actuators stand; middle without.")
+        Path | None,
+        typer.Option("--positions", metavar="FILE.csv", help="Positions of the actuators; their middle without."),
     ] = None
     travel: Annotated[
         str,
-        typer.Option("--travel", metavar=TRAVELS, callback=one_of(TRAVELS), help="Of an actuator."),
+        typer.Option("--travel", metavar=TRAVELS, callback=one_of(TRAVELS), help="Travel of an actuator."),
     ] = "normal"
 
-    def refuse(self, inputs: list[Path]) -> None:
-        """Raises InputError for files that cannot be what they are given as."""
-        if self.actuators is not None and self.actuators.suffix.lower() not in (".csv", ".fits"):
-            raise InputError(
-                f"--actuators {self.actuators}: ends in {self.actuators.suffix!r} (expected .csv or .fits)"
-            )
-        for place in (self.actuators, self.positions):
-            if place is not None and any(place.resolve() == source.resolve() for source in inputs):
-                raise InputError(f"{place}: is an input, too (expected another file)")
+    def options(self) -> dict[str, Any]:
+        """The same for `catseye.surface`."""
+        return {
+            "actuators": self.actuators is not None,
+            "positions": self.positions,
+            "travel": "axis" if self.travel == "axis" else "normal",
+        }
 
 
 @app.command(
@@ -141,7 +142,9 @@ def surface(  # noqa: PLR0913 - its options are its command line
             metavar="INPUT…", help="Directories of catseye reduce --out, or tables of prisms; in the order measured."
         ),
     ],
-    site: Annotated[str, typer.Option("--site", metavar="SITE", help="The telescope: gbt, or a folder.")] = "gbt",
+    site: Annotated[
+        str, typer.Option("--site", metavar="SITE", help="Site of the telescope: gbt, or a folder.")
+    ] = "gbt",
     shape: _Shape,
     reading: _Reading,
     wanted: _Corrections,
@@ -155,51 +158,25 @@ def surface(  # noqa: PLR0913 - its options are its command line
     strict: Strict = False,
 ) -> None:
     """A dish's surface: best paraboloid, half-path errors, Zernike terms, gain, change, elevation, actuators."""
-    if wanted.positions is not None and wanted.actuators is None:
-        raise InputError(f"--positions {wanted.positions}: goes with --actuators only")
-    for name, values in (("--elevation-deg", reading.elevation_deg), ("--temperature-c", reading.temperature_c)):
-        if values and len(values) != len(inputs):
-            raise InputError(f"{name} is given {len(values)} times for {len(inputs)} inputs (expected once for each)")
-    wanted.refuse(inputs)
-    if out is not None:
-        from catseye.gateways.writers.output import refuse_output
+    from catseye.api.result import require_writable, save
+    from catseye.api.surface import require_actuators_file
+    from catseye.api.surface import surface as surface_of
 
-        refuse_output(out, *inputs)
+    require_actuators_file(wanted.actuators, *inputs)
+    require_writable(out, *inputs)
     progress = ProgressLine(quiet)
     try:
-        from catseye.api.telescope import surface as surfaced
-        from catseye.gateways.writers.output import atomic_directory
-
-        result = surfaced(
-            *inputs,
-            site=site,
-            **shape.options(),
-            **reading.options(),
-            actuators=wanted.actuators is not None,
-            positions=wanted.positions,
-            travel="axis" if wanted.travel == "axis" else "normal",
-            progress=progress,
+        result = surface_of(
+            *inputs, site=site, **shape.options(), **reading.options(), **wanted.options(), progress=progress
         )
+        if wanted.actuators is not None:
+            result.save_actuators(wanted.actuators)  # before the directory: no directory without it
         if out is not None:
-            with atomic_directory(out, *inputs) as directory:
-                result.write(directory, progress)
-                _keep(result, wanted.actuators)  # no directory without the table that was asked for, too
-        else:
-            _keep(result, wanted.actuators)
+            save(result, out, progress=progress)
     finally:
         progress.clear()
-    from catseye.gateways.surface.objects import term_lines
-
-    found = result.found
-    rows = [f"{'':<14}{line}" for line in term_lines(found.shapes, found.change, found.lookup)[:TERMS_TOLD]]
+    rows = [f"{'':<14}{line}" for line in result.rows()[:MOST_LINES]]
     files = None if out is None else f"{out}/: report.html, surface.json, tables of prisms and Zernike terms"
     table = None if wanted.actuators is None else f"{wanted.actuators}: the actuators' corrections"
     written = [("Written to", files), ("Written to", table)]
     tell(result, json=json, quiet=quiet, strict=strict, rows=rows, written=written)
-
-
-def _keep(result: "SurfaceResult", actuators: Path | None) -> None:
-    if actuators is not None:
-        from catseye.gateways.surface.files import write_actuators
-
-        write_actuators(result.found, actuators)

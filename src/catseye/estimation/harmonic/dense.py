@@ -7,6 +7,7 @@ import numpy as np
 from catseye.aliases import Array
 from catseye.errors import EstimationError, ValidityError
 from catseye.estimation.harmonic.body import arms_of, rigid_part
+from catseye.estimation.harmonic.labels import NUMBERED, HarmonicLabels
 
 FLOATING = 1e-12  # of the normal matrix of unit diagonal: a smaller eigenvalue is an undetermined direction
 
@@ -29,7 +30,16 @@ class Solved:
     full_covariance: Array | None = None
 
 
-def solved_together(y: Array, visible: Array, r: Array, *, body: Array, local: Array, full: Array) -> Solved:
+def solved_together(
+    y: Array,
+    visible: Array,
+    r: Array,
+    *,
+    body: Array,
+    local: Array,
+    full: Array,
+    labels: HarmonicLabels = NUMBERED,
+) -> Solved:
     """Joint solution: the body's unknowns function by function, then the points'.
 
     y             (T, n, 3) m, 0 if not seen
@@ -37,6 +47,7 @@ def solved_together(y: Array, visible: Array, r: Array, *, body: Array, local: A
     r             (n, 3, 6) rigid design
     body, local   (T, K), (T, m)
     full          (T or 1, 3n, 3n) m^2
+    labels        for messages
 
     Raises ValidityError for an invalid covariance, EstimationError for undetermined unknowns.
     """
@@ -56,7 +67,7 @@ def solved_together(y: Array, visible: Array, r: Array, *, body: Array, local: A
         normal += white[:, :-1].T @ white[:, :-1]
         right += white[:, :-1].T @ white[:, -1]
         pvv += float(white[:, -1] @ white[:, -1])
-    inverse = inverse_of(normal, np.sqrt(np.diag(normal)), k, m=m)
+    inverse = inverse_of(normal, np.sqrt(np.diag(normal)), k, m=m, labels=labels)
     x = inverse @ right
     c, a = x[: 6 * k], x[6 * k :].reshape(n, m, 3)
     local_columns = 6 * k + np.arange(3 * m) + 3 * m * np.arange(n)[:, None]
@@ -68,15 +79,15 @@ def solved_together(y: Array, visible: Array, r: Array, *, body: Array, local: A
         to_six[6 * k :, 6 * k :] = np.einsum("jni,fg->fjngi", part, np.eye(m)).reshape(6 * m, 3 * n * m)
         link = to_six @ inverse @ to_six.T
     return Solved(
-        c.reshape(k, 6).T,
-        a.transpose(0, 2, 1),
-        inverse[local_columns[:, :, None], local_columns[:, None, :]],
-        inverse[local_columns][:, :, : 6 * k],
-        inverse[: 6 * k, : 6 * k],
-        link,
-        np.zeros((epochs, 0)),
-        max(pvv - float(right @ x), 0.0),
-        inverse,
+        rigid=c.reshape(k, 6).T,
+        own=a.transpose(0, 2, 1),
+        own_covariance=inverse[local_columns[:, :, None], local_columns[:, None, :]],
+        cross=inverse[local_columns][:, :, : 6 * k],
+        rigid_covariance=inverse[: 6 * k, : 6 * k],
+        six_link=link,
+        shared=np.zeros((epochs, 0)),
+        pvv=max(pvv - float(right @ x), 0.0),
+        full_covariance=inverse,
     )
 
 
@@ -88,26 +99,26 @@ def design_of(r: Array, body: Array, local: Array) -> Array:
     return np.concatenate([by_body, by_local], axis=1)
 
 
-def inverse_of(normal: Array, size: Array, k: int, *, m: int) -> Array:
+def inverse_of(normal: Array, size: Array, k: int, *, m: int, labels: HarmonicLabels = NUMBERED) -> Array:
     """Inverse of a normal matrix scaled by `size`.
 
     EstimationError naming undetermined unknowns.
     """
     if np.any(size == 0.0):
-        raise EstimationError(f"{_label(int(np.argmin(size)), k, m)} floats: no measurement depends on it")
+        raise EstimationError(f"{_label(int(np.argmin(size)), k, m, labels)} floats: no measurement depends on it")
     values, vectors = np.linalg.eigh(normal / np.outer(size, size))
     if values[0] < FLOATING:
-        worst = ", ".join(_label(int(i), k, m) for i in np.argsort(-np.abs(vectors[:, 0]))[:3])
+        worst = ", ".join(_label(int(i), k, m, labels) for i in np.argsort(-np.abs(vectors[:, 0]))[:3])
         raise EstimationError(f"these float together: {worst}; measure more epochs or points, or take fewer functions")
     return (vectors / values) @ vectors.T / np.outer(size, size)
 
 
-def _label(index: int, k: int, m: int) -> str:
+def _label(index: int, k: int, m: int, labels: HarmonicLabels) -> str:
     if index < 6 * k:
         axis = ("shift x", "shift y", "shift z", "turn x", "turn y", "turn z")[index % 6]
-        return f"{axis} of the body's function {index // 6 + 1}"
+        return f"{axis} of {labels.body_function(index // 6)}"
     point, offset = divmod(index - 6 * k, 3 * m)
-    return f"{'xyz'[offset % 3]} of point {point} by its function {offset // 3 + 1}"
+    return f"{'xyz'[offset % 3]} of {labels.point_function(point, offset // 3)}"
 
 
 def _root(covariance: Array, epoch: int) -> Array:

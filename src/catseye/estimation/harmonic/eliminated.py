@@ -16,6 +16,7 @@ from catseye.aliases import Array
 from catseye.errors import EstimationError, ValidityError
 from catseye.estimation.harmonic.body import arms_of, moved, rigid_part
 from catseye.estimation.harmonic.dense import FLOATING, Solved, inverse_of
+from catseye.estimation.harmonic.labels import NUMBERED, HarmonicLabels
 
 MOST_REMAINING = 8000  # remaining unknowns: their matrix takes 0.5 GB
 PIECE = 128  # points per batch, with shared unknowns per epoch
@@ -36,7 +37,15 @@ class _Design(NamedTuple):
 
 
 def solved_by_elimination(
-    y: Array, visible: Array, r: Array, *, body: Array, local: Array, points: Array, shared: Array | None
+    y: Array,
+    visible: Array,
+    r: Array,
+    *,
+    body: Array,
+    local: Array,
+    points: Array,
+    shared: Array | None,
+    labels: HarmonicLabels = NUMBERED,
 ) -> Solved:
     """Solution of body, points and shared unknowns, by elimination of the points.
 
@@ -46,6 +55,7 @@ def solved_by_elimination(
     body, local   (T, K), (T, m)
     points        (T or 1, n or 1, 3, 3) m^2
     shared        (T or 1, n, 3, q) m, or None
+    labels        for messages
 
     Raises ValidityError for an invalid covariance and for too many remaining unknowns, EstimationError for undetermined
     ones.
@@ -67,7 +77,7 @@ def solved_by_elimination(
     sums = (functions.T @ wy.reshape(epochs, -1)).reshape(q, n, 3)
 
     blocks = moments[:m, :m].transpose(2, 0, 3, 1, 4).reshape(n, 3 * m, 3 * m)
-    inverse = _inverses(blocks, m)
+    inverse = _inverses(blocks, m, labels)
     g_local = sums[:m].transpose(1, 0, 2).reshape(n, 3 * m)
     g_body = np.einsum("fknil,nlj->nfikj", moments[:m, m:], r).reshape(n, 3 * m, 6 * k)
     big = np.zeros((remaining, remaining))
@@ -83,7 +93,7 @@ def solved_by_elimination(
         half = (np.swapaxes(root, -1, -2) @ g).reshape(-1, remaining)
         big -= half.T @ half
         right -= half.T @ np.einsum("pji,pj->pi", root, g_local[at]).ravel()
-    core = _core(big, before, k, m)
+    core = _core(big, before, k, m, labels)
     s = core @ right
     links = _links(g_body, weights, u, local)
     return _answer(s, core, inverse, g_local, y, weights, design=_Design(u, r, body, local), links=links)
@@ -162,7 +172,7 @@ def _links(g_body: Array, weights: Array, u: Array, local: Array):
         yield at, np.concatenate([g_body[at], by_z], axis=2)
 
 
-def _inverses(blocks: Array, m: int) -> Array:
+def _inverses(blocks: Array, m: int, labels: HarmonicLabels) -> Array:
     """Inverses of the points' normal matrices.
 
     EstimationError with the first undetermined point.
@@ -176,31 +186,33 @@ def _inverses(blocks: Array, m: int) -> Array:
     floats |= values[:, 0] < FLOATING
     if floats.any():
         raise EstimationError(
-            f"the {m} functions of point {int(np.argmax(floats))} (counted from 0) float: it was measured in too few "
+            f"the {m} functions of {labels.point(int(np.argmax(floats)))} float: it was measured in too few "
             f"epochs, or these are too similar ({int(floats.sum())} points of {len(blocks)}); leave it out or use fewer"
         )
     inverse = (vectors / values[:, None, :]) @ np.swapaxes(vectors, -1, -2)
     return inverse / size[:, :, None] / size[:, None, :]
 
 
-def _core(big: Array, size: Array, k: int, m: int) -> Array:
+def _core(big: Array, size: Array, k: int, m: int, labels: HarmonicLabels) -> Array:
     """Inverse of the reduced matrix.
 
     `size` is from its diagonal before elimination.
     """
     if len(big) <= 6 * k:
-        return inverse_of(big, size, k, m=m) if len(big) else big
+        return inverse_of(big, size, k, m=m, labels=labels) if len(big) else big
     from scipy.linalg import cho_factor, cho_solve
 
     if np.any(size == 0.0):
-        raise EstimationError("the body's functions float: no measurement depends on one of them")
+        raise EstimationError(f"functions of {labels.body} float: no measurement depends on one of them")
     scaled = big / size[:, None] / size
     try:
         factor = cho_factor(scaled, lower=True, overwrite_a=True, check_finite=False)
     except np.linalg.LinAlgError as problem:
-        raise EstimationError("the body's functions float: measure more epochs or points, or take fewer") from problem
+        raise EstimationError(
+            f"functions of {labels.body} float: measure more epochs or points, or take fewer"
+        ) from problem
     if np.min(np.diag(factor[0])) ** 2 < FLOATING:
-        raise EstimationError("the body's functions float: measure more epochs or points, or take fewer")
+        raise EstimationError(f"functions of {labels.body} float: measure more epochs or points, or take fewer")
     return cho_solve(factor, np.eye(len(big)), overwrite_b=True, check_finite=False) / size[:, None] / size
 
 
@@ -239,4 +251,13 @@ def _answer(
     if u.shape[-1]:
         residual -= np.einsum("tniq,tq->tni", np.broadcast_to(u, (epochs, *u.shape[1:])), z, optimize=True)
     pvv = float(np.einsum("tni,tnij,tnj->", residual, weights, residual, optimize=True)) + float(np.sum(z**2))
-    return Solved(rigid, shifts, covariance, cross, core[: 6 * k, : 6 * k], link, z, pvv)
+    return Solved(
+        rigid=rigid,
+        own=shifts,
+        own_covariance=covariance,
+        cross=cross,
+        rigid_covariance=core[: 6 * k, : 6 * k],
+        six_link=link,
+        shared=z,
+        pvv=pvv,
+    )

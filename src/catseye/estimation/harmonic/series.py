@@ -23,6 +23,7 @@ from catseye.errors import EstimationError, ValidityError
 from catseye.estimation.harmonic.body import moved, rigid_design, rigid_part
 from catseye.estimation.harmonic.dense import solved_together
 from catseye.estimation.harmonic.eliminated import solved_by_elimination
+from catseye.estimation.harmonic.labels import NUMBERED, HarmonicLabels
 
 TOGETHER = 3000  # unknowns: limit with a full covariance
 
@@ -122,7 +123,15 @@ class HarmonicFit:
         return rows @ self.whole @ np.swapaxes(rows, -1, -2)
 
 
-def fit_harmonics(displacement: Array, arms: Array, *, body: Array, own: Array, spread: Spread) -> HarmonicFit:
+def fit_harmonics(
+    displacement: Array,
+    arms: Array,
+    *,
+    body: Array,
+    own: Array,
+    spread: Spread,
+    labels: HarmonicLabels = NUMBERED,
+) -> HarmonicFit:
     """Motion of a body and of its points from many epochs.
 
     displacement   (T, n, 3) m; NaN if a point was not measured (any coordinate: all three)
@@ -130,6 +139,7 @@ def fit_harmonics(displacement: Array, arms: Array, *, body: Array, own: Array, 
     body           (T, K) functions of the body's shift and turn; K may be 0
     own            (T, m) functions of the points; m may be 0; linearly independent of the body's
     spread         covariance of the displacements
+    labels         names of points and functions, for messages
 
     Raises ValidityError for inconsistent shapes or invalid covariances, EstimationError for undetermined unknowns.
 
@@ -144,7 +154,7 @@ def fit_harmonics(displacement: Array, arms: Array, *, body: Array, own: Array, 
     [1, 0, 2]
     """
     y = np.array(displacement, dtype=float)
-    _refuse_shapes(y, arms, body, own)
+    _refuse_shapes(y, arms, body, own, labels)
     measured = np.isfinite(y).all(axis=2)
     y[~measured] = 0.0
     r = rigid_design(np.asarray(arms, dtype=float))
@@ -154,9 +164,11 @@ def fit_harmonics(displacement: Array, arms: Array, *, body: Array, own: Array, 
                 f"{len(arms)} points with a full covariance are too many unknowns (expected at most {TOGETHER}): give "
                 "covariances of points and shared effects"
             )
-        solved = solved_together(y, measured, r, body=body, local=own, full=spread.full)
+        solved = solved_together(y, measured, r, body=body, local=own, full=spread.full, labels=labels)
     elif spread.points is not None:
-        solved = solved_by_elimination(y, measured, r, body=body, local=own, points=spread.points, shared=spread.shared)
+        solved = solved_by_elimination(
+            y, measured, r, body=body, local=own, points=spread.points, shared=spread.shared, labels=labels
+        )
     else:
         raise ValidityError("a spread has neither a full covariance nor those of points (expected one)")
     six, six_covariance = _rigid_parts(
@@ -166,18 +178,18 @@ def fit_harmonics(displacement: Array, arms: Array, *, body: Array, own: Array, 
     residual[~measured] = np.nan
     unknown = 6 * body.shape[1] + 3 * len(arms) * own.shape[1]
     return HarmonicFit(
-        solved.rigid,
-        solved.own,
-        solved.own_covariance,
-        solved.cross,
-        solved.rigid_covariance,
-        six,
-        six_covariance,
-        solved.shared,
-        residual,
-        solved.pvv,
-        3 * int(measured.sum()) - unknown,
-        solved.full_covariance,
+        rigid=solved.rigid,
+        own=solved.own,
+        own_covariance=solved.own_covariance,
+        cross=solved.cross,
+        rigid_covariance=solved.rigid_covariance,
+        six=six,
+        six_covariance=six_covariance,
+        shared=solved.shared,
+        residual=residual,
+        pvv=solved.pvv,
+        degrees_of_freedom=3 * int(measured.sum()) - unknown,
+        whole=solved.full_covariance,
     )
 
 
@@ -194,7 +206,7 @@ def _rigid_parts(own: Array, arms: Array, link: Array | None, rigid_covariance: 
     return np.einsum("jni,nim->jm", part, own), link
 
 
-def _refuse_shapes(y: Array, arms: Array, body: Array, own: Array) -> None:
+def _refuse_shapes(y: Array, arms: Array, body: Array, own: Array, labels: HarmonicLabels) -> None:
     if y.ndim != 3 or y.shape[2] != 3 or np.shape(arms) != y.shape[1:]:
         raise ValidityError(f"displacements {y.shape}, arms {np.shape(arms)}: expected (T, n, 3) and (n, 3)")
     for name, rows in (("body", body), ("own", own)):
@@ -204,4 +216,4 @@ def _refuse_shapes(y: Array, arms: Array, body: Array, own: Array) -> None:
         raise ValidityError("no function of the body or of the points")
     never = np.flatnonzero(~np.isfinite(y).all(axis=2).any(axis=0))
     if len(never):
-        raise EstimationError(f"point {never[0]} (counted from 0) was measured in no epoch: leave it out")
+        raise EstimationError(f"{labels.point(int(never[0]))} was measured in no epoch: leave it out")

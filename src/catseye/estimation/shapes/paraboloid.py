@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Literal
 
 import numpy as np
@@ -19,6 +20,23 @@ CONVERGED_STEP = 1e-10  # m and rad: a tenth of a nanometre at a metre's arm
 ITERATIONS = 30
 SQUARE = 500  # limit of points for full matrix products, which take seconds beyond it
 DEPENDENT = 1e-10  # of a column's length: minimum left after orthogonalisation
+
+
+class ParaboloidStatus(IntEnum):
+    """Status of a fitted paraboloid; the reason of its EstimationError."""
+
+    CONVERGED = 0
+    TOO_FEW = 1
+    UNDETERMINED = 2
+    UNSETTLED = 3
+
+
+TEXTS = {
+    ParaboloidStatus.CONVERGED: "converged",
+    ParaboloidStatus.TOO_FEW: "fewer points than parameters",
+    ParaboloidStatus.UNDETERMINED: "the points do not hold the paraboloid",
+    ParaboloidStatus.UNSETTLED: "not settled",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +130,7 @@ def fit_paraboloid(
     weights = np.ones(k) if weights is None else np.asarray(weights, dtype=float)
     if (available := int(np.count_nonzero(weights))) < count:
         what = "a paraboloid of known focal length" if free == POSE else f"a paraboloid of free {', '.join(free)}"
-        raise EstimationError(f"{what} needs {count} points, {available} given")
+        raise EstimationError(f"{what} needs {count} points, {available} given", reason=ParaboloidStatus.TOO_FEW)
     tilts = nominal.rotation[:, :2]  # its x and y axes in the outer frame
     root = np.sqrt(weights)[:, None]
     translation, turn, focal = np.zeros(3), np.zeros(2), focal_length
@@ -126,11 +144,17 @@ def fit_paraboloid(
         translation, turn = translation + parts.get("vertex", 0.0), turn + parts.get("axis", 0.0)
         focal = focal + float(parts["focal-length"][0]) if "focal-length" in free else focal
         if not 0.0 < focal < np.inf:
-            raise EstimationError(f"the paraboloid's focal length ran to {focal:g} m; hold it, or begin nearer")
+            raise EstimationError(
+                f"the paraboloid's focal length ran to {focal:g} m; hold it, or begin nearer",
+                reason=ParaboloidStatus.UNSETTLED,
+            )
         if count == 0 or np.max(np.abs(step)) < CONVERGED_STEP:
             break
     else:
-        raise EstimationError(f"the paraboloid did not settle in {ITERATIONS} iterations; last step {step} m, rad")
+        raise EstimationError(
+            f"the paraboloid did not settle in {ITERATIONS} iterations; last step {step} m, rad",
+            reason=ParaboloidStatus.UNSETTLED,
+        )
     local, normal, deviation, _ = _deviation(points, nominal, translation, tilts @ turn, focal)
     along = covariance_along(covariance, normal)
     expansion = _expansion(free, tilts) @ gain
@@ -228,7 +252,10 @@ def _gain(design: np.ndarray, scaled: np.ndarray, k: int) -> np.ndarray:
     scale = np.linalg.norm(rows, axis=0)
     orthogonal, triangle = np.linalg.qr(rows / scale)
     if np.min(np.abs(np.diag(triangle))) < DEPENDENT:
-        raise EstimationError(f"{k} points do not hold the paraboloid: they lie on one line or circle about its axis")
+        raise EstimationError(
+            f"{k} points do not hold the paraboloid: they lie on one line or circle about its axis",
+            reason=ParaboloidStatus.UNDETERMINED,
+        )
     return np.linalg.solve(triangle, (orthogonal * scaled).T) / scale[:, None]
 
 

@@ -6,16 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.shapes.paraboloid import PARAMETERS, POSE, Measure, fit_paraboloid, ordered
+from catseye.estimation.shapes.paraboloid import (
+    PARAMETERS,
+    POSE,
+    TEXTS,
+    Measure,
+    ParaboloidStatus,
+    fit_paraboloid,
+    ordered,
+)
 from catseye.geometry.frames.frame import Transform
 
-CONVERGED, TOO_FEW, UNHELD, UNSETTLED = 0, 1, 2, 3
-STATUS = {
-    CONVERGED: "converged",
-    TOO_FEW: "fewer points than parameters",
-    UNHELD: "the points do not hold the paraboloid",
-    UNSETTLED: "not settled",
-}
 LARGE = 20_000  # points times epochs from which the compiled form is faster, import included
 
 
@@ -31,7 +32,7 @@ class SurfaceSeries:
     covariance   (T, p, p)
     deviation    (T, k) m, normal, above zero towards the focus; nan for missing points
     points       (T,) number of points measured
-    status       (T,) 0 if converged, else a key of STATUS
+    status       (T,) values of `ParaboloidStatus`
     """
 
     free: tuple[str, ...]
@@ -43,11 +44,13 @@ class SurfaceSeries:
 
     def require_converged(self) -> "SurfaceSeries":
         """Return this series, or raise EstimationError naming the first failed epoch."""
-        bad = np.flatnonzero(self.status != CONVERGED)
+        bad = np.flatnonzero(self.status != ParaboloidStatus.CONVERGED)
         if len(bad):
+            status = ParaboloidStatus(int(self.status[bad[0]]))
             raise EstimationError(
-                f"epoch {bad[0] + 1} of {len(self.status)}: {STATUS[int(self.status[bad[0]])]}, "
-                f"{self.points[bad[0]]} points measured; {len(bad)} epochs failed"
+                f"epoch {bad[0] + 1} of {len(self.status)}: {TEXTS[status]}, "
+                f"{self.points[bad[0]]} points measured; {len(bad)} epochs failed",
+                reason=status,
             )
         return self
 
@@ -110,12 +113,12 @@ def _plainly(
     p = sum(PARAMETERS[name] for name in free)
     local = (points - nominal.translation) @ nominal.rotation
     series = SurfaceSeries(
-        free,
-        np.full((epochs, p), np.nan),
-        np.full((epochs, p, p), np.nan),
-        np.full((epochs, k), np.nan),
-        np.isfinite(local).all(axis=2).sum(axis=1),
-        np.zeros(epochs, dtype=np.int64),
+        free=free,
+        parameters=np.full((epochs, p), np.nan),
+        covariance=np.full((epochs, p, p), np.nan),
+        deviation=np.full((epochs, k), np.nan),
+        points=np.isfinite(local).all(axis=2).sum(axis=1),
+        status=np.zeros(epochs, dtype=np.int64),
     )
     for epoch in range(epochs):
         finite = np.isfinite(local[epoch]).all(axis=1)
@@ -131,8 +134,9 @@ def _plainly(
                 measure=measure,
             )
         except EstimationError as problem:
-            text = str(problem)
-            series.status[epoch] = TOO_FEW if "needs" in text else UNHELD if "hold" in text else UNSETTLED
+            if not isinstance(problem.reason, ParaboloidStatus):
+                raise
+            series.status[epoch] = problem.reason
             continue
         parts = {
             "vertex": fit.translation,

@@ -6,10 +6,14 @@ Tested against its plain form, `fit_paraboloid` per epoch.
 import numpy as np
 from numba import njit
 
+from catseye.estimation.shapes.paraboloid import ParaboloidStatus
+
 ITERATIONS = 30
 CONVERGED_STEP = 1e-10  # m and rad
 LEAST_PIVOT = 1e-13  # of a normal matrix of unit diagonal
-TOO_FEW, UNHELD, UNSETTLED = 1, 2, 3
+TOO_FEW, UNDETERMINED, UNSETTLED = (
+    int(status) for status in (ParaboloidStatus.TOO_FEW, ParaboloidStatus.UNDETERMINED, ParaboloidStatus.UNSETTLED)
+)
 
 
 @njit(cache=True, error_model="numpy")
@@ -152,7 +156,7 @@ def series(local, variance, weights, columns, focal, squared):
                 status[t] = TOO_FEW
                 break
             if turn == 0 and not _scaled(normal, size, p):
-                status[t] = UNHELD
+                status[t] = UNDETERMINED
                 break
             for a in range(p):
                 right[a] /= size[a]
@@ -172,7 +176,7 @@ def series(local, variance, weights, columns, focal, squared):
             parameters[t, a] = six[columns[a]]
         _pass(epoch_points, weights, noise, six, settings, 2, off, sums)
         if not _scaled(normal, size, p):
-            status[t] = UNHELD
+            status[t] = UNDETERMINED
             continue
         _noise(normal, spread, size, covariance[t], column, p)
     return parameters, covariance, deviation, points, status

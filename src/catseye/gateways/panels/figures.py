@@ -1,10 +1,10 @@
-"""Figures of panel setting as SVG text: dish maps, corners, control chart, effect of turning."""
+"""Figures of panel setting: dish maps, corners, control chart, effect of turning."""
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, Figure, styled
 from catseye.reduction.panels.crew import members, sessions
 from catseye.reduction.panels.heights import surface_rms
 
@@ -15,19 +15,17 @@ if TYPE_CHECKING:
 OUTSIDE = 1.03  # times the limits, so that edges are not cut
 
 
-def panel_figures(work: "PanelWork") -> dict[str, str]:
-    """SVG text of each figure, by name."""
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
-        drawn: dict[str, str] = {
-            "corners": svg(_corners(work)),
-            "surface": svg(_surface(work.latest)),
-            "lie": svg(_lie(work)),
+def panel_figures(work: "PanelWork") -> dict[str, Figure]:
+    """Figures of the report, by name."""
+    with styled():
+        drawn = {
+            "corners": _corners(work),
+            "surface": _surface(work.latest),
+            "lie": _lie(work),
+            "control": _control(work),
         }
-        drawn["control"] = svg(_control(work))
         if work.setting is not None:
-            drawn["turning"] = svg(_turning(work))
+            drawn["turning"] = _turning(work)
         return drawn
 
 

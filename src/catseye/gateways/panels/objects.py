@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from catseye.gateways.writers.passage import Passage
-from catseye.gateways.writers.verdict import Verdict
 from catseye.reduction.panels.crew import members, sessions, standing, zeros
 from catseye.reduction.panels.heights import surface_rms
 from catseye.reduction.panels.job import verdicts
@@ -61,21 +60,12 @@ def screws(heights: "PanelHeights") -> Iterable[Screw]:
             )
 
 
-def panels_verdict(work: "PanelWork") -> Verdict:
-    """Verdict from the control of the readings, not from the number of screws to turn."""
-    if work.notes:
-        return Verdict("doubtful", work.notes[0].rstrip("."))
-    rows = list(screws(work.latest))
-    turn = sum(screw.verdict == "turn" for screw in rows)
-    return Verdict("good", f"{turn} of {len(rows)} screws are to be turned, and the readings are in control")
-
-
 def panels_object(work: "PanelWork") -> dict[str, Any]:
     """Object that `catseye panels --json` prints: SI units."""
     last = work.latest
     return {
         "format": FORMAT,
-        "verdict": panels_verdict(work).to_object(),
+        "verdict": work.verdict.to_object(),
         "instrument": {"name": work.sheet.name, "serial": work.sheet.serial},
         "layout": {"panels": len(work.layout.panels), "corners": len(work.layout.corners)},
         "goal": work.sheet.goal_um * 1e-6,

@@ -13,7 +13,6 @@ from catseye.gateways.panels.objects import (
     doubt_text,
     micrometres,
     panels_object,
-    panels_verdict,
     passages,
     screws,
 )
@@ -29,6 +28,7 @@ from catseye.gateways.panels.tables import (
     readings_csv,
     screws_csv,
 )
+from catseye.gateways.writers.drawing import svgs
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import join_tables
@@ -101,12 +101,12 @@ def panels_report(work: "PanelWork", when: datetime) -> str:
         f'<header><h1>Panel setting</h1><div class="faint">{escape(work.sheet.name)}, reduced by catseye on '
         f"{when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ</div><nav>{links}</nav></header>"
     )
-    drawn = panel_figures(work)
+    drawn = svgs(panel_figures(work))
     words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in passages(work))
     figures = {name: picture(drawn[name], text) for name, text in CAPTIONS.items() if name in drawn}
     body = [
         header,
-        verdict_line(panels_verdict(work)),
+        verdict_line(work.verdict),
         _cards(work),
         section("result", "Result", f"<dl>{words}</dl>", *(figures[n] for n in ("corners", "lie", "surface"))),
         section("screws", "Screws", _screws(work)),

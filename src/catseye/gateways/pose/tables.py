@@ -9,9 +9,9 @@ import numpy as np
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.estimation.shapes.pose import Pose
 from catseye.gateways.writers.columns import Column, Table
+from catseye.reduction.pose.findings import PoseFindings
 from catseye.reduction.pose.series_comparison import PointingFindings
 from catseye.reduction.pose.track_profile import TrackProfile
-from catseye.reduction.pose.findings import PoseFindings
 
 PAGE = "star-offsets.md"
 

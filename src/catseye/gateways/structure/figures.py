@@ -3,7 +3,7 @@
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
-from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl
 from catseye.reduction.structure.check import LeaveOut
 from catseye.reduction.structure.series import StructureFit
 from catseye.reduction.structure.vibration import Vibration
@@ -12,15 +12,13 @@ AXES = ("x", "y", "z")
 BAND = 2.0  # standard uncertainties shown
 
 
-def motion_figure(fit: StructureFit) -> str:
+def motion_figure(fit: StructureFit) -> Figure:
     """Shift and rotation of the group with elevation, with u and each epoch's residual motion."""
-    from catseye.estimation.harmonic.body import rigid_part
-
     series = fit.series
     e = np.asarray(series.posture.elevation, dtype=float)
     grid = np.linspace(e.min(), e.max(), 121)
     predicted = fit.predict(grid)
-    at = fit.predict(e)  # without temperature and direction terms
+    at, motion = fit.predict(e), fit.residual_motion  # without temperature and direction terms
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9.2, 5.4), layout="constrained")
         axes = figure.subplots(2, 3, sharex=True)
@@ -30,20 +28,14 @@ def motion_figure(fit: StructureFit) -> str:
             u = BAND * np.sqrt(np.maximum(predicted.six_covariance[:, c, c], 0.0)) / scale
             panel.fill_between(grid / DEGREE, value - u, value + u, color=SERIES[0], alpha=0.18, linewidth=0)
             panel.plot(grid / DEGREE, value, color=SERIES[0])
-            residual_motion = np.full(len(e), np.nan)
-            for t, residual in enumerate(fit.fit.residual):
-                measured = np.isfinite(residual).all(axis=1)
-                part = rigid_part(fit.arms[measured]) if measured.sum() >= 3 else None
-                if part is not None:
-                    residual_motion[t] = float(np.einsum("ni,ni->", part[c], residual[measured])) / scale
-            panel.plot(e / DEGREE, at.six[:, c] / scale + residual_motion, "o", color=INK, markersize=2.6)
+            panel.plot(e / DEGREE, at.six[:, c] / scale + motion[:, c] / scale, "o", color=INK, markersize=2.6)
             panel.set_title(f"{'shift' if c < 3 else 'turn about'} {AXES[c % 3]}, {unit}")
             if c >= 3:
                 panel.set_xlabel("elevation, degrees")
-        return svg(figure)
+        return figure
 
 
-def residual_figure(fit: StructureFit, check: LeaveOut | None) -> str:
+def residual_figure(fit: StructureFit, check: LeaveOut | None) -> Figure:
     """Map of residuals, points downwards, epochs by elevation; and left-out epochs over their claim."""
     order = np.argsort(np.asarray(fit.series.posture.elevation))
     residual = fit.fit.residual[order] / MILLIMETRE
@@ -81,10 +73,10 @@ def residual_figure(fit: StructureFit, check: LeaveOut | None) -> str:
             )
         below.set_yticks([])
         below.set_title("Claims are correct if the bars match the red curve" if check is not None else "Residuals")
-        return svg(figure)
+        return figure
 
 
-def spectrum_figure(vibration: Vibration) -> str:
+def spectrum_figure(vibration: Vibration) -> Figure:
     """Densities of all series with the first one's confidence band, peaks named."""
     f, density = vibration.spectrum.frequency_hz, vibration.spectrum.density / MILLIMETRE**2
     with mpl.rc_context(STYLE):
@@ -108,4 +100,4 @@ def spectrum_figure(vibration: Vibration) -> str:
         panel.set_ylabel("density of the range, mm²/Hz")
         if len(vibration.series) <= 12:
             panel.legend(loc="upper right", ncols=2)
-        return svg(figure)
+        return figure

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -12,56 +11,48 @@ from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.gateways.structure.figures import motion_figure, residual_figure, spectrum_figure
 from catseye.gateways.structure.objects import (
     FORMAT,
+    structure_object,
     structure_samplers,
     vibration_object,
     vibration_samplers,
 )
 from catseye.gateways.structure.tables import coefficients_csv, prediction_csv, residuals_csv, spectra_csv
+from catseye.gateways.writers.drawing import svg
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import SAMPLERS, join_samplers
-from catseye.gateways.writers.verdict import Verdict, verdict_line
+from catseye.gateways.writers.verdict import verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
-from catseye.reduction.structure.check import LeaveOut
-from catseye.reduction.structure.series import Prediction, StructureFit
+from catseye.reduction.structure.findings import StructureFindings
 from catseye.reduction.structure.vibration import Vibration
 
 
 def write_structure(
-    fit: StructureFit,
-    directory: Path,
-    *,
-    answer: Mapping[str, Any],
-    check: LeaveOut | None,
-    predicted: Prediction | None,
-    inputs: Mapping[str, str],
-    progress: Progress | None = None,
+    found: StructureFindings, directory: Path, inputs: Mapping[str, str], *, progress: Progress | None = None
 ) -> None:
-    """Write the files of a fit.
+    """Write the files of a model.
 
-    fit, check, predicted   as for `structure_object`
-    directory               existing, from `writers.output.atomic_directory`
-    answer                  object from `structure_object`
-    inputs                  SHA-256 of each input file, by name
-    progress                called for each file
+    directory   existing, from `writers.output.atomic_directory`
+    inputs      SHA-256 of each input file, by name
+    progress    called for each file
     """
     when = datetime.now(UTC)
-    request = answer.get("prediction") or {}
+    fit, predicted = found.fit, found.predicted
     files: Files = {
         "coefficients.csv": lambda: coefficients_csv(fit),
-        "residuals.csv": lambda: residuals_csv(fit, check),
-        "structure.json": lambda: json_page({"format": FORMAT, **answer}),
-        "report.html": lambda: _structure_page(fit, answer, check, predicted),
+        "residuals.csv": lambda: residuals_csv(fit, found.check),
+        "structure.json": lambda: json_page({"format": FORMAT, **structure_object(found)}),
+        "report.html": lambda: _structure_page(found),
     }
     if predicted is not None:
-        files = {"prediction.csv": lambda: prediction_csv(predicted, request), **files}
+        files = {"prediction.csv": lambda: prediction_csv(predicted, found.request), **files}
     provenance = {
         "format": FORMAT,
         "made_by": "catseye structure",
         "model": vars(fit.model) | {"group": fit.series.group},
     }
     write_files(files, directory, {**provenance, **origin(when, inputs)}, progress=progress)
-    join_samplers(directory, SAMPLERS, structure_samplers(fit, check, predicted, request=request))
+    join_samplers(directory, SAMPLERS, structure_samplers(found))
 
 
 def write_vibration(
@@ -84,10 +75,8 @@ def write_vibration(
     join_samplers(directory, SAMPLERS, vibration_samplers(vibration, zero_mjd))
 
 
-def _structure_page(
-    fit: StructureFit, answer: Mapping[str, Any], check: LeaveOut | None, predicted: Prediction | None
-) -> str:
-    s = fit.series
+def _structure_page(found: StructureFindings) -> str:
+    fit, check, predicted, s = found.fit, found.check, found.predicted, found.fit.series
     cards = [
         card("Epochs", str(len(s)), f"{len(s.names)} points of {s.group}, frame {s.frame}"),
         card("Variance factor", f"{fit.fit.variance_factor:.2f}", f"{fit.fit.degrees_of_freedom} degrees of freedom"),
@@ -109,14 +98,14 @@ def _structure_page(
     head = ["function", *(f"shift {a}, mm" for a in "xyz"), *(f"turn {a}, arcsec" for a in "xyz")]
     parts = [
         f"<header><h1>Structure: {s.group}</h1></header>",
-        verdict_line(Verdict(**answer["verdict"])),
+        verdict_line(found.verdict),
         '<div class="cards">' + "".join(cards) + "</div>",
-        *(paragraph(note) for note in answer["notes"]),
+        *(paragraph(note) for note in found.notes),
         section(
             "motion",
             "Motion of the group",
             picture(
-                motion_figure(fit),
+                svg(motion_figure(fit)),
                 "Shift and rotation about the pivot from the mean of the epochs, at the reference temperature. Band: "
                 "two standard uncertainties of a future epoch. Points: epochs without temperature and direction terms.",
             ),
@@ -125,15 +114,16 @@ def _structure_page(
         section(
             "residuals",
             "Residuals",
-            picture(residual_figure(fit, check), "Measured minus model, for each point and epoch; colours cover 98 %."),
+            picture(
+                svg(residual_figure(fit, check)), "Measured minus model, for each point and epoch; colours cover 98 %."
+            ),
         ),
     ]
     if predicted is not None:
-        request = answer["prediction"]
         lines = [
             [f"{e:g}", name, *(f"{v:.5f}" for v in predicted.place[k, i]),
              *(f"{v * 1e3:.3f}" for v in np.sqrt(np.diag(predicted.covariance[k, i])))]
-            for k, e in enumerate(request["elevation_deg"])
+            for k, e in enumerate(found.request.elevation_deg)
             for i, name in enumerate(predicted.names)
         ]  # fmt: skip
         warned = [paragraph(text, "bad") for text in predicted.outside]
@@ -167,7 +157,7 @@ def _vibration_page(vibration: Vibration) -> str:
             "spectra",
             "Spectra",
             picture(
-                spectrum_figure(vibration),
+                svg(spectrum_figure(vibration)),
                 "One-sided density of each range; the band is the 95 % interval of the first one's density. Red: half "
                 "the rate. A question mark: it may be an alias.",
             ),

@@ -1,50 +1,38 @@
-"""Structural model and vibration as JSON and sampler tables; SI unless a key says otherwise."""
+"""Structural model and vibration as JSON, text and sampler tables; SI unless a key says otherwise."""
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from catseye.constants import DEGREE, SECONDS_PER_DAY, ZERO_CELSIUS_K
+from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, SECONDS_PER_DAY, ZERO_CELSIUS_K
+from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable
 from catseye.geometry.antenna.deformation import COMPONENTS
 from catseye.reduction.structure.check import LeaveOut
+from catseye.reduction.structure.findings import PredictionRequest, StructureFindings
 from catseye.reduction.structure.series import Prediction, StructureFit
 from catseye.reduction.structure.vibration import Vibration
-from catseye.verdict import Verdict
 
 FORMAT = "catseye-structure-1"
 PSD = "m2 / Hz"
+MOST_PEAKS = 10  # in the text
 
 
-def structure_object(
-    fit: StructureFit,
-    check: LeaveOut | None,
-    predicted: Prediction | None,
-    *,
-    asked: dict[str, Any],
-    notes: tuple[str, ...],
-    verdict: Verdict,
-) -> dict[str, Any]:
-    """Object that `catseye structure --json` prints.
-
-    fit         the model
-    check       cross-validation, if requested
-    predicted   prediction, if requested
-    asked       elevation_deg, temperature_c and way of the prediction
-    notes       for the reader
-    verdict     from `reduction.structure.verdict.structure_verdict`
-    """
+def structure_object(found: StructureFindings) -> dict[str, Any]:
+    """Object that `catseye structure --json` prints."""
+    fit, check, predicted = found.fit, found.check, found.predicted
     six, covariance = fit.six_of()
     u = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(-1, 6).T
     series, motion = fit.series, fit.fit
     rms = np.sqrt(np.nanmean(motion.residual**2, axis=(0, 2)))
     return {
-        "verdict": verdict.to_object(),
+        "verdict": found.verdict.to_object(),
         "group": series.group,
         "frame": series.frame,
         "pivot": series.pivot,
         "epochs": len(series),
-        "elevation_deg": [float(f(series.posture.elevation) / DEGREE) for f in (np.min, np.max)],
+        "elevation_deg": _elevations(fit),
         "temperature_c": _range(series.posture.temperature_c) if fit.model.temperature else None,
         "reference_temperature_c": fit.reference_c if fit.model.temperature else None,
         "functions": fit.model.functions,
@@ -63,9 +51,68 @@ def structure_object(
         "degrees_of_freedom": motion.degrees_of_freedom,
         "scatter": {"u_shift": fit.scatter.u_six[:3], "u_turn": fit.scatter.u_six[3:], "u_point": fit.scatter.u_point},
         "left_out": None if check is None else _check(check),
-        "prediction": None if predicted is None else _prediction(predicted, asked),
-        "notes": list(notes),
+        "prediction": None if predicted is None else _prediction(predicted, found.request),
+        "notes": list(found.notes),
     }
+
+
+def structure_passages(found: StructureFindings) -> list[Passage]:
+    """Passages on the group, its scatter, the epochs left out, predicted points, notes."""
+    fit, check, series = found.fit, found.check, found.fit.series
+    low, high = _elevations(fit)
+    passages = [
+        Passage(
+            "Structure",
+            f"{len(series.names)} points of {series.group!r} in the frame {series.frame}, {len(series)} epochs, "
+            f"elevation {low:.1f} to {high:.1f} degrees. Variance factor {fit.fit.variance_factor:.2f}, "
+            f"{fit.fit.degrees_of_freedom} degrees of freedom.",
+        ),
+        Passage(
+            "New each time",
+            f"{1e3 * np.linalg.norm(fit.scatter.u_six[:3]):.3f} mm of the group's shift and "
+            f"{fit.scatter.u_point * 1e3:.3f} mm of each coordinate are in no function (u).",
+        ),
+    ]
+    if check is not None:
+        passages.append(
+            Passage(
+                "Left out",
+                f"epochs not seen by the fit were met to {check.rms * 1e3:.3f} mm rms, {check.ratio:.2f} of what was "
+                f"claimed (1 is honest); {int(check.extrapolated.sum())} of them by extrapolation.",
+            )
+        )
+    if found.predicted is not None:
+        passages += _prediction_passages(found.predicted, found.request)
+    return passages + [Passage("Note", note) for note in found.notes]
+
+
+def _prediction_passages(predicted: Prediction, request: PredictionRequest) -> list[Passage]:
+    """A passage for each predicted point, the elevation before the first."""
+    passages = []
+    for k, e in enumerate(request.elevation_deg):
+        for i, name in enumerate(predicted.names):
+            x, y, z = predicted.place[k, i]
+            u_x, u_y, u_z = np.sqrt(np.diag(predicted.covariance[k, i])) / MILLIMETRE
+            text = f"{name}  x {x:9.4f}  y {y:9.4f}  z {z:9.4f} m   u {u_x:.3f}, {u_y:.3f}, {u_z:.3f} mm"
+            passages.append(Passage(f"At {e:g}°" if i == 0 else "", text))
+    return passages
+
+
+def motion_lines(fit: StructureFit) -> list[str]:
+    """Two lines for each function: shift and turn of the group, and their u."""
+    six, q = fit.six_of()
+    u = np.sqrt(np.maximum(np.diag(q), 0.0)).reshape(-1, 6).T
+    lines = [f"{'function':<10}{'shift x, y, z, mm':>27}   {'turn x, y, z, arcsec':>27}"]
+    for k, name in enumerate(fit.model.functions):
+        for head, part in ((name, six[:, k]), ("  u", u[:, k])):
+            shift = " ".join(f"{v:8.3f}" for v in part[:3] / MILLIMETRE)
+            turn = " ".join(f"{v:8.3f}" for v in part[3:] / ARCSECOND)
+            lines.append(f"{head:<10} {shift}    {turn}")
+    return lines
+
+
+def _elevations(fit: StructureFit) -> list[float]:
+    return [float(f(fit.series.posture.elevation) / DEGREE) for f in (np.min, np.max)]
 
 
 def _range(values: Any) -> list[float]:
@@ -73,20 +120,18 @@ def _range(values: Any) -> list[float]:
 
 
 def _check(check: LeaveOut) -> dict[str, Any]:
-    inside = ~check.extrapolated
-    ratios = check.normalised
     return {
         "rms": check.rms,
         "ratio": check.ratio,
-        "ratio_inside": float(np.sqrt(np.nanmean(ratios[inside]) / 3.0)) if inside.any() else float("nan"),
+        "ratio_inside": check.ratio_inside,
         "folds": int(check.fold.max()) + 1,
         "extrapolated_epochs": int(check.extrapolated.sum()),
     }
 
 
-def _prediction(predicted: Prediction, request: dict[str, Any]) -> dict[str, Any]:
+def _prediction(predicted: Prediction, request: PredictionRequest) -> dict[str, Any]:
     return {
-        **request,
+        **asdict(request),
         "points": {
             name: {"place": predicted.place[:, i], "covariance": predicted.covariance[:, i]}
             for i, name in enumerate(predicted.names)
@@ -97,11 +142,9 @@ def _prediction(predicted: Prediction, request: dict[str, Any]) -> dict[str, Any
     }
 
 
-def structure_samplers(
-    fit: StructureFit, check: LeaveOut | None, predicted: Prediction | None, *, request: dict[str, Any]
-) -> dict[str, SamplerTable]:
+def structure_samplers(found: StructureFindings) -> dict[str, SamplerTable]:
     """Tables of a fit for FITS: residuals, coefficients, prediction."""
-    series = fit.series
+    fit, check, predicted, series = found.fit, found.check, found.predicted, found.fit.series
     words: dict[str, Any] = {"frame": f"{series.frame}, as the rigid telescope carries it", "pivot": _pivot(fit)}
     t, p = np.nonzero(np.isfinite(fit.fit.residual).all(axis=2))
     columns = {
@@ -136,7 +179,7 @@ def structure_samplers(
         tables["PREDICTION"] = SamplerTable(
             "PREDICTION",
             {
-                "ELEVATION": SamplerColumn("deg", np.array(request["elevation_deg"], dtype=float)[k], "requested"),
+                "ELEVATION": SamplerColumn("deg", np.array(found.request.elevation_deg, dtype=float)[k], "requested"),
                 "POINT": SamplerColumn("", np.array([predicted.names[i] for i in n]), "name"),
                 "PLACE": SamplerColumn("m", predicted.place[k, n], "x, y, z"),
                 "COVARIANCE": SamplerColumn("m2", predicted.covariance[k, n], "of x, y, z"),
@@ -198,6 +241,25 @@ def vibration_object(vibration: Vibration) -> dict[str, Any]:
         ],
         "notes": list(vibration.notes),
     }
+
+
+def vibration_passages(vibration: Vibration) -> list[Passage]:
+    """Passages on the series, the highest peaks, the modes, notes."""
+    passages = [
+        Passage("Series", f"{s.name}: {len(s.seconds)} ranges, {s.rate_hz:.3f} a second") for s in vibration.series
+    ]
+    for peak in vibration.peaks[:MOST_PEAKS]:
+        where = f"{peak.likely_hz:.4g} Hz" if peak.decided else f"{peak.peak.frequency_hz:.4g} Hz, or an alias of it"
+        passages.append(Passage("Peak", f"{where}: {peak.peak.over:.0f} times the background"))
+    for mode in vibration.modes:
+        passages.append(
+            Passage(
+                "Mode",
+                f"{mode.frequency_hz:.4f} Hz, u {mode.u_frequency_hz:.4f} Hz; damping ratio {mode.damping_ratio:.4f}; "
+                f"rms {mode.covariance[0, 0] ** 0.5 * 1e6:.1f} µm",
+            )
+        )
+    return passages + [Passage("Note", note) for note in vibration.notes]
 
 
 def vibration_samplers(vibration: Vibration, zero_mjd: float) -> dict[str, SamplerTable]:

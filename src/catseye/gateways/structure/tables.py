@@ -1,15 +1,14 @@
 """Tables of a structure's model and of its vibration: coefficients, residuals, prediction, spectra."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.gateways.writers.columns import Column, Table
 from catseye.reduction.structure.check import LeaveOut
+from catseye.reduction.structure.findings import PredictionRequest
 from catseye.reduction.structure.series import Prediction, StructureFit
 from catseye.reduction.structure.vibration import Vibration
 
@@ -152,11 +151,11 @@ class PredictedRows:
     """Source of prediction.csv: a row per elevation and point."""
 
     predicted: Prediction
-    request: Mapping[str, Any]
+    request: PredictionRequest
 
     @property
-    def elevations(self) -> list[float]:
-        return self.request["elevation_deg"]
+    def elevations(self) -> tuple[float, ...]:
+        return self.request.elevation_deg
 
 
 def _place(k: int) -> Column[PredictedRows]:
@@ -186,7 +185,7 @@ PREDICTION = Table[PredictedRows](
             "temperature_c",
             "deg_C",
             "temperature of the structure; empty if none was given",
-            lambda r: [r.request["temperature_c"]] * (len(r.elevations) * len(r.predicted.names)),
+            lambda r: [r.request.temperature_c] * (len(r.elevations) * len(r.predicted.names)),
             ".3f",
         ),
         Column("point", "", "point", lambda r: list(r.predicted.names) * len(r.elevations)),
@@ -257,7 +256,7 @@ def residuals_csv(fit: StructureFit, check: LeaveOut | None) -> str:
     return RESIDUALS.csv(ResidualRows(fit, check))
 
 
-def prediction_csv(predicted: Prediction, request: Mapping[str, Any]) -> str:
+def prediction_csv(predicted: Prediction, request: PredictionRequest) -> str:
     """Table of predicted points."""
     return PREDICTION.csv(PredictedRows(predicted, request))
 

@@ -37,12 +37,12 @@ from catseye.gateways.writers.output import atomic_file
 from catseye.gateways.writers.samplers_fits import join_tables, write_samplers
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.surface.actuators import rows_of
-from catseye.reduction.surface.verdict import SurfaceFindings, surface_verdict
+from catseye.reduction.surface.findings import SurfaceFindings
 
 
 def surface_object(result: SurfaceFindings) -> dict[str, Any]:
     """Object that `catseye surface --json` prints: one epoch's keys, or `epochs`, `change`, `lookup`."""
-    answer: dict[str, Any] = {"format": FORMAT, "verdict": surface_verdict(result).to_object()}
+    answer: dict[str, Any] = {"format": FORMAT, "verdict": result.verdict.to_object()}
     if len(result.shapes) == 1:
         answer |= shape_object(result.shapes[0])
     else:
@@ -92,13 +92,13 @@ def write_actuators(result: SurfaceFindings, path: Path) -> None:
     Raises InputError for another suffix, or if a foreign file would be overwritten.
     """
     if result.actuators is None:
-        raise InputError(f"--actuators {path}: no actuator corrections were computed")
+        raise InputError(f"{path}: no actuator corrections were computed (expected actuators)")
     rows = rows_of(result.actuators)
     ending = path.suffix.lower()
     if ending == ".csv":
-        with atomic_file(path, "--actuators", ACTUATOR_MARK) as pieces:
+        with atomic_file(path, "actuators", ACTUATOR_MARK) as pieces:
             pieces.append(actuators_csv(rows))
     elif ending == ".fits":
-        write_samplers(path, {"ACTUATORS": actuators_table(rows)}, option="--actuators")
+        write_samplers(path, {"ACTUATORS": actuators_table(rows)}, option="actuators")
     else:
-        raise InputError(f"--actuators {path}: ends in {ending!r} (expected .csv or .fits)")
+        raise InputError(f"actuators {path}: ends in {ending!r} (expected .csv or .fits)")

@@ -10,18 +10,12 @@ from catseye.gateways.writers.passage import Passage
 from catseye.optics.zernike import Numbering, number
 from catseye.reduction.surface.actuators import Actuators
 from catseye.reduction.surface.change import Change
+from catseye.reduction.surface.findings import SurfaceFindings
 from catseye.reduction.surface.lookup import Lookup
 from catseye.reduction.surface.shape import Expansion, Gain, MeanSquare, SurfaceShape
-from catseye.reduction.surface.verdict import SurfaceFindings, stands_out
 
 FORMAT = "catseye-surface-1"
-ABSORBED = 0.5  # share of a term's square above which a note is given
 UNOBSERVED = "rotation about the dish's own axis: a paraboloid does not show it"
-
-
-def root(square: float) -> float | None:
-    """Square root, m; null if subtracting the noise left a negative square."""
-    return float(np.sqrt(square)) if square >= 0.0 else None
 
 
 def shape_object(shape: SurfaceShape) -> dict[str, Any]:
@@ -80,24 +74,22 @@ def change_object(change: Change) -> dict[str, Any]:
 
 
 def _square(square: MeanSquare) -> dict[str, Any]:
-    surface_rms = root(square.own)
     return {
-        "half_path_rms_measured": root(square.measured),
-        "half_path_rms_noise": root(square.noise),
-        "half_path_rms": surface_rms,
-        "u_half_path_rms": square.u / (2.0 * surface_rms) if surface_rms else None,
+        "half_path_rms_measured": square.measured_rms,
+        "half_path_rms_noise": square.noise_rms,
+        "half_path_rms": square.rms,
+        "u_half_path_rms": square.u_rms,
         "half_path_mean_square": square.own,
         "u_half_path_mean_square": square.u,
     }
 
 
 def _gain(gain: Gain) -> dict[str, Any]:
-    loss = -10.0 * np.log10(gain.ruze) if gain.ruze > 0.0 else float("inf")
     return {
         "frequency": gain.frequency,
         "gain": gain.ruze,
         "u_gain": gain.u_ruze,
-        "loss_db": loss,
+        "loss_db": gain.loss_db,
         "gain_noise_included": gain.measured,
         "gain_coherent_noise_included": gain.coherent,
     }
@@ -191,17 +183,13 @@ def shape_passages(shape: SurfaceShape) -> list[Passage]:
         Passage("Half path", _rms(square, shape.settings.taper_db)),
     ]
     passages += [_gain_passage(g) for g in shape.gains]
-    absorbed = [
-        t.name
-        for t, s in zip(shape.expansion.terms, shape.expansion.share, strict=True)
-        if t.n >= 2 and s > ABSORBED and not (t == (2, 0) and "focal-length" in fit.free)
-    ]
-    if absorbed:
+    if shape.absorbed:
+        absorbed = ", ".join(term.name for term in shape.absorbed)
         passages.append(
             Passage(
                 "Note",
-                f"the free paraboloid absorbs most of {', '.join(absorbed)} as a rotation of the offset dish; fix "
-                "the axis (--free vertex,focal-length), fit fewer terms and use `joint`, or compare two epochs",
+                f"the free paraboloid absorbs most of {absorbed} as a rotation of the offset dish; hold the axis (free "
+                "vertex and focal length), fit fewer terms and use `joint`, or compare two epochs",
             )
         )
     return passages
@@ -226,12 +214,11 @@ def _pose(shape: SurfaceShape) -> str:
 
 
 def _rms(square: MeanSquare, taper_db: float) -> str:
-    surface_rms = root(square.own)
     lit = f"weighted for an edge taper of {taper_db:g} dB" if taper_db else "uniform weight over the aperture"
-    text = f"{(root(square.measured) or 0.0) * 1e3:.4f} mm rms as measured, {lit}; "
-    if not surface_rms or not stands_out(square):
+    text = f"{(square.measured_rms or 0.0) * 1e3:.4f} mm rms as measured, {lit}; "
+    if square.rms is None or square.u_rms is None or not square.stands_out:
         return text + "not above the measurement noise"
-    return text + f"{surface_rms * 1e3:.4f} ± {square.u / (2.0 * surface_rms) * 1e3:.4f} mm without measurement noise"
+    return text + f"{square.rms * 1e3:.4f} ± {square.u_rms * 1e3:.4f} mm without measurement noise"
 
 
 def _gain_passage(gain: Gain) -> Passage:

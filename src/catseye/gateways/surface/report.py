@@ -12,7 +12,6 @@ from catseye.gateways.surface.objects import (
     actuators_passage,
     change_passages,
     lookup_passages,
-    root,
     shape_passages,
 )
 from catseye.gateways.writers.drawing import svg
@@ -23,9 +22,9 @@ from catseye.gateways.writers.verdict import verdict_line
 from catseye.optics.zernike import number
 from catseye.reduction.surface.actuators import Actuators
 from catseye.reduction.surface.change import Change
+from catseye.reduction.surface.findings import SurfaceFindings
 from catseye.reduction.surface.lookup import Lookup
 from catseye.reduction.surface.shape import Expansion, MeanSquare, ShapeSettings, SurfaceShape
-from catseye.reduction.surface.verdict import SurfaceFindings, surface_verdict
 
 
 def surface_report(result: SurfaceFindings, when: datetime, inputs: Mapping[str, str]) -> str:
@@ -34,7 +33,7 @@ def surface_report(result: SurfaceFindings, when: datetime, inputs: Mapping[str,
     when     UTC
     inputs   SHA-256 of each input file, by name
     """
-    body = [_header(result, when), verdict_line(surface_verdict(result))]
+    body = [_header(result, when), verdict_line(result.verdict)]
     if result.lookup is not None:
         body.append(_lookup(result.lookup))
     if result.change is not None:
@@ -62,8 +61,7 @@ def _definitions(passages: list[Passage]) -> str:
 
 
 def _cards(square: MeanSquare, extra: list[str]) -> str:
-    surface_rms = root(square.own)
-    text = "not above the noise" if surface_rms is None else f"{surface_rms / MILLIMETRE:.3f} mm"
+    text = "not above the noise" if square.rms is None else f"{square.rms / MILLIMETRE:.3f} mm"
     first = card("Half-path rms", text, "weighted by the illumination, without measurement noise")
     return f'<div class="cards">{first}{"".join(extra)}</div>'
 

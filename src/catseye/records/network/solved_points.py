@@ -35,6 +35,8 @@ class SolvedPoints:
     posture      azimuth and elevation, rad, from pose.json, if there
     hashes       SHA-256 of the files read, by name
     verdict      of the reduction; None if the file has none
+    dish         names of the prisms of its surface, if it has one
+    focal_length of that surface, m
     """
 
     file: str
@@ -45,6 +47,8 @@ class SolvedPoints:
     posture: tuple[float, float] | None
     hashes: dict[str, str]
     verdict: Verdict | None = None
+    dish: tuple[str, ...] = ()
+    focal_length: float | None = None
 
     def __repr__(self) -> str:
         where = Path(self.file).name
@@ -72,10 +76,11 @@ class SolvedPoints:
         return np.array([at[n] for n in names], dtype=int)
 
 
-def read_solved_points(path: Path | str) -> SolvedPoints:
+def read_solved_points(path: Path | str, *, averaged: bool = True) -> SolvedPoints:
     """Points of a coordinates.json, or of a directory from `catseye reduce --out`.
 
-    path   the file, or the directory
+    path       the file, or the directory
+    averaged   mean of a printed covariance's two triangles, which differ by rounding; False: as printed
 
     Raises InputError with file, place, value and expectation.
     """
@@ -91,11 +96,11 @@ def read_solved_points(path: Path | str) -> SolvedPoints:
     if document.get("frame") != "ground":
         raise refusal(name, f"frame = {shown(document.get('frame'))} (expected 'ground')")
     x = np.array([[_number(name, n, points[n], axis) for axis in "xyz"] for n in names])
-    covariance = _covariance(name, stored_covariance(document, folder.directory, len(order)), len(order))
+    printed = stored_covariance(document, folder.directory, len(order))
+    covariance = _covariance(name, printed, len(order), averaged=averaged)
     pose_file = folder.directory / POSE_FILE
     pose = read_written_pose(pose_file, expected=(NIGHT_POSE,), folder=folder) if pose_file.is_file() else None
-    hashes = {f"{path.name}/{f}" if path.is_dir() else f: digest for f, digest in folder.hashes.items()}
-    judged = stored_verdict(name, document)
+    dish, focal_length = _dish(name, document, names)
     return SolvedPoints(
         file=str(path),
         campaign=str(document.get("campaign", "")),
@@ -103,9 +108,22 @@ def read_solved_points(path: Path | str) -> SolvedPoints:
         x=x,
         covariance=covariance,
         posture=None if pose is None else pose.posture,
-        hashes=hashes,
-        verdict=judged,
+        hashes={f"{path.name}/{f}" if path.is_dir() else f: digest for f, digest in folder.hashes.items()},
+        verdict=stored_verdict(name, document),
+        dish=dish,
+        focal_length=focal_length,
     )
+
+
+def _dish(file: str, document: dict[str, Any], names: tuple[str, ...]) -> tuple[tuple[str, ...], float | None]:
+    """Names of a dish's prisms and its focal length; nothing where the reduction has no dish."""
+    surface = document.get("surface")
+    if surface is None:
+        return (), None
+    deviations = surface.get("deviations") if isinstance(surface, dict) else None
+    if not isinstance(deviations, dict) or not deviations.keys() <= set(names):
+        raise refusal(file, "surface.deviations is missing or names no point (expected as catseye reduce writes it)")
+    return tuple(deviations), _number(file, "surface", surface, "focal_length")
 
 
 def _object(folder: Folder, name: str) -> dict[str, Any]:
@@ -127,7 +145,7 @@ def _number(file: str, point: str, row: Any, axis: str) -> float:
     return float(value)
 
 
-def _covariance(file: str, rows: Any, size: int) -> np.ndarray:
+def _covariance(file: str, rows: Any, size: int, *, averaged: bool) -> np.ndarray:
     if isinstance(rows, np.ndarray):  # mapped: checked when used
         if not np.all(np.diag(rows) >= 0.0):
             raise refusal(file, "its covariance file has a negative variance (expected a covariance, m^2)")
@@ -141,4 +159,4 @@ def _covariance(file: str, rows: Any, size: int) -> np.ndarray:
     scale = np.sqrt(np.abs(np.outer(np.diag(q), np.diag(q))))
     if np.any(np.diag(q) < 0.0) or np.any(np.abs(q - q.T) > DRAWN * scale + 1e-30):
         raise refusal(file, "covariance is not symmetric or has a negative variance (expected a covariance, m^2)")
-    return 0.5 * (q + q.T)
+    return 0.5 * (q + q.T) if averaged else q

@@ -27,7 +27,7 @@ class WrittenPose:
     """Pose read from a file; None for each part that the file lacks.
 
     file         as named by the user, for messages
-    posture      azimuth and elevation of the telescope, rad
+    posture_deg  azimuth and elevation of the telescope, degrees
     frame        axes of rotation and translation: "ground", "alidade", "reflector"; "" if unknown
     rotation     (3,) rad, rotation vector
     covariance   (6, 6) m², m rad, rad²: translation then rotation
@@ -38,7 +38,7 @@ class WrittenPose:
     """
 
     file: str
-    posture: tuple[float, float] | None
+    posture_deg: tuple[float, float] | None
     frame: str
     rotation: np.ndarray | None
     covariance: np.ndarray | None
@@ -46,6 +46,11 @@ class WrittenPose:
     correction_covariance: np.ndarray | None
     verdict: Verdict | None
     digest: str
+
+    @property
+    def posture(self) -> tuple[float, float] | None:
+        """Azimuth and elevation of the telescope, rad."""
+        return None if self.posture_deg is None else (self.posture_deg[0] * DEGREE, self.posture_deg[1] * DEGREE)
 
 
 def read_written_pose(
@@ -66,7 +71,7 @@ def read_written_pose(
     beam: Mapping[str, Any] = pointing if isinstance(pointing, dict) else {}
     return WrittenPose(
         file=file,
-        posture=_posture(file, document),
+        posture_deg=_posture_deg(file, document),
         frame=str(document.get("frame") or ""),
         rotation=_numbers(file, document, "rotation", (3,)),
         covariance=_numbers(file, document, "covariance", (6, 6)),
@@ -89,15 +94,15 @@ def _document(text: str, file: str, expected: tuple[str, ...]) -> dict[str, Any]
     return document
 
 
-def _posture(file: str, document: Mapping[str, Any]) -> tuple[float, float] | None:
-    """Posture (2,), rad, of a document."""
+def _posture_deg(file: str, document: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Posture (2,), degrees, of a document."""
     key = next((each for each in POSTURES if isinstance(document.get(each), dict)), None)
     if key is None:
         return None
     angles = [document[key].get(angle) for angle in ("azimuth_deg", "elevation_deg")]
     if any(isinstance(v, bool) or not isinstance(v, int | float) or not math.isfinite(v) for v in angles):
         raise refusal(file, f"{key} = {shown(document[key])} (expected azimuth_deg and elevation_deg)")
-    azimuth, elevation = (float(v) * DEGREE for v in angles)
+    azimuth, elevation = (float(v) for v in angles)
     return azimuth, elevation
 
 

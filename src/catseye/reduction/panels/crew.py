@@ -43,7 +43,17 @@ def standing(heights: PanelHeights, chosen: np.ndarray | None = None) -> CornerS
     selected = heights.known if chosen is None else heights.known & chosen
     h, u, p = heights.relative[selected], heights.u_relative[selected], heights.conforms[selected]
     if not len(h):
-        return CornerStatistics(0, np.nan, np.nan, np.nan, np.nan, 0, 0, 0, np.nan)
+        return CornerStatistics(
+            corners=0,
+            rms=np.nan,
+            rms_true=np.nan,
+            within=np.nan,
+            expected_within=np.nan,
+            surely=0,
+            surely_not=0,
+            undecided=0,
+            median_u=np.nan,
+        )
     square = float(np.mean(h**2))
     surely, surely_not = int(np.sum(p >= SURE)), int(np.sum(p <= 1.0 - SURE))
     return CornerStatistics(

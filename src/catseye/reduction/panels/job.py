@@ -16,6 +16,7 @@ from catseye.records.panels.readings import digest_of_maps, read_maps, read_pane
 from catseye.reduction.panels.crew import SURE, Setting, setting
 from catseye.reduction.panels.heights import PanelHeights, conformity, reduce_panels
 from catseye.reduction.panels.maps import FittedMap, fitted_map
+from catseye.verdict import Verdict
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,15 @@ class PanelWork:
     def latest(self) -> PanelHeights:
         """Heights as left if available, else as found: input of the screw turns."""
         return self.found if self.left is None else self.left
+
+    @property
+    def verdict(self) -> Verdict:
+        """Verdict from the control of the readings, not from the number of screws to turn."""
+        if self.notes:
+            return Verdict("doubtful", self.notes[0].rstrip("."))
+        advice = verdicts(self.latest)
+        turn = int((advice == "turn").sum())
+        return Verdict("good", f"{turn} of {advice.size} screws are to be turned, and the readings are in control")
 
 
 def panel_work(
@@ -112,14 +122,14 @@ def panel_work(
         as_left = reduce_panels(later_readings, layout, sheet, survey=later, maps=maps, reject=reject)
     turning = None if as_left is None else setting(as_found, as_left)
     return PanelWork(
-        layout,
-        sheet,
-        as_found,
-        as_left,
-        turning,
-        maps,
-        inputs,
-        tuple(_notes(files, layout, as_found, as_left, turning)),
+        layout=layout,
+        sheet=sheet,
+        found=as_found,
+        left=as_left,
+        setting=turning,
+        maps=maps,
+        inputs=inputs,
+        notes=tuple(_notes(files, layout, as_found, as_left, turning)),
     )
 
 

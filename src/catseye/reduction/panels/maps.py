@@ -87,11 +87,11 @@ def fitted_map(panel_map: PanelMap) -> FittedMap:
     s = float(np.sqrt(np.sum(weight * residual**2) / max(k - 3, 1)))
     q = np.linalg.inv(design.T @ (design * weight[:, None]))
     return FittedMap(
-        panel_map.panel,
-        panel_map.xy,
-        residual,
-        fit,
-        s * np.sqrt(np.diag(q)),
-        float(np.sqrt(np.mean(residual**2))),
-        weight < 0.5,
+        panel=panel_map.panel,
+        xy=panel_map.xy,
+        shape=residual,
+        fit=fit,
+        u_fit=s * np.sqrt(np.diag(q)),
+        rms=float(np.sqrt(np.mean(residual**2))),
+        outlying=weight < 0.5,
     )

@@ -135,7 +135,7 @@ def tips_of(readings: PanelReadings, layout: PanelLayout, sheet: PanelInstrument
             f"{readings.where[row[k]]}, {sheet.gauge[gauge[k]].name}_mm at {layout.corners[corner[k]]}, turn "
             f"{readings.turn[row[k]]}, has no panel under it (expected a blank cell, or another turn)",
         )
-    return Tips(row, gauge, corner, panel, share, tool, place, at, rise)
+    return Tips(row=row, gauge=gauge, corner=corner, panel=panel, share=share, tool=tool, place=place, at=at, rise=rise)
 
 
 def corrected(readings: PanelReadings, layout: PanelLayout, sheet: PanelInstrument, *, tips: Tips) -> np.ndarray:
@@ -254,7 +254,16 @@ def panel_model(
         _warps(layout, sheet, places, target, mapped),
         _shafts(layout, sheet, columns, survey),
     ]
-    return PanelModel(layout, columns, tips, (*groups, *more), blocks, target, u_target, mapped)
+    return PanelModel(
+        layout=layout,
+        columns=columns,
+        tips=tips,
+        groups=(*groups, *more),
+        blocks=blocks,
+        target=target,
+        u_target=u_target,
+        mapped=mapped,
+    )
 
 
 def _mapped(

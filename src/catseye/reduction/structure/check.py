@@ -55,6 +55,12 @@ class LeaveOut:
         return float(np.sqrt(np.nanmean(self.normalised) / 3.0))
 
     @property
+    def ratio_inside(self) -> float:
+        """`ratio` of the epochs that were not extrapolated; nan without any."""
+        inside = ~self.extrapolated
+        return float(np.sqrt(np.nanmean(self.normalised[inside]) / 3.0)) if inside.any() else float("nan")
+
+    @property
     def rms(self) -> float:
         """Root mean square of the coordinates' differences, m."""
         return float(np.sqrt(np.nanmean(self.residual**2)))

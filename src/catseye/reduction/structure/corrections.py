@@ -185,7 +185,16 @@ def frame_motion(antenna: Antenna, measured: MeasuredPosture, frame: str, *, add
     vector = to_vector(fit.matrix)
     six = np.concatenate([fit.translation, vector])
     correction = six - antenna.six(frame, posture)
-    return FrameMotion(frame, names, six, correction, fit.covariance, fit.residual, fit.pvv, fit.degrees_of_freedom)
+    return FrameMotion(
+        frame=frame,
+        names=names,
+        six=six,
+        correction=correction,
+        covariance=fit.covariance,
+        residual=fit.residual,
+        pvv=fit.pvv,
+        degrees_of_freedom=fit.degrees_of_freedom,
+    )
 
 
 def correct_posture(antenna: Antenna, measured: MeasuredPosture) -> Corrections:
@@ -231,7 +240,14 @@ def correct_posture(antenna: Antenna, measured: MeasuredPosture) -> Corrections:
     six = {name: theta[6 * i : 6 * i + 6] for i, name in enumerate(frames)}
     shape = (-1, 3)
     return Corrections(
-        frames, six, covariance, measured.names, residual.reshape(shape), standardised.reshape(shape), pvv, len(misfit)
+        frames=frames,
+        six=six,
+        covariance=covariance,
+        names=measured.names,
+        residual=residual.reshape(shape),
+        standardised=standardised.reshape(shape),
+        pvv=pvv,
+        degrees_of_freedom=len(misfit),
     )
 
 

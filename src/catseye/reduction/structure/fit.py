@@ -115,13 +115,13 @@ def fit_model(
     rows = sum(3 * len(epoch.names) for epoch in epochs)
     priors = int(np.linalg.matrix_rank(prior_normal)) if prior_normal.any() else 0
     return ModelFit(
-        layout,
-        _spread_out(antenna, layout, theta),
-        inverse[:size, :size],
-        {name: place[3 * i : 3 * i + 3] for i, name in enumerate(targets)},
-        tuple(residuals),
-        pvv,
-        rows + priors - size,
+        free=layout,
+        coefficients=_spread_out(antenna, layout, theta),
+        covariance=inverse[:size, :size],
+        places={name: place[3 * i : 3 * i + 3] for i, name in enumerate(targets)},
+        residuals=tuple(residuals),
+        pvv=pvv,
+        degrees_of_freedom=rows + priors - size,
     )
 
 

@@ -98,7 +98,7 @@ def group_series(
     if correlated and len(used) * (3 * len(names)) ** 2 > MOST:
         raise InputError(
             f"{len(names)} points in {len(used)} epochs with a covariance of all in each are too many (expected "
-            f"{MOST:.0e} numbers at most): name fewer, or take them as independent (--independent)"
+            f"{MOST:.0e} numbers at most): name fewer, or take them as independent"
         )
     places = np.full((len(used), len(names), 3), np.nan)
     # of absent points: ones, never used
@@ -126,7 +126,18 @@ def group_series(
     mjd = np.array([epoch.mjd for epoch in used])
     sorted_labels = tuple(epoch.label for epoch in used)
     spread = Spread(full=full) if correlated else Spread(points=alone)
-    return GroupSeries(group, frame, names, mjd, posture, ways(e), places, spread, middle, sorted_labels)
+    return GroupSeries(
+        group=group,
+        frame=frame,
+        names=names,
+        mjd=mjd,
+        posture=posture,
+        way=ways(e),
+        places=places,
+        spread=spread,
+        pivot=middle,
+        labels=sorted_labels,
+    )
 
 
 def carrier_of(frame: str, azimuth: float, elevation: float, *, nominal: Nominal) -> Transforms:

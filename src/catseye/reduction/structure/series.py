@@ -13,7 +13,7 @@ and for hysteresis `up`: 1 after the elevation rose, -1 after it fell. The scatt
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,7 @@ from catseye.aliases import Array
 from catseye.constants import DEGREE
 from catseye.errors import EstimationError, InputError, ValidityError
 from catseye.estimation.harmonic.body import rigid_design, rigid_part
+from catseye.estimation.harmonic.labels import HarmonicLabels
 from catseye.estimation.harmonic.series import HarmonicFit, Spread, fit_harmonics
 from catseye.geometry.antenna.deformation import PostureTerms, TelescopePosture
 
@@ -53,6 +54,8 @@ class SeriesModel:
     def __post_init__(self) -> None:
         if self.harmonics not in (1, 2):
             raise ValidityError(f"{self.harmonics} harmonics of elevation (expected 1 or 2)")
+        if self.own not in get_args(Own):
+            raise ValidityError(f"own = {self.own!r} (expected {' or '.join(get_args(Own))})")
 
     @property
     def functions(self) -> tuple[str, ...]:
@@ -216,6 +219,17 @@ class StructureFit:
         six = np.concatenate([self.fit.six, self.fit.rigid], axis=1)
         return six, self.fit.six_covariance[np.ix_(at, at)]
 
+    @property
+    def residual_motion(self) -> Array:
+        """Shift and turn (T, 6) of each epoch's residuals, m and rad; nan where they determine none."""
+        motion = np.full((len(self.series), 6), np.nan)
+        for t, residual in enumerate(self.fit.residual):
+            measured = np.isfinite(residual).all(axis=1)
+            part = rigid_part(self.arms[measured]) if measured.sum() >= 3 else None
+            if part is not None:
+                motion[t] = [float(np.einsum("ni,ni->", one, residual[measured])) for one in part]
+        return motion
+
     def predict(
         self, elevation: ArrayLike, *, temperature_c: ArrayLike | None = None, way: ArrayLike = 0.0
     ) -> Prediction:
@@ -243,7 +257,14 @@ class StructureFit:
         k = rows.shape[1]
         shared = np.einsum("pa,aibj,pb->pij", change, q.reshape(k, 6, k, 6), change, optimize=True)
         spread = shared + self.scatter.covariance
-        return Prediction(self.series.names, place, covariance, change @ six.T, spread, self.outside(posture, way))
+        return Prediction(
+            names=self.series.names,
+            place=place,
+            covariance=covariance,
+            six=change @ six.T,
+            six_covariance=spread,
+            outside=self.outside(posture, way),
+        )
 
     def outside(self, posture: TelescopePosture, way: ArrayLike = 0.0) -> tuple[str, ...]:
         """Quantities of a posture outside the fitted range, as texts."""
@@ -290,17 +311,26 @@ def fit_structure(series: GroupSeries, model: SeriesModel | None = None) -> Stru
     reference_c = float(np.mean(np.asarray(series.posture.temperature_c, dtype=float))) if what.temperature else 0.0
     rows = what.rows(fitted_posture(series, what), series.way, reference_c)
     m = what.own_count
+    labels = HarmonicLabels(series.group, series.names, what.functions, m)
     scatter = EpochScatter(np.zeros((6, 6)), 0.0)
 
     def fitted() -> StructureFit:
         spread = widened(series.spread, middle - series.pivot, scatter)
         try:
             harmonics = fit_harmonics(
-                series.places - middle, middle - series.pivot, body=rows[:, m:], own=rows[:, :m], spread=spread
+                series.places - middle,
+                middle - series.pivot,
+                body=rows[:, m:],
+                own=rows[:, :m],
+                spread=spread,
+                labels=labels,
             )
         except EstimationError as problem:
-            raise EstimationError(_named(str(problem), series, what)) from problem
-        return StructureFit(series, what, middle, reference_c, harmonics, scatter)
+            functions = f"functions {', '.join(what.functions)}; {len(series)} epochs"
+            raise EstimationError(f"group {series.group!r}: {problem} ({functions})") from problem
+        return StructureFit(
+            series=series, model=what, rest=middle, reference_c=reference_c, fit=harmonics, scatter=scatter
+        )
 
     fit = fitted()
     if what.scatter:
@@ -415,21 +445,10 @@ def refuse_unknown(series: GroupSeries, model: SeriesModel) -> None:
     """Raise InputError where a function needs a quantity that an epoch lacks."""
     requirements = [("elevation", np.asarray(series.posture.elevation, dtype=float), "a posture")]
     if model.temperature:
-        hint = "a temperature of the structure, or a model without (--no-temperature)"
+        hint = "a temperature of the structure, or a model without"
         requirements.append(("temperature", np.asarray(series.posture.temperature_c, dtype=float), hint))
     for name, values, hint in requirements:
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
             label = series.labels[bad[0]] if series.labels else f"{bad[0]} (counted from 0)"
             raise InputError(f"epoch {label}: its {name} is unknown (expected {hint})")
-
-
-def _named(text: str, series: GroupSeries, model: SeriesModel) -> str:
-    """Error text with names of points and functions for their numbers."""
-    import re
-
-    m, functions = model.own_count, model.functions
-    text = re.sub(r"the body's function (\d+)", lambda f: f"{series.group} by {functions[m + int(f[1]) - 1]!r}", text)
-    text = re.sub(r"by its function (\d+)", lambda f: f"by {functions[int(f[1]) - 1]!r}", text)
-    text = re.sub(r"point (\d+)( \(counted from 0\))?", lambda f: series.names[int(f[1])], text)
-    return f"group {series.group!r}: {text} (functions {', '.join(functions)}; {len(series)} epochs)"

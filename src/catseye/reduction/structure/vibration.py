@@ -27,6 +27,7 @@ from catseye.signal.vibration.spectrum import (
     shape_at,
     spectrum,
 )
+from catseye.verdict import Verdict
 
 LEAST = 64  # samples of a series: 8 s at full rate
 STRETCHES = 8  # segments of the shortest series by default, half overlapping
@@ -104,6 +105,20 @@ class Vibration:
     floor: Array
     notes: tuple[str, ...]
 
+    @property
+    def verdict(self) -> Verdict:
+        """Verdict by the peaks: one at least, none an alias perhaps, and modes that converged."""
+        if not self.peaks:
+            return Verdict("good", "no vibration stands out from the background")
+        undecided = sum(not peak.decided for peak in self.peaks)
+        if undecided:
+            return Verdict(
+                "doubtful", f"peaks that may be aliases of higher frequencies: {undecided} of {len(self.peaks)}"
+            )
+        if not self.modes:
+            return Verdict("doubtful", "peaks stand out from the background, but no mode converged")
+        return Verdict("good", f"peaks above the background: {len(self.peaks)}, none of which may be an alias")
+
 
 def vibration(
     series: Sequence[RangeSeries],
@@ -154,7 +169,9 @@ def vibration(
             modes = _modes(series_list, spectra, found_peaks[:most_modes], floor, notes)
         except CatseyeError as problem:
             notes.append(f"Modes were not found: {problem}.")
-    return Vibration(series_list, spectra, tuple(found_peaks), modes, floor, tuple(notes))
+    return Vibration(
+        series=series_list, spectrum=spectra, peaks=tuple(found_peaks), modes=modes, floor=floor, notes=tuple(notes)
+    )
 
 
 def _found_peak(
@@ -170,7 +187,14 @@ def _found_peak(
     likely, share = likely_alias(times, values, may_be, stretch=length)
     decided = len(may_be) == 1 or (len(times) > 1 and float(np.diff(np.sort(share)[-2:])[0]) > CLEAR)
     shape = shape_at(spectra, peak.frequency_hz) if len(times) > 1 else None
-    return FoundPeak(peak, may_be, likely if decided else peak.frequency_hz, share, decided, shape)
+    return FoundPeak(
+        peak=peak,
+        may_be_hz=may_be,
+        likely_hz=likely if decided else peak.frequency_hz,
+        share=share,
+        decided=decided,
+        shape=shape,
+    )
 
 
 def _modes(
@@ -243,13 +267,28 @@ def difference(one: RangeSeries, second: RangeSeries, *, scale: float = 1.0, lon
     value = (1.0 - part) * second.ranges[at - 1] + part * second.ranges[at]
     spread = ((1.0 - part) * second.u[at - 1]) ** 2 + (part * second.u[at]) ** 2
     return RangeSeries(
-        one.name,
-        f"less {second.name}" if scale == 1.0 else f"less {scale:.6g} {second.name}",
-        one.seconds[usable],
-        (one.ranges - scale * value)[usable],
-        np.sqrt(one.u**2 + scale**2 * spread)[usable],
-        one.window,
+        ranger=one.name,
+        target=f"less {second.name}" if scale == 1.0 else f"less {scale:.6g} {second.name}",
+        seconds=one.seconds[usable],
+        ranges=(one.ranges - scale * value)[usable],
+        u=np.sqrt(one.u**2 + scale**2 * spread)[usable],
+        window=one.window,
     )
+
+
+def less_series(series: Sequence[RangeSeries], less: str) -> tuple[RangeSeries, ...]:
+    """Series of a ranger less one of them, in which common errors cancel.
+
+    series   at least two of one ranger
+    less     RANGER:TARGET, name of the one subtracted
+
+    Raises InputError for a name that is none of them.
+    """
+    base = next((one for one in series if one.name == less), None)
+    if base is None:
+        names = ", ".join(one.name for one in series)
+        raise InputError(f"less = {less}: no such series (the journal has {names})")
+    return tuple(difference(one, base) for one in series if one.ranger == base.ranger and one.name != less)
 
 
 @dataclass(frozen=True, eq=False)

@@ -126,17 +126,17 @@ def corrections(
     )
     lean = np.ones(len(names)) if travel == "normal" else cosine(places, shape.fit.focal_length)
     return Actuators(
-        names,
-        places,
-        foretold.value,
-        foretold.covariance,
-        -foretold.value / lean,
-        np.sqrt(np.diag(foretold.covariance)) / lean,
-        _positions(names, positions or {}),
-        foretold.weights,
-        shape.prisms.names,
-        prism_rows >= 0,
-        rough,
+        names=names,
+        places=places,
+        deviation=foretold.value,
+        covariance=foretold.covariance,
+        correction=-foretold.value / lean,
+        u_correction=np.sqrt(np.diag(foretold.covariance)) / lean,
+        position=_positions(names, positions or {}),
+        weights=foretold.weights,
+        prisms=shape.prisms.names,
+        measured=prism_rows >= 0,
+        roughness=rough,
     )
 
 

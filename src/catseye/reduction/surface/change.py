@@ -116,22 +116,22 @@ def change_between(first: Prisms, second: Prisms, aperture: LitAperture, *, sett
     )
     square = mean_square(half, half_covariance, weights)
     return Change(
-        first,
-        second,
-        aperture,
-        plain,
-        names,
-        one,
-        motion,
-        _sandwich(gain, covariance),
-        deviation,
-        propagated,
-        half,
-        weights,
-        places,
-        expansion,
-        square,
-        gains_of(half, weights, square, frequencies=settings.frequencies),
+        first=first,
+        second=second,
+        aperture=aperture,
+        settings=plain,
+        names=names,
+        local=one,
+        motion=motion,
+        motion_covariance=_sandwich(gain, covariance),
+        deviation=deviation,
+        deviation_covariance=propagated,
+        half_path=half,
+        weights=weights,
+        places=places,
+        expansion=expansion,
+        square=square,
+        gains=gains_of(half, weights, square, frequencies=settings.frequencies),
     )
 
 

@@ -114,18 +114,18 @@ def lookup_of(shapes: Sequence[SurfaceShape]) -> Lookup:
             variance = np.einsum("ea,ab,eb->e", rows, model.covariance, rows)
             u_table[:, k, position] = model.raised * np.sqrt(variance)
     return Lookup(
-        tuple(shapes),
-        columns,
-        left_out,
-        elevation,
-        rising,
-        temperature,
-        measured,
-        u,
-        models,
-        table_deg,
-        table,
-        u_table,
+        shapes=tuple(shapes),
+        columns=columns,
+        left_out=left_out,
+        elevation_deg=elevation,
+        rising=rising,
+        temperature_c=temperature,
+        measured=measured,
+        u_measured=u,
+        models=models,
+        table_deg=table_deg,
+        table=table,
+        u_table=u_table,
     )
 
 
@@ -159,7 +159,7 @@ def _elevations(shapes: Sequence[SurfaceShape]) -> np.ndarray:
     result: list[float] = []
     for shape in shapes:
         if shape.prisms.elevation_deg is None:
-            raise EstimationError(f"{shape.prisms.source}: unknown elevation; set it by --elevation-deg")
+            raise EstimationError(f"{shape.prisms.source}: unknown elevation; set it by elevation_deg")
         result.append(shape.prisms.elevation_deg)
     return np.array(result)
 
@@ -230,4 +230,11 @@ def _model(term: Term, design: np.ndarray, measured: np.ndarray, u: np.ndarray) 
     checked = residual_variance > 1e-9 * u**2
     standardised = np.where(checked, residual / np.sqrt(np.where(checked, residual_variance, 1.0)), np.nan)
     factor = float(np.sum((residual / u) ** 2) / freedom) if freedom else float("nan")
-    return TermModel(term, value, covariance, residual, standardised, factor)
+    return TermModel(
+        term=term,
+        value=value,
+        covariance=covariance,
+        residual=residual,
+        standardised=standardised,
+        variance_factor=factor,
+    )

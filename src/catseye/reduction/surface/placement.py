@@ -59,7 +59,7 @@ class DishPlacement:
             faults.append(f"{len(self.elsewhere)} prisms nearer to another's design place than to their own ({named})")
         if not faults:
             return ""
-        cure = f"; with {' or '.join(self.cures)} they do" if self.cures else "; check --site and the units"
+        cure = f"; with {' or '.join(self.cures)} they do" if self.cures else "; check the site and the units"
         return f"the points do not fit the site's dish: {'; '.join(faults)}{cure}"
 
 

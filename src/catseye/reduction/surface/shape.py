@@ -17,6 +17,8 @@ from catseye.optics.zernike import Numbering, Term, orthonormal, terms, zernike
 from catseye.records.site.site import ParaboloidRecord
 from catseye.verdict import Verdict
 
+CLEAR = 2.0  # standard uncertainties by which a mean square stands out: 95 %
+ABSORBED = 0.5  # share of a term's square that the paraboloid absorbs mostly
 SMALLEST_SEPARATION = (
     1e-8  # smallest singular value of Zernike terms beside the paraboloid: below, they are inseparable
 )
@@ -128,6 +130,11 @@ class Expansion:
     rest: np.ndarray
 
 
+def _root(square: float) -> float | None:
+    """Square root; None if subtracting the noise left a negative square."""
+    return float(np.sqrt(square)) if square >= 0.0 else None
+
+
 @dataclass(frozen=True)
 class MeanSquare:
     """Mean square of half-path errors under the illumination.
@@ -151,6 +158,31 @@ class MeanSquare:
         """
         return self.measured - self.noise
 
+    @property
+    def rms(self) -> float | None:
+        """Root mean square of the surface alone, m; None where the noise hides it."""
+        return _root(self.own)
+
+    @property
+    def u_rms(self) -> float | None:
+        """Standard uncertainty of `rms`, m; None without one."""
+        return self.u / (2.0 * self.rms) if self.rms else None
+
+    @property
+    def measured_rms(self) -> float | None:
+        """Root mean square as measured, m."""
+        return _root(self.measured)
+
+    @property
+    def noise_rms(self) -> float | None:
+        """Root mean square of the noise, m."""
+        return _root(self.noise)
+
+    @property
+    def stands_out(self) -> bool:
+        """True for errors above the measurement's noise, with 95 %."""
+        return bool(self.own > CLEAR * self.u)
+
 
 @dataclass(frozen=True)
 class Gain:
@@ -166,6 +198,11 @@ class Gain:
     u_ruze: float
     measured: float
     coherent: float
+
+    @property
+    def loss_db(self) -> float:
+        """Loss by Ruze, dB; infinite where no gain is left."""
+        return -10.0 * float(np.log10(self.ruze)) if self.ruze > 0.0 else float("inf")
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,6 +227,15 @@ class SurfaceShape:
     def rms_normal(self) -> float:
         """Root mean square of the normal deviations, m, unweighted."""
         return float(np.sqrt(np.mean(self.fit.deviation**2)))
+
+    @property
+    def absorbed(self) -> tuple[Term, ...]:
+        """Terms that the free paraboloid absorbs mostly, besides those that it stands for."""
+        return tuple(
+            term
+            for term, share in zip(self.expansion.terms, self.expansion.share, strict=True)
+            if term.n >= 2 and share > ABSORBED and not (term == (2, 0) and "focal-length" in self.fit.free)
+        )
 
 
 def shape_of(prisms: Prisms, aperture: LitAperture, settings: ShapeSettings | None = None) -> SurfaceShape:
@@ -228,7 +274,17 @@ def shape_of(prisms: Prisms, aperture: LitAperture, settings: ShapeSettings | No
     )
     square = mean_square(fit.half_path, fit.half_path_covariance, weights)
     gains = gains_of(fit.half_path, weights, square, frequencies=settings.frequencies)
-    return SurfaceShape(prisms, aperture, settings, fit, weights, places, expansion, square, gains)
+    return SurfaceShape(
+        prisms=prisms,
+        aperture=aperture,
+        settings=settings,
+        fit=fit,
+        weights=weights,
+        places=places,
+        expansion=expansion,
+        square=square,
+        gains=gains,
+    )
 
 
 def expansion_of(
@@ -265,15 +321,15 @@ def expansion_of(
     value = gain @ error
     share, joint, joint_covariance = _joint_terms(values, error, along, shares, design, selected, settings.free)
     return Expansion(
-        selected,
-        value,
-        _rounded(gain @ covariance @ gain.T),
-        share,
-        joint,
-        joint_covariance,
-        ortho_gain @ error,
-        np.sqrt(np.maximum(np.diag(ortho_gain @ covariance @ ortho_gain.T), 0.0)),  # rounding may be below it
-        error - values @ value,
+        terms=selected,
+        value=value,
+        covariance=_rounded(gain @ covariance @ gain.T),
+        share=share,
+        joint=joint,
+        joint_covariance=joint_covariance,
+        orthonormal=ortho_gain @ error,
+        u_orthonormal=np.sqrt(np.maximum(np.diag(ortho_gain @ covariance @ ortho_gain.T), 0.0)),  # rounding below 0
+        rest=error - values @ value,
     )
 
 

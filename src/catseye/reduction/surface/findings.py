@@ -1,23 +1,26 @@
-"""Verdict on surfaces.
+"""Recipe of surfaces: shapes, change, look-up table, actuators, and the verdict on them.
 
-By the prisms' places, the limits of a dish, errors above the noise, and the inputs' verdicts.
+The verdict is by the prisms' places, the limits of a dish, errors above the noise, and the inputs' verdicts.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from catseye.aliases import Progress
 from catseye.constants import DEGREE, MILLIMETRE
+from catseye.errors import EstimationError
+from catseye.records.site.folder import SiteFolder
 from catseye.reduction.site.posture import SURE, largest_correction
-from catseye.reduction.surface.actuators import Actuators
-from catseye.reduction.surface.change import Change
-from catseye.reduction.surface.lookup import Lookup
-from catseye.reduction.surface.placement import TRAVEL, DishPlacement
-from catseye.reduction.surface.shape import MeanSquare, SurfaceShape
+from catseye.reduction.surface.actuators import Actuators, Travel, actuators_of, corrections
+from catseye.reduction.surface.change import Change, change_between
+from catseye.reduction.surface.lookup import Lookup, lookup_of
+from catseye.reduction.surface.placement import TRAVEL, DishPlacement, design_places, placement_of
+from catseye.reduction.surface.shape import LitAperture, Prisms, ShapeSettings, SurfaceShape, shape_of
 from catseye.verdict import Verdict
 
 LARGEST_FACTOR = 2.0  # variance factor of a look-up table's model beyond which its epochs disagree
-CLEAR = 2.0  # standard uncertainties by which a mean square stands out: 95 %
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,14 +38,57 @@ class SurfaceFindings:
     actuators: Actuators | None = None
     placements: tuple[DishPlacement, ...] = ()
 
+    @property
+    def verdict(self) -> Verdict:
+        """Verdict on the surface.
 
-def surface_verdict(result: SurfaceFindings) -> Verdict:
-    """Verdict on a surface.
+        Prisms on the site's dish, errors above the noise, epochs that fit the look-up table, and the inputs' verdicts.
+        """
+        sources = {shape.prisms.source: shape.prisms.verdict for shape in self.shapes}
+        return _own_verdict(self).resting_on(sources)
 
-    Prisms on the site's dish, errors above the noise, epochs that fit the look-up table, and the inputs' verdicts.
+
+def reduce_surface(
+    epochs: Sequence[Prisms],
+    site: SiteFolder,
+    settings: ShapeSettings,
+    *,
+    actuators: bool = False,
+    positions: Mapping[str, float] | None = None,
+    travel: Travel = "normal",
+    progress: Progress | None = None,
+) -> SurfaceFindings:
+    """Surface of a dish from the prisms of its epochs, in the order measured.
+
+    epochs      one: its shape; two: second less first as well; from three on: a look-up table by elevation
+    site        of the telescope
+    settings    of the shapes
+    actuators   corrections of all actuators, from the last epoch
+    positions   mm, of the actuators by name; None: their middle
+    travel      of an actuator
+    progress    called with (what, done, of how many)
+
+    Raises EstimationError for too few prisms and for prisms off the site's dish.
     """
-    sources = {shape.prisms.source: shape.prisms.verdict for shape in result.shapes}
-    return _own_verdict(result).resting_on(sources)
+    aperture, design = LitAperture.of(site.site.paraboloid), design_places(site)
+    shapes, placements = [], []
+    for k, prisms in enumerate(epochs):
+        if progress is not None:
+            progress("fitting epochs", k, len(epochs))
+        placement = placement_of(prisms, aperture, design)
+        try:
+            if np.all(placement.outside > 0.0):
+                raise EstimationError(placement.doubt)
+            shapes.append(shape_of(prisms, aperture, settings))
+        except EstimationError as problem:
+            raise EstimationError(f"{prisms.source}: {placement.doubt or problem}") from problem
+        placements.append(placement)
+    change = change_between(epochs[0], epochs[1], aperture, settings=settings) if len(epochs) == 2 else None
+    lookup = lookup_of(shapes) if len(epochs) >= 3 else None
+    corrected = None
+    if actuators:
+        corrected = corrections(shapes[-1], *actuators_of(site), positions=positions, travel=travel)
+    return SurfaceFindings(tuple(shapes), change, lookup, corrected, tuple(placements))
 
 
 def _own_verdict(result: SurfaceFindings) -> Verdict:
@@ -54,7 +100,7 @@ def _own_verdict(result: SurfaceFindings) -> Verdict:
             return Verdict("doubtful", f"{shape.prisms.source}: {doubt}")
     if result.lookup is not None:
         return _of_lookup(result)
-    noisy = [shape for shape in result.shapes if not stands_out(shape.square)]
+    noisy = [shape for shape in result.shapes if not shape.square.stands_out]
     if noisy:
         return Verdict("doubtful", f"{noisy[0].prisms.source}: no error of the surface stands out from the noise")
     prisms = ", ".join(str(len(shape.prisms.names)) for shape in result.shapes)
@@ -71,11 +117,6 @@ def _of_lookup(result: SurfaceFindings) -> Verdict:
         most = max(factors)
         return Verdict("doubtful", f"epochs scatter about the look-up table with a variance factor up to {most:.1f}")
     return Verdict("good", f"a look-up table of {len(result.shapes)} epochs, which scatter about it as they claim")
-
-
-def stands_out(square: MeanSquare) -> bool:
-    """True for errors above the measurement's noise, with 95 %."""
-    return bool(square.own > CLEAR * square.u)
 
 
 def _implausible(shape: SurfaceShape) -> str:
