@@ -8,6 +8,7 @@ CatseyeError
 └── EstimationError   an adjustment without a result, raised only when the result is required
 """
 
+from enum import Enum
 from typing import Any
 
 
@@ -46,4 +47,16 @@ class FrameError(CatseyeError, ValueError):
 
 
 class EstimationError(CatseyeError):
-    """Adjustment without a result, raised only when the result is required."""
+    """Adjustment without a result, raised only when the result is required.
+
+    reason   member of an enum of the module that raises; None without one
+    data     values that the text names, by name
+
+    >>> EstimationError("pillar number 3 has no distance", pillar=3).data
+    {'pillar': 3}
+    """
+
+    def __init__(self, text: str, *, reason: Enum | None = None, **data: Any) -> None:
+        super().__init__(text)
+        self.reason = reason
+        self.data = data
