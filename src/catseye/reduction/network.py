@@ -9,7 +9,8 @@ from threadpoolctl import threadpool_limits
 from catseye.aliases import Progress
 from catseye.constants import PPM
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, GroupFit
+from catseye.estimation.least_squares.adjustment import GroupFit
+from catseye.estimation.least_squares.status import CONVERGED
 from catseye.estimation.network.adjustment import NetworkSettings, adjust_network, fits_near
 from catseye.estimation.network.approximate.start import approximate
 from catseye.estimation.network.cures import inflation_of, targets_of_ranges
@@ -158,7 +159,7 @@ def _likely(
     if not any(np.any(p < level) for p in tests.adjusted):
         return tuple(np.zeros(m, dtype=bool) for m in sizes)
     options = SnoopingOptions(level=level)
-    if plain.status.startswith(CONVERGED):
+    if plain.status.usable:
         return snoop(solve, sizes, options=options, weigh=False).rejected
     start = estimate_robustly(solve, sizes, places=targets_of_ranges(plain.network))  # its tests are void
     return snoop(solve, sizes, options=options, start=start.rejected, doubtful=start.undecided, weigh=False).rejected

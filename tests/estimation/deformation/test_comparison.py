@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from catseye.errors import EstimationError
 from catseye.estimation.deformation import comparison, epoch_model
 from catseye.estimation.deformation.comparison import ComparisonOptions, compare
+from catseye.estimation.least_squares.status import Outcome, Status
 from catseye.estimation.network.adjustment import NetworkSettings, adjust_network
 from draws import draws
 from repository import TESTS
@@ -399,7 +400,7 @@ def test_incompatible_epochs_are_refused_in_one_line(metro, ranging_network):
     with pytest.raises(EstimationError, match="the epochs have different axes: x, y, z with"):
         compare(first, axes)
     with pytest.raises(EstimationError, match="the second epoch has no solution to compare: rank deficient"):
-        compare(first, replace(second, status="rank deficient: everything"))
+        compare(first, replace(second, status=Status(Outcome.RANK_DEFICIENT, "everything")))
     with pytest.raises(EstimationError, match="point '999' is not in both epochs"):
         compare(first, second, points=["31", "999"])
     with pytest.raises(EstimationError, match="unknown datum 'loose'"):

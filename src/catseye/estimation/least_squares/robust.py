@@ -26,10 +26,10 @@ from catseye.estimation.least_squares.conflict import (
     touched,
 )
 from catseye.estimation.least_squares.influence import Influence
+from catseye.estimation.least_squares.status import Outcome, Status
 from catseye.estimation.observations.kinds import ObservationGroup
 
-UNDECIDED = "rejection undecided after {rounds} rounds: some observations contradict each other and none stands out"
-UNHELD = "observations at one point contradict each other, and without them it is not held ({status})"
+UNDECIDED = "after {rounds} rounds: some observations contradict each other and none stands out"
 DECISIVE = 9.0  # difference of sums of squares between two explanations, below which neither is believed
 GRAVE = 6.0  # |w| of a rejected observation from which it matters whether the right one was rejected
 UNCHECKED = 0.05  # share of sigma^2 / variance of the estimated error below which nothing else speaks for or against
@@ -136,7 +136,7 @@ def adjust_robustly(
             return _without_undecided(solution, groups, removable, outliers, free, names, solver)
         active = [a | b for a, b in zip(active, back, strict=True)]
         returns = [n + b for n, b in zip(returns, back, strict=True)]
-    return replace(solution, status=UNDECIDED.format(rounds=outliers.rounds))
+    return replace(solution, status=Status(Outcome.REJECTION_UNDECIDED, UNDECIDED.format(rounds=outliers.rounds)))
 
 
 def _without_worst(
@@ -215,7 +215,7 @@ def _without_undecided(
         return solution
     final = adjust(solution.x, groups, free=free, active=active, names=names, solver=solver)
     if not final.solved:
-        return replace(final, status=UNHELD.format(status=final.status))
+        return replace(final, status=Status(Outcome.NOT_HELD, final.status))
     return final
 
 

@@ -7,7 +7,6 @@ import numpy as np
 
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import (
-    CONVERGED,
     GroupFit,
     LeastSquaresSolution,
     SolverSettings,
@@ -15,6 +14,7 @@ from catseye.estimation.least_squares.adjustment import (
 )
 from catseye.estimation.least_squares.covariance import Covariance
 from catseye.estimation.least_squares.rows import ActiveRows, variances
+from catseye.estimation.least_squares.status import ADVICE, CONVERGED, Outcome, Status
 from catseye.estimation.network.datum import (
     Floating,
     datum_conditions,
@@ -26,7 +26,7 @@ from catseye.estimation.network.datum import (
     with_datum,
     with_reference,
 )
-from catseye.estimation.network.diagnosis import contradicted, diagnosed, floating_text, unconnected
+from catseye.estimation.network.diagnosis import contradicted, diagnosed, floating_status, unconnected
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork
 from catseye.estimation.observations.kinds import Linear, ObservationGroup
 
@@ -34,12 +34,11 @@ FEWEST_POINTS = 200  # above which exchanged points are tried only with the rang
 PASSES = 8  # limit of passes: solve with minimal constraints, transform to the datum
 REACHED = 0.9  # of the variance factor: above it another start was no improvement
 
-NO_DATUM = "rank deficient: the network floats ({motions}) without a datum; hold coordinates, mark datum points, \
+NO_DATUM = "the network floats ({motions}) without a datum; hold coordinates, mark datum points, \
 or adjust it free (--datum free)"
-WEAK_DATUM = "rank deficient: the datum's coordinates do not hold the network against {motions}; mark more of them"
-NOT_SETTLED = "not converged: the network did not settle in its datum after {passes} passes; \
-check the starting coordinates"
-NOT_PLACED = "no approximate coordinates: {points}; give some, or observe more"
+WEAK_DATUM = "the datum's coordinates do not hold the network against {motions}; mark more of them"
+NOT_SETTLED = "the network did not settle in its datum after {passes} passes"
+NOT_PLACED = "{points}; give some, or observe more"
 
 
 @dataclass(frozen=True)
@@ -111,7 +110,7 @@ def adjust_network(
             )
     problem = _Problem.of(network, start)
     if problem.missing:
-        return problem.unanswered(NOT_PLACED.format(points=_listed(problem.missing)))
+        return problem.unanswered(Status(Outcome.NOT_PLACED, NOT_PLACED.format(points=_listed(problem.missing))))
     sparse = None if engine is None else engine == "sparse"
     solver = SolverSettings(settings.iterations, settings.tests, sparse)
     solution = problem.solve(active, (inflation, alone), solver)
@@ -193,7 +192,7 @@ def _trial(network: ObservationNetwork, inflation: Sequence[np.ndarray] | None) 
     except EstimationError:  # large, and not a ranging network: a trial would take too long
         if weighed:
             raise
-        return replace(_Problem.of(network, None).unanswered("not tried"), variance_factor=np.inf)
+        return replace(_Problem.of(network, None).unanswered(Status(Outcome.NOT_TRIED)), variance_factor=np.inf)
 
 
 def _listed(reasons: dict[str, str], most: int = 4) -> str:
@@ -274,7 +273,9 @@ class _Problem:
             if loose.shape[1]:
                 text = WEAK_DATUM if datum.any() else NO_DATUM
                 status = unconnected(self.network, self._afloat(rows, x))
-                return self.unanswered(status or text.format(motions=floating.words(loose)), x)
+                return self.unanswered(
+                    status or Status(Outcome.RANK_DEFICIENT, text.format(motions=floating.words(loose))), x
+                )
             free_columns = self.free.copy()
             free_columns[minimal_coordinates(conditions)] = False
             solution = adjust(
@@ -307,9 +308,11 @@ class _Problem:
         assert solution is not None
         solution = replace(solution, x=x, iterations=iterations)
         if not settled and solution.status == CONVERGED:
-            solution = replace(solution, status=NOT_SETTLED.format(passes=PASSES))
+            solution = replace(
+                solution, status=Status(Outcome.NOT_CONVERGED, NOT_SETTLED.format(passes=PASSES), ADVICE)
+            )
         if len(solution.floating):
-            status = unconnected(self.network, self._afloat(rows, x)) or floating_text(self.network, solution)
+            status = unconnected(self.network, self._afloat(rows, x)) or floating_status(self.network, solution)
             return self.unanswered(status, solution.x)
         # sum of redundancy numbers, without rounding
         degrees = sum(int(r.active.sum()) for r in rows) - int(free_columns.sum())
@@ -390,7 +393,7 @@ class _Problem:
             q=q,
         )
 
-    def unanswered(self, status: str, x: np.ndarray | None = None) -> NetworkSolution:
+    def unanswered(self, status: Status, x: np.ndarray | None = None) -> NetworkSolution:
         """Solution without an answer: start or last values, residuals, no covariance."""
         at = self.x0 if x is None else x
         all_fixed = np.zeros(len(at), dtype=bool)

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, GroupFit
+from catseye.estimation.least_squares.adjustment import GroupFit
+from catseye.estimation.least_squares.status import CONVERGED, Outcome
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork
 from catseye.estimation.network.multilateration.gauss_newton import adjust_ranges
 from catseye.estimation.network.multilateration.network import RangingNetwork
@@ -62,7 +63,7 @@ def adjusted_as_ranges(
             raise EstimationError("the ranging engine does not weigh coordinates robustly; use another engine")
         return None
     solution = adjust_ranges(problem[0], tests=tests, iterations=iterations, inflation=factors)
-    if solution.status.startswith("contradictory"):  # still a solution; `diagnosis` adds what and where
+    if solution.status.outcome is Outcome.CONTRADICTORY:  # still a solution; `diagnosis` adds what and where
         solution = replace(solution, status=CONVERGED)
     if solution.status != CONVERGED and not forced:
         return None

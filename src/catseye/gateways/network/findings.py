@@ -9,7 +9,7 @@ from operator import itemgetter
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, NONCENTRALITY
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY
 from catseye.estimation.network.external import effects_at_ends
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, label, points_of
 from catseye.estimation.quality.ellipsoid import Ellipsoid, ellipsoid, relative_covariance
@@ -266,7 +266,7 @@ class Findings:
     @property
     def answered(self) -> bool:
         """True if there are coordinates, valid within their covariance."""
-        return self.solution.status.startswith(CONVERGED)
+        return self.solution.status.usable
 
     @cached_property
     def u(self) -> np.ndarray:

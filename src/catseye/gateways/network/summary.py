@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
-from catseye.estimation.least_squares.adjustment import CONVERGED
+from catseye.estimation.least_squares.status import CONVERGED
 from catseye.estimation.quality.reliability import TOO_LARGE, TOO_SMALL, too_good
 from catseye.gateways.network.findings import Findings
 from catseye.gateways.writers.passage import Passage

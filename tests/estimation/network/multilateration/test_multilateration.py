@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.least_squares.adjustment import CONVERGED, adjust
+from catseye.estimation.least_squares.adjustment import adjust
+from catseye.estimation.least_squares.status import CONVERGED
 from catseye.estimation.network.multilateration import gauss_newton
 from catseye.estimation.network.multilateration.gauss_newton import adjust_ranges
 from catseye.estimation.network.multilateration.network import RangingNetwork
