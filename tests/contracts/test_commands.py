@@ -245,8 +245,8 @@ def test_quick_answers_spare_the_heavy_imports(arguments):
     assert done.stderr.strip() == "[]"
 
 
-ONE_CALL = ["air", "beam", "explain", "glass", "link", "night", "plan", "reduce", "replay", "safety", "sound"]
-OF_THE_TERMINAL = {"json", "out", "quiet", "strict", "page", "threads"}
+ONE_CALL = ["adjust", "air", "beam", "explain", "glass", "link", "night", "plan", "reduce", "replay", "safety", "sound"]
+OF_THE_TERMINAL = {"json", "out", "quiet", "strict", "page", "threads", "template"}
 
 
 @pytest.mark.parametrize("name", ONE_CALL)

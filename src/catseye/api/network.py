@@ -1,20 +1,20 @@
 """`adjust`, `plan`, `compare` and `locate`: points from ranges, angles, heights and vectors between them."""
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypedDict, Unpack, overload
 
 import numpy as np
 
 from catseye.aliases import Progress
 from catseye.api.reading import place_of
 from catseye.api.result import Result, quantities
-from catseye.api.units import In, with_units
+from catseye.api.units import In, plain, with_units
 from catseye.constants import MILLIMETRE
-from catseye.errors import EstimationError, InputError
+from catseye.errors import ArgumentError, EstimationError, InputError
 
 if TYPE_CHECKING:
     from astropy.table import QTable
@@ -22,12 +22,15 @@ if TYPE_CHECKING:
 
     from catseye.estimation.network.model import ObservationNetwork
     from catseye.estimation.network.positions.dispatch import Positions
-    from catseye.gateways.network.comparison import ComparedEpochs
-    from catseye.gateways.network.findings import Findings
-    from catseye.gateways.network.plan import PlanFindings
     from catseye.gateways.writers.passage import Passage
-    from catseye.reduction.network import AdjustedNetwork
+    from catseye.reduction.network.adjusted import AdjustedNetwork
+    from catseye.reduction.network.comparison import ComparedEpochs
+    from catseye.reduction.network.plan import PlannedNetwork
+    from catseye.reduction.network.treatment import AdjustmentOptions
 
+    NetworkSource: TypeAlias = str | os.PathLike[str] | ObservationNetwork | Mapping[str, Any]
+
+TEXTS = ("point", "role", "from", "to")  # columns of points.csv and ranges.csv that are no lengths
 NETWORKS = ".toml, .dat (STAR*NET), .gkf (GNU Gama), or a folder with points.csv and ranges.csv"
 
 
@@ -35,73 +38,117 @@ NETWORKS = ".toml, .dat (STAR*NET), .gkf (GNU Gama), or a folder with points.csv
 class AdjustmentResult(Result):
     """A network adjusted: n points and m observations, in the axes and the order of its file.
 
-    names                of the points
-    x                    (n, 3) m; nan where a coordinate is absent: nobody gave it and nothing measures it
-    covariances          (n, 3, 3) m² of each point; `covariance` is that of all together; nan likewise
-    u                    (n, 3) m, standard uncertainties
-    status               "converged", or what is wrong and what to do
-    variance_factor      [pvv] / degrees of freedom, expectation 1; nan where nothing is redundant
-    degrees_of_freedom   observations less unknowns, the datum's conditions added
-    residuals            (m,) observed less predicted, m or rad
-    standardised         (m,) residual over its standard uncertainty; nan where nothing checks the observation
-    redundancy           (m,) share of an error that shows in its residual
-    suspects             rows of observations that the tests reject, worst first: named, not removed
-    likely               rows that one-by-one data snooping would leave out
-    findings             everything else, told
-    treated              the solution beneath, and how observations were treated
-    path                 that was read; None where a network was given
+    adjusted   the recipe's answer: solution, observations, tests, treatment
+    path       that was read; None where a network or arrays were given
     """
 
-    names: tuple[str, ...]
-    x: np.ndarray
-    covariances: np.ndarray
-    u: np.ndarray
-    status: str
-    variance_factor: float
-    degrees_of_freedom: float
-    residuals: np.ndarray
-    standardised: np.ndarray
-    redundancy: np.ndarray
-    suspects: np.ndarray
-    likely: np.ndarray
-    findings: "Findings"
-    treated: "AdjustedNetwork"
+    adjusted: "AdjustedNetwork"
     path: Path | None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the points, in the order of the file."""
+        return self.adjusted.names
+
+    @property
+    def x(self) -> np.ndarray:
+        """Coordinates (n, 3) m; nan where a coordinate is absent: nobody gave it and nothing measures it."""
+        return self.adjusted.x
+
+    @property
+    def covariances(self) -> np.ndarray:
+        """Covariances (n, 3, 3) m² of each point; `covariance` is that of all together; nan likewise."""
+        return self.adjusted.covariance
+
+    @property
+    def u(self) -> np.ndarray:
+        """Standard uncertainties (n, 3) m."""
+        return self.adjusted.u
+
+    @property
+    def status(self) -> str:
+        """Status: "converged", or the problem and its remedy."""
+        return self.adjusted.solution.status
+
+    @property
+    def variance_factor(self) -> float:
+        """Variance factor [pvv] / degrees of freedom, expectation 1; nan where nothing is redundant."""
+        return self.adjusted.solution.variance_factor
+
+    @property
+    def degrees_of_freedom(self) -> float:
+        """Observations less unknowns, the datum's conditions added."""
+        return self.adjusted.solution.degrees_of_freedom
+
+    @property
+    def residuals(self) -> np.ndarray:
+        """Residuals (m,), observed less predicted, m or rad."""
+        return self.adjusted.table.residual
+
+    @property
+    def standardised(self) -> np.ndarray:
+        """Residuals (m,) over their standard uncertainties; nan where nothing checks the observation."""
+        return self.adjusted.table.standardised
+
+    @property
+    def redundancy(self) -> np.ndarray:
+        """Share (m,) of an error that shows in its residual."""
+        return self.adjusted.table.redundancy
+
+    @property
+    def suspects(self) -> np.ndarray:
+        """Rows of observations that the tests reject, worst first: named, not removed."""
+        return self.adjusted.suspects
+
+    @property
+    def likely(self) -> np.ndarray:
+        """Rows that one-by-one data snooping would leave out."""
+        return self.adjusted.likely
 
     @cached_property
     def covariance(self) -> np.ndarray:
         """Covariance of all coordinates, (3n, 3n) m², x, y, z of each point in turn; computed when asked for."""
-        axes = self.findings.network.axes  # a signed permutation: an unknown row leaves the others known
+        axes = self.adjusted.network.axes  # a signed permutation: an unknown row leaves the others known
         at, n = np.argmax(np.abs(axes), axis=0), len(self.names)
         sign = np.tile(axes[at, np.arange(3)], n)
         rows = (3 * np.arange(n)[:, None] + at).ravel()
-        block = self.findings.solution.block(self.names)[np.ix_(rows, rows)]
-        return np.asarray(np.outer(sign, sign) * block * self.findings.factor)
+        block = self.adjusted.solution.block(self.names)[np.ix_(rows, rows)]
+        return np.asarray(np.outer(sign, sign) * block * self.adjusted.factor)
 
     def passages(self) -> "Sequence[Passage]":
-        """The network, its points, the fit, the checks, and what was left out."""
+        """The network, its points, its parameters, the fit, the checks, and what was left out."""
         from catseye.gateways.network.summary import passages, treatment_passages
 
-        return [*passages(self.findings), *treatment_passages(self.treated, self.findings)]
+        return [*passages(self.adjusted), *treatment_passages(self.adjusted)]
+
+    def rows(self) -> list[str]:
+        """Lines with the coordinates of a small network, for a terminal."""
+        from catseye.gateways.network.summary import point_rows
+
+        return point_rows(self.adjusted)
 
     def to_object(self) -> dict[str, Any]:
         """JSON object of `catseye adjust --json`."""
         from catseye.gateways.network.objects import network_object
 
-        return network_object(self.findings, self.treated)
+        return network_object(self.adjusted)
+
+    def to_json(self) -> str:
+        """JSON of the command on one line, made in pieces."""
+        from catseye.gateways.network.objects import network_json
+
+        return "".join(network_json(self.adjusted)).rstrip("\n")
 
     def tables(self) -> "dict[str, QTable]":
         """`points`: a row a point; `observations`: a row an observation, in its own unit, which stands beside it."""
+        axes = self.adjusted.network.axis_names
         points = {
             "point": (self.names, ""),
-            **{axis: (self.x[:, k], "m") for k, axis in enumerate(self.findings.network.axis_names)},
-            **{
-                f"u_{axis}": (self.u[:, k] / MILLIMETRE, "mm")
-                for k, axis in enumerate(self.findings.network.axis_names)
-            },
+            **{axis: (self.x[:, k], "m") for k, axis in enumerate(axes)},
+            **{f"u_{axis}": (self.u[:, k] / MILLIMETRE, "mm") for k, axis in enumerate(axes)},
             "covariance": (self.covariances / MILLIMETRE**2, "mm2"),
         }
-        table = self.findings.table
+        table = self.adjusted.table
         ends = [*self.names, ""]
         columns = {
             "kind": ([table.kinds[k] for k in table.kind], ""),
@@ -122,14 +169,25 @@ class AdjustmentResult(Result):
         """The figures of the report: plan, elevation, residuals, redundancy."""
         from catseye.gateways.network.figures import network_figures
 
-        return {name: drawn.figure for name, drawn in network_figures(self.findings).items()}
+        return {name: drawn.figure for name, drawn in network_figures(self.adjusted).items()}
+
+    @property
+    def answered(self) -> bool:
+        """True if there are coordinates, valid within their covariance."""
+        return self.adjusted.answered
+
+    def require_answer(self) -> None:
+        """Raise EstimationError where the adjustment has no answer."""
+        if not self.adjusted.answered:
+            network = self.path or self.adjusted.network.source or "the network"
+            raise EstimationError(f"{network}: {self.status}")
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye adjust --out`; EstimationError where there is no answer to write."""
-        require_answer(self)
+        self.require_answer()
         from catseye.gateways.network.files import write_network
 
-        write_network(self.findings, directory, self.inputs(), progress=progress, treated=self.treated)
+        write_network(self.adjusted, directory, self.inputs(), progress=progress)
 
     def inputs(self) -> dict[str, str]:
         """SHA-256 of the network's file or tables."""
@@ -140,100 +198,168 @@ class AdjustmentResult(Result):
         return () if self.path is None else (self.path,)
 
 
+class _AdjustOptions(TypedDict, total=False):
+    """Keywords of `adjust`, for type checkers: with `later` and without it takes the same."""
+
+    points: Sequence[str] | None
+    datum: str | None
+    reject: bool
+    robust: str | None
+    components: str | None
+    scale_by_variance_factor: bool
+    level: Any
+    iterations: Any
+    relative: Sequence[tuple[str, str]]
+    sigma_mm: Any
+    sigma_ppm: Any
+    progress: Progress | None
+
+
+@overload
+def adjust(network: "NetworkSource", later: None = None, **options: Unpack[_AdjustOptions]) -> AdjustmentResult: ...
+
+
+@overload
+def adjust(
+    network: "NetworkSource", later: "NetworkSource", **options: Unpack[_AdjustOptions]
+) -> "ComparisonResult": ...
+
+
 @with_units
 def adjust(
-    network: "str | os.PathLike[str] | ObservationNetwork",
+    network: "NetworkSource",
+    later: "NetworkSource | None" = None,
     *,
+    points: Sequence[str] | None = None,
     datum: str | None = None,
     reject: bool = False,
     robust: str | None = None,
     components: str | None = None,
     scale_by_variance_factor: bool = False,
     level: Annotated[Any, In("", one=True)] = 0.05,
+    iterations: Annotated[Any, In("", whole=True)] = None,
     relative: Sequence[tuple[str, str]] = (),
     sigma_mm: Annotated[Any, In("mm", one=True)] = None,
     sigma_ppm: Annotated[Any, In("ppm", one=True)] = None,
     progress: Progress | None = None,
-) -> AdjustmentResult:
+) -> "AdjustmentResult | ComparisonResult":
     """A network by least squares, every observation used as claimed unless asked otherwise.
 
-    network      file or folder (docs/formats/network.md), an example's name, or what `load` gave
+    network      file or folder (docs/formats/network.md), an example's name, what `load` gave, or a mapping of the
+                 columns of points.csv and ranges.csv: {"points": {...}, "ranges": {...}}, mappings of arrays or
+                 QTables; lengths with a unit, or in m
+    later        the same network at a later epoch: the answer is then that of `compare`, both adjusted alike
+    points       names to compare between the two epochs; None: all common ones
     datum        "free": inner constraints on the marked points; "fixed": marked points held; None: as the file marks it
     reject       leave out observations that the tests reject, one by one
     robust       or weigh them: "huber", "danish" and so on, as `catseye adjust --robust`
     components   estimate the claims themselves: "rangers" or "groups"
     scale_by_variance_factor   multiply covariances by the variance factor; tau tests
     level        of the tests, of all single ones together
+    iterations   cap of the Gauss-Newton steps of every solution, 1 or more; None: 50
     relative     pairs of points whose relative ellipsoid is wanted
     sigma_mm, sigma_ppm   standard uncertainty of a range of ranges.csv that has none: a + b D, in quadrature
     progress     called with (what, done, of how many)
 
     A network without an answer is a result, too: its verdict is "failed", `status` says why and what to do, and
-    `catseye.save` refuses it. Raises InputError for a file that cannot be used and EstimationError for a name that is
-    not in the network.
+    `catseye.save` refuses it; two epochs without an answer are refused. Raises InputError for a file or a column that
+    cannot be used, ArgumentError for arguments that do not fit together, and EstimationError for a name that is not in
+    the network.
 
     >>> answer = adjust("networks/ground-ring")
     >>> answer.verdict.word, answer.x.shape == (len(answer.names), 3)
     ('good', True)
     """
-    from catseye.gateways.network.findings import findings
-    from catseye.gateways.network.summary import verdict
-    from catseye.reduction.network import adjusted
+    from catseye.estimation.least_squares.adjustment import COMPLETE
+    from catseye.reduction.network.treatment import AdjustmentOptions
+
+    if points is not None and later is None:
+        raise ArgumentError("points needs a later epoch to compare with", "points")
+    options = AdjustmentOptions(
+        datum=datum,
+        reject=reject,
+        robust=robust,
+        components=components,
+        scale_by_variance_factor=scale_by_variance_factor,
+        level=level,
+        relative=tuple(relative),
+        solver=COMPLETE if iterations is None else replace(COMPLETE, iterations=iterations),
+    )
+    first = _adjusted(network, sigma_mm, sigma_ppm, options=options, progress=progress)
+    if later is None:
+        return first
+    second = _adjusted(later, sigma_mm, sigma_ppm, options=options, progress=progress)
+    return compare(
+        first, second, points=points, level=level, scale_by_variance_factor=scale_by_variance_factor, progress=progress
+    )
+
+
+def _adjusted(
+    network: "NetworkSource",
+    sigma_mm: float | None,
+    sigma_ppm: float | None,
+    *,
+    options: "AdjustmentOptions",
+    progress: Progress | None,
+) -> AdjustmentResult:
+    from catseye.reduction.network.adjusted import adjusted
 
     read, path = _network_of(network, sigma_mm, sigma_ppm)
-    treated = adjusted(
-        read, datum=datum, reject=reject, robust=robust, level=level, components=components, progress=progress
-    )
-    told = findings(treated.solution, scaled=scale_by_variance_factor, level=level, pairs=relative)
-    return AdjustmentResult(
-        verdict(told),
-        told.names,
-        told.x,
-        told.covariance,
-        told.u,
-        told.solution.status,
-        told.solution.variance_factor,
-        told.solution.degrees_of_freedom,
-        told.table.residual,
-        told.table.standardised,
-        told.table.redundancy,
-        told.suspects,
-        np.flatnonzero(told.in_table(treated.likely)),
-        told,
-        treated,
-        path,
-    )
+    answer = adjusted(read, options, progress=progress)
+    return AdjustmentResult(verdict=answer.verdict, adjusted=answer, path=path)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ComparisonResult(Result):
     """Movements of k common points between two epochs, in the axes of the first epoch's file.
 
-    names           of the common points
-    displacement    (k, 3) m, second epoch less first
-    covariances     (k, 3, 3) m² of each displacement
-    u               (k, 3) m
-    p               (k,) chance of a displacement as large if the point stands still
-    words           (k) "moved", "stable", "held", "undecided" or "not checked"
-    compared        everything else
+    compared        the recipe's answer: displacements, tests, both adjustments
     first, second   the epochs
     """
 
-    names: tuple[str, ...]
-    displacement: np.ndarray
-    covariances: np.ndarray
-    u: np.ndarray
-    p: np.ndarray
-    words: tuple[str, ...]
     compared: "ComparedEpochs"
     first: AdjustmentResult
     second: AdjustmentResult
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the common points."""
+        return tuple(self.compared.deformation.names)
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Displacements (k, 3) m, second epoch less first."""
+        return self.compared.displacement
+
+    @property
+    def covariances(self) -> np.ndarray:
+        """Covariances (k, 3, 3) m² of each displacement."""
+        return self.compared.covariance
+
+    @property
+    def u(self) -> np.ndarray:
+        """Standard uncertainties (k, 3) m."""
+        return self.compared.u
+
+    @property
+    def p(self) -> np.ndarray:
+        """Chance (k,) of a displacement as large if the point stands still."""
+        return self.compared.deformation.p
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Verdicts (k) on the points: "moved", "stable", "held", "undecided" or "not checked"."""
+        return tuple(self.compared.verdicts)
 
     def passages(self) -> "Sequence[Passage]":
         """Movements and assumptions."""
         from catseye.gateways.network.comparison import comparison_passages
 
         return comparison_passages(self.compared)
+
+    def rows(self) -> list[str]:
+        """No further lines for a terminal."""
+        return []
 
     def to_object(self) -> dict[str, Any]:
         """JSON object of `catseye adjust A B --json`."""
@@ -277,8 +403,8 @@ class ComparisonResult(Result):
 
 @with_units
 def compare(
-    first: "str | os.PathLike[str] | ObservationNetwork | AdjustmentResult",
-    second: "str | os.PathLike[str] | ObservationNetwork | AdjustmentResult",
+    first: "NetworkSource | AdjustmentResult",
+    second: "NetworkSource | AdjustmentResult",
     *,
     points: Sequence[str] | None = None,
     level: Annotated[Any, In("", one=True)] = 0.05,
@@ -297,52 +423,54 @@ def compare(
 
     Raises EstimationError where an epoch has no answer or the two have too little in common.
     """
-    from catseye.estimation.deformation.comparison import ComparisonOptions
-    from catseye.estimation.deformation.comparison import compare as moved_between
-    from catseye.gateways.network.comparison import ComparedEpochs, comparison_verdict
+    from catseye.reduction.network.comparison import compared
 
     epochs = [
         each if isinstance(each, AdjustmentResult) else adjust(each, level=level, progress=progress)
         for each in (first, second)
     ]
     for epoch in epochs:
-        require_answer(epoch)
-    solutions = [epoch.findings.solution for epoch in epochs]
-    chosen = ComparisonOptions(level=level, scale_by_variance_factor=scale_by_variance_factor)
-    moved = moved_between(*solutions, points=points, options=chosen)
-    compared = ComparedEpochs(epochs[0].findings, epochs[1].findings, moved)
-    return ComparisonResult(
-        comparison_verdict(compared),
-        tuple(compared.deformation.names),
-        compared.displacement,
-        compared.covariance,
-        compared.u,
-        compared.deformation.p,
-        tuple(compared.verdicts),
-        compared,
-        epochs[0],
-        epochs[1],
+        epoch.require_answer()
+    found = compared(
+        epochs[0].adjusted,
+        epochs[1].adjusted,
+        points=points,
+        level=level,
+        scale_by_variance_factor=scale_by_variance_factor,
     )
+    return ComparisonResult(verdict=found.verdict, compared=found, first=epochs[0], second=epochs[1])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PlanResult(Result):
     """A network before it is measured: n points.
 
-    names         of the points
-    u             (n, 3) m, predicted standard uncertainties
-    covariances   (n, 3, 3) m² predicted
-    mean_u        m, root mean square over the points that matter
-    planned       everything else: weak directions, worth of observations, candidates, schedule, scatter on paper
-    path          that was read; None where a network was given
+    planned   the recipe's answer: weak directions, worth of observations, candidates, schedule, Monte Carlo
+    path      that was read; None where a network or arrays were given
     """
 
-    names: tuple[str, ...]
-    u: np.ndarray
-    covariances: np.ndarray
-    mean_u: float
-    planned: "PlanFindings"
+    planned: "PlannedNetwork"
     path: Path | None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the points, in the order of the file."""
+        return self.planned.predicted.names
+
+    @property
+    def u(self) -> np.ndarray:
+        """Standard uncertainties (n, 3) m, predicted."""
+        return self.planned.predicted.u
+
+    @property
+    def covariances(self) -> np.ndarray:
+        """Covariances (n, 3, 3) m², predicted."""
+        return self.planned.predicted.covariance
+
+    @property
+    def mean_u(self) -> float:
+        """Root mean square, m, over the points that matter."""
+        return self.planned.plan.mean_u
 
     def passages(self) -> "Sequence[Passage]":
         """Worth, weak points, single points of failure, what to measure next."""
@@ -358,7 +486,7 @@ class PlanResult(Result):
 
     def tables(self) -> "dict[str, QTable]":
         """`points`: a row a point; `candidates`: further ranges, the best first."""
-        axes = self.planned.findings.network.axis_names
+        axes = self.planned.predicted.network.axis_names
         points = {
             "point": (self.names, ""),
             **{f"u_{axis}": (self.u[:, k] / MILLIMETRE, "mm") for k, axis in enumerate(axes)},
@@ -377,7 +505,7 @@ class PlanResult(Result):
         """Plan and elevation with the predicted ellipsoids."""
         from catseye.gateways.network.figures import network_figures
 
-        drawn = network_figures(self.planned.findings)
+        drawn = network_figures(self.planned.predicted)
         return {name: drawn[name].figure for name in ("plan", "elevation") if name in drawn}
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
@@ -397,7 +525,7 @@ class PlanResult(Result):
 
 @with_units
 def plan(
-    network: "str | os.PathLike[str] | ObservationNetwork",
+    network: "NetworkSource",
     *,
     datum: str | None = None,
     interest: Sequence[str] | None = None,
@@ -432,31 +560,22 @@ def plan(
 
     Raises InputError for a file that cannot be used and EstimationError where the network floats.
     """
-    from catseye.estimation.network.plan import plan as planned
-    from catseye.estimation.network.plan import schedule
-    from catseye.gateways.network.findings import findings
-    from catseye.gateways.network.plan import PlanFindings, plan_verdict
-    from catseye.reduction.network import monte_carlo_scatter
+    from catseye.reduction.network.plan import MonteCarloOptions, PlanOptions, planned
 
     read, path = _network_of(network, sigma_mm, sigma_ppm, planned=True)
-    worth = planned(read, datum=datum, interest=interest, most=most)
-    picked = () if budget_s is None else schedule(worth, budget_s=budget_s, shot_s=shot_s)
-    scatter = None
-    if runs:
-        scatter = monte_carlo_scatter(
-            worth.solution.network,
-            runs=runs,
-            seed=seed,
-            air_ppm=air_ppm,
-            station_ppm=station_ppm,
-            refraction=refraction,
-            blunders=blunders_percent / 100.0,
-            progress=progress,
-        )
-    told = PlanFindings(findings(worth.solution), worth, picked, scatter)
-    return PlanResult(
-        plan_verdict(told), told.findings.names, told.findings.u, told.findings.covariance, worth.mean_u, told, path
+    monte_carlo = MonteCarloOptions(
+        runs=runs,
+        seed=seed,
+        air_ppm=air_ppm,
+        station_ppm=station_ppm,
+        refraction=refraction,
+        blunders=blunders_percent / 100.0,
     )
+    options = PlanOptions(
+        datum=datum, interest=interest, budget_s=budget_s, shot_s=shot_s, most=most, monte_carlo=monte_carlo
+    )
+    found = planned(read, options, progress=progress)
+    return PlanResult(verdict=found.verdict, planned=found, path=path)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -480,8 +599,8 @@ class PositionsResult(Result):
 
     def passages(self) -> "Sequence[Passage]":
         """Number and quality of the positions, and the status of the first that failed."""
-        from catseye.gateways.network.summary import quantity
         from catseye.gateways.writers.passage import Passage
+        from catseye.reduction.network.words import quantity
 
         count, total = int(self.found.sum()), len(self.found)
         text = f"{count} of {total} targets found"
@@ -544,13 +663,19 @@ def locate(
     found = placed.status == PositionStatus.FOUND
     words = np.array([placed.text(k) if not good else "found" for k, good in enumerate(found)])
     return PositionsResult(
-        _positions_verdict(placed, found, words), placed.x, placed.covariance, words, found, placed.pvv, placed.ranges
+        verdict=_positions_verdict(placed, found, words),
+        x=placed.x,
+        covariance=placed.covariance,
+        status=words,
+        found=found,
+        pvv=placed.pvv,
+        ranges=placed.ranges,
     )
 
 
 def _positions_verdict(placed: "Positions", found: np.ndarray, words: np.ndarray) -> Any:
     """Good where all were found and something checks them."""
-    from catseye.gateways.writers.verdict import Verdict
+    from catseye.verdict import Verdict
 
     lost = np.flatnonzero(~found)
     if not found.any():
@@ -564,15 +689,18 @@ def _positions_verdict(placed: "Positions", found: np.ndarray, words: np.ndarray
     return Verdict("good", "every target was found, and its ranges agree with each other")
 
 
-def require_answer(result: AdjustmentResult) -> AdjustmentResult:
-    """The adjustment itself, or EstimationError where it has no answer."""
-    if not result.findings.answered:
-        raise EstimationError(f"{result.path or result.findings.network.source or 'the network'}: {result.status}")
-    return result
+def write_template(directory: Path) -> None:
+    """Write tables to begin a network with: points.csv, ranges.csv and what they mean.
+
+    directory   to be made
+    """
+    from catseye.gateways.examples import copy_example
+
+    copy_example("networks/template", directory)
 
 
 def _network_of(
-    network: "str | os.PathLike[str] | ObservationNetwork",
+    network: "NetworkSource",
     sigma_mm: float | None,
     sigma_ppm: float | None,
     *,
@@ -580,14 +708,43 @@ def _network_of(
 ) -> "tuple[ObservationNetwork, Path | None]":
     """The network itself and the path it was read from."""
     from catseye.estimation.network.model import ObservationNetwork
-    from catseye.records.network.any_file import read_network
+    from catseye.records.network.any_file import network_of_columns, read_network
 
     if isinstance(network, ObservationNetwork):
         return network, None
+    if isinstance(network, Mapping):
+        tables = _tables_of(network)
+        return network_of_columns(tables, sigma_mm=sigma_mm, sigma_ppm=sigma_ppm, planned=planned), None
     path = place_of(network)
     if not path.exists():
         raise InputError(f"{path}: missing (expected {NETWORKS})")
     return read_network(path, sigma_mm=sigma_mm, sigma_ppm=sigma_ppm, planned=planned), path
+
+
+def _tables_of(network: Mapping[str, Any]) -> dict[str, dict[str, list[Any]]]:
+    """Columns of two tables as names and plain numbers in m, from mappings of arrays or QTables."""
+    strange = sorted(set(network) ^ {"points", "ranges"})
+    if strange:
+        raise InputError(f"network has the tables {', '.join(map(str, network))} (expected points and ranges)")
+    tables = {}
+    for table, columns in network.items():
+        names = list(getattr(columns, "colnames", columns))
+        tables[table] = {name: _cells(columns[name], name, f"adjust: {table}, {name}") for name in names}
+        lengths = {name: len(cells) for name, cells in tables[table].items()}
+        if len(set(lengths.values())) > 1:
+            text = ", ".join(f"{name} {count}" for name, count in lengths.items())
+            raise InputError(f"{table} has columns of different lengths: {text}")
+    return tables
+
+
+def _cells(values: Any, name: str, called: str) -> list[Any]:
+    """Cells of a column: text as it is, or lengths in m."""
+    if name in TEXTS:
+        return [str(value).strip() for value in np.asarray(values).tolist()]
+    numbers = np.asarray(plain(values, In("m"), called), dtype=float)
+    if numbers.ndim != 1:
+        raise InputError(f"{called} has the shape {numbers.shape} (expected a column)")
+    return numbers.tolist()
 
 
 def _hashes(path: Path | None) -> dict[str, str]:

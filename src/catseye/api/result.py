@@ -43,6 +43,20 @@ class Result:
         """JSON object of the command, in Python's and numpy's own types."""
         raise NotImplementedError
 
+    def to_json(self) -> str:
+        """JSON of the command, one line."""
+        from catseye.gateways.writers.objects import json_line
+
+        return json_line(self.to_object())
+
+    @property
+    def answered(self) -> bool:
+        """True if there is an answer to tell and to save; False for an adjustment that failed."""
+        return True
+
+    def require_answer(self) -> None:
+        """Raise EstimationError where there is no answer."""
+
     def tables(self) -> "dict[str, QTable]":
         """Every table of the answer by its name, the main one first; columns have units where they have one."""
         raise NotImplementedError

@@ -33,10 +33,9 @@ def tell(
     written   title and what was written under it; None: nothing was
     """
     if json:
-        from catseye.gateways.writers.objects import json_line
-
-        say(json_line(result.to_object()))
-    elif not quiet:
+        say(result.to_json())
+    result.require_answer()
+    if not json and not quiet:
         say(wrapped("Verdict", result.verdict.text))
         for passage in result.passages() if sentences else ():
             say(wrapped(passage.title, passage.text))

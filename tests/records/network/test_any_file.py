@@ -9,7 +9,7 @@ from catseye.errors import InputError
 from catseye.estimation.observations.kinds import Distances, ObservedCoordinates
 from catseye.records.files.columns import columns_of
 from catseye.records.network.any_file import read_network
-from catseye.reduction.network import adjusted
+from catseye.reduction.network.adjusted import adjusted
 from repository import ROOT, TESTS
 
 VECTORS = TESTS / "vectors" / "networks"

@@ -12,12 +12,19 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import sparray
 
-from catseye.errors import EstimationError
+from catseye.errors import ArgumentError, EstimationError
 from catseye.estimation.least_squares.bordered import Border
 from catseye.estimation.least_squares.covariance import Covariance, Dense
 from catseye.estimation.least_squares.normal import NormalEquations
 from catseye.estimation.least_squares.rows import ActiveRows, variances
-from catseye.estimation.least_squares.status import CONVERGED, Outcome, Status, not_converged, rank_deficient, undefined
+from catseye.estimation.least_squares.status import (
+    CONVERGED,
+    AdjustmentOutcome,
+    Status,
+    not_converged,
+    rank_deficient,
+    undefined,
+)
 from catseye.estimation.observations.kinds import ObservationGroup
 
 NONCENTRALITY = 4.13  # two-sided test at 0.1 %, power 80 %, as [BAARDA68]: normal quantiles 3.29 + 0.84
@@ -86,7 +93,7 @@ class LeastSquaresSolution:
     @property
     def solved(self) -> bool:
         """True if every parameter is determined, converged or not."""
-        return not len(self.floating) and self.status.outcome is not Outcome.UNDEFINED
+        return not len(self.floating) and self.status.outcome is not AdjustmentOutcome.UNDEFINED
 
     def variance_factor(self, names: Sequence[str] | None = None) -> tuple[float, float]:
         """Variance factor [pvv] / degrees of freedom (expectation 1), and the degrees of freedom.
@@ -105,13 +112,18 @@ class LeastSquaresSolution:
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """Settings of `adjust`.
+    """Settings of a least-squares estimate, from the option of a command down to the solver.
 
-    iterations   limit of Gauss-Newton steps; a step that raises the cost is halved, at most ten times
+    iterations   cap of Gauss-Newton steps; a step that raises the cost is halved, at most ten times
     tests        False: only residuals and sigmas in the fits, zero covariance (for intermediate solutions)
     sparse       solve sparse or dense; chosen by size if None
     border       eliminate the parameters outside a border by blocks, see `bordered`; None: as `sparse` says
     rough        with a border: tests accurate to a thousandth are enough (while selecting observations)
+
+    In all of `estimation`, `iterations` caps the steps of one estimate and `rounds` a search that solves anew in each,
+    such as the rejection of one observation after the other.
+
+    Raises ArgumentError for a cap below 1.
     """
 
     iterations: int = 50
@@ -119,6 +131,10 @@ class SolverSettings:
     sparse: bool | None = None
     border: Border | None = None
     rough: bool = False
+
+    def __post_init__(self) -> None:
+        if self.iterations < 1:
+            raise ArgumentError(f"iterations = {self.iterations} is invalid (expected 1 or more)", "iterations")
 
 
 COMPLETE = SolverSettings()

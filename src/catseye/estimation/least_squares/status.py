@@ -3,8 +3,8 @@
 from enum import Enum
 
 
-class Outcome(Enum):
-    """Outcome of an adjustment; the value is the text of its status."""
+class AdjustmentOutcome(Enum):
+    """AdjustmentOutcome of an adjustment; the value is the text of its status."""
 
     CONVERGED = "converged"
     CONTRADICTED = "converged, but {detail}"
@@ -30,23 +30,23 @@ class Status(str):
     detail    problem and place
     advice    remedy at the end of the line
 
-    >>> status = Status(Outcome.NOT_CONVERGED, "the last step was 3 m", "; check the starting coordinates")
+    >>> status = Status(AdjustmentOutcome.NOT_CONVERGED, "the last step was 3 m", "; check the starting coordinates")
     >>> status, status.outcome.name, status.advised("; S1 is wrong")
     ('not converged: the last step was 3 m; check the starting coordinates', 'NOT_CONVERGED', \
 'not converged: the last step was 3 m; S1 is wrong')
     """
 
-    outcome: Outcome
+    outcome: AdjustmentOutcome
     detail: str
     advice: str
     __slots__ = ("advice", "detail", "outcome")
 
-    def __new__(cls, outcome: Outcome, detail: str = "", advice: str = "") -> "Status":
+    def __new__(cls, outcome: AdjustmentOutcome, detail: str = "", advice: str = "") -> "Status":
         status = super().__new__(cls, outcome.value.format(detail=detail) + advice)
         status.outcome, status.detail, status.advice = outcome, detail, advice
         return status
 
-    def __reduce__(self) -> tuple[type["Status"], tuple[Outcome, str, str]]:
+    def __reduce__(self) -> tuple[type["Status"], tuple[AdjustmentOutcome, str, str]]:
         return Status, (self.outcome, self.detail, self.advice)
 
     def advised(self, advice: str) -> "Status":
@@ -56,10 +56,10 @@ class Status(str):
     @property
     def usable(self) -> bool:
         """True if the parameters are valid within their covariance, contradicted or not."""
-        return self.outcome in (Outcome.CONVERGED, Outcome.CONTRADICTED)
+        return self.outcome in (AdjustmentOutcome.CONVERGED, AdjustmentOutcome.CONTRADICTED)
 
 
-CONVERGED = Status(Outcome.CONVERGED)
+CONVERGED = Status(AdjustmentOutcome.CONVERGED)
 ADVICE = "; check the starting coordinates"
 
 
@@ -70,15 +70,17 @@ def not_converged(step: float, iterations: int) -> Status:
     iterations   taken
     """
     text = f"the last step was {step:.2g} standard deviations after {iterations} iterations"
-    return Status(Outcome.NOT_CONVERGED, text, ADVICE)
+    return Status(AdjustmentOutcome.NOT_CONVERGED, text, ADVICE)
 
 
 def rank_deficient(names: str) -> Status:
     """Status of undetermined parameters."""
-    return Status(Outcome.RANK_DEFICIENT, f"{names} not determined by any observation; add one, or give a prior")
+    return Status(
+        AdjustmentOutcome.RANK_DEFICIENT, f"{names} not determined by any observation; add one, or give a prior"
+    )
 
 
 def undefined(names: str) -> Status:
     """Status of observations without finite values or derivatives."""
     text = f"{names} has no finite value or derivative there"
-    return Status(Outcome.UNDEFINED, text, "; two points may coincide, or an observation is not a number")
+    return Status(AdjustmentOutcome.UNDEFINED, text, "; two points may coincide, or an observation is not a number")

@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.special import chdtrc
 
 from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
-from catseye.estimation.least_squares.status import CONVERGED, Outcome, Status
+from catseye.estimation.least_squares.status import CONVERGED, AdjustmentOutcome, Status
 from catseye.estimation.network.cures import EXCHANGE_ALL, Adjust, reason
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, label, points_of
 from catseye.estimation.shapes.rigid_body import closed_form
@@ -62,7 +62,7 @@ def unconnected(network: ObservationNetwork, afloat: Callable[[np.ndarray], bool
         return None
     text = " | ".join(_members(network, piece) for piece in pieces[:4]) + (" | ..." if number > 4 else "")
     which = "each" if len(loose) == number else f"that of {_members(network, loose[0])}"
-    return Status(Outcome.RANK_DEFICIENT, PIECES.format(count=number, pieces=text, loose=which))
+    return Status(AdjustmentOutcome.RANK_DEFICIENT, PIECES.format(count=number, pieces=text, loose=which))
 
 
 def _members(network: ObservationNetwork, piece: np.ndarray) -> str:
@@ -81,7 +81,8 @@ def floating_status(network: ObservationNetwork, solution: LeastSquaresSolution)
     if not worst:
         floating = ", ".join(floating_parameters[:4])
         return Status(
-            Outcome.RANK_DEFICIENT, FLOATS.format(points=floating, advice="observe it, hold it, or give it a prior")
+            AdjustmentOutcome.RANK_DEFICIENT,
+            FLOATS.format(points=floating, advice="observe it, hold it, or give it a prior"),
         )
     observations = _observations_at(network, worst[:4])
     words = [
@@ -91,7 +92,9 @@ def floating_status(network: ObservationNetwork, solution: LeastSquaresSolution)
     text = ", ".join(words) + (f" and {len(worst) - 4} more" if len(worst) > 4 else "")
     if floating_parameters:
         text += f", with {', '.join(floating_parameters[:3])},"
-    return Status(Outcome.RANK_DEFICIENT, FLOATS.format(points=text, advice=_advice(network, solution, worst[0])))
+    return Status(
+        AdjustmentOutcome.RANK_DEFICIENT, FLOATS.format(points=text, advice=_advice(network, solution, worst[0]))
+    )
 
 
 def _observations_at(network: ObservationNetwork, points: list[int]) -> list[int]:
@@ -164,7 +167,7 @@ def diagnosed(solution: NetworkSolution, adjust: Adjust | None) -> Status:
         worst=f"{label(network, group, row)} (residual {residual_text})",
         guess=reason(solution, adjust).text,
     )
-    return Status(Outcome.CONTRADICTED, detail)
+    return Status(AdjustmentOutcome.CONTRADICTED, detail)
 
 
 def _datum_exchanged(solution: NetworkSolution) -> Status | None:
@@ -192,7 +195,7 @@ def _datum_exchanged(solution: NetworkSolution) -> Status | None:
         return None
     first, second = points.names[on[i]], points.names[on[j]]
     detail = DATUM_EXCHANGED.format(first=first, second=second, misfit=misfit_given, best=best)
-    return Status(Outcome.CONTRADICTED, detail)
+    return Status(AdjustmentOutcome.CONTRADICTED, detail)
 
 
 def _misfit(x: np.ndarray, reference: np.ndarray) -> float:

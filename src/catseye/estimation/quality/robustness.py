@@ -15,7 +15,7 @@ import numpy as np
 
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit
-from catseye.estimation.least_squares.status import CONVERGED, Outcome, Status
+from catseye.estimation.least_squares.status import CONVERGED, AdjustmentOutcome, Status
 from catseye.estimation.quality.reliability import UNCHECKED, single_level, w_critical
 
 Solve = Callable[[Sequence[np.ndarray]], Sequence[GroupFit]]
@@ -237,7 +237,7 @@ def estimate_robustly(
     w = rows.w() / s
     status = CONVERGED
     if not change < SETTLED:
-        status = Status(Outcome.NOT_CONVERGED, NOT_CONVERGED.format(change=change, iterations=iterations))
+        status = Status(AdjustmentOutcome.NOT_CONVERGED, NOT_CONVERGED.format(change=change, iterations=iterations))
     return RobustEstimate(
         weights=rows.split(1.0 / rows.inflation**2),
         rejected=rows.split(np.abs(w) > options.limit),
@@ -446,7 +446,7 @@ def snoop(
     status = CONVERGED
     if not finished:
         detail = UNFINISHED.format(rounds=options.rounds, worst=worst, limit=critical)
-        status = Status(Outcome.UNFINISHED, detail)
+        status = Status(AdjustmentOutcome.UNFINISHED, detail)
     rejections, undecided = _rejections(rows, out, critical, weigh)
     undecided |= rows.doubtful
     status = _loosen(rows, out, undecided, status)
@@ -532,4 +532,4 @@ def _loosen(rows: _Rows, out: np.ndarray, undecided: np.ndarray, status: Status)
         return status
     named = [f"{g}:{k}" for g, k in map(rows.place, np.flatnonzero(holding)[:6])]
     ellipsis = " ..." if np.count_nonzero(holding) > 6 else ""
-    return Status(Outcome.UNDECIDED, UNDECIDED.format(rows=", ".join(named) + ellipsis, size=size))
+    return Status(AdjustmentOutcome.UNDECIDED, UNDECIDED.format(rows=", ".join(named) + ellipsis, size=size))

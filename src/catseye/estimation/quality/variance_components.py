@@ -17,7 +17,7 @@ import numpy as np
 
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import GroupFit
-from catseye.estimation.least_squares.status import CONVERGED, Outcome, Status
+from catseye.estimation.least_squares.status import CONVERGED, AdjustmentOutcome, Status
 
 Scaled = Callable[[Sequence[np.ndarray]], Sequence[GroupFit]]
 
@@ -248,11 +248,11 @@ def variance_components(
     if step.max() >= tolerance:
         worst = int(np.argmax(step))
         detail = NOT_CONVERGED.format(name=model.names[worst], step=step[worst], iterations=steps)
-        status = Status(Outcome.NOT_CONVERGED, detail)
+        status = Status(AdjustmentOutcome.NOT_CONVERGED, detail)
         fits = tuple(solve(model.scales(theta)))
     if inseparable:
         names = ", ".join(model.names[k] for k in inseparable)
-        status = Status(Outcome.INSEPARABLE, INSEPARABLE.format(names=names))
+        status = Status(AdjustmentOutcome.INSEPARABLE, INSEPARABLE.format(names=names))
     return Components(
         names=model.names,
         values=theta,

@@ -8,7 +8,8 @@ from math import isfinite
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.gateways.network.findings import MEASURES, ROLES, Findings
+from catseye.reduction.network.adjusted import AdjustedNetwork
+from catseye.reduction.network.observations import MEASURES, ROLES
 
 Formats = dict[str, str]  # number format of each column; "" for texts, "d" for integers
 Column = Sequence[str] | np.ndarray
@@ -55,44 +56,44 @@ PARAMETERS: Formats = {"parameter": "", "unit": "", "value": ".13g", "u": ".7g",
 TRIANGLE = np.triu_indices(3)
 
 
-def coordinates_csv(findings: Findings) -> Iterator[str]:
+def coordinates_csv(adjusted: AdjustedNetwork) -> Iterator[str]:
     """Table of points with standard uncertainties, covariances and semi-axes of the ellipsoid.
 
-    findings   findings on a solution; variances include its variance factor where it is `scaled`
+    adjusted   network; variances include its variance factor where it is `scaled`
     """
-    axes, names = np.abs(findings.network.axes), [cell(n) for n in findings.names]
-    letters = np.array([cell(n) for n in findings.network.axis_names])
-    fixed, datum = ((flags @ axes) > 0.0 for flags in (findings.network.points.fixed, findings.network.points.datum))
-    triangle = findings.covariance[:, *TRIANGLE] / MILLIMETRE**2
+    axes, names = np.abs(adjusted.network.axes), [cell(n) for n in adjusted.names]
+    letters = np.array([cell(n) for n in adjusted.network.axis_names])
+    fixed, datum = ((flags @ axes) > 0.0 for flags in (adjusted.network.points.fixed, adjusted.network.points.datum))
+    triangle = adjusted.covariance[:, *TRIANGLE] / MILLIMETRE**2
     yield from table(
         COORDINATES,
         len(names),
         lambda part: [
             names[part],
-            *findings.x[part].T,
-            *(findings.u[part].T / MILLIMETRE),
+            *adjusted.x[part].T,
+            *(adjusted.u[part].T / MILLIMETRE),
             *triangle[part].T,
-            *(findings.ellipsoid.semi_axes[part].T / MILLIMETRE),
+            *(adjusted.ellipsoid.semi_axes[part].T / MILLIMETRE),
             [" ".join(letters[f]) for f in fixed[part]],
             [" ".join(letters[d]) for d in datum[part]],
-            findings.observation_counts[part],
+            adjusted.observation_counts[part],
         ],
     )
 
 
-def observations_csv(findings: Findings, *, worst_first: bool = False) -> Iterator[str]:
+def observations_csv(adjusted: AdjustedNetwork, *, worst_first: bool = False) -> Iterator[str]:
     """Table of observations; lengths in m and angles in rad, as `unit` says.
 
-    findings      findings on a solution
+    adjusted      adjusted on a solution
     worst_first   by falling |standardised|; else in file order. `number` counts from 0 in file order, as the indices
                   of `suspects` in JSON do.
     """
-    rows, places = findings.table, findings.network.places
+    rows, places = adjusted.table, adjusted.network.places
     order = rows.worst_first if worst_first else np.arange(len(rows))
-    kinds, groups = [cell(k) for k in rows.kinds], [cell(g.name) for g in findings.network.groups]
-    points = [*(cell(n) for n in findings.names), ""]
+    kinds, groups = [cell(k) for k in rows.kinds], [cell(g.name) for g in adjusted.network.groups]
+    points = [*(cell(n) for n in adjusted.names), ""]
     suspect = np.zeros(len(rows), dtype=bool)
-    suspect[findings.suspects] = True
+    suspect[adjusted.suspects] = True
 
     def columns(part: slice) -> list[Column]:
         at = order[part]
@@ -104,8 +105,8 @@ def observations_csv(findings: Findings, *, worst_first: bool = False) -> Iterat
             [cell(c) for c in rows.component[at].tolist()],
             rows.unit[at].tolist(),
             *(getattr(rows, name)[at] for name in MEASURES),
-            findings.statistic[at],
-            findings.p[at],
+            adjusted.statistic[at],
+            adjusted.p[at],
             *(np.where(flag[at], "yes", "no").tolist() for flag in (suspect, rows.active, rows.checked)),
             [groups[g] for g, _ in where],
             [cell(places[g][r]) if places and places[g] else "" for g, r in where],
@@ -114,17 +115,17 @@ def observations_csv(findings: Findings, *, worst_first: bool = False) -> Iterat
     yield from table(OBSERVATIONS, len(rows), columns)
 
 
-def parameters_csv(findings: Findings) -> Iterator[str]:
+def parameters_csv(adjusted: AdjustedNetwork) -> Iterator[str]:
     """Table of additional parameters, in x east, y north, z up; empty prior_u: free, 0: held."""
-    parameters = findings.network.parameters
+    parameters = adjusted.network.parameters
     yield from table(
         PARAMETERS,
         len(parameters),
         lambda part: [
             [cell(p.name) for p in parameters[part]],
             [p.unit for p in parameters[part]],
-            findings.solution.parameters[part],
-            findings.u_parameters[part],
+            adjusted.solution.parameters[part],
+            adjusted.u_parameters[part],
             np.array([p.sigma for p in parameters[part]]),
         ],
     )

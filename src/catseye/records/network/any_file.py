@@ -6,12 +6,20 @@ folder        points.csv and ranges.csv                  `folder`
 .dat          STAR*NET                                   `starnet`
 """
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from catseye.estimation.network.model import ObservationNetwork
+from catseye.records.files.columns import columns_of_arrays
 from catseye.records.files.refusal import refusal, shown
 from catseye.records.network.claim import RangeClaim
-from catseye.records.network.folder import read_network_folder
+from catseye.records.network.folder import (
+    MORE_POINT_COLUMNS,
+    POINT_COLUMNS,
+    network_of_tables,
+    range_columns,
+    read_network_folder,
+)
 from catseye.records.network.gama import read_gama
 from catseye.records.network.plausible import with_lengths_checked
 from catseye.records.network.starnet import read_starnet
@@ -38,6 +46,28 @@ def read_network(
     Raises InputError, one line, for a file that is missing, of another kind, or that cannot be used.
     """
     network = _read(Path(path), sigma_mm=sigma_mm, sigma_ppm=sigma_ppm, planned=planned)
+    return network if planned else with_lengths_checked(network)
+
+
+def network_of_columns(
+    tables: Mapping[str, Mapping[str, Sequence[object]]],
+    *,
+    sigma_mm: float | None = None,
+    sigma_ppm: float | None = None,
+    planned: bool = False,
+) -> ObservationNetwork:
+    """Network of the columns of points.csv and ranges.csv.
+
+    tables     "points" and "ranges": columns by name, texts and numbers in m; nan is blank
+    sigma_mm, sigma_ppm, planned   as for `read_network`
+
+    Raises InputError as for a folder.
+    """
+    claim = RangeClaim.from_options(sigma_mm, sigma_ppm)
+    points = columns_of_arrays(tables["points"], "points", POINT_COLUMNS, optional=MORE_POINT_COLUMNS)
+    required, optional = range_columns(planned)
+    ranges = columns_of_arrays(tables["ranges"], "ranges", required, optional=optional)
+    network = network_of_tables(points, ranges, claim, planned=planned)
     return network if planned else with_lengths_checked(network)
 
 

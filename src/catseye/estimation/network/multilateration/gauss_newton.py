@@ -16,8 +16,8 @@ import numpy as np
 from scipy.linalg import lapack
 
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.least_squares.adjustment import ROUNDING, STEP_IN_SIGMAS
-from catseye.estimation.least_squares.status import CONVERGED, Outcome, Status, not_converged, undefined
+from catseye.estimation.least_squares.adjustment import COMPLETE, ROUNDING, STEP_IN_SIGMAS, SolverSettings
+from catseye.estimation.least_squares.status import CONVERGED, AdjustmentOutcome, Status, not_converged, undefined
 from catseye.estimation.network.multilateration import status as status_of
 from catseye.estimation.network.multilateration.blocks import IterationState, NumpyBlocks, Reduced, Statistics
 from catseye.estimation.network.multilateration.datum import InnerConstraints, displacements, generators
@@ -47,16 +47,14 @@ class Blocks(Protocol):
 def adjust_ranges(
     network: RangingNetwork,
     *,
-    tests: bool = True,
-    iterations: int = 50,
+    solver: SolverSettings = COMPLETE,
     inflation: np.ndarray | None = None,
     engine: str | None = None,
 ) -> RangingSolution:
     """Best-fit coordinates, zeros and scales of a ranging network, with covariances and tests.
 
     network      see `RangingNetwork`
-    tests        False: covariances and tests are nan
-    iterations   limit of Gauss-Newton steps; a step that raises the cost is halved, at most ten times
+    solver       cap of steps, tests or not; without tests, covariances and tests are nan
     inflation    (m,) factor on each range's sigma, infinite leaves it out but still tests it against its prediction
     engine       "numpy", "numba", or None: compiled from 200 000 ranges on
 
@@ -75,7 +73,7 @@ def adjust_ranges(
     """
     setup = set_up(network, inflation)
     blocks = _engine(setup, engine)
-    return _Iteration(setup, blocks).run(network, iterations, tests)
+    return _Iteration(setup, blocks).run(network, solver)
 
 
 def _engine(setup: Setup, engine: str | None) -> Blocks:
@@ -149,11 +147,11 @@ class _Iteration:
         self.free = np.flatnonzero(self.problem.free_stations.ravel())
         self.steps, self.cost, self.moment = 0, np.nan, 0.0
 
-    def run(self, network: RangingNetwork, iterations: int, tests: bool) -> RangingSolution:
+    def run(self, network: RangingNetwork, solver: SolverSettings) -> RangingSolution:
         """Iterate to convergence, then compute the statistics."""
         status, answer = not_converged(np.inf, 0), None
         reduced, before = self._reduce(self.state), 0.0
-        while self.steps < iterations:
+        while self.steps < solver.iterations:
             self.steps += 1
             step = self._solve(reduced)
             if isinstance(step, Status):
@@ -167,7 +165,7 @@ class _Iteration:
             if descent is None:
                 break
             reduced, before = descent, step.size
-        return self._solution(network, status, reduced, answer, tests)
+        return self._solution(network, status, reduced, answer, solver.tests)
 
     def _reduce(self, state: IterationState) -> Reduced:
         """Normal equations at a state; the factor is reset."""
@@ -311,14 +309,14 @@ class _Iteration:
         count = motions.shape[1]
         if datum.empty:
             words = status_of.described(motions, self.setup.size)
-            return Status(Outcome.RANK_DEFICIENT, status_of.MOTIONS.format(motions=words, count=count))
+            return Status(AdjustmentOutcome.RANK_DEFICIENT, status_of.MOTIONS.format(motions=words, count=count))
         free = self.problem.free_stations[:, :3], self.problem.free_targets
         conditions = datum.conditions(state, motions, free)
         _, values, vectors = np.linalg.svd(conditions.response)
         loose = values <= 1e-10 * max(values[0], 1.0)
         if loose.any():
             words = status_of.described(motions @ vectors[loose].T, self.setup.size)
-            return Status(Outcome.RANK_DEFICIENT, status_of.DATUM.format(motions=words))
+            return Status(AdjustmentOutcome.RANK_DEFICIENT, status_of.DATUM.format(motions=words))
         return conditions
 
     def _solution(

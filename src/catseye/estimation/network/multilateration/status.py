@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.estimation.least_squares.status import Outcome, Status, rank_deficient
+from catseye.estimation.least_squares.status import AdjustmentOutcome, Status, rank_deficient
 from catseye.estimation.network.multilateration.blocks import UNCHECKED, IterationState, Problem, Statistics, linearise
 
 TARGET = "{name} {why}{others}; add ranges from other directions, hold it or give it a prior"
@@ -69,7 +69,7 @@ def floating_targets(problem: Problem, state: IterationState, names: Names, *, f
         why = f"lies on one {'line' if line else 'plane'} with all {stations} stations that see it"
     other_targets = [names.target(int(i)) for i in floating[1:]]
     others = f" (so do {listed(other_targets)})" if other_targets else ""
-    return Status(Outcome.RANK_DEFICIENT, TARGET.format(name=names.target(worst), why=why, others=others))
+    return Status(AdjustmentOutcome.RANK_DEFICIENT, TARGET.format(name=names.target(worst), why=why, others=others))
 
 
 def described(motions: np.ndarray, size: float) -> str:
@@ -118,7 +118,7 @@ def floating_network(
     """
     parts = pieces(problem, names, joined)
     if len(parts) > 1:
-        return Status(Outcome.RANK_DEFICIENT, PIECES.format(count=len(parts), pieces=" and ".join(parts[:3])))
+        return Status(AdjustmentOutcome.RANK_DEFICIENT, PIECES.format(count=len(parts), pieces=" and ".join(parts[:3])))
     worst = np.argsort(-np.round(part / part.max(), 6), kind="stable")  # roundoff must not change the order
     called = [names.parameter(int(i), problem.width) for i in worst if part[i] > 1e-3 * part.max()]
     return rank_deficient(listed(called))
@@ -145,4 +145,4 @@ def contradiction(
         off = statistics.residual[i] / max(statistics.redundancy[i], UNCHECKED)
         ends = f"{names.station(int(problem.station[i]))} to {names.target(int(problem.target[i]))}"
         where += f" and at the range {ends} (about {off:.2g} m off)"
-    return Status(Outcome.CONTRADICTORY, CONTRADICTORY.format(median=median, worst=where))
+    return Status(AdjustmentOutcome.CONTRADICTORY, CONTRADICTORY.format(median=median, worst=where))

@@ -1,22 +1,20 @@
-"""Recipe for a network: plain or robust adjustment, data snooping, variance components."""
+"""Treatment of a network's observations: plain, robust, data snooping, variance components."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from catseye.aliases import Progress
 from catseye.constants import PPM
-from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import GroupFit
+from catseye.errors import ArgumentError, EstimationError
+from catseye.estimation.least_squares.adjustment import COMPLETE, GroupFit, SolverSettings
 from catseye.estimation.least_squares.status import CONVERGED
 from catseye.estimation.network.adjustment import NetworkSettings, adjust_network, fits_near
 from catseye.estimation.network.approximate.start import approximate
 from catseye.estimation.network.cures import inflation_of, targets_of_ranges
 from catseye.estimation.network.datum import with_datum
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
-from catseye.estimation.network.monte_carlo import Disturbance, MonteCarloScatter, scatter
 from catseye.estimation.network.ranging_engine import RangingCovariance
 from catseye.estimation.observations.kinds import Distances
 from catseye.estimation.quality.reliability import observation_tests
@@ -40,12 +38,55 @@ Placed = tuple[
 ]  # names of points with approximate places, and of those on an assumed side
 
 
-@dataclass(frozen=True, eq=False)
-class AdjustedNetwork:
-    """Network with its solution and the treatment of observations.
+@dataclass(frozen=True)
+class AdjustmentOptions:
+    """Options of an adjustment.
 
-    solution     of the adjustment, with the treatment below
-    treatment    "plain", "rejected", or the name of a robust method
+    datum        "free": inner constraints on the marked points; "fixed": marked points held; None: as the file marks it
+    reject       leave out observations that the w test rejects, found from a robust start
+    robust       or weigh each by an M-estimate: a key of `estimation.quality.robustness.WEIGHTS`
+    components   "rangers": estimate the constant and the ppm part of each ranger's claim; "groups": a factor a group
+    scale_by_variance_factor   multiply covariances by the variance factor; tau tests
+    level        of all tests of single observations together, and of the chi-square test
+    relative     pairs of points whose relative ellipsoid is wanted
+    solver       settings of every solution, whatever the treatment
+
+    Raises EstimationError for an unknown method, ArgumentError for a level that is no probability and for both of
+    `reject` and `robust`.
+    """
+
+    datum: str | None = None
+    reject: bool = False
+    robust: str | None = None
+    components: str | None = None
+    scale_by_variance_factor: bool = False
+    level: float = 0.05
+    relative: Sequence[tuple[str, str]] = ()
+    solver: SolverSettings = COMPLETE
+
+    def __post_init__(self) -> None:
+        if self.reject and self.robust is not None:
+            raise ArgumentError("robust cannot go with reject: either weigh or leave out", "robust", "reject")
+        if not 0.0 < self.level < 1.0:
+            raise ArgumentError(f"level = {self.level:g} is invalid (expected a probability between 0 and 1)", "level")
+        if self.robust is not None and self.robust not in WEIGHTS:
+            raise EstimationError(f"robust method {self.robust!r} is unknown (expected one of {', '.join(WEIGHTS)})")
+        if self.components not in (None, "rangers", "groups"):
+            raise EstimationError(
+                f"variance components by {self.components!r} are unknown (expected rangers or groups)"
+            )
+
+    @property
+    def treats(self) -> bool:
+        """True if observations are not used as claimed."""
+        return self.reject or self.robust is not None or self.components is not None
+
+
+@dataclass(frozen=True, eq=False)
+class Treatment:
+    """Treatment of a network's observations.
+
+    method       "plain", "rejected", or the name of a robust method
     weights      one (m,) a group: share of its claimed weight that each observation has; 0 where left out
     rejected     one (m,) bool a group
     undecided    one (m,) bool a group: contradicted by others, undecidable which is wrong; almost no weight
@@ -56,8 +97,7 @@ class AdjustedNetwork:
                  observations were rejected or weighed
     """
 
-    solution: NetworkSolution
-    treatment: str
+    method: str
     weights: tuple[np.ndarray, ...]
     rejected: tuple[np.ndarray, ...]
     undecided: tuple[np.ndarray, ...]
@@ -66,49 +106,60 @@ class AdjustedNetwork:
     notes: tuple[str, ...] = ()
     likely: tuple[np.ndarray, ...] = ()
 
+    @classmethod
+    def plain(cls, sizes: Sequence[int]) -> "Treatment":
+        """Every observation of groups of these sizes as claimed."""
+        nothing = tuple(np.zeros(m, dtype=bool) for m in sizes)
+        weights = tuple(np.ones(m) for m in sizes)
+        return cls(method="plain", weights=weights, rejected=nothing, undecided=nothing, likely=nothing)
 
-def adjusted(
-    network: ObservationNetwork,
-    *,
-    datum: str | None = None,
-    reject: bool = False,
-    robust: str | None = None,
-    level: float = 0.05,
-    components: str | None = None,
-    progress: Progress | None = None,
-) -> AdjustedNetwork:
-    """Adjusted coordinates of a network.
 
-    Every observation is used as claimed unless an argument says otherwise.
+Solve = Callable[[Sequence[np.ndarray]], tuple[GroupFit, ...]]
 
-    network      from `records.network.any_file.read_network`
-    datum        as `adjust_network`
-    reject       leave out observations that the w test rejects, found from a robust start
-    robust       or weigh each by an M-estimate: a key of `estimation.quality.robustness.WEIGHTS`
-    level        of all tests together, for `reject`
-    components   "rangers": estimate the constant and the ppm part of each ranger's claim; "groups": a factor a group
 
-    Raises EstimationError for an unknown method, or where a network without an answer is to be treated.
+def treated(
+    network: ObservationNetwork, options: AdjustmentOptions, *, progress: Progress | None = None
+) -> tuple[NetworkSolution, Treatment]:
+    """Solution of a network, and the treatment of its observations.
+
+    network    from `records.network.any_file.read_network`
+    options    every observation is used as claimed unless they say otherwise
+    progress   called with (what, done, of how many)
+
+    Raises EstimationError where a network without an answer is to be treated.
     """
-    if robust is not None and robust not in WEIGHTS:
-        raise EstimationError(f"robust method {robust!r} is unknown (expected one of {', '.join(WEIGHTS)})")
-    if components not in (None, "rangers", "groups"):
-        raise EstimationError(f"variance components by {components!r} are unknown (expected rangers or groups)")
-    network, placed = _placed(with_datum(network, datum))
-    treated = reject or robust is not None or components is not None
-    plain = replace(
-        adjust_network(network, settings=NetworkSettings(diagnose=not treated)),
-        approximate=placed[0],
-        assumed=placed[1],
-    )
+    network, placed = _placed(with_datum(network, options.datum))
+    settings = NetworkSettings(options.solver, diagnose=not options.treats)
+    plain = replace(adjust_network(network, settings=settings), approximate=placed[0], assumed=placed[1])
     sizes = [len(g.observed) for g in network.groups]
-    no_rows = tuple(np.zeros(m, dtype=bool) for m in sizes)
-    result = AdjustedNetwork(plain, "plain", tuple(np.ones(m) for m in sizes), no_rows, no_rows, likely=no_rows)
+    treatment = Treatment.plain(sizes)
     if not plain.answered:
-        return result
+        return plain, treatment
+    solve = _solver(network, plain, options, progress)
+    if not options.treats:
+        return plain, replace(treatment, likely=_likely(plain, solve, options.level))
+    solution = plain
+    if options.robust is not None or options.reject:
+        inflation, treatment = (
+            _weighed(network, solve, sizes, options.robust)
+            if options.robust is not None
+            else _with_rejections(network, solve, sizes, options.level)
+        )
+        solution = _final(network, inflation, placed, options, alone=True)
+    if options.components is not None:
+        solution, treatment = _with_components(network, solution, treatment, options, progress)
+    return solution, replace(treatment, likely=treatment.rejected)
+
+
+def _solver(
+    network: ObservationNetwork, plain: NetworkSolution, options: AdjustmentOptions, progress: Progress | None
+) -> Solve:
+    """Function that adjusts a network with inflated sigmas, as robust estimation and data snooping need it."""
     count, engine = 0, _engine(plain)
     near = plain.status == CONVERGED and plain.variance_factor < NEAR and not plain.replaced
-    fast = fits_near(network, plain) if near and engine is None and len(network.points.names) < FEW else None
+    small = near and engine is None and len(network.points.names) < FEW
+    fast = fits_near(network, plain, options.solver) if small else None
+    settings = NetworkSettings(options.solver, diagnose=False)
 
     def solve(inflation: Sequence[np.ndarray]) -> tuple[GroupFit, ...]:
         nonlocal count
@@ -118,38 +169,27 @@ def adjusted(
         quick = None if fast is None else fast(inflation)
         if quick is not None:
             return quick
-        return adjust_network(
-            network, inflation=inflation, alone=True, settings=NetworkSettings(diagnose=False), engine=engine
-        ).fits
+        return adjust_network(network, inflation=inflation, alone=True, settings=settings, engine=engine).fits
 
-    if not treated:
-        return replace(result, likely=_likely(plain, solve, level))
-    if robust is not None:
-        estimate = estimate_robustly(
-            solve, sizes, options=RobustOptions(method=robust), places=targets_of_ranges(network)
-        )
-        inflation = [1.0 / np.sqrt(np.maximum(w, MOST_INFLATION**-2)) for w in estimate.weights]
-        solution = _final(network, inflation, placed, alone=True)
-        notes = () if estimate.status == CONVERGED else (f"robust estimation {estimate.status}",)
-        result = replace(
-            result,
-            solution=solution,
-            treatment=robust,
-            weights=estimate.weights,
-            rejected=estimate.rejected,
-            undecided=estimate.undecided,
-            notes=notes,
-        )
-    elif reject:
-        result = _with_rejections(network, solve, sizes, placed, level)
-    if components is not None:
-        result = _with_components(network, result, components, progress)
-    return replace(result, likely=result.rejected)
+    return solve
 
 
-def _likely(
-    plain: NetworkSolution, solve: Callable[[Sequence[np.ndarray]], tuple[GroupFit, ...]], level: float
-) -> tuple[np.ndarray, ...]:
+def _weighed(
+    network: ObservationNetwork, solve: Solve, sizes: Sequence[int], method: str
+) -> tuple[Sequence[np.ndarray], Treatment]:
+    """Inflation of the observations by an M-estimate, and the treatment."""
+    estimate = estimate_robustly(solve, sizes, options=RobustOptions(method=method), places=targets_of_ranges(network))
+    inflation = [1.0 / np.sqrt(np.maximum(w, MOST_INFLATION**-2)) for w in estimate.weights]
+    return inflation, Treatment(
+        method=method,
+        weights=estimate.weights,
+        rejected=estimate.rejected,
+        undecided=estimate.undecided,
+        notes=() if estimate.status == CONVERGED else (f"robust estimation {estimate.status}",),
+    )
+
+
+def _likely(plain: NetworkSolution, solve: Solve, level: float) -> tuple[np.ndarray, ...]:
     """Candidates that data snooping, one by one, would reject.
 
     From a plain adjustment; nothing is rejected here.
@@ -166,22 +206,14 @@ def _likely(
 
 
 def _with_rejections(
-    network: ObservationNetwork,
-    solve: Callable[[Sequence[np.ndarray]], tuple[GroupFit, ...]],
-    sizes: Sequence[int],
-    placed: Placed,
-    level: float,
-) -> AdjustedNetwork:
-    """Adjustment without observations that the w test rejects.
-
-    By data snooping from a robust start.
-    """
+    network: ObservationNetwork, solve: Solve, sizes: Sequence[int], level: float
+) -> tuple[Sequence[np.ndarray], Treatment]:
+    """Inflation that leaves out what the w test rejects, by data snooping from a robust start, and the treatment."""
     start = estimate_robustly(solve, sizes, places=targets_of_ranges(network))
     chosen = snoop(solve, sizes, options=SnoopingOptions(level=level), start=start.rejected, doubtful=start.undecided)
     inflation = inflation_of(chosen.rejected, chosen.undecided)
-    return AdjustedNetwork(
-        solution=_final(network, inflation, placed, alone=True),
-        treatment="rejected",
+    return inflation, Treatment(
+        method="rejected",
         weights=tuple(1.0 / np.square(i) for i in inflation),
         rejected=chosen.rejected,
         undecided=chosen.undecided,
@@ -211,21 +243,33 @@ def _engine(solution: NetworkSolution) -> str | None:
 
 
 def _final(
-    network: ObservationNetwork, inflation: Sequence[np.ndarray], placed: Placed, *, alone: bool
+    network: ObservationNetwork,
+    inflation: Sequence[np.ndarray],
+    placed: Placed,
+    options: AdjustmentOptions,
+    *,
+    alone: bool,
 ) -> NetworkSolution:
-    return replace(adjust_network(network, inflation=inflation, alone=alone), approximate=placed[0], assumed=placed[1])
+    settings = NetworkSettings(options.solver)
+    solution = adjust_network(network, inflation=inflation, alone=alone, settings=settings)
+    return replace(solution, approximate=placed[0], assumed=placed[1])
 
 
 def _with_components(
-    network: ObservationNetwork, result: AdjustedNetwork, by: str, progress: Progress | None
-) -> AdjustedNetwork:
+    network: ObservationNetwork,
+    solution: NetworkSolution,
+    treatment: Treatment,
+    options: AdjustmentOptions,
+    progress: Progress | None,
+) -> tuple[NetworkSolution, Treatment]:
     """Adjustment with estimated instead of claimed uncertainties.
 
     Rejected observations stay out.
     """
-    placed = (result.solution.approximate, result.solution.assumed)
-    out = [np.where(w > 0.5, 1.0, np.inf) for w in result.weights] if result.treatment == "rejected" else None
-    count, engine = 0, _engine(result.solution)
+    placed = (solution.approximate, solution.assumed)
+    out = [np.where(w > 0.5, 1.0, np.inf) for w in treatment.weights] if treatment.method == "rejected" else None
+    count, engine = 0, _engine(solution)
+    settings = NetworkSettings(options.solver, diagnose=False)
 
     def scaled(scales: Sequence[np.ndarray]) -> tuple[GroupFit, ...]:
         nonlocal count
@@ -233,22 +277,22 @@ def _with_components(
         if progress is not None:
             progress("estimating components", count, 0)
         used = scales if out is None else [s * o for s, o in zip(scales, out, strict=True)]
-        return adjust_network(network, inflation=used, settings=NetworkSettings(diagnose=False), engine=engine).fits
+        return adjust_network(network, inflation=used, settings=settings, engine=engine).fits
 
     sizes = tuple(len(g.observed) for g in network.groups)
-    if by == "groups":
+    if options.components == "groups":
         model: GroupFactors | RowModel = GroupFactors(tuple(g.name for g in network.groups), sizes)
     else:
-        model = _ranger_model(network, result.solution)
+        model = _ranger_model(network, solution)
     components = variance_components(scaled, model)
     inflation = model.scales(components.values)
     if out is not None:
         inflation = [s * o for s, o in zip(inflation, out, strict=True)]
-    solution = _final(network, inflation, placed, alone=False)
-    notes = result.notes
+    notes = treatment.notes
     if components.status != CONVERGED:
         notes = (*notes, f"variance components {components.status}")
-    return replace(result, solution=solution, components=components, notes=notes)
+    final = _final(network, inflation, placed, options, alone=False)
+    return final, replace(treatment, components=components, notes=notes)
 
 
 def _ranger_model(network: ObservationNetwork, solution: NetworkSolution) -> RowModel:
@@ -285,34 +329,3 @@ def _ranger_model(network: ObservationNetwork, solution: NetworkSolution) -> Row
         start=np.tile(np.square(START), len(rangers)),
         fixed=tuple(fixed),
     )
-
-
-def monte_carlo_scatter(
-    network: ObservationNetwork,
-    *,
-    runs: int,
-    seed: int,
-    air_ppm: float = 0.0,
-    station_ppm: float = 0.0,
-    refraction: float = 0.0,
-    blunders: float = 0.0,
-    progress: Progress | None = None,
-) -> MonteCarloScatter:
-    """Monte Carlo simulation of a planned network; see `scatter`.
-
-    It is measured many times with external errors, and adjusted each time.
-
-    network      with its datum as it will be; its coordinates are the truth
-    runs, seed   number of simulations, seed of the generator
-    air_ppm      standard deviation of a scale error of all ranges together
-    station_ppm  the same for each ranger
-    refraction   standard deviation of the coefficient of vertical refraction
-    blunders     share of gross errors of 20 standard uncertainties; with them, wrong observations are rejected
-    """
-    disturbance = Disturbance(common_ppm=air_ppm, station_ppm=station_ppm, refraction=refraction, blunders=blunders)
-
-    def solve(drawn: ObservationNetwork) -> NetworkSolution:
-        return adjusted(drawn, reject=blunders > 0.0).solution
-
-    with threadpool_limits(limits=1, user_api="blas"):  # spinning pools make small matrices many times slower
-        return scatter(network, solve, runs=runs, seed=seed, disturbance=disturbance, progress=progress)
