@@ -171,17 +171,17 @@ class PointObservations:
         jacobians = [g.predict(solution.x)[1] for g in groups]
         totals = total_residuals(solution.fits, solution.x, shared)
         return PointObservations(
-            groups,
-            removable,
-            advice,
-            solution.x,
-            [residual for residual, _ in totals],
-            [sigma for _, sigma in totals],
-            jacobians,
-            _by_column(groups, jacobians),
-            advice_at,
-            shared,
-            np.array(settled, dtype=int),
+            groups=groups,
+            removable=removable,
+            advice=advice,
+            x=solution.x,
+            residual=[residual for residual, _ in totals],
+            sigma=[sigma for _, sigma in totals],
+            jacobians=jacobians,
+            by_column=_by_column(groups, jacobians),
+            advice_at=advice_at,
+            shared=shared,
+            settled=np.array(settled, dtype=int),
         )
 
     def rows(self, columns: np.ndarray) -> list[tuple[int, np.ndarray]]:

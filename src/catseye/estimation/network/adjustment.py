@@ -246,7 +246,16 @@ class _Problem:
             )
         free = np.concatenate([points.free.ravel(), sigma > 0.0])
         xyz = np.where(points.absent, 0.0, xyz)  # any value: no observation depends on it
-        return cls(network, np.concatenate([xyz.ravel(), values]), free, groups, found, missing, assumed, replaced)
+        return cls(
+            network=network,
+            x0=np.concatenate([xyz.ravel(), values]),
+            free=free,
+            groups=groups,
+            found=found,
+            missing=missing,
+            assumed=assumed,
+            replaced=replaced,
+        )
 
     @property
     def names(self) -> list[str]:

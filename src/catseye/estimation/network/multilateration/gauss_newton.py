@@ -239,7 +239,15 @@ class _Iteration:
             first = first + turned
             second = second + displacements(self.state.targets, motions @ shift) * self.problem.free_targets
             size += float(reduced.before @ turned**2)
-        return _Step(first, second, size**0.5, gain, 4.0 * EPS * self.moment**0.5, factor, motions)
+        return _Step(
+            stations=first,
+            targets=second,
+            size=size**0.5,
+            gain=gain,
+            noise=4.0 * EPS * self.moment**0.5,
+            factor=factor,
+            motions=motions,
+        )
 
     def _undefined(self) -> Status:
         problem, names = self.problem, self.setup.names
