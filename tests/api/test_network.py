@@ -225,7 +225,7 @@ def test_estimated_parameters_stand_among_the_sentences():
     answer = catseye.adjust("networks/feed-arm.toml")
     estimated = [p.name for p in answer.adjusted.network.parameters if p.sigma > 0.0 and p.unit != "rad"]
     assert estimated
-    said = {p.title: p.text for p in answer.passages()}["The parameters"]
+    said = {p.title: p.text for p in answer.passages()}["Parameters"]
     assert all(name in said for name in estimated[:12])
 
 

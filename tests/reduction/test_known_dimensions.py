@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from catseye.api.network import adjust, plan
+from catseye.api.network import adjust
+from catseye.api.planning import plan
 from catseye.errors import InputError
 from command_scene import command_line
 

@@ -1,37 +1,29 @@
-"""`adjust`, `plan`, `compare` and `locate`: points from ranges, angles, heights and vectors between them."""
+"""`adjust` and `compare`: points from ranges, angles, heights and vectors between them."""
 
-import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypedDict, Unpack, overload
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack, overload
 
 import numpy as np
 
 from catseye.aliases import Progress
-from catseye.api.reading import place_of
+from catseye.api.network_source import hashes_of, network_of
 from catseye.api.result import Result, quantities
-from catseye.api.units import In, plain, with_units
+from catseye.api.units import In, with_units
 from catseye.constants import MILLIMETRE
-from catseye.errors import ArgumentError, EstimationError, InputError
+from catseye.errors import ArgumentError, EstimationError
 
 if TYPE_CHECKING:
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
-    from catseye.estimation.network.model import ObservationNetwork
-    from catseye.estimation.network.positions.dispatch import Positions
+    from catseye.api.network_source import NetworkSource
     from catseye.gateways.writers.passage import Passage
     from catseye.reduction.network.adjusted import AdjustedNetwork
     from catseye.reduction.network.comparison import ComparedEpochs
-    from catseye.reduction.network.plan import PlannedNetwork
     from catseye.reduction.network.treatment import AdjustmentOptions
-
-    NetworkSource: TypeAlias = str | os.PathLike[str] | ObservationNetwork | Mapping[str, Any]
-
-TEXTS = ("point", "role", "from", "to")  # columns of points.csv and ranges.csv that are no lengths
-NETWORKS = ".toml, .dat (STAR*NET), .gkf (GNU Gama), or a folder with points.csv and ranges.csv"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -191,7 +183,7 @@ class AdjustmentResult(Result):
 
     def inputs(self) -> dict[str, str]:
         """SHA-256 of the network's file or tables."""
-        return _hashes(self.path)
+        return hashes_of(self.path)
 
     def sources(self) -> tuple[Path, ...]:
         """The network's file or folder."""
@@ -304,7 +296,7 @@ def _adjusted(
 ) -> AdjustmentResult:
     from catseye.reduction.network.adjusted import adjusted
 
-    read, path = _network_of(network, sigma_mm, sigma_ppm)
+    read, path = network_of(network, sigma_mm, sigma_ppm)
     answer = adjusted(read, options, progress=progress)
     return AdjustmentResult(verdict=answer.verdict, adjusted=answer, path=path)
 
@@ -441,254 +433,6 @@ def compare(
     return ComparisonResult(verdict=found.verdict, compared=found, first=epochs[0], second=epochs[1])
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class PlanResult(Result):
-    """A network before it is measured: n points.
-
-    planned   the recipe's answer: weak directions, worth of observations, candidates, schedule, Monte Carlo
-    path      that was read; None where a network or arrays were given
-    """
-
-    planned: "PlannedNetwork"
-    path: Path | None
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the points, in the order of the file."""
-        return self.planned.predicted.names
-
-    @property
-    def u(self) -> np.ndarray:
-        """Standard uncertainties (n, 3) m, predicted."""
-        return self.planned.predicted.u
-
-    @property
-    def covariances(self) -> np.ndarray:
-        """Covariances (n, 3, 3) m², predicted."""
-        return self.planned.predicted.covariance
-
-    @property
-    def mean_u(self) -> float:
-        """Root mean square, m, over the points that matter."""
-        return self.planned.plan.mean_u
-
-    def passages(self) -> "Sequence[Passage]":
-        """Worth, weak points, single points of failure, what to measure next."""
-        from catseye.gateways.network.plan import plan_passages
-
-        return plan_passages(self.planned)
-
-    def to_object(self) -> dict[str, Any]:
-        """JSON object of `catseye plan --json`."""
-        from catseye.gateways.network.plan import plan_object
-
-        return plan_object(self.planned)
-
-    def tables(self) -> "dict[str, QTable]":
-        """`points`: a row a point; `candidates`: further ranges, the best first."""
-        axes = self.planned.predicted.network.axis_names
-        points = {
-            "point": (self.names, ""),
-            **{f"u_{axis}": (self.u[:, k] / MILLIMETRE, "mm") for k, axis in enumerate(axes)},
-            "longest_axis": (self.planned.plan.weakest / MILLIMETRE, "mm"),
-        }
-        further = self.planned.plan.candidates
-        columns = {
-            "from": ([c.from_ for c in further], ""),
-            "to": ([c.to for c in further], ""),
-            "gain": ([1e6 * c.gain for c in further], "um"),
-            "mean_u": ([1e3 * c.mean_u for c in further], "mm"),
-        }
-        return {"points": quantities(points), "candidates": quantities(columns)}
-
-    def figures(self) -> "dict[str, Figure]":
-        """Plan and elevation with the predicted ellipsoids."""
-        from catseye.gateways.network.figures import network_figures
-
-        drawn = network_figures(self.planned.predicted)
-        return {name: drawn[name].figure for name in ("plan", "elevation") if name in drawn}
-
-    def write(self, directory: Path, progress: Progress | None = None) -> None:
-        """Write the files of `catseye plan --out`."""
-        from catseye.gateways.network.plan import write_plan
-
-        write_plan(self.planned, directory, self.inputs(), progress=progress)
-
-    def inputs(self) -> dict[str, str]:
-        """SHA-256 of the network's file or tables."""
-        return _hashes(self.path)
-
-    def sources(self) -> tuple[Path, ...]:
-        """The network's file or folder."""
-        return () if self.path is None else (self.path,)
-
-
-@with_units
-def plan(
-    network: "NetworkSource",
-    *,
-    datum: str | None = None,
-    interest: Sequence[str] | None = None,
-    budget_s: Annotated[Any, In("s", one=True)] = None,
-    shot_s: Annotated[Any, In("s", one=True)] = 5.0,
-    most: Annotated[Any, In("", whole=True)] = 20,
-    runs: Annotated[Any, In("", whole=True)] = 0,
-    seed: Annotated[Any, In("", whole=True)] = 1,
-    air_ppm: Annotated[Any, In("ppm", one=True)] = 0.0,
-    station_ppm: Annotated[Any, In("ppm", one=True)] = 0.0,
-    refraction: Annotated[Any, In("", one=True)] = 0.0,
-    blunders_percent: Annotated[Any, In("percent", one=True)] = 0.0,
-    sigma_mm: Annotated[Any, In("mm", one=True)] = None,
-    sigma_ppm: Annotated[Any, In("ppm", one=True)] = None,
-    progress: Progress | None = None,
-) -> PlanResult:
-    """A network before it is measured: what it will be worth, where it is weak, what to measure next.
-
-    network    as for `adjust`; observed values are not used, and may be missing: an empty cell, no column `distance`,
-               no value in TOML. What of a sigma grows with the distance follows the planned one
-    datum      as for `adjust`
-    interest   points that matter; all that are not held without
-    budget_s   time of every ranger for further ranges, s: gives a schedule
-    shot_s     time of one range, s
-    most       further ranges to list
-    runs       times to measure the network on paper, with the generator of `seed` and
-    air_ppm, station_ppm   scale errors of all ranges together and of each station's (1 sigma)
-    refraction             spread of the coefficient k of refraction (1 sigma)
-    blunders_percent       share of gross errors, which are then searched for and left out
-    sigma_mm, sigma_ppm    as for `adjust`
-    progress   called with (what, done, of how many)
-
-    Raises InputError for a file that cannot be used and EstimationError where the network floats.
-    """
-    from catseye.reduction.network.plan import MonteCarloOptions, PlanOptions, planned
-
-    read, path = _network_of(network, sigma_mm, sigma_ppm, planned=True)
-    monte_carlo = MonteCarloOptions(
-        runs=runs,
-        seed=seed,
-        air_ppm=air_ppm,
-        station_ppm=station_ppm,
-        refraction=refraction,
-        blunders=blunders_percent / 100.0,
-    )
-    options = PlanOptions(
-        datum=datum, interest=interest, budget_s=budget_s, shot_s=shot_s, most=most, monte_carlo=monte_carlo
-    )
-    found = planned(read, options, progress=progress)
-    return PlanResult(verdict=found.verdict, planned=found, path=path)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class PositionsResult(Result):
-    """Positions of m targets, each from its own ranges to known stations.
-
-    x             (m, 3) m; nan where there is none
-    covariance    (m, 3, 3) m², of stations without uncertainty; nan likewise
-    status        (m,) text: "found", or what is wrong and what to do
-    found         (m,) bool
-    pvv           (m,) sum of squared residuals in sigmas; nan where none was tried
-    ranges        (m,) int, used for each
-    """
-
-    x: np.ndarray
-    covariance: np.ndarray
-    status: np.ndarray
-    found: np.ndarray
-    pvv: np.ndarray
-    ranges: np.ndarray
-
-    def passages(self) -> "Sequence[Passage]":
-        """Number and quality of the positions, and the status of the first that failed."""
-        from catseye.gateways.writers.passage import Passage
-        from catseye.reduction.network.words import quantity
-
-        count, total = int(self.found.sum()), len(self.found)
-        text = f"{count} of {total} targets found"
-        if count:
-            u = np.sqrt(np.einsum("nii->n", self.covariance[self.found]) / 3.0)
-            usual, worst = quantity(float(np.median(u)), "m"), quantity(float(u.max()), "m")
-            text += f"; a coordinate is usually known to {usual}, of the worst to {worst} (1σ, stations taken as exact)"
-        first = np.flatnonzero(~self.found)
-        rest = [Passage("The others", f"first target {first[0]}: {self.status[first[0]]}.")] if len(first) else []
-        return [Passage("Positions", text + "."), *rest]
-
-    def to_object(self) -> dict[str, Any]:
-        """Arrays in the order of the targets."""
-        names = ("x", "covariance", "status", "found", "pvv", "ranges")
-        return {"verdict": self.verdict.to_object(), **{name: getattr(self, name) for name in names}}
-
-    def tables(self) -> "dict[str, QTable]":
-        """`positions`: a row a target."""
-        u = np.sqrt(np.einsum("nii->ni", self.covariance))
-        columns = {
-            **{axis: (self.x[:, k], "m") for k, axis in enumerate("xyz")},
-            **{f"u_{axis}": (u[:, k] / MILLIMETRE, "mm") for k, axis in enumerate("xyz")},
-            "covariance": (self.covariance / MILLIMETRE**2, "mm2"),
-            "ranges": (self.ranges, ""),
-            "status": (self.status, ""),
-        }
-        return {"positions": quantities(columns)}
-
-
-@with_units
-def locate(
-    stations: Annotated[Any, In("m")],
-    ranges: Annotated[Any, In("m")],
-    sigma: Annotated[Any, In("m")],
-    *,
-    near: Annotated[Any, In("m")] = None,
-) -> PositionsResult:
-    """Positions of many targets, each by least squares from its ranges to known stations.
-
-    stations   (n, 3) m, known: for stations with an uncertainty, and for what they have in common, `adjust` a network
-    ranges     (m, n) m, nan where missing; (n,) is one target
-    sigma      m, standard uncertainties of the ranges, independent: a number, (n,) or (m, n)
-    near       (3,) or (m, 3) m: a point on the target's side of the stations' plane, where two mirror images fit alike
-
-    Raises InputError for shapes that do not join and for stations that are not finite.
-    Source: `catseye.estimation.network.positions.dispatch`.
-
-    >>> stations = [[0.0, 0, 0], [50, 0, 1], [0, 50, 2], [50, 50, 9]]
-    >>> there = locate(stations, np.linalg.norm(np.array([20.0, 10, 30]) - stations, axis=1), 1e-4)
-    >>> np.round(there.x, 6).tolist(), there.verdict.word
-    ([[20.0, 10.0, 30.0]], 'good')
-    """
-    from catseye.estimation.network.positions.dispatch import positions
-    from catseye.estimation.network.positions.status import PositionStatus
-
-    s = np.asarray(stations, dtype=float)
-    d = np.atleast_2d(np.asarray(ranges, dtype=float))
-    u = np.asarray(sigma, dtype=float)
-    placed = positions(s, d, np.full(d.shape[1], float(u)) if u.ndim == 0 else u, near=near)
-    found = placed.status == PositionStatus.FOUND
-    words = np.array([placed.text(k) if not good else "found" for k, good in enumerate(found)])
-    return PositionsResult(
-        verdict=_positions_verdict(placed, found, words),
-        x=placed.x,
-        covariance=placed.covariance,
-        status=words,
-        found=found,
-        pvv=placed.pvv,
-        ranges=placed.ranges,
-    )
-
-
-def _positions_verdict(placed: "Positions", found: np.ndarray, words: np.ndarray) -> Any:
-    """Good where all were found and something checks them."""
-    from catseye.verdict import Verdict
-
-    lost = np.flatnonzero(~found)
-    if not found.any():
-        return Verdict("failed", f"no target was found; target 0: {words[0]}" if len(words) else "there is no target")
-    if len(lost):
-        return Verdict(
-            "doubtful", f"{len(lost)} of {len(found)} targets were not found; target {lost[0]}: {words[lost[0]]}"
-        )
-    if not (placed.degrees_of_freedom > 0).all():
-        return Verdict("doubtful", "some targets have three ranges only, which nothing checks")
-    return Verdict("good", "every target was found, and its ranges agree with each other")
-
-
 def write_template(directory: Path) -> None:
     """Write tables to begin a network with: points.csv, ranges.csv and what they mean.
 
@@ -697,57 +441,3 @@ def write_template(directory: Path) -> None:
     from catseye.gateways.examples import copy_example
 
     copy_example("networks/template", directory)
-
-
-def _network_of(
-    network: "NetworkSource",
-    sigma_mm: float | None,
-    sigma_ppm: float | None,
-    *,
-    planned: bool = False,
-) -> "tuple[ObservationNetwork, Path | None]":
-    """The network itself and the path it was read from."""
-    from catseye.estimation.network.model import ObservationNetwork
-    from catseye.records.network.any_file import network_of_columns, read_network
-
-    if isinstance(network, ObservationNetwork):
-        return network, None
-    if isinstance(network, Mapping):
-        tables = _tables_of(network)
-        return network_of_columns(tables, sigma_mm=sigma_mm, sigma_ppm=sigma_ppm, planned=planned), None
-    path = place_of(network)
-    if not path.exists():
-        raise InputError(f"{path}: missing (expected {NETWORKS})")
-    return read_network(path, sigma_mm=sigma_mm, sigma_ppm=sigma_ppm, planned=planned), path
-
-
-def _tables_of(network: Mapping[str, Any]) -> dict[str, dict[str, list[Any]]]:
-    """Columns of two tables as names and plain numbers in m, from mappings of arrays or QTables."""
-    strange = sorted(set(network) ^ {"points", "ranges"})
-    if strange:
-        raise InputError(f"network has the tables {', '.join(map(str, network))} (expected points and ranges)")
-    tables = {}
-    for table, columns in network.items():
-        names = list(getattr(columns, "colnames", columns))
-        tables[table] = {name: _cells(columns[name], name, f"adjust: {table}, {name}") for name in names}
-        lengths = {name: len(cells) for name, cells in tables[table].items()}
-        if len(set(lengths.values())) > 1:
-            text = ", ".join(f"{name} {count}" for name, count in lengths.items())
-            raise InputError(f"{table} has columns of different lengths: {text}")
-    return tables
-
-
-def _cells(values: Any, name: str, called: str) -> list[Any]:
-    """Cells of a column: text as it is, or lengths in m."""
-    if name in TEXTS:
-        return [str(value).strip() for value in np.asarray(values).tolist()]
-    numbers = np.asarray(plain(values, In("m"), called), dtype=float)
-    if numbers.ndim != 1:
-        raise InputError(f"{called} has the shape {numbers.shape} (expected a column)")
-    return numbers.tolist()
-
-
-def _hashes(path: Path | None) -> dict[str, str]:
-    from catseye.gateways.network.files import input_hashes
-
-    return {} if path is None else input_hashes(path)

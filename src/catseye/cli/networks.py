@@ -37,13 +37,13 @@ Datum = Annotated[
         "--datum",
         metavar=DATUMS,
         callback=one_of(DATUMS),
-        help="free: nothing held, inner constraints on the marked points; fixed: marked points held. "
+        help="Datum, free: nothing held, inner constraints on the marked points; fixed: marked points held. "
         "As the file marks it if not given.",
     ),
 ]
 Scaled = Annotated[
     bool,
-    typer.Option("--scale-by-variance-factor", help="Multiply covariances by the variance factor; tau tests."),
+    typer.Option("--scale-by-variance-factor", help="Covariances times the variance factor; tau tests."),
 ]
 Out = Annotated[
     Path | None,
@@ -68,13 +68,16 @@ class _Treatment(NamedTuple):
 
     datum: Datum = None
     scale_by_variance_factor: Scaled = False
-    reject: Annotated[
-        bool, typer.Option("--reject", help="Leave out observations that the tests reject, one by one.")
-    ] = False
+    reject: Annotated[bool, typer.Option("--reject", help="Rejection of observations by the tests, one by one.")] = (
+        False
+    )
     robust: Annotated[
         str | None,
         typer.Option(
-            "--robust", metavar=NETWORK_WEIGHTS, callback=one_of(NETWORK_WEIGHTS), help="Weigh observations robustly."
+            "--robust",
+            metavar=NETWORK_WEIGHTS,
+            callback=one_of(NETWORK_WEIGHTS),
+            help="Robust weights of the observations.",
         ),
     ] = None
     components: Annotated[
@@ -83,7 +86,7 @@ class _Treatment(NamedTuple):
             "--components",
             metavar=COMPONENTS,
             callback=one_of(COMPONENTS),
-            help="Estimate the claims themselves: constant and ppm part of each ranger, or a factor a group.",
+            help="Estimation of the claims themselves: constant and ppm part of each ranger, or a factor a group.",
         ),
     ] = None
     level: Annotated[
@@ -129,7 +132,11 @@ def adjust(  # noqa: PLR0913 - its options are its command line
     template: Annotated[
         Path | None,
         typer.Option(
-            "--template", metavar="DIR", is_eager=True, callback=_template, help="Write tables to begin with, and end."
+            "--template",
+            metavar="DIR",
+            is_eager=True,
+            callback=_template,
+            help="Folder for tables to begin with; nothing else is done.",
         ),
     ] = None,
     out: Out = None,
@@ -231,7 +238,7 @@ def plan(  # noqa: PLR0913 - its options are its command line
     strict: Strict = False,
 ) -> None:
     """A network before it is measured: what it will be worth, where it is weak, what to measure next."""
-    from catseye.api.network import plan as planned
+    from catseye.api.planning import plan as planned
     from catseye.api.result import require_writable
 
     require_writable(out, network)

@@ -232,7 +232,7 @@ def plan_report(planned: PlannedNetwork, when: datetime, inputs: Mapping[str, st
             paragraph("Worth: increase of the mean standard uncertainty without the observation."),
             _worth(planned),
         ),
-        section("paper", CONTENTS["paper"], scatter or paragraph("Not requested (--runs).", "faint")),
+        section("paper", CONTENTS["paper"], scatter or paragraph("Not requested.", "faint")),
         provenance_section(when, inputs, {"candidates listed": str(len(plan.candidates))}),
     ]
     return page(f"catseye plan: {name}", "\n".join(body))

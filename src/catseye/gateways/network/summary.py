@@ -68,7 +68,7 @@ def _parameters(adjusted: AdjustedNetwork) -> list[Passage]:
     count = len(words)
     if count > MOST_PARAMETERS:
         words = [*words[:MOST_PARAMETERS], f"and {count - MOST_PARAMETERS} more"]
-    return [Passage("The parameters", f"Estimated: {', '.join(words)}.")] if words else []
+    return [Passage("Parameters", f"Estimated: {', '.join(words)}.")] if words else []
 
 
 def treatment_passages(adjusted: AdjustedNetwork) -> list[Passage]:

@@ -78,7 +78,7 @@ def _read(path: Path, *, sigma_mm: float | None, sigma_ppm: float | None, planne
     if path.suffix.lower() == ".dat":
         return read_starnet(path, claim)
     if claim:
-        raise refusal(path.name, "contains all uncertainties (expected no --sigma-mm, no --sigma-ppm)")
+        raise refusal(path.name, "contains all uncertainties (expected neither sigma_mm nor sigma_ppm)")
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         kinds = f"expected a folder with points.csv and ranges.csv, or {' '.join(READERS)}"
