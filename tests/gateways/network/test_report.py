@@ -19,7 +19,7 @@ from catseye.gateways.network import comparison_report as comparison
 from catseye.gateways.network import figures
 from catseye.gateways.network.comparison_report import comparison_report
 from catseye.gateways.network.report import network_report
-from catseye.gateways.network.summary import direction_words, passages
+from catseye.gateways.network.summary import direction_words
 from catseye.records.network.folder import read_network_folder
 from catseye.records.network.gama import read_gama
 from catseye.reduction.network.adjusted import adjusted_network
@@ -94,12 +94,6 @@ def with_error(found, row, error):
     return adjusted_network(adjust_network(replace(network, groups=groups)))
 
 
-def rescaled(found, factor):
-    """The same network with every claimed sigma multiplied."""
-    groups = tuple(replace(g, covariance=g.covariance * factor**2) for g in found.network.groups)
-    return adjusted_network(adjust_network(replace(found.network, groups=groups)))
-
-
 def test_page_is_self_contained_and_shows_every_point(tunnel, single):
     for found in (tunnel, single):
         page = network_report(found, WHEN, INPUTS)
@@ -131,35 +125,8 @@ def test_large_network_report_lists_the_worst(ranging):
     assert re.search(r"one in \d+ of 9000 observed pairs", page)
 
 
-def test_a_good_network_is_called_good(ranging, tunnel):
-    assert ranging.verdict.word == "good"
-    assert "checked by no other" not in ranging.verdict.why
-    assert "but 3 of them are not checked by others" in tunnel.verdict.why  # 211 was sighted once
-    assert "4901 - 211" in passages(tunnel)[-1].text
-
-
-@pytest.mark.parametrize(
-    ("factor", "judged", "word"), [(0.5, "doubtful", "101 % more"), (3.0, "doubtful", "66 % less")]
-)
-def test_wrong_claims_are_detected_by_the_scatter(tunnel, factor, judged, word):
-    found = rescaled(tunnel, factor)
-    assert found.verdict.word == judged
-    ratio = np.sqrt(found.global_test.factor)
-    assert ratio * factor == pytest.approx(np.sqrt(tunnel.global_test.factor), rel=1e-6)
-    assert word.split()[-1] in found.verdict[1]
-    # a [pvv] so small comes by chance less often than once in ten thousand: the claim, or its unit, is in doubt
-    assert ("unit" in found.verdict.why) == (factor == 3.0)
-    assert f"{abs(100 * (ratio - 1)):.0f} %" in found.verdict[1]
-
-
-def test_a_blunder_is_named_with_its_size(ranging):
+def test_a_blunder_leads_the_table_of_observations(ranging):
     found = with_error(ranging, 1234, 0.002)
-    word, text = found.verdict
-    assert word == "doubtful"
-    assert found.suspects[0] == 1234
-    assert ranging.label(1234) in text
-    size = float(re.search(r"as if it were wrong by ([-\d.]+) mm", text).group(1))
-    assert size == pytest.approx(2.0, abs=0.4)
     tables = read(network_report(found, WHEN, INPUTS))
     (observations,) = (t for t in tables if t[0][0] == "observation")
     assert observations[1][0] == ranging.label(1234)
@@ -172,7 +139,6 @@ def test_undetermined_network_names_what_is_undetermined(tunnel):
     found = adjusted_network(adjust_network(loose))
     page = network_report(found, WHEN, INPUTS)
     tables = read(page)
-    assert found.verdict[1] == f"no answer: {found.solution.status}"
     assert "rank deficient" in page
     (rows,) = (t for t in tables if t[0][0] == "point")
     assert {row[6] for row in rows[1:]} == {"–"}  # no uncertainty is claimed
