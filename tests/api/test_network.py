@@ -1,5 +1,6 @@
 """`adjust`, `compare`, `plan`, `locate` from Python: the numbers of the commands, arrays, verdicts."""
 
+import inspect
 import json
 
 import numpy as np
@@ -8,6 +9,7 @@ from astropy import units
 from astropy.table import QTable
 
 import catseye
+from catseye.api import network as face
 from catseye.errors import ArgumentError, EstimationError, InputError
 from catseye.estimation.least_squares.adjustment import adjust
 from catseye.estimation.network import adjustment as network_adjustment
@@ -197,6 +199,12 @@ def test_the_cap_of_iterations_reaches_every_solution_of_every_treatment(options
     same = catseye.adjust("networks/ground-ring", iterations=49, **options)
     np.testing.assert_array_equal(same.x, usual.x)
     assert set(caps) == {49}
+
+
+def test_type_checkers_are_told_every_keyword_of_adjust():
+    parameters = inspect.signature(catseye.adjust).parameters.values()
+    keywords = {each.name for each in parameters if each.kind is each.KEYWORD_ONLY}
+    assert set(face._AdjustOptions.__annotations__) == keywords
 
 
 def test_invalid_and_contradicting_arguments_are_named(tmp_path):

@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AdjustmentResult(Result):
-    """A network adjusted: n points and m observations, in the axes and the order of its file.
+    """Adjusted network of n points and m observations.
+
+    In the axes and the order of its file.
 
     adjusted   the recipe's answer: solution, observations, tests, treatment
     path       that was read; None where a network or arrays were given
@@ -44,12 +46,18 @@ class AdjustmentResult(Result):
 
     @property
     def x(self) -> np.ndarray:
-        """Coordinates (n, 3) m; nan where a coordinate is absent: nobody gave it and nothing measures it."""
+        """Coordinates (n, 3) m.
+
+        nan where a coordinate is absent: nobody gave it and nothing measures it.
+        """
         return self.adjusted.x
 
     @property
     def covariances(self) -> np.ndarray:
-        """Covariances (n, 3, 3) m² of each point; `covariance` is that of all together; nan likewise."""
+        """Covariances (n, 3, 3) m² of each point.
+
+        nan where a coordinate is absent; `covariance` is that of all points together.
+        """
         return self.adjusted.covariance
 
     @property
@@ -64,7 +72,10 @@ class AdjustmentResult(Result):
 
     @property
     def variance_factor(self) -> float:
-        """Variance factor [pvv] / degrees of freedom, expectation 1; nan where nothing is redundant."""
+        """Variance factor [pvv] / degrees of freedom, expectation 1.
+
+        nan where nothing is redundant.
+        """
         return self.adjusted.solution.variance_factor
 
     @property
@@ -79,7 +90,10 @@ class AdjustmentResult(Result):
 
     @property
     def standardised(self) -> np.ndarray:
-        """Residuals (m,) over their standard uncertainties; nan where nothing checks the observation."""
+        """Residuals (m,) over their standard uncertainties.
+
+        nan where nothing checks the observation.
+        """
         return self.adjusted.table.standardised
 
     @property
@@ -89,7 +103,7 @@ class AdjustmentResult(Result):
 
     @property
     def suspects(self) -> np.ndarray:
-        """Rows of observations that the tests reject, worst first: named, not removed."""
+        """Rows of observations that the tests reject, worst first."""
         return self.adjusted.suspects
 
     @property
@@ -99,7 +113,10 @@ class AdjustmentResult(Result):
 
     @cached_property
     def covariance(self) -> np.ndarray:
-        """Covariance of all coordinates, (3n, 3n) m², x, y, z of each point in turn; computed when asked for."""
+        """Covariance of all coordinates, (3n, 3n) m².
+
+        x, y, z of each point in turn; computed on first use.
+        """
         axes = self.adjusted.network.axes  # a signed permutation: an unknown row leaves the others known
         at, n = np.argmax(np.abs(axes), axis=0), len(self.names)
         sign = np.tile(axes[at, np.arange(3)], n)
@@ -108,13 +125,13 @@ class AdjustmentResult(Result):
         return np.asarray(np.outer(sign, sign) * block * self.adjusted.factor)
 
     def passages(self) -> "Sequence[Passage]":
-        """The network, its points, its parameters, the fit, the checks, and what was left out."""
+        """Sentences on network, points, parameters, fit, checks and treatment."""
         from catseye.gateways.network.summary import passages, treatment_passages
 
         return [*passages(self.adjusted), *treatment_passages(self.adjusted)]
 
     def rows(self) -> list[str]:
-        """Lines with the coordinates of a small network, for a terminal."""
+        """Coordinates of a small network as lines of text."""
         from catseye.gateways.network.summary import point_rows
 
         return point_rows(self.adjusted)
@@ -132,7 +149,10 @@ class AdjustmentResult(Result):
         return "".join(network_json(self.adjusted)).rstrip("\n")
 
     def tables(self) -> "dict[str, QTable]":
-        """`points`: a row a point; `observations`: a row an observation, in its own unit, which stands beside it."""
+        """`points`, a row a point; `observations`, a row an observation.
+
+        An observation is in its own unit, which stands beside it.
+        """
         axes = self.adjusted.network.axis_names
         points = {
             "point": (self.names, ""),
@@ -191,7 +211,7 @@ class AdjustmentResult(Result):
 
 
 class _AdjustOptions(TypedDict, total=False):
-    """Keywords of `adjust`, for type checkers: with `later` and without it takes the same."""
+    """Keywords of `adjust`, for type checkers."""
 
     points: Sequence[str] | None
     datum: str | None
@@ -235,7 +255,9 @@ def adjust(
     sigma_ppm: Annotated[Any, In("ppm", one=True)] = None,
     progress: Progress | None = None,
 ) -> "AdjustmentResult | ComparisonResult":
-    """A network by least squares, every observation used as claimed unless asked otherwise.
+    """Least-squares adjustment of a network, or comparison of two epochs.
+
+    Every observation is used as claimed unless an argument says otherwise.
 
     network      file or folder (docs/formats/network.md), an example's name, what `load` gave, or a mapping of the
                  columns of points.csv and ranges.csv: {"points": {...}, "ranges": {...}}, mappings of arrays or
@@ -244,7 +266,7 @@ def adjust(
     points       names to compare between the two epochs; None: all common ones
     datum        "free": inner constraints on the marked points; "fixed": marked points held; None: as the file marks it
     reject       leave out observations that the tests reject, one by one
-    robust       or weigh them: "huber", "danish" and so on, as `catseye adjust --robust`
+    robust       or weigh them: "huber", "l1", "biweight", "igg3" or "geman_mcclure"
     components   estimate the claims themselves: "rangers" or "groups"
     scale_by_variance_factor   multiply covariances by the variance factor; tau tests
     level        of the tests, of all single ones together
@@ -303,7 +325,9 @@ def _adjusted(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ComparisonResult(Result):
-    """Movements of k common points between two epochs, in the axes of the first epoch's file.
+    """Movements of k common points between two epochs.
+
+    In the axes of the first epoch's file.
 
     compared        the recipe's answer: displacements, tests, both adjustments
     first, second   the epochs
@@ -335,12 +359,15 @@ class ComparisonResult(Result):
 
     @property
     def p(self) -> np.ndarray:
-        """Chance (k,) of a displacement as large if the point stands still."""
+        """Probability (k,) of such a displacement by chance."""
         return self.compared.deformation.p
 
     @property
     def words(self) -> tuple[str, ...]:
-        """Verdicts (k) on the points: "moved", "stable", "held", "undecided" or "not checked"."""
+        """Verdicts on the points.
+
+        "moved", "stable", "held", "undecided" or "not checked".
+        """
         return tuple(self.compared.verdicts)
 
     def passages(self) -> "Sequence[Passage]":
@@ -434,7 +461,9 @@ def compare(
 
 
 def write_template(directory: Path) -> None:
-    """Write tables to begin a network with: points.csv, ranges.csv and what they mean.
+    """Write tables to begin a network with.
+
+    points.csv, ranges.csv and a README that explains them.
 
     directory   to be made
     """

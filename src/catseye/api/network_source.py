@@ -3,12 +3,12 @@
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
 
 from catseye.api.reading import place_of
-from catseye.api.units import In, plain
+from catseye.api.units import In, plain, with_units
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
@@ -20,10 +20,11 @@ TEXTS = ("point", "role", "from", "to")  # columns of points.csv and ranges.csv 
 NETWORKS = ".toml, .dat (STAR*NET), .gkf (GNU Gama), or a folder with points.csv and ranges.csv"
 
 
+@with_units
 def network_of(
     network: "NetworkSource",
-    sigma_mm: float | None,
-    sigma_ppm: float | None,
+    sigma_mm: Annotated[Any, In("mm", one=True)],
+    sigma_ppm: Annotated[Any, In("ppm", one=True)],
     *,
     planned: bool = False,
 ) -> "tuple[ObservationNetwork, Path | None]":
@@ -43,7 +44,7 @@ def network_of(
 
 
 def _tables_of(network: Mapping[str, Any]) -> dict[str, dict[str, list[Any]]]:
-    """Columns of two tables as names and plain numbers in m, from mappings of arrays or QTables."""
+    """Columns of two tables, names and plain numbers in m."""
     strange = sorted(set(network) ^ {"points", "ranges"})
     if strange:
         raise InputError(f"network has the tables {', '.join(map(str, network))} (expected points and ranges)")
@@ -59,7 +60,7 @@ def _tables_of(network: Mapping[str, Any]) -> dict[str, dict[str, list[Any]]]:
 
 
 def _cells(values: Any, name: str, called: str) -> list[Any]:
-    """Cells of a column: text as it is, or lengths in m."""
+    """Cells of a column, texts or lengths in m."""
     if name in TEXTS:
         return [str(value).strip() for value in np.asarray(values).tolist()]
     numbers = np.asarray(plain(values, In("m"), called), dtype=float)
@@ -69,7 +70,7 @@ def _cells(values: Any, name: str, called: str) -> list[Any]:
 
 
 def hashes_of(path: Path | None) -> dict[str, str]:
-    """SHA-256 of a network's file or tables; none without a path."""
+    """SHA-256 of a network's file or tables, by name."""
     from catseye.gateways.network.files import input_hashes
 
     return {} if path is None else input_hashes(path)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PlanResult(Result):
-    """A network before it is measured: n points.
+    """Plan of a network of n points.
 
     planned   the recipe's answer: weak directions, worth of observations, candidates, schedule, Monte Carlo
     path      that was read; None where a network or arrays were given
@@ -54,7 +54,7 @@ class PlanResult(Result):
         return self.planned.plan.mean_u
 
     def passages(self) -> "Sequence[Passage]":
-        """Worth, weak points, single points of failure, what to measure next."""
+        """Sentences on worth, weak points and further ranges."""
         from catseye.gateways.network.plan import plan_passages
 
         return plan_passages(self.planned)
@@ -123,7 +123,7 @@ def plan(
     sigma_ppm: Annotated[Any, In("ppm", one=True)] = None,
     progress: Progress | None = None,
 ) -> PlanResult:
-    """A network before it is measured: what it will be worth, where it is weak, what to measure next.
+    """Predicted quality of a network, and best further ranges.
 
     network    as for `adjust`; observed values are not used, and may be missing: an empty cell, no column `distance`,
                no value in TOML. What of a sigma grows with the distance follows the planned one

@@ -145,7 +145,7 @@ def adjust(  # noqa: PLR0913 - its options are its command line
     quiet: Quiet = False,
     strict: Strict = False,
 ) -> None:
-    """A network adjusted by least squares, or two epochs of it compared."""
+    """Least-squares adjustment of a network, or comparison of two epochs."""
     from catseye.api import network as face
     from catseye.api.result import require_writable
 
@@ -237,7 +237,7 @@ def plan(  # noqa: PLR0913 - its options are its command line
     quiet: Quiet = False,
     strict: Strict = False,
 ) -> None:
-    """A network before it is measured: what it will be worth, where it is weak, what to measure next."""
+    """Plan of a network: predicted quality, weak points, best further ranges."""
     from catseye.api.planning import plan as planned
     from catseye.api.result import require_writable
 

@@ -4,7 +4,7 @@ from enum import Enum
 
 
 class AdjustmentOutcome(Enum):
-    """AdjustmentOutcome of an adjustment; the value is the text of its status."""
+    """Outcome of an adjustment; the value is its text."""
 
     CONVERGED = "converged"
     CONTRADICTED = "converged, but {detail}"
@@ -24,7 +24,7 @@ class AdjustmentOutcome(Enum):
 
 
 class Status(str):
-    """Status of an adjustment: a line for people, and its parts for code.
+    """Status of an adjustment, one line with its parts.
 
     outcome   what came of it
     detail    problem and place
@@ -55,7 +55,7 @@ class Status(str):
 
     @property
     def usable(self) -> bool:
-        """True if the parameters are valid within their covariance, contradicted or not."""
+        """True if the parameters are valid within their covariance."""
         return self.outcome in (AdjustmentOutcome.CONVERGED, AdjustmentOutcome.CONTRADICTED)
 
 

@@ -105,7 +105,7 @@ class AdjustedNetwork:
 
     @cached_property
     def likely(self) -> np.ndarray:
-        """Rows of `table` that data snooping, one by one, would leave out; those left out where it did."""
+        """Rows of `table` that data snooping would leave out, or did."""
         return np.flatnonzero(self.in_table(self.treatment.likely)) if self.treatment else np.zeros(0, dtype=int)
 
     @property
@@ -333,7 +333,7 @@ def _too_good(network: AdjustedNetwork) -> str:
 
 
 def suspects_words(network: AdjustedNetwork) -> str:
-    """Number of suspects and the first in words; "" for none."""
+    """Number of suspects and the first, in words."""
     count = len(network.suspects)
     if not count:
         return ""

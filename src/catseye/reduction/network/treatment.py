@@ -154,7 +154,7 @@ def treated(
 def _solver(
     network: ObservationNetwork, plain: NetworkSolution, options: AdjustmentOptions, progress: Progress | None
 ) -> Solve:
-    """Function that adjusts a network with inflated sigmas, as robust estimation and data snooping need it."""
+    """Function that adjusts a network with inflated sigmas."""
     count, engine = 0, _engine(plain)
     near = plain.status == CONVERGED and plain.variance_factor < NEAR and not plain.replaced
     small = near and engine is None and len(network.points.names) < FEW
@@ -208,7 +208,10 @@ def _likely(plain: NetworkSolution, solve: Solve, level: float) -> tuple[np.ndar
 def _with_rejections(
     network: ObservationNetwork, solve: Solve, sizes: Sequence[int], level: float
 ) -> tuple[Sequence[np.ndarray], Treatment]:
-    """Inflation that leaves out what the w test rejects, by data snooping from a robust start, and the treatment."""
+    """Inflation that leaves out what the w test rejects.
+
+    By data snooping from a robust start; with the treatment.
+    """
     start = estimate_robustly(solve, sizes, places=targets_of_ranges(network))
     chosen = snoop(solve, sizes, options=SnoopingOptions(level=level), start=start.rejected, doubtful=start.undecided)
     inflation = inflation_of(chosen.rejected, chosen.undecided)
