@@ -13,28 +13,51 @@ from catseye.constants import MILLIMETRE
 if TYPE_CHECKING:
     from astropy.table import QTable
 
-    from catseye.estimation.network.positions.dispatch import Positions
     from catseye.gateways.writers.passage import Passage
+    from catseye.reduction.network.positions import LocatedTargets
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PositionsResult(Result):
     """Positions of m targets, each from its own ranges to known stations.
 
-    x             (m, 3) m; nan where there is none
-    covariance    (m, 3, 3) m², of stations without uncertainty; nan likewise
-    status        (m,) text: "found", or what is wrong and what to do
-    found         (m,) bool
-    pvv           (m,) sum of squared residuals in sigmas; nan where none was tried
-    ranges        (m,) int, used for each
+    located   the recipe's answer
     """
 
-    x: np.ndarray
-    covariance: np.ndarray
-    status: np.ndarray
-    found: np.ndarray
-    pvv: np.ndarray
-    ranges: np.ndarray
+    located: "LocatedTargets"
+
+    @property
+    def x(self) -> np.ndarray:
+        """Coordinates (m, 3) m; nan where there are none."""
+        return self.located.positions.x
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Covariances (m, 3, 3) m² for stations without uncertainty."""
+        return self.located.positions.covariance
+
+    @property
+    def status(self) -> np.ndarray:
+        """Texts (m,): "found", or the problem and its remedy."""
+        return self.located.words
+
+    @property
+    def found(self) -> np.ndarray:
+        """Mask (m,) of targets with a position."""
+        return self.located.found
+
+    @property
+    def pvv(self) -> np.ndarray:
+        """Sums (m,) of squared residuals in sigmas.
+
+        nan where no solution was tried.
+        """
+        return self.located.positions.pvv
+
+    @property
+    def ranges(self) -> np.ndarray:
+        """Number (m,) of ranges of each target."""
+        return self.located.positions.ranges
 
     def passages(self) -> "Sequence[Passage]":
         """Number and quality of the positions, and the status of the first that failed."""
@@ -92,37 +115,12 @@ def locate(
     >>> np.round(there.x, 6).tolist(), there.verdict.word
     ([[20.0, 10.0, 30.0]], 'good')
     """
-    from catseye.estimation.network.positions.dispatch import positions
-    from catseye.estimation.network.positions.status import PositionStatus
+    from catseye.reduction.network.positions import located
 
-    s = np.asarray(stations, dtype=float)
-    d = np.atleast_2d(np.asarray(ranges, dtype=float))
-    u = np.asarray(sigma, dtype=float)
-    placed = positions(s, d, np.full(d.shape[1], float(u)) if u.ndim == 0 else u, near=near)
-    found = placed.status == PositionStatus.FOUND
-    words = np.array([placed.text(k) if not good else "found" for k, good in enumerate(found)])
-    return PositionsResult(
-        verdict=_positions_verdict(placed, found, words),
-        x=placed.x,
-        covariance=placed.covariance,
-        status=words,
-        found=found,
-        pvv=placed.pvv,
-        ranges=placed.ranges,
+    found = located(
+        np.asarray(stations, dtype=float),
+        np.atleast_2d(np.asarray(ranges, dtype=float)),
+        np.asarray(sigma, dtype=float),
+        near=near,
     )
-
-
-def _positions_verdict(placed: "Positions", found: np.ndarray, words: np.ndarray) -> Any:
-    """Good where all were found and something checks them."""
-    from catseye.verdict import Verdict
-
-    lost = np.flatnonzero(~found)
-    if not found.any():
-        return Verdict("failed", f"no target was found; target 0: {words[0]}" if len(words) else "there is no target")
-    if len(lost):
-        return Verdict(
-            "doubtful", f"{len(lost)} of {len(found)} targets were not found; target {lost[0]}: {words[lost[0]]}"
-        )
-    if not (placed.degrees_of_freedom > 0).all():
-        return Verdict("doubtful", "some targets have three ranges only, which nothing checks")
-    return Verdict("good", "every target was found, and its ranges agree with each other")
+    return PositionsResult(verdict=found.verdict, located=found)
