@@ -103,13 +103,14 @@ def _claims(treatment: Treatment) -> str:
     assert components is not None
     roots, u = components.roots()
     words = []
-    for name, variance, root, u_root in zip(components.names, components.values, roots, u, strict=True):
-        if "^2 of " not in name:
+    columns = zip(components.names, components.values, roots, u, strict=True)
+    for k, (name, variance, root, u_root) in enumerate(columns):
+        if treatment.components_by == "groups":
             words.append(f"{name} {variance:.3g} times the claimed variance")
             continue
-        scale, unit = (1e6, "µm") if name.startswith("constant") else (1e6, "ppm")
+        scale, unit = 1e6, ("µm", "ppm")[k % 2]  # a constant and a scale of each ranger
         spread = f" (u {u_root * scale:.2g})" if np.isfinite(u_root) else ""
-        words.append(f"{name.replace('^2 of', ' of').replace('  ', ' ')} {root * scale:.3g} {unit}{spread}")
+        words.append(f"{name.replace('^2 of', ' of')} {root * scale:.3g} {unit}{spread}")
     return f"Estimated from the observations: {listed(words)}."
 
 

@@ -91,7 +91,8 @@ class Treatment:
     rejected     one (m,) bool a group
     undecided    one (m,) bool a group: contradicted by others, undecidable which is wrong; almost no weight
     rejections   result of data snooping for each rejected observation
-    components   estimated components of variance, on request
+    components   estimated components of variance, on request: of "rangers" a constant, m², and a scale, ratio², each
+    components_by   "rangers" or "groups"; None without
     notes        for the user, one line each
     likely       one (m,) bool a group: candidates of data snooping, one by one; all rejected ones where
                  observations were rejected or weighed
@@ -103,6 +104,7 @@ class Treatment:
     undecided: tuple[np.ndarray, ...]
     rejections: tuple[Rejection, ...] = ()
     components: Components | None = None
+    components_by: str | None = None
     notes: tuple[str, ...] = ()
     likely: tuple[np.ndarray, ...] = ()
 
@@ -295,7 +297,7 @@ def _with_components(
     if components.status != CONVERGED:
         notes = (*notes, f"variance components {components.status}")
     final = _final(network, inflation, placed, options, alone=False)
-    return final, replace(treatment, components=components, notes=notes)
+    return final, replace(treatment, components=components, components_by=options.components, notes=notes)
 
 
 def _ranger_model(network: ObservationNetwork, solution: NetworkSolution) -> RowModel:
