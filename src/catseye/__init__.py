@@ -16,12 +16,14 @@ from catseye.version import __version__
 if TYPE_CHECKING:
     from catseye.api.laboratory import baseline, calibrate, triplet
     from catseye.api.living import replay, simulate
-    from catseye.api.network import adjust, compare, locate, plan
+    from catseye.api.network import adjust, compare
     from catseye.api.night import explain, night, reduce
     from catseye.api.optics import beam, glass, link, safety
     from catseye.api.panels import panels
+    from catseye.api.planning import plan
     from catseye.api.pointing import fit_pointing, predict_pointing
     from catseye.api.pose import pose
+    from catseye.api.positions import locate
     from catseye.api.reading import examples, load
     from catseye.api.result import save, show
     from catseye.api.steering import point, track
@@ -33,12 +35,14 @@ if TYPE_CHECKING:
 FACE = {  # file of catseye.api -> its exported names
     "laboratory": ("baseline", "calibrate", "triplet"),
     "living": ("replay", "simulate"),
-    "network": ("adjust", "compare", "locate", "plan"),
+    "network": ("adjust", "compare"),
     "night": ("explain", "night", "reduce"),
     "optics": ("beam", "glass", "link", "safety"),
     "panels": ("panels",),
+    "planning": ("plan",),
     "pointing": ("fit_pointing", "predict_pointing"),
     "pose": ("pose",),
+    "positions": ("locate",),
     "reading": ("examples", "load"),
     "result": ("save", "show"),
     "steering": ("point", "track"),

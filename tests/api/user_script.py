@@ -19,6 +19,10 @@ def user_script() -> None:
     assert_type(night.verdict.why, str)
     night.coordinates  # type: ignore[attr-defined]  # noqa: B018
 
+    network = catseye.adjust("networks/ground-ring", iterations=9)
+    assert_type(network.u, np.ndarray)
+    assert_type(catseye.adjust("networks/ground-ring", "networks/ground-ring", points=["A"]).words, tuple[str, ...])
+
     shot = catseye.explain(Path("night-01"), 120, monte_carlo=0)
     assert_type(shot.u_range, float | None)
     shot.u  # type: ignore[attr-defined]  # noqa: B018

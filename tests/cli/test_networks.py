@@ -207,3 +207,34 @@ def test_relative_ellipsoids_are_of_the_pairs_asked_for(answered, catseye):
     status, _, err = catseye("adjust", file, "--relative", "ZY113,NOBODY")
     assert (status, err.count("\n")) == (1, 1)
     assert "NOBODY" in err
+
+
+@pytest.mark.parametrize(
+    "treatment",
+    [[], ["--robust", "huber"], ["--reject"], ["--components", "groups"]],
+    ids=lambda t: " ".join(t) or "plain",
+)
+def test_the_cap_of_iterations_reaches_every_treatment(catseye, treatment):
+    ring = EXAMPLES / "ground-ring"
+    status, out, err = catseye("adjust", ring, "--iterations", "1", "--json", *treatment)
+    said = json.loads(out)
+    assert status == 1
+    assert (said["iterations"], said["verdict"]["word"]) == (1, "failed")
+    assert said["status"].startswith("not converged: the last step was")
+    assert said["status"] in err
+    assert catseye("adjust", ring, "--iterations", "0", *treatment)[0] == 2
+    usual, capped = (catseye("adjust", ring, "--json", *treatment, *more)[1] for more in ([], ["--iterations", "50"]))
+    assert capped == usual
+
+
+def test_estimated_zeros_and_air_stand_on_the_terminal(catseye):
+    _, out, _ = catseye("adjust", EXAMPLES / "feed-arm.toml")
+    line = next(line for line in out.splitlines() if line.startswith("Parameters"))
+    assert "refractivity" in line
+    assert "zero ZY118" in " ".join(out.split())
+
+
+def test_robust_weights_and_rejection_exclude_each_other(catseye):
+    status, out, err = catseye("adjust", EXAMPLES / "ground-ring", "--reject", "--robust", "huber")
+    assert (status, out) == (2, "")
+    assert "--robust cannot go with --reject" in err

@@ -24,7 +24,7 @@ from catseye.optics.safety import limits
 from catseye.ranger import addresses
 from catseye.records.site.target import FrameName
 from catseye.reduction.calibrations import kinds
-from catseye.reduction.network import adjusted
+from catseye.reduction.network.treatment import AdjustmentOptions
 from catseye.reduction.pose import pointing_offsets
 from catseye.reduction.pose import pose as pose_recipe
 from catseye.reduction.pose.findings import CARRIED
@@ -74,7 +74,7 @@ def test_every_vocabulary_is_held_to_a_source():
 
 def test_the_components_are_those_that_the_recipe_names():
     with pytest.raises(EstimationError, match=f"expected {vocabularies.COMPONENTS.replace('|', ' or ')}"):
-        adjusted(None, components="strange")
+        AdjustmentOptions(components="strange")
 
 
 def test_what_is_kept_outside_the_vocabularies_agrees_as_well():

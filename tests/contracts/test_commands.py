@@ -246,6 +246,7 @@ def test_quick_answers_spare_the_heavy_imports(arguments):
 
 
 ONE_CALL = [
+    "adjust",
     "air",
     "beam",
     "explain",

@@ -28,7 +28,7 @@ def test_the_folder_is_adjusted_and_finds_the_point(tmp_path):
 def test_the_toml_is_adjusted(tmp_path):
     (tmp_path / "n.toml").write_text(block("## Our TOML", "toml"))
     found = catseye.adjust(tmp_path / "n.toml")
-    assert found.findings.answered
+    assert found.answered
     assert found.degrees_of_freedom >= 1
     assert found.names == ("A", "B", "P")
     assert 0.01 < found.variance_factor < 4.0

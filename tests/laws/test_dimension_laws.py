@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import catseye
-from catseye.api.network import adjust, plan
+from catseye.api.network import adjust
+from catseye.api.planning import plan
 from laws.network_scene import DATUMS, DIMENSIONS, least_squares, scene
 
 SEEDS = range(2)

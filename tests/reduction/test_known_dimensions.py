@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from catseye.api.network import adjust, plan
+from catseye.api.network import adjust
+from catseye.api.planning import plan
 from catseye.errors import InputError
-from catseye.gateways.network.summary import verdict
 from command_scene import command_line
 
 HERE = Path(__file__).parents[1] / "vectors" / "networks" / "dimensions"
@@ -122,8 +122,8 @@ def test_the_angle_that_is_half_a_turn_off_is_left_out():
 
 @pytest.mark.parametrize(("file", "word"), [("plane-held.gkf", "doubtful"), ("plane-datum.gkf", "good")])
 def test_an_assumed_side_is_a_doubt_where_points_are_held_and_a_convention_in_a_free_network(file, word):
-    found = adjust(HERE / file).findings
+    found = adjust(HERE / file).adjusted
     assumed = replace(found, solution=replace(found.solution, assumed=("4",)))
-    assert verdict(found).word == "good"
-    assert verdict(assumed).word == word
-    assert ("side on which these points lie" in verdict(assumed).why) == (word == "doubtful")
+    assert found.verdict.word == "good"
+    assert assumed.verdict.word == word
+    assert ("side on which these points lie" in assumed.verdict.why) == (word == "doubtful")

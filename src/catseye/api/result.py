@@ -49,6 +49,14 @@ class Result:
 
         return json_line(self.to_object())
 
+    @property
+    def answered(self) -> bool:
+        """True if there is an answer to tell and to save; False for an adjustment that failed."""
+        return True
+
+    def require_answer(self) -> None:
+        """Raise EstimationError where there is no answer."""
+
     def tables(self) -> "dict[str, QTable]":
         """Every table of the answer by its name, the main one first; columns have units where they have one."""
         raise NotImplementedError

@@ -7,15 +7,15 @@ import typer
 
 from catseye.cli.commands import Json, Quiet, Threads, app
 from catseye.cli.option_groups import grouped
-from catseye.cli.results import Strict, judge, tell
+from catseye.cli.results import Strict, tell
 from catseye.cli.terminal import ProgressLine, say
 from catseye.cli.vocabularies import COMPONENTS, DATUMS, NETWORK_WEIGHTS, one_of
 
 if TYPE_CHECKING:
-    from catseye.api.network import AdjustmentResult
     from catseye.api.result import Result
 
-FEW = 40  # points that a terminal is told one by one
+ADJUSTED = "coordinates.csv, observations.csv, adjustment.json, and more"
+COMPARED = "displacements.csv, comparison.json"
 SUFFIXES = ".toml, .dat (STAR*NET), .gkf (GNU Gama), or a folder with points.csv and ranges.csv"
 
 
@@ -37,13 +37,13 @@ Datum = Annotated[
         "--datum",
         metavar=DATUMS,
         callback=one_of(DATUMS),
-        help="free: nothing held, inner constraints on the marked points; fixed: marked points held. "
+        help="Datum, free: nothing held, inner constraints on the marked points; fixed: marked points held. "
         "As the file marks it if not given.",
     ),
 ]
 Scaled = Annotated[
     bool,
-    typer.Option("--scale-by-variance-factor", help="Multiply covariances by the variance factor; tau tests."),
+    typer.Option("--scale-by-variance-factor", help="Covariances times the variance factor; tau tests."),
 ]
 Out = Annotated[
     Path | None,
@@ -58,7 +58,9 @@ class _Claim(NamedTuple):
         float | None,
         typer.Option("--sigma-mm", help="Standard uncertainty a + b D of ranges that have none: a, mm."),
     ] = None
-    sigma_ppm: Annotated[float | None, typer.Option("--sigma-ppm", help="And b, ppm.")] = None
+    sigma_ppm: Annotated[
+        float | None, typer.Option("--sigma-ppm", help="Standard uncertainty a + b D of ranges that have none: b, ppm.")
+    ] = None
 
 
 class _Treatment(NamedTuple):
@@ -66,13 +68,16 @@ class _Treatment(NamedTuple):
 
     datum: Datum = None
     scale_by_variance_factor: Scaled = False
-    reject: Annotated[
-        bool, typer.Option("--reject", help="Leave out observations that the tests reject, one by one.")
-    ] = False
+    reject: Annotated[bool, typer.Option("--reject", help="Rejection of observations by the tests, one by one.")] = (
+        False
+    )
     robust: Annotated[
         str | None,
         typer.Option(
-            "--robust", metavar=NETWORK_WEIGHTS, callback=one_of(NETWORK_WEIGHTS), help="Weigh observations robustly."
+            "--robust",
+            metavar=NETWORK_WEIGHTS,
+            callback=one_of(NETWORK_WEIGHTS),
+            help="Robust weights of the observations.",
         ),
     ] = None
     components: Annotated[
@@ -81,21 +86,25 @@ class _Treatment(NamedTuple):
             "--components",
             metavar=COMPONENTS,
             callback=one_of(COMPONENTS),
-            help="Estimate the claims themselves: constant and ppm part of each ranger, or a factor a group.",
+            help="Estimation of the claims themselves: constant and ppm part of each ranger, or a factor a group.",
         ),
     ] = None
     level: Annotated[
         float, typer.Option("--level", callback=_level, help="Level of the tests, of all single ones together.")
     ] = 0.05
+    iterations: Annotated[
+        int | None,
+        typer.Option("--iterations", min=1, help="Cap of the Gauss-Newton steps of every solution; 50 if not given."),
+    ] = None
 
 
 def _template(directory: Path | None) -> None:
-    """Before all else: a folder to begin with is written, and the command ends."""
+    """Write a folder to begin with, before all else, and end the command."""
     if directory is None:
         return
-    from catseye.gateways.examples import copy_example
+    from catseye.api.network import write_template
 
-    copy_example("networks/template", directory)
+    write_template(directory)
     say(f"Written: {directory}/points.csv, ranges.csv and README.md, which says what they mean.")
     say(f"Next:    catseye adjust {directory} --out report")
     raise typer.Exit
@@ -111,7 +120,7 @@ def adjust(  # noqa: PLR0913 - its options are its command line
     later: Annotated[
         Path | None, typer.Argument(metavar="[LATER]", help="The same network at a later epoch: what moved?")
     ] = None,
-    asked: _Treatment,
+    treatment: _Treatment,
     claim: _Claim,
     relative: Annotated[
         list[str] | None,
@@ -123,7 +132,11 @@ def adjust(  # noqa: PLR0913 - its options are its command line
     template: Annotated[
         Path | None,
         typer.Option(
-            "--template", metavar="DIR", is_eager=True, callback=_template, help="Write tables to begin with, and end."
+            "--template",
+            metavar="DIR",
+            is_eager=True,
+            callback=_template,
+            help="Folder for tables to begin with; nothing else is done.",
         ),
     ] = None,
     out: Out = None,
@@ -132,77 +145,25 @@ def adjust(  # noqa: PLR0913 - its options are its command line
     quiet: Quiet = False,
     strict: Strict = False,
 ) -> None:
-    """A network adjusted by least squares, or two epochs of it compared."""
-    if asked.reject and asked.robust is not None:
-        raise typer.BadParameter("cannot go with --reject: either weigh or leave out.", param_hint="'--robust'")
-    if points is not None and later is None:
-        raise typer.BadParameter("needs a second network to compare with.", param_hint="'--points'")
-    pairs = [_pair(text) for text in relative or ()]
-    sources = [network] if later is None else [network, later]
-    _refuse(out, sources)
+    """Least-squares adjustment of a network, or comparison of two epochs."""
+    from catseye.api import network as face
+    from catseye.api.result import require_writable
+
+    require_writable(out, network, *(() if later is None else (later,)))
     progress = ProgressLine(quiet)
     try:
-        from catseye.api import network as face
-
-        options: dict[str, Any] = {**asked._asdict(), **claim._asdict(), "relative": pairs, "progress": progress}
-        epochs = [face.adjust(source, **options) for source in sources]
-        if later is None:
-            result: Result = epochs[0]
-            if epochs[0].findings.answered:
-                _save(result, out, progress)
-        else:
-            result = face.compare(
-                epochs[0],
-                epochs[1],
-                points=_names(points),
-                level=asked.level,
-                scale_by_variance_factor=asked.scale_by_variance_factor,
-            )
-            _save(result, out, progress)
+        options: dict[str, Any] = {**treatment._asdict(), **claim._asdict(), "progress": progress}
+        pairs = [_pair(text) for text in relative or ()]
+        result = face.adjust(network, later, points=_names(points), relative=pairs, **options)
+        _save(result, out, progress)
     finally:
         progress.clear()
-    if later is not None:
-        tell(result, json=json, quiet=quiet, strict=strict, written=_written(out, "displacements.csv, comparison.json"))
-        return
-    _tell_adjusted(epochs[0], out, json=json, quiet=quiet, strict=strict)
-
-
-def _tell_adjusted(result: "AdjustmentResult", out: Path | None, *, json: bool, quiet: bool, strict: bool) -> None:
-    """The adjustment; without an answer its JSON where that is wanted, and why on stderr with exit status 1."""
-    from catseye.api.network import require_answer
-
-    if json:
-        from catseye.gateways.network.objects import network_json
-
-        say("".join(network_json(result.findings, treated=result.treated)).rstrip("\n"))
-    require_answer(result)
-    if json:
-        judge(result.verdict, strict=strict)
-        return
-    few = result.names if len(result.names) <= FEW else ()
-    there = result.findings.coordinates
-    rows = [
-        f"{'':<14}{name:<10} "
-        + "  ".join(
-            f"{axis} {v:12.5f}" if known else f"{'':14}"
-            for axis, v, known in zip(result.findings.network.axis_names, x, has, strict=True)
-        )
-        + f"   u {', '.join(f'{v * 1e3:.3f}' for v in u[has])} mm"
-        for name, x, u, has in zip(few, result.x, result.u, there, strict=False)
-    ]
-    files = _written(out, "coordinates.csv, observations.csv, adjustment.json, and more")
-    tell(result, json=False, quiet=quiet, strict=strict, rows=rows, written=files)
-
-
-def _refuse(out: Path | None, sources: list[Path]) -> None:
-    if out is not None:
-        from catseye.gateways.writers.output import refuse_output
-
-        refuse_output(out, *sources)
+    files = _written(out, ADJUSTED if later is None else COMPARED)
+    tell(result, json=json, quiet=quiet, strict=strict, rows=result.rows(), written=files)
 
 
 def _save(result: "Result", out: Path | None, progress: ProgressLine) -> None:
-    if out is not None:
+    if out is not None and result.answered:
         from catseye.api.result import save
 
         save(result, out, progress=progress)
@@ -238,24 +199,26 @@ class _Further(NamedTuple):
     most: Annotated[int, typer.Option("--most", min=1, help="Further ranges to list.")] = 20
 
 
-class _OnPaper(NamedTuple):
+class _MonteCarlo(NamedTuple):
     """Monte Carlo runs and their blunders."""
 
-    runs: Annotated[int, typer.Option("--runs", min=0, help="Times to measure the network on paper.")] = 0
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the runs.")] = 1
+    runs: Annotated[int, typer.Option("--runs", min=0, help="Number of simulated measurements of the network.")] = 0
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the runs.")] = 1
     air_ppm: Annotated[
-        float, typer.Option("--air-ppm", min=0.0, help="In the runs: scale error of all ranges together, ppm (1σ).")
+        float, typer.Option("--air-ppm", min=0.0, help="Scale error of all ranges together in the runs, ppm (1σ).")
     ] = 0.0
     station_ppm: Annotated[
-        float, typer.Option("--station-ppm", min=0.0, help="In the runs: scale error of each station's ranges, ppm.")
+        float, typer.Option("--station-ppm", min=0.0, help="Scale error of each station's ranges in the runs, ppm.")
     ] = 0.0
     refraction: Annotated[
         float,
-        typer.Option("--refraction", min=0.0, help="In the runs: spread of the coefficient k of refraction (1σ)."),
+        typer.Option("--refraction", min=0.0, help="Spread of the coefficient k of refraction in the runs (1σ)."),
     ] = 0.0
     blunders_percent: Annotated[
         float,
-        typer.Option("--blunders-percent", min=0.0, max=30.0, help="In the runs: share of gross errors, rejected."),
+        typer.Option(
+            "--blunders-percent", min=0.0, max=30.0, help="Share of gross errors in the runs, which are rejected."
+        ),
     ] = 0.0
 
 
@@ -265,8 +228,8 @@ def plan(  # noqa: PLR0913 - its options are its command line
     *,
     network: Annotated[Path, typer.Argument(metavar="NETWORK", help=f"{SUFFIXES}; observed values are not used.")],
     datum: Datum = None,
-    asked: _Further,
-    on_paper: _OnPaper,
+    further: _Further,
+    monte_carlo: _MonteCarlo,
     claim: _Claim,
     out: Out = None,
     threads: Threads = None,
@@ -274,15 +237,21 @@ def plan(  # noqa: PLR0913 - its options are its command line
     quiet: Quiet = False,
     strict: Strict = False,
 ) -> None:
-    """A network before it is measured: what it will be worth, where it is weak, what to measure next."""
-    _refuse(out, [network])
+    """Plan of a network: predicted quality, weak points, best further ranges."""
+    from catseye.api.planning import plan as planned
+    from catseye.api.result import require_writable
+
+    require_writable(out, network)
     progress = ProgressLine(quiet)
     try:
-        from catseye.api.network import plan as planned
-
-        further = {**asked._asdict(), "interest": _names(asked.interest)}
-        given: dict[str, Any] = {**further, **on_paper._asdict(), **claim._asdict()}
-        result = planned(network, datum=datum, progress=progress, **given)
+        interest = _names(further.interest)
+        options: dict[str, Any] = {
+            **further._asdict(),
+            **monte_carlo._asdict(),
+            **claim._asdict(),
+            "interest": interest,
+        }
+        result = planned(network, datum=datum, progress=progress, **options)
         _save(result, out, progress)
     finally:
         progress.clear()

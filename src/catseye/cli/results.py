@@ -34,7 +34,8 @@ def tell(
     """
     if json:
         say(result.to_json())
-    elif not quiet:
+    result.require_answer()
+    if not json and not quiet:
         say(wrapped("Verdict", result.verdict.text))
         for passage in result.passages() if sentences else ():
             say(wrapped(passage.title, passage.text))

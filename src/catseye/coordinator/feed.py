@@ -107,9 +107,10 @@ class FeedClient:
                             clock=asyncio.get_running_loop().time,
                             network=self._network,
                             key=self._key,
+                            peer="feed",
                         )
                 except InputError as problem:
-                    why = str(problem).replace("no ranger", "no feed")
+                    why = str(problem)
                 except TimeoutError:
                     why = f"{self.host} port {self.port} does not answer"
                 if client is not None:

@@ -74,8 +74,11 @@ class ZyClient(asyncio.Protocol):
         clock: Callable[[], float] = time.monotonic,
         network: ConnectionMaker | None = None,
         key: str | None = None,
+        peer: str = "ranger",
     ) -> "ZyClient":
         """A connected client, by sockets unless stated otherwise.
+
+        peer   word for what listens, in messages
 
         Raises InputError if nothing listens there.
         """
@@ -83,7 +86,7 @@ class ZyClient(asyncio.Protocol):
         try:
             return await (network or Sockets()).connect(factory, host, port)
         except OSError as problem:
-            raise InputError(f"no ranger answers at {host} port {port}: {problem.strerror or problem}") from problem
+            raise InputError(f"no {peer} answers at {host} port {port}: {problem.strerror or problem}") from problem
 
     def request(
         self, command: str, *parameters: object, ticks: int | None = None, then: Listener | None = None

@@ -11,6 +11,8 @@ from scipy.spatial.transform import Rotation
 from catseye.errors import EstimationError
 from catseye.estimation.deformation import comparison, epoch_model
 from catseye.estimation.deformation.comparison import ComparisonOptions, compare
+from catseye.estimation.least_squares.adjustment import SolverSettings
+from catseye.estimation.least_squares.status import AdjustmentOutcome, Status
 from catseye.estimation.network.adjustment import NetworkSettings, adjust_network
 from draws import draws
 from repository import TESTS
@@ -115,7 +117,7 @@ def test_the_second_epoch_follows_its_held_points_as_readjusting_it_does(metro):
     rows = [second.index[name] for name in MONITORED]
     held = np.argwhere(second.network.points.fixed)
     assert len(held) == 24
-    slope, h, quick = np.zeros((30, 24)), 1e-3, NetworkSettings(tests=False)
+    slope, h, quick = np.zeros((30, 24)), 1e-3, NetworkSettings(SolverSettings(tests=False))
     for k, (i, axis) in enumerate(held):
         ends = []
         for sign in (1, -1):
@@ -399,7 +401,7 @@ def test_incompatible_epochs_are_refused_in_one_line(metro, ranging_network):
     with pytest.raises(EstimationError, match="the epochs have different axes: x, y, z with"):
         compare(first, axes)
     with pytest.raises(EstimationError, match="the second epoch has no solution to compare: rank deficient"):
-        compare(first, replace(second, status="rank deficient: everything"))
+        compare(first, replace(second, status=Status(AdjustmentOutcome.RANK_DEFICIENT, "everything")))
     with pytest.raises(EstimationError, match="point '999' is not in both epochs"):
         compare(first, second, points=["31", "999"])
     with pytest.raises(EstimationError, match="unknown datum 'loose'"):

@@ -5,8 +5,9 @@ import pytest
 from scipy.optimize import least_squares
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, STEP_IN_SIGMAS, SolverSettings, adjust
+from catseye.estimation.least_squares.adjustment import STEP_IN_SIGMAS, SolverSettings, adjust
 from catseye.estimation.least_squares.rows import full_jacobian
+from catseye.estimation.least_squares.status import CONVERGED
 from catseye.estimation.observations.kinds import Distances, Linear
 
 

@@ -7,12 +7,13 @@ import pytest
 from scipy.sparse import csr_array
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, SolverSettings, adjust
+from catseye.estimation.least_squares.adjustment import SolverSettings, adjust
 from catseye.estimation.least_squares.bordered import Border, BorderedCovariance
 from catseye.estimation.least_squares.covariance import JointPoints
 from catseye.estimation.least_squares.normal import NormalEquations
 from catseye.estimation.least_squares.robust import OutlierSearch, adjust_robustly
 from catseye.estimation.least_squares.rows import ActiveRows
+from catseye.estimation.least_squares.status import CONVERGED
 from catseye.estimation.observations.kinds import Distances, Linear
 
 STATIONS, TARGETS = 5, 40

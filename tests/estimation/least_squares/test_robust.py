@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catseye.estimation.least_squares.adjustment import CONVERGED, adjust
+from catseye.estimation.least_squares.adjustment import adjust
 from catseye.estimation.least_squares.conflict import LocalConflict, PointObservations, contradicted, search
 from catseye.estimation.least_squares.robust import OutlierSearch, adjust_robustly
+from catseye.estimation.least_squares.status import CONVERGED
 from catseye.estimation.observations.kinds import Distances, Linear
 from draws import examples
 

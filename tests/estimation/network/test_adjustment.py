@@ -358,7 +358,7 @@ def test_points_on_a_line_do_not_turn_about_it():
 def test_unsettled_datum_is_reported(ranging_network, monkeypatch):
     network, _ = ranging_network(24, off=0.5)
     monkeypatch.setattr(
-        network_adjustment, "PASSES", 1
+        network_adjustment, "ROUNDS", 1
     )  # the first pass holds the fewest coordinates, half a metre off
     solution = adjust_network(network, engine="dense")
     assert solution.status.startswith("not converged: the network did not settle in its datum")

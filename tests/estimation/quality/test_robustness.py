@@ -12,7 +12,8 @@ from scipy.optimize import linprog
 from scipy.stats import chi2, norm
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, NONCENTRALITY, GroupFit, adjust
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit, adjust
+from catseye.estimation.least_squares.status import CONVERGED
 from catseye.estimation.observations.kinds import Linear
 from catseye.estimation.quality.robustness import (
     WEIGHTS,

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, NONCENTRALITY, GroupFit
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit
+from catseye.estimation.least_squares.status import CONVERGED
 from catseye.estimation.quality.variance_components import (
     GroupFactors,
     RowModel,

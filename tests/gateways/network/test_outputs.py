@@ -17,12 +17,10 @@ from catseye.estimation.deformation.comparison import compare
 from catseye.estimation.network.adjustment import adjust_network
 from catseye.estimation.network.plan import Candidate
 from catseye.gateways.network.comparison import (
-    ComparedEpochs,
     comparison_object,
     comparison_passages,
 )
 from catseye.gateways.network.files import input_hashes, write_comparison, write_network
-from catseye.gateways.network.findings import findings
 from catseye.gateways.network.objects import network_json, network_object
 from catseye.gateways.network.summary import treatment_passages
 from catseye.gateways.network.tables import (
@@ -35,7 +33,9 @@ from catseye.gateways.network.tables import (
 from catseye.gateways.network.xml import NAMESPACE, network_xml
 from catseye.records.network.folder import read_network_folder
 from catseye.records.network.gama import read_gama
-from catseye.reduction.network import adjusted
+from catseye.reduction.network.adjusted import adjusted, adjusted_network
+from catseye.reduction.network.comparison import ComparedEpochs
+from catseye.reduction.network.treatment import AdjustmentOptions
 from column_scene import assert_columns
 from repository import TESTS
 
@@ -131,7 +131,7 @@ def solution(path):
 
 @pytest.fixture(scope="module")
 def found(solution):
-    return findings(solution)
+    return adjusted_network(solution)
 
 
 @pytest.fixture(scope="module")
@@ -143,12 +143,12 @@ def floating(solution):
     for group, on in zip(network.groups, active, strict=True):
         if group.kind == "slope_distance":
             on[group.ends[1] == 3 * at] = False
-    return findings(adjust_network(network, active=active))
+    return adjusted_network(adjust_network(network, active=active))
 
 
 @pytest.fixture(scope="module")
 def ranging():
-    return findings(adjust_network(read_network_folder(NETWORKS / "ranging-18x500")))
+    return adjusted_network(adjust_network(read_network_folder(NETWORKS / "ranging-18x500")))
 
 
 @pytest.mark.parametrize("lines", [False, True])
@@ -183,7 +183,7 @@ def test_coordinates_and_covariances_are_in_the_axes_of_the_file(found, solution
 )
 def test_printed_answers_of_other_programs_come_out_in_every_format(folder, phase, scaled):
     source = NETWORKS / folder / (f"{phase.removeprefix('-')}.gkf" if phase else "network.gkf")
-    found = findings(adjust_network(read_gama(source)), scaled=scaled)
+    found = adjusted_network(adjust_network(read_gama(source)), scaled=scaled)
     points, tags = network_object(found)["points"], {"c": f"{{{NAMESPACE}}}"}
     root = ElementTree.fromstring("".join(network_xml(found)))
     adjusted = {p.find("{*}id").text: p for p in root.iterfind("{*}coordinates/{*}adjusted/{*}point")}
@@ -223,7 +223,7 @@ def test_turned_axes_turn_a_component_with_all_that_follows_it(solution):
     """The same answer told in axes x west, y south: every difference changes its sign, height does not."""
     turned = replace(solution, network=replace(solution.network, axes=np.diag([-1.0, -1.0, 1.0])))
     straight = replace(solution, network=replace(solution.network, axes=np.eye(3)))
-    a, b = (network_object(findings(s))["observations"] for s in (straight, turned))
+    a, b = (network_object(adjusted_network(s))["observations"] for s in (straight, turned))
     for one, other in zip(a, b, strict=True):
         sign = -1.0 if one.get("component") in ("x", "y") else 1.0
         for key in ("observed", "residual", "standardised", "estimated_error", "test"):
@@ -248,7 +248,7 @@ EIGHT = {  # where east and north stand in x and y, by GNU Gama's names of the a
 def test_covariances_follow_the_coordinates_into_any_axes(solution, name):
     axes = np.eye(3)
     axes[:2, :2] = EIGHT[name]
-    found = findings(replace(solution, network=replace(solution.network, axes=axes)))
+    found = adjusted_network(replace(solution, network=replace(solution.network, axes=axes)))
     points = network_object(found)["points"]
     row = solution.index["Q,2"]
     point, expected = points["Q,2"], axes.T @ solution.covariance[row] @ axes
@@ -282,7 +282,7 @@ def test_a_planted_blunder_is_the_first_suspect_with_its_sign_and_size(solution)
     wrong = group.observed.copy()
     wrong[2] += 0.03
     groups = tuple(replace(g, observed=wrong) if g is group else g for g in network.groups)
-    told = network_object(findings(adjust_network(replace(network, groups=groups))))
+    told = network_object(adjusted_network(adjust_network(replace(network, groups=groups))))
     row = told["observations"][told["suspects"][0]]
     assert (row["kind"], row["observed"]) == ("slope_distance", wrong[2])
     assert row["estimated_error"] == pytest.approx(0.03, abs=0.006)
@@ -299,10 +299,9 @@ def test_excluded_rows_are_named_by_their_number_in_the_file(solution):
     wrong = group.observed.copy()
     wrong[1] += 0.05  # y here, which the file calls x
     groups = tuple(replace(g, observed=wrong) if g is group else g for g in network.groups)
-    treated = adjusted(replace(network, groups=groups), reject=True)
-    found = findings(treated.solution)
-    told = network_object(found, treated)
-    assert read_json(network_json(found, treated=treated)) == told
+    found = adjusted(replace(network, groups=groups), AdjustmentOptions(reject=True))
+    told = network_object(found)
+    assert read_json(network_json(found)) == told
     assert told["treatment"]["method"] == "rejected"
     out = told["treatment"]["rejected"]
     (mine,) = [r for r in told["treatment"]["rejections"] if told["observations"][r["observation"]]["component"] == "x"]
@@ -311,7 +310,7 @@ def test_excluded_rows_are_named_by_their_number_in_the_file(solution):
     assert (row["kind"], row["active"], row["weight"]) == ("vector", False, 0.0)
     assert mine["estimated_error"] == pytest.approx(0.05, abs=0.01)
     assert all(r["weight"] == 1.0 for i, r in enumerate(told["observations"]) if i not in out)
-    said = treatment_passages(treated, found)
+    said = treatment_passages(found)
     assert f"x of {found.label(mine['observation']).removeprefix('x of ')}" in said[0].text
 
 
@@ -349,7 +348,7 @@ def test_global_test_refers_to_the_a_priori_value(found):
 
 
 def test_variance_factor_is_applied_on_request_and_reported(solution, found):
-    scaled = findings(solution, scaled=True)
+    scaled = adjusted_network(solution, scaled=True)
     told, plain = network_object(scaled), network_object(found)
     factor = told["variance_factor"]
     assert (told["scaled"], plain["scaled"], told["critical"]["test"]) == (True, False, "tau")
@@ -362,7 +361,7 @@ def test_variance_factor_is_applied_on_request_and_reported(solution, found):
 
 def test_an_unknown_variance_factor_is_not_applied(solution):
     with pytest.raises(EstimationError, match="variance factor is unknown"):
-        findings(replace(solution, variance_factor=float("nan"), degrees_of_freedom=0.0), scaled=True)
+        adjusted_network(replace(solution, variance_factor=float("nan"), degrees_of_freedom=0.0), scaled=True)
 
 
 def test_tables_agree_with_json(found):
@@ -528,7 +527,7 @@ def test_no_name_breaks_a_file(solution):
     points = solution.network.points
     odd = ('a<b>&"c"', "x,\n2", "bell\x07", "ü", *points.names[4:])
     network = replace(solution.network, points=replace(points, names=odd), description="]]> <!-- --> \x00")
-    strange = findings(replace(solution, network=network))
+    strange = adjusted_network(replace(solution, network=network))
     assert list(read_json(network_json(strange))["points"]) == list(odd)
     assert [row["point"] for row in read_csv(coordinates_csv(strange))] == list(odd)
     root = ElementTree.fromstring("".join(network_xml(strange)))
@@ -568,7 +567,7 @@ def compared(tmp_path_factory, solution):
     second = adjust_network(read_gama(file))
     names = [n for n in solution.network.points.names if n != "far"]
     moved = compare(solution, second, points=names)
-    return ComparedEpochs(findings(solution), findings(second), moved)
+    return ComparedEpochs(adjusted_network(solution), adjusted_network(second), moved)
 
 
 def test_movements_are_in_the_axes_of_the_file(compared):

@@ -9,7 +9,7 @@ from catseye.errors import InputError
 from catseye.estimation.observations.kinds import Distances, ObservedCoordinates
 from catseye.records.files.columns import columns_of
 from catseye.records.network.any_file import read_network
-from catseye.reduction.network import adjusted
+from catseye.reduction.network.adjusted import adjusted
 from repository import ROOT, TESTS
 
 VECTORS = TESTS / "vectors" / "networks"
@@ -231,14 +231,14 @@ def test_a_claim_serves_ranges_without_a_sigma(tmp_path):
     lines = (own / "ranges.csv").read_text().splitlines()
     lines[1] = lines[1].rpartition(",")[0] + ","
     (own / "ranges.csv").write_text("\n".join(lines))
-    with pytest.raises(InputError, match=r"ranges.csv: line 2, no sigma \(expected one, m, or --sigma-mm"):
+    with pytest.raises(InputError, match=r"ranges.csv: line 2, no sigma \(expected one, m, or sigma_mm"):
         read_network(own)
     (group,) = read_network(own, sigma_mm=1.0, sigma_ppm=2.0).groups[:1]
     assert np.sqrt(group.covariance[0]) == pytest.approx(1e-3 + 2e-6 * group.observed[0])
     assert np.sqrt(group.covariance[1]) == pytest.approx(float(lines[2].rpartition(",")[2]))
     (own / "ranges.csv").write_text("\n".join(line.rpartition(",")[0] for line in lines))
     assert np.sqrt(read_network(own, sigma_ppm=2.0).groups[0].covariance) == pytest.approx(2e-6 * group.observed)
-    with pytest.raises(InputError, match=r"--sigma-mm = -1 \(expected 0 to 100000\)"):
+    with pytest.raises(InputError, match=r"sigma_mm = -1 \(expected 0 to 100000\)"):
         read_network(own, sigma_mm=-1.0)
     with pytest.raises(InputError, match="contains all uncertainties"):
         read_network(EXAMPLES / "feed-arm.toml", sigma_mm=1.0)

@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from catseye.api.network import adjust, plan
+from catseye.api.network import adjust
+from catseye.api.planning import plan
 from catseye.errors import InputError
 
 POINTS = "point,x,y,z,role\nA,0,0,0,fixed\nB,400,0,3,fixed\nC,0,300,-2,fixed\nD,400,300,40,fixed\nP,180,130,25,free\n"

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from catseye.api.network import adjust, plan
+from catseye.api.network import adjust
+from catseye.api.planning import plan
 from catseye.errors import InputError
 from catseye.records.network.any_file import read_network
 from catseye.records.network.gama import gama_network

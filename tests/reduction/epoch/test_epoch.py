@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from catseye.atmosphere.index.air import group_refractivity
-from catseye.estimation.least_squares.adjustment import CONVERGED
+from catseye.estimation.least_squares.status import CONVERGED
 from catseye.records.night.campaign import REFERENCE
 from catseye.reduction.epoch.dish import dish_prior, dish_prisms
 from catseye.reduction.epoch.epoch import reduce_epoch

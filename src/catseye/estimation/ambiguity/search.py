@@ -221,7 +221,14 @@ def _ranged(
     if not all(np.isfinite(v).all() for v in (start, prior, stations, lengths, periods, c)) or np.any(periods <= 0.0):
         return None
     try:
-        return Ranged(start, np.linalg.cholesky(prior), stations, lengths, periods, np.linalg.cholesky(c))
+        return Ranged(
+            start=start,
+            prior_root=np.linalg.cholesky(prior),
+            stations=stations,
+            lengths=lengths,
+            periods=periods,
+            root=np.linalg.cholesky(c),
+        )
     except np.linalg.LinAlgError:
         return None
 
@@ -242,7 +249,18 @@ def _unlocated(ranges: int, status: AmbiguityStatus) -> Located:
     nan = np.full(3, np.nan)
     square = np.full((3, 3), np.nan)
     no_cycles = np.zeros(ranges, dtype=np.int64)
-    return Located(nan, square, no_cycles, np.inf, nan, 0.0, 0.0, 0, -1, status)
+    return Located(
+        x=nan,
+        covariance=square,
+        cycles=no_cycles,
+        chi_square=np.inf,
+        next_x=nan,
+        discrimination=0.0,
+        probability=0.0,
+        candidates=0,
+        left_out=-1,
+        status=status,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -310,14 +328,14 @@ def _judged(ranged: Ranged, explanations: list[_Explanation]) -> Located:
     else:
         status = AmbiguityStatus.TOO_FEW if took_part < 4 else AmbiguityStatus.AMBIGUOUS
     return Located(
-        chosen.candidates.x[best],
-        chosen.candidates.covariance,
-        cycles,
-        square,
-        places[int(np.argmin(listed))] if np.isfinite(listed).any() else nowhere[0],
-        float(costs[nearest]),
-        1.0 / (1.0 + doubt),
-        sum(e.candidates.tried for e in explanations),
-        chosen.left_out,
-        status,
+        x=chosen.candidates.x[best],
+        covariance=chosen.candidates.covariance,
+        cycles=cycles,
+        chi_square=square,
+        next_x=places[int(np.argmin(listed))] if np.isfinite(listed).any() else nowhere[0],
+        discrimination=float(costs[nearest]),
+        probability=1.0 / (1.0 + doubt),
+        candidates=sum(e.candidates.tried for e in explanations),
+        left_out=chosen.left_out,
+        status=status,
     )

@@ -35,7 +35,14 @@ class Ranged:
         """Selected ranges in a given order."""
         covariance = self.root @ self.root.T
         root = np.linalg.cholesky(covariance[np.ix_(rows, rows)])
-        return Ranged(self.start, self.prior_root, self.stations[rows], self.lengths[rows], self.periods[rows], root)
+        return Ranged(
+            start=self.start,
+            prior_root=self.prior_root,
+            stations=self.stations[rows],
+            lengths=self.lengths[rows],
+            periods=self.periods[rows],
+            root=root,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +138,9 @@ def expanded(ranged: Ranged, rows: np.ndarray, base: Trunk, *, most: int) -> Cyc
     nearest_cycles = np.rint((distance - ranged.lengths) / ranged.periods)
     nearest_cycles[:, order] = cycles
     covariance = np.linalg.inv(information[np.argmin(square)]) if len(square) else np.full((3, 3), np.nan)
-    return CycleCandidates(x, nearest_cycles.astype(np.int64), square, covariance, floor, tried)
+    return CycleCandidates(
+        x=x, cycles=nearest_cycles.astype(np.int64), chi_square=square, covariance=covariance, floor=floor, tried=tried
+    )
 
 
 def _best_figure(ranged: Ranged, rows: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ from catseye.estimation.deformation.congruence import (
 )
 from catseye.estimation.deformation.deformation import Deformation, moved_points
 from catseye.estimation.deformation.epoch_model import DatumConnection, EpochModel
-from catseye.estimation.least_squares.adjustment import CONVERGED
+from catseye.estimation.least_squares.status import CONVERGED
 from catseye.estimation.network.model import NetworkSolution
 
 LARGEST = 700  # common points of one joint test, whose work grows with their number cubed
@@ -179,7 +179,7 @@ def compare(
 def _check_alike(first: NetworkSolution, second: NetworkSolution) -> None:
     a, b = first.network, second.network
     for which, solution in (("first", first), ("second", second)):
-        if not solution.status.startswith(CONVERGED):
+        if not solution.status.usable:
             raise EstimationError(f"the {which} epoch has no solution to compare: {solution.status}")
     if not np.array_equal(a.axes, b.axes) or a.axis_names != b.axis_names:
         raise EstimationError(

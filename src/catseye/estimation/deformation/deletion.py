@@ -16,7 +16,7 @@ UNCHECKED = 1e-9  # of the largest precision, in units of each coordinate's sigm
 SINGLE = (
     1e-3  # of the level, for tests of single points: one large movement is diluted among hundreds in the global test
 )
-SEARCHES = 10
+ROUNDS = 10
 TIED = 1e-6  # of a statistic: two explanations closer than this are tied
 
 
@@ -231,12 +231,12 @@ def find_moved(
     aligned = sorted(far)
     search = DeletionSearch(differences(epochs, datum, ~np.isin(np.arange(n), aligned)), variance_factor)
     start = aligned if without and search.spares(aligned) else []
-    for _ in range(SEARCHES):
+    for _ in range(ROUNDS):
         out, steps, stopped = backward(search, epochs.names, level, rule, start)
         out = out if stopped else sorted(returned(search, out, level, rule))
         if out == aligned or stopped:
             return MovedSet(search, out, steps, stopped)
         aligned = out
         search = DeletionSearch(differences(epochs, datum, ~np.isin(np.arange(n), out)), variance_factor)
-    stopped = CIRCLES.format(rounds=SEARCHES, moved=", ".join(epochs.names[i] for i in out))
+    stopped = CIRCLES.format(rounds=ROUNDS, moved=", ".join(epochs.names[i] for i in out))
     return MovedSet(search, out, steps, stopped)

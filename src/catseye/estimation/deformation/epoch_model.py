@@ -262,7 +262,15 @@ class EpochModel:
         q1, q2, cross, _ = self.parts(at, at)
         names = tuple(self.names[i] for i in points)
         compared = self.compared.reshape(-1, 3)[points]
-        return Epochs(names, self.x[points], self.y[points], q1, q2, cross=cross, compared=compared)
+        return Epochs(
+            names=names,
+            first=self.x[points],
+            second=self.y[points],
+            covariance_first=q1,
+            covariance_second=q2,
+            cross=cross,
+            compared=compared,
+        )
 
     def of_points(self, points: np.ndarray, turned: np.ndarray) -> np.ndarray:
         """Covariance (m, 3, 3) m^2 of single points' differences, the second epoch rotated (3, 3)."""

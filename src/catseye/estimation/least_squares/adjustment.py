@@ -12,19 +12,20 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import sparray
 
-from catseye.errors import EstimationError
+from catseye.errors import ArgumentError, EstimationError
 from catseye.estimation.least_squares.bordered import Border
 from catseye.estimation.least_squares.covariance import Covariance, Dense
 from catseye.estimation.least_squares.normal import NormalEquations
 from catseye.estimation.least_squares.rows import ActiveRows, variances
+from catseye.estimation.least_squares.status import (
+    CONVERGED,
+    AdjustmentOutcome,
+    Status,
+    not_converged,
+    rank_deficient,
+    undefined,
+)
 from catseye.estimation.observations.kinds import ObservationGroup
-
-CONVERGED = "converged"
-NOT_CONVERGED = "not converged: the last step was {step:.2g} standard deviations after {iterations} iterations; \
-check the starting coordinates"
-RANK_DEFICIENT = "rank deficient: {names} not determined by any observation; add one, or give a prior"
-UNDEFINED = "undefined at the current values: {names} has no finite value or derivative there; \
-two points may coincide, or an observation is not a number"
 
 NONCENTRALITY = 4.13  # two-sided test at 0.1 %, power 80 %, as [BAARDA68]: normal quantiles 3.29 + 0.84
 STEP_IN_SIGMAS = 1e-3  # norm over all parameters: a further step changes no result
@@ -73,7 +74,7 @@ class LeastSquaresSolution:
 
     x: np.ndarray
     q: Covariance
-    status: str
+    status: Status
     iterations: int
     fits: tuple[GroupFit, ...]
     floating: np.ndarray
@@ -92,7 +93,7 @@ class LeastSquaresSolution:
     @property
     def solved(self) -> bool:
         """True if every parameter is determined, converged or not."""
-        return not len(self.floating) and not self.status.startswith(UNDEFINED[:9])
+        return not len(self.floating) and self.status.outcome is not AdjustmentOutcome.UNDEFINED
 
     def variance_factor(self, names: Sequence[str] | None = None) -> tuple[float, float]:
         """Variance factor [pvv] / degrees of freedom (expectation 1), and the degrees of freedom.
@@ -111,13 +112,18 @@ class LeastSquaresSolution:
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """Settings of `adjust`.
+    """Settings of a least-squares estimate, from the option of a command down to the solver.
 
-    iterations   limit of Gauss-Newton steps; a step that raises the cost is halved, at most ten times
+    iterations   cap of Gauss-Newton steps; a step that raises the cost is halved, at most ten times
     tests        False: only residuals and sigmas in the fits, zero covariance (for intermediate solutions)
     sparse       solve sparse or dense; chosen by size if None
     border       eliminate the parameters outside a border by blocks, see `bordered`; None: as `sparse` says
     rough        with a border: tests accurate to a thousandth are enough (while selecting observations)
+
+    In all of `estimation`, `iterations` caps the steps of one estimate and `rounds` a search that solves anew in each,
+    such as the rejection of one observation after the other.
+
+    Raises ArgumentError for a cap below 1.
     """
 
     iterations: int = 50
@@ -125,6 +131,10 @@ class SolverSettings:
     sparse: bool | None = None
     border: Border | None = None
     rough: bool = False
+
+    def __post_init__(self) -> None:
+        if self.iterations < 1:
+            raise ArgumentError(f"iterations = {self.iterations} is invalid (expected 1 or more)", "iterations")
 
 
 COMPLETE = SolverSettings()
@@ -167,13 +177,13 @@ def adjust(
     small_dense = not normal.sparse and normal.border is None and len(free_columns) > 0
     q: Covariance = Dense(np.zeros((n, n))) if small_dense else _NoCovariance(n)
     floating = np.zeros((0, n))
-    status, steps, size = NOT_CONVERGED, 0, np.inf
+    status, steps, size = None, 0, np.inf
     while steps < iterations:
         steps += 1
         step, size, cost = normal.step(x)
         if not np.isfinite(cost):
             q = _NoCovariance(n, np.nan, free_columns)
-            status = UNDEFINED.format(names=", ".join(_undefined(rows, x)))
+            status = undefined(", ".join(_undefined(rows, x)))
             break
         floating = normal.floating()
         if len(floating):
@@ -181,7 +191,7 @@ def adjust(
             worst = [int(i) for i in np.argsort(-part) if part[i] > 1e-3 * part.max()]
             called = [names[i] if names is not None else f"parameter {i}" for i in worst[:4]]
             q = _NoCovariance(n, np.nan, free_columns)  # zero would claim certainty of an undetermined parameter
-            status = RANK_DEFICIENT.format(names=", ".join(called) + (" ..." if len(worst) > 4 else ""))
+            status = rank_deficient(", ".join(called) + (" ..." if len(worst) > 4 else ""))
             break
         if tests and (size < STEP_IN_SIGMAS or steps == iterations):
             q = normal.covariance(rough=solver.rough)
@@ -191,10 +201,10 @@ def adjust(
             break
         if not moved:
             break
-    if status == NOT_CONVERGED:
-        status = NOT_CONVERGED.format(step=size, iterations=steps)
     fits = tuple(_fit(r, x, q, tests) for r in rows)
-    return LeastSquaresSolution(x, q, status, steps, fits, floating)
+    return LeastSquaresSolution(
+        x=x, q=q, status=status or not_converged(size, steps), iterations=steps, fits=fits, floating=floating
+    )
 
 
 def _lower(rows: Sequence[ActiveRows], x: np.ndarray, step: np.ndarray, cost: float) -> tuple[np.ndarray, bool]:
@@ -267,7 +277,17 @@ def _fit(rows: ActiveRows, x: np.ndarray, q: Covariance, tests: bool) -> GroupFi
     v = np.where(on, residual, 0.0)
     redundancy, standardised, error, detectable = (np.zeros(m) for _ in range(4))
     pvv = float(np.sum(rows.whiten(v) ** 2))
-    fit = GroupFit(group.name, on, residual, np.sqrt(variance), redundancy, standardised, error, detectable, pvv)
+    fit = GroupFit(
+        name=group.name,
+        active=on,
+        residual=residual,
+        sigma=np.sqrt(variance),
+        redundancy=redundancy,
+        standardised=standardised,
+        estimated_error=error,
+        detectable_error=detectable,
+        pvv=pvv,
+    )
     if not tests:
         return fit
     wide = rows.spread(jacobian)

@@ -116,22 +116,22 @@ class TargetBlocks:
         rows_of = np.append(np.searchsorted(c[firsts], np.arange(len(own) + 1)), len(firsts))
         wide = np.diff(border_first)
         return TargetBlocks(
-            moving,
-            columns,
-            block,
-            place,
-            inner,
-            outer,
-            own,
-            met % (len(outer) + 1),
-            border_first,
-            np.append(0, np.cumsum(own * own)),
-            np.append(0, np.cumsum(own * wide)),
-            take,
-            flat,
-            rows_of,
-            row_pointers,
-            at,
+            moving=moving,
+            columns=columns,
+            block=block,
+            place=place,
+            inner=inner,
+            outer=outer,
+            own=own,
+            border=met % (len(outer) + 1),
+            border_first=border_first,
+            inside_first=np.append(0, np.cumsum(own * own)),
+            reach_first=np.append(0, np.cumsum(own * wide)),
+            take=take,
+            parameter=flat,
+            rows_of=rows_of,
+            row_pointers=row_pointers,
+            at=at,
         )
 
     def values(self, jacobians: Sequence[np.ndarray]) -> np.ndarray:
@@ -235,7 +235,15 @@ class Eliminated:
         factor, failed = _on_cores(
             len(s), lambda: lapack.dpotrf(s.T, lower=0, overwrite_a=1)
         )  # s.T: its upper triangle
-        return Eliminated(blocks, scale, values, inverse, w, not (loose or failed), [factor])
+        return Eliminated(
+            blocks=blocks,
+            scale=scale,
+            values=values,
+            inside=inverse,
+            reach=w,
+            held=not (loose or failed),
+            _left=[factor],
+        )
 
     def solve_scaled(self, right: np.ndarray) -> np.ndarray:
         """N^-1 right of all parameters, both scaled, (n,) or (n, k); held ones are zero."""

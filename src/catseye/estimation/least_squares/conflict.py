@@ -14,7 +14,7 @@ from catseye.estimation.observations.kinds import Distances, MovingDistances, Ob
 
 MOST_AT_ONE_POINT = 2  # wrong observations searched for at one point, exhaustively
 LARGEST_SEARCH = 24  # observations at a point; more give enough redundancy for the robust fit alone
-SEARCHES = 6  # per point, each linearised at the likeliest position of the previous one
+ROUNDS = 6  # per point, each linearised at the likeliest position of the previous one
 FAR = 6.0  # sigmas from a point's prior information, beyond which its observations are searched
 SLACK = 2.0  # factor on sigma in the search, because everything but the point is fixed there
 
@@ -171,17 +171,17 @@ class PointObservations:
         jacobians = [g.predict(solution.x)[1] for g in groups]
         totals = total_residuals(solution.fits, solution.x, shared)
         return PointObservations(
-            groups,
-            removable,
-            advice,
-            solution.x,
-            [residual for residual, _ in totals],
-            [sigma for _, sigma in totals],
-            jacobians,
-            _by_column(groups, jacobians),
-            advice_at,
-            shared,
-            np.array(settled, dtype=int),
+            groups=groups,
+            removable=removable,
+            advice=advice,
+            x=solution.x,
+            residual=[residual for residual, _ in totals],
+            sigma=[sigma for _, sigma in totals],
+            jacobians=jacobians,
+            by_column=_by_column(groups, jacobians),
+            advice_at=advice_at,
+            shared=shared,
+            settled=np.array(settled, dtype=int),
         )
 
     def rows(self, columns: np.ndarray) -> list[tuple[int, np.ndarray]]:
@@ -248,7 +248,7 @@ def search(columns: np.ndarray, meeting: PointObservations) -> tuple[LocalConfli
 
     A wrong range of half a metre moves its point so far that derivatives there are not accurate to 25 um.
     """
-    for _ in range(SEARCHES):
+    for _ in range(ROUNDS):
         local = at_point(columns, meeting, slack=SLACK)
         if not 2 <= len(local.rows) <= LARGEST_SEARCH:
             return local, None

@@ -26,10 +26,10 @@ from catseye.estimation.least_squares.conflict import (
     touched,
 )
 from catseye.estimation.least_squares.influence import Influence
+from catseye.estimation.least_squares.status import AdjustmentOutcome, Status
 from catseye.estimation.observations.kinds import ObservationGroup
 
-UNDECIDED = "rejection undecided after {rounds} rounds: some observations contradict each other and none stands out"
-UNHELD = "observations at one point contradict each other, and without them it is not held ({status})"
+UNDECIDED = "after {rounds} rounds: some observations contradict each other and none stands out"
 DECISIVE = 9.0  # difference of sums of squares between two explanations, below which neither is believed
 GRAVE = 6.0  # |w| of a rejected observation from which it matters whether the right one was rejected
 UNCHECKED = 0.05  # share of sigma^2 / variance of the estimated error below which nothing else speaks for or against
@@ -37,7 +37,7 @@ CHECKED = NONCENTRALITY / UNCHECKED**0.5  # detectable error over sigma up to wh
 BACK = 0.9  # of `critical`: what is out comes back below it; between the two it stays as it is, or rounds would not end
 MOST_AT_ONCE = 200  # observations left out between two adjustments
 SUSPECT, WRONG = 3.0, 10.0  # sigmas of a residual after the robust start: a suspect, and left out at first
-MOST_REWEIGHTED, CROSSING = 8, 2  # fits of the robust start; and residuals that may still cross at the last
+ITERATIONS, CROSSING = 8, 2  # fits of the robust start; and residuals that may still cross at the last
 MOST_RETURNS = 2  # of one observation; so the rounds end
 
 
@@ -136,7 +136,9 @@ def adjust_robustly(
             return _without_undecided(solution, groups, removable, outliers, free, names, solver)
         active = [a | b for a, b in zip(active, back, strict=True)]
         returns = [n + b for n, b in zip(returns, back, strict=True)]
-    return replace(solution, status=UNDECIDED.format(rounds=outliers.rounds))
+    return replace(
+        solution, status=Status(AdjustmentOutcome.REJECTION_UNDECIDED, UNDECIDED.format(rounds=outliers.rounds))
+    )
 
 
 def _without_worst(
@@ -215,7 +217,7 @@ def _without_undecided(
         return solution
     final = adjust(solution.x, groups, free=free, active=active, names=names, solver=solver)
     if not final.solved:
-        return replace(final, status=UNHELD.format(status=final.status))
+        return replace(final, status=Status(AdjustmentOutcome.NOT_HELD, final.status))
     return final
 
 
@@ -234,7 +236,7 @@ def _reweighted(
     rough = SolverSettings(iterations=1, tests=False, border=border)
     solution = adjust(x0, groups, free=free, names=names, solver=rough)
     before: list[np.ndarray] = []
-    for _ in range(MOST_REWEIGHTED):
+    for _ in range(ITERATIONS):
         if not solution.solved or _steady(solution, before):
             break
         before = [f.residual for f in solution.fits]

@@ -105,7 +105,9 @@ class ActiveRows:
             columns, position = shared(columns)
         elif covariance.ndim == 3 and columns.ndim == 2:
             columns = columns.reshape(len(covariance), -1)
-        return cls(group, chosen, factor, chosen.astype(float), position, columns)
+        return cls(
+            group=group, active=chosen, factor=factor, weight=chosen.astype(float), position=position, columns=columns
+        )
 
     def whiten(self, a: np.ndarray) -> np.ndarray:
         """L^-1 a for (m,) or (m, k)."""

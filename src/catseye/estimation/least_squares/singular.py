@@ -85,7 +85,9 @@ class FactoredModel:
         spread = gain @ qu  # gain Q gain', as gain Q = gain Q U U'
         if p and (least := float(np.linalg.eigvalsh(0.5 * (spread + spread.T))[0])) < -NEGATIVE * m:
             raise EstimationError(NO_COVARIANCE.format(value=least))
-        return FactoredModel(sigma, u, vt.T / s / length[:, None], level, factor, gain, spread)
+        return FactoredModel(
+            sigma=sigma, base=u, back=vt.T / s / length[:, None], level=level, factor=factor, gain=gain, spread=spread
+        )
 
     def solve(self, values: np.ndarray, closure: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Weighted residuals l and parameters x: Q l + design x = values, design' l = c.

@@ -7,7 +7,7 @@ import numpy as np
 
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import (
-    CONVERGED,
+    COMPLETE,
     GroupFit,
     LeastSquaresSolution,
     SolverSettings,
@@ -15,6 +15,7 @@ from catseye.estimation.least_squares.adjustment import (
 )
 from catseye.estimation.least_squares.covariance import Covariance
 from catseye.estimation.least_squares.rows import ActiveRows, variances
+from catseye.estimation.least_squares.status import ADVICE, CONVERGED, AdjustmentOutcome, Status
 from catseye.estimation.network.datum import (
     Floating,
     datum_conditions,
@@ -26,37 +27,35 @@ from catseye.estimation.network.datum import (
     with_datum,
     with_reference,
 )
-from catseye.estimation.network.diagnosis import contradicted, diagnosed, floating_text, unconnected
+from catseye.estimation.network.diagnosis import contradicted, diagnosed, floating_status, unconnected
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork
 from catseye.estimation.observations.kinds import Linear, ObservationGroup
 
 FEWEST_POINTS = 200  # above which exchanged points are tried only with the ranging engine
-PASSES = 8  # limit of passes: solve with minimal constraints, transform to the datum
+ROUNDS = 8  # cap: solve with minimal constraints, transform to the datum
+TRIAL_ITERATIONS = 15  # cap of a trial without tests: a good correction converges soon
 REACHED = 0.9  # of the variance factor: above it another start was no improvement
 
-NO_DATUM = "rank deficient: the network floats ({motions}) without a datum; hold coordinates, mark datum points, \
+NO_DATUM = "the network floats ({motions}) without a datum; hold coordinates, mark datum points, \
 or adjust it free (--datum free)"
-WEAK_DATUM = "rank deficient: the datum's coordinates do not hold the network against {motions}; mark more of them"
-NOT_SETTLED = "not converged: the network did not settle in its datum after {passes} passes; \
-check the starting coordinates"
-NOT_PLACED = "no approximate coordinates: {points}; give some, or observe more"
+WEAK_DATUM = "the datum's coordinates do not hold the network against {motions}; mark more of them"
+NOT_SETTLED = "the network did not settle in its datum after {rounds} passes"
+NOT_PLACED = "{points}; give some, or observe more"
 
 
 @dataclass(frozen=True)
 class NetworkSettings:
     """Settings of `adjust_network`.
 
-    iterations   limit of Gauss-Newton steps of each pass
-    tests        False: no covariance and test statistics
-    diagnose     False: status "converged" or "not converged" only, without the cause
+    solver     of every solution; its choice of sparse or dense follows the engine
+    diagnose   False: status "converged" or "not converged" only, without the cause
     """
 
-    iterations: int = 50
-    tests: bool = True
+    solver: SolverSettings = COMPLETE
     diagnose: bool = True
 
 
-COMPLETE = NetworkSettings()
+DIAGNOSED = NetworkSettings()
 
 
 def adjust_network(
@@ -67,7 +66,7 @@ def adjust_network(
     inflation: Sequence[np.ndarray] | None = None,
     alone: bool = False,
     start: NetworkSolution | None = None,
-    settings: NetworkSettings = COMPLETE,
+    settings: NetworkSettings = DIAGNOSED,
     engine: str | None = None,
 ) -> NetworkSolution:
     """Coordinates of a network with covariance, and a fit of every observation.
@@ -90,7 +89,7 @@ def adjust_network(
     if inflation is not None:
         finite = [np.isfinite(f) for f in inflation]
         active = finite if active is None else [a & k for a, k in zip(active, finite, strict=True)]
-    diagnose = settings.tests and settings.diagnose
+    diagnose = settings.solver.tests and settings.diagnose
     if engine in (None, "ranging"):
         from catseye.estimation.network.ranging_engine import adjusted_as_ranges
 
@@ -99,8 +98,7 @@ def adjust_network(
             active=active,
             inflation=inflation,
             start=start,
-            iterations=settings.iterations,
-            tests=settings.tests,
+            solver=settings.solver,
             forced=engine is not None,
         )
         if solution is not None:
@@ -111,9 +109,11 @@ def adjust_network(
             )
     problem = _Problem.of(network, start)
     if problem.missing:
-        return problem.unanswered(NOT_PLACED.format(points=_listed(problem.missing)))
+        return problem.unanswered(
+            Status(AdjustmentOutcome.NOT_PLACED, NOT_PLACED.format(points=_listed(problem.missing)))
+        )
     sparse = None if engine is None else engine == "sparse"
-    solver = SolverSettings(settings.iterations, settings.tests, sparse)
+    solver = replace(settings.solver, sparse=sparse)
     solution = problem.solve(active, (inflation, alone), solver)
     if diagnose and solution.answered:
         if start is None and contradicted(solution):
@@ -123,12 +123,13 @@ def adjust_network(
 
 
 def fits_near(
-    network: ObservationNetwork, near: NetworkSolution
+    network: ObservationNetwork, near: NetworkSolution, solver: SolverSettings = COMPLETE
 ) -> Callable[[Sequence[np.ndarray]], tuple[GroupFit, ...] | None]:
     """Function that refits a network near a solution with inflated sigmas, quickly.
 
     network   with its datum marked
     near      its solution, as start values
+    solver    settings of each refit
 
     The function takes an inflation as `adjust_network` with `alone`, and returns one fit per group, or None without a
     solution. A minimal set of coordinates is fixed instead of the datum's conditions: that changes no residual and no
@@ -146,7 +147,7 @@ def fits_near(
     def solve(inflation: Sequence[np.ndarray]) -> tuple[GroupFit, ...] | None:
         _, added = problem._inflated(inflation, True)
         active = _padded([np.isfinite(f) for f in inflation], problem.groups, True)
-        solution = adjust(problem.x0, problem.groups, free=free, active=active, extra_variance=added)
+        solution = adjust(problem.x0, problem.groups, free=free, active=active, extra_variance=added, solver=solver)
         return solution.fits[: len(network.groups)] if solution.status == CONVERGED else None
 
     return solve
@@ -181,7 +182,8 @@ def _trial(network: ObservationNetwork, inflation: Sequence[np.ndarray] | None) 
     """Trial adjustment of a copy: coordinates and variance factor, tests only with inflation."""
     large = len(network.points.names) >= FEWEST_POINTS
     weighed = inflation is not None
-    settings = NetworkSettings(iterations=50 if weighed else 15, tests=weighed, diagnose=False)
+    solver = SolverSettings(tests=weighed) if weighed else SolverSettings(iterations=TRIAL_ITERATIONS, tests=False)
+    settings = NetworkSettings(solver, diagnose=False)
     try:
         return adjust_network(
             network,
@@ -193,7 +195,9 @@ def _trial(network: ObservationNetwork, inflation: Sequence[np.ndarray] | None) 
     except EstimationError:  # large, and not a ranging network: a trial would take too long
         if weighed:
             raise
-        return replace(_Problem.of(network, None).unanswered("not tried"), variance_factor=np.inf)
+        return replace(
+            _Problem.of(network, None).unanswered(Status(AdjustmentOutcome.NOT_TRIED)), variance_factor=np.inf
+        )
 
 
 def _listed(reasons: dict[str, str], most: int = 4) -> str:
@@ -242,7 +246,16 @@ class _Problem:
             )
         free = np.concatenate([points.free.ravel(), sigma > 0.0])
         xyz = np.where(points.absent, 0.0, xyz)  # any value: no observation depends on it
-        return cls(network, np.concatenate([xyz.ravel(), values]), free, groups, found, missing, assumed, replaced)
+        return cls(
+            network=network,
+            x0=np.concatenate([xyz.ravel(), values]),
+            free=free,
+            groups=groups,
+            found=found,
+            missing=missing,
+            assumed=assumed,
+            replaced=replaced,
+        )
 
     @property
     def names(self) -> list[str]:
@@ -268,13 +281,15 @@ class _Problem:
         datum = points.datum & self.free[:n].reshape(-1, 3) & np.isfinite(points.xyz)
         solution: LeastSquaresSolution | None = None
         settled = False
-        for _ in range(PASSES):
+        for _ in range(ROUNDS):
             floating = self._motions(rows, x)
             conditions, loose = datum_conditions(floating, datum, points.xyz)
             if loose.shape[1]:
                 text = WEAK_DATUM if datum.any() else NO_DATUM
                 status = unconnected(self.network, self._afloat(rows, x))
-                return self.unanswered(status or text.format(motions=floating.words(loose)), x)
+                return self.unanswered(
+                    status or Status(AdjustmentOutcome.RANK_DEFICIENT, text.format(motions=floating.words(loose))), x
+                )
             free_columns = self.free.copy()
             free_columns[minimal_coordinates(conditions)] = False
             solution = adjust(
@@ -307,9 +322,11 @@ class _Problem:
         assert solution is not None
         solution = replace(solution, x=x, iterations=iterations)
         if not settled and solution.status == CONVERGED:
-            solution = replace(solution, status=NOT_SETTLED.format(passes=PASSES))
+            solution = replace(
+                solution, status=Status(AdjustmentOutcome.NOT_CONVERGED, NOT_SETTLED.format(rounds=ROUNDS), ADVICE)
+            )
         if len(solution.floating):
-            status = unconnected(self.network, self._afloat(rows, x)) or floating_text(self.network, solution)
+            status = unconnected(self.network, self._afloat(rows, x)) or floating_status(self.network, solution)
             return self.unanswered(status, solution.x)
         # sum of redundancy numbers, without rounding
         degrees = sum(int(r.active.sum()) for r in rows) - int(free_columns.sum())
@@ -390,7 +407,7 @@ class _Problem:
             q=q,
         )
 
-    def unanswered(self, status: str, x: np.ndarray | None = None) -> NetworkSolution:
+    def unanswered(self, status: Status, x: np.ndarray | None = None) -> NetworkSolution:
         """Solution without an answer: start or last values, residuals, no covariance."""
         at = self.x0 if x is None else x
         all_fixed = np.zeros(len(at), dtype=bool)

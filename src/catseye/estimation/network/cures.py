@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED
+from catseye.estimation.least_squares.status import CONVERGED
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, label, points_of
 from catseye.estimation.observations.kinds import Distances, ObservationGroup
 from catseye.estimation.quality.reliability import TOO_LARGE, global_test

@@ -8,19 +8,19 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.special import chdtrc
 
-from catseye.estimation.least_squares.adjustment import CONVERGED, LeastSquaresSolution
+from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
+from catseye.estimation.least_squares.status import CONVERGED, AdjustmentOutcome, Status
 from catseye.estimation.network.cures import EXCHANGE_ALL, Adjust, reason
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, label, points_of
 from catseye.estimation.shapes.rigid_body import closed_form
 
-PIECES = "rank deficient: the network is in {count} pieces that no observation joins: {pieces}; observe between them, \
+PIECES = "the network is in {count} pieces that no observation joins: {pieces}; observe between them, \
 or hold {loose}"
-FLOATS = "rank deficient: {points} floats; {advice}"
-CONTRADICTS = "converged, but the observations contradict each other: variance factor {factor:.3g} with \
+FLOATS = "{points} floats; {advice}"
+CONTRADICTS = "the observations contradict each other: variance factor {factor:.3g} with \
 {degrees:.0f} degrees of freedom, worst {worst}{guess}"
 TIED_BY_PARAMETERS = ("rigid_body", "frame_point", "tilt", "joint")  # kinds whose points are connected by a pose
-ADVICE = "; check the starting coordinates"  # of a failed solution; removed if the cause is known
-DATUM_EXCHANGED = "converged, but {first} and {second} appear exchanged: the datum's coordinates fit the measured \
+DATUM_EXCHANGED = "{first} and {second} appear exchanged: the datum's coordinates fit the measured \
 shape to {misfit:.3g} m, with the two exchanged to {best:.3g} m; exchange them, or take them out of the datum"
 DISPLACED = 0.01  # of the network's size: a worse fit of the datum coordinates is investigated
 EXCHANGED_BACK = 0.1  # of the misfit: below it after the correct exchange
@@ -45,7 +45,7 @@ def pieces_of(network: ObservationNetwork) -> np.ndarray:
     return np.asarray(np.unique(label, return_inverse=True)[1])
 
 
-def unconnected(network: ObservationNetwork, afloat: Callable[[np.ndarray], bool]) -> str | None:
+def unconnected(network: ObservationNetwork, afloat: Callable[[np.ndarray], bool]) -> Status | None:
     """Status of a disconnected network.
 
     None if connected, or if each piece is held by itself.
@@ -62,7 +62,7 @@ def unconnected(network: ObservationNetwork, afloat: Callable[[np.ndarray], bool
         return None
     text = " | ".join(_members(network, piece) for piece in pieces[:4]) + (" | ..." if number > 4 else "")
     which = "each" if len(loose) == number else f"that of {_members(network, loose[0])}"
-    return PIECES.format(count=number, pieces=text, loose=which)
+    return Status(AdjustmentOutcome.RANK_DEFICIENT, PIECES.format(count=number, pieces=text, loose=which))
 
 
 def _members(network: ObservationNetwork, piece: np.ndarray) -> str:
@@ -70,7 +70,7 @@ def _members(network: ObservationNetwork, piece: np.ndarray) -> str:
     return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
 
 
-def floating_text(network: ObservationNetwork, solution: LeastSquaresSolution) -> str:
+def floating_status(network: ObservationNetwork, solution: LeastSquaresSolution) -> Status:
     """Status of a floating solution: points, reason and remedy."""
     names, count = network.points.names, len(network.points.names)
     directions = solution.floating
@@ -79,8 +79,10 @@ def floating_text(network: ObservationNetwork, solution: LeastSquaresSolution) -
     worst = [int(i) for i in np.argsort(-by_point, kind="stable") if by_point[i] > 1e-2 * max(part.max(), 1e-300)]
     floating_parameters = [p.name for k, p in enumerate(network.parameters) if part[3 * count + k] > 1e-2 * part.max()]
     if not worst:
-        return FLOATS.format(
-            points=", ".join(floating_parameters[:4]), advice="observe it, hold it, or give it a prior"
+        floating = ", ".join(floating_parameters[:4])
+        return Status(
+            AdjustmentOutcome.RANK_DEFICIENT,
+            FLOATS.format(points=floating, advice="observe it, hold it, or give it a prior"),
         )
     observations = _observations_at(network, worst[:4])
     words = [
@@ -90,7 +92,9 @@ def floating_text(network: ObservationNetwork, solution: LeastSquaresSolution) -
     text = ", ".join(words) + (f" and {len(worst) - 4} more" if len(worst) > 4 else "")
     if floating_parameters:
         text += f", with {', '.join(floating_parameters[:3])},"
-    return FLOATS.format(points=text, advice=_advice(network, solution, worst[0]))
+    return Status(
+        AdjustmentOutcome.RANK_DEFICIENT, FLOATS.format(points=text, advice=_advice(network, solution, worst[0]))
+    )
 
 
 def _observations_at(network: ObservationNetwork, points: list[int]) -> list[int]:
@@ -139,7 +143,7 @@ def _tests(solution: NetworkSolution) -> list[np.ndarray]:
     return [np.where(f.active & (f.redundancy > 1e-6), np.abs(f.standardised), 0.0) for f in solution.fits]
 
 
-def diagnosed(solution: NetworkSolution, adjust: Adjust | None) -> str:
+def diagnosed(solution: NetworkSolution, adjust: Adjust | None) -> Status:
     """Status of a solution, with a diagnosis if not converged or grossly contradictory.
 
     solution   converged or not
@@ -151,21 +155,22 @@ def diagnosed(solution: NetworkSolution, adjust: Adjust | None) -> str:
         return _datum_exchanged(solution) or CONVERGED
     if solution.status != CONVERGED:
         cause = reason(solution, adjust)
-        return (solution.status.removesuffix(ADVICE) if cause.named else solution.status) + cause.text
+        return solution.status.advised(cause.text if cause.named else solution.status.advice + cause.text)
     tests, network = _tests(solution), solution.network
     group = int(np.argmax([float(t.max(initial=0.0)) for t in tests]))
     row = int(np.argmax(tests[group]))
     unit = getattr(network.groups[group], "unit", "m")
     residual_text = f"{solution.fits[group].residual[row]:+.4g} {unit}, {tests[group][row]:.3g} standard deviations"
-    return CONTRADICTS.format(
+    detail = CONTRADICTS.format(
         factor=solution.variance_factor,
         degrees=solution.degrees_of_freedom,
         worst=f"{label(network, group, row)} (residual {residual_text})",
         guess=reason(solution, adjust).text,
     )
+    return Status(AdjustmentOutcome.CONTRADICTED, detail)
 
 
-def _datum_exchanged(solution: NetworkSolution) -> str | None:
+def _datum_exchanged(solution: NetworkSolution) -> Status | None:
     """Status if the measured shape fits the datum coordinates only with two of them exchanged.
 
     No observation shows this: the network is consistent, but rotated and shifted by the wrong coordinates.
@@ -189,7 +194,8 @@ def _datum_exchanged(solution: NetworkSolution) -> str | None:
     if best > EXCHANGED_BACK * misfit_given:
         return None
     first, second = points.names[on[i]], points.names[on[j]]
-    return DATUM_EXCHANGED.format(first=first, second=second, misfit=misfit_given, best=best)
+    detail = DATUM_EXCHANGED.format(first=first, second=second, misfit=misfit_given, best=best)
+    return Status(AdjustmentOutcome.CONTRADICTED, detail)
 
 
 def _misfit(x: np.ndarray, reference: np.ndarray) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import GroupFit
 from catseye.estimation.least_squares.covariance import Covariance
+from catseye.estimation.least_squares.status import Status
 from catseye.estimation.network.names import PointIndex
 from catseye.estimation.observations.kinds import ObservationGroup
 
@@ -156,7 +157,7 @@ class NetworkSolution:
     covariance: np.ndarray
     parameters: np.ndarray
     u_parameters: np.ndarray
-    status: str
+    status: Status
     iterations: int
     fits: tuple[GroupFit, ...]
     variance_factor: float

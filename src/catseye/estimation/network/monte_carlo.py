@@ -7,7 +7,6 @@ import numpy as np
 
 from catseye.constants import PPM
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED
 from catseye.estimation.least_squares.rows import variances
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
 from catseye.estimation.observations.kinds import Distances, ZenithAngles
@@ -121,7 +120,7 @@ def scatter(
         values = starts + sigma * generator.standard_normal(len(starts))
         drawn, wrong = measured(network, np.concatenate([truth, values]), generator, disturbance=applied)
         solution = solve(drawn)
-        if not solution.status.startswith(CONVERGED):
+        if not solution.status.usable:
             status = solution.status
             continue
         converged += 1

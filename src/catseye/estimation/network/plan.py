@@ -178,7 +178,9 @@ def schedule(
         count = len(coordinates)
         after = (max(total, 0.0) / count) ** 0.5
         gain = (before / count) ** 0.5 - after
-        picked.append(Candidate(names[i], names[j], float(sigma[best]), after, gain, float(spent[i])))
+        picked.append(
+            Candidate(from_=names[i], to=names[j], u=float(sigma[best]), mean_u=after, gain=gain, at_s=float(spent[i]))
+        )
         open_ &= spent[pairs[:, 0]] + shot_s <= budget_s * (1.0 + 1e-12)
         open_[best] &= repeats
     return tuple(picked)

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, GroupFit
+from catseye.estimation.least_squares.adjustment import GroupFit, SolverSettings
+from catseye.estimation.least_squares.status import CONVERGED, AdjustmentOutcome
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork
 from catseye.estimation.network.multilateration.gauss_newton import adjust_ranges
 from catseye.estimation.network.multilateration.network import RangingNetwork
@@ -25,8 +26,7 @@ def adjusted_as_ranges(
     active: Sequence[np.ndarray] | None,
     inflation: Sequence[np.ndarray] | None,
     start: NetworkSolution | None,
-    iterations: int,
-    tests: bool,
+    solver: SolverSettings,
     forced: bool,
 ) -> NetworkSolution | None:
     """Solution of a ranging network.
@@ -37,8 +37,7 @@ def adjusted_as_ranges(
     active       as for `adjust_network`
     inflation    likewise
     start        an earlier solution
-    iterations   limit of Gauss-Newton steps
-    tests        as for `adjust_network`
+    solver       as for `adjust_network`
     forced       raise EstimationError for an unsuitable network instead of None, and keep a failed solution
 
     Without a solution the general engine is used, which gives the reason.
@@ -61,8 +60,8 @@ def adjusted_as_ranges(
         if forced:
             raise EstimationError("the ranging engine does not weigh coordinates robustly; use another engine")
         return None
-    solution = adjust_ranges(problem[0], tests=tests, iterations=iterations, inflation=factors)
-    if solution.status.startswith("contradictory"):  # still a solution; `diagnosis` adds what and where
+    solution = adjust_ranges(problem[0], solver=solver, inflation=factors)
+    if solution.status.outcome is AdjustmentOutcome.CONTRADICTORY:  # still a solution; `diagnosis` adds what and where
         solution = replace(solution, status=CONVERGED)
     if solution.status != CONVERGED and not forced:
         return None

@@ -14,17 +14,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, NONCENTRALITY, GroupFit
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit
+from catseye.estimation.least_squares.status import CONVERGED, AdjustmentOutcome, Status
 from catseye.estimation.quality.reliability import UNCHECKED, single_level, w_critical
 
 Solve = Callable[[Sequence[np.ndarray]], Sequence[GroupFit]]
 
-NOT_CONVERGED = "not converged: weights still changed by {change:.2g} after {iterations} iterations"
+NOT_CONVERGED = "weights still changed by {change:.2g} after {iterations} iterations"
 UNDECIDED = (
-    "undecided: observations (group:row) {rows} contradict others, and which are wrong cannot be decided; "
+    "observations (group:row) {rows} contradict others, and which are wrong cannot be decided; "
     "parameters that only they determine use their sigmas times {size:.3g}"
 )
-UNFINISHED = "not finished after {rounds} rounds of data snooping; the worst |w| is {worst:.3g} (limit {limit:.3g})"
+UNFINISHED = "after {rounds} rounds of data snooping; the worst |w| is {worst:.3g} (limit {limit:.3g})"
 
 MAD_TO_SIGMA = 1.482602218505602  # of normal errors: 1 / 0.6744897501960817
 MOST_INFLATION = 1e3  # for zero weights: a weight of 1e-6 no longer affects the result, and the row stays predicted
@@ -105,7 +106,7 @@ class RobustEstimate:
     statistic: tuple[np.ndarray, ...]
     scale: float
     iterations: int
-    status: str
+    status: Status
     fits: tuple[GroupFit, ...]
 
 
@@ -234,7 +235,9 @@ def estimate_robustly(
     change = _reweight(rows, WEIGHTS[method], 1.0 if rescale else s, rescale, iterations)
     s = _scale(rows, rescale) if rescale else s
     w = rows.w() / s
-    status = CONVERGED if change < SETTLED else NOT_CONVERGED.format(change=change, iterations=iterations)
+    status = CONVERGED
+    if not change < SETTLED:
+        status = Status(AdjustmentOutcome.NOT_CONVERGED, NOT_CONVERGED.format(change=change, iterations=iterations))
     return RobustEstimate(
         weights=rows.split(1.0 / rows.inflation**2),
         rejected=rows.split(np.abs(w) > options.limit),
@@ -375,7 +378,7 @@ class SnoopingResult:
     rejections: tuple[Rejection, ...]
     critical: float
     solutions: int
-    status: str
+    status: Status
     fits: tuple[GroupFit, ...]
 
 
@@ -440,12 +443,21 @@ def snoop(
         else:
             finished = True
             break
-    status = CONVERGED if finished else UNFINISHED.format(rounds=options.rounds, worst=worst, limit=critical)
+    status = CONVERGED
+    if not finished:
+        detail = UNFINISHED.format(rounds=options.rounds, worst=worst, limit=critical)
+        status = Status(AdjustmentOutcome.UNFINISHED, detail)
     rejections, undecided = _rejections(rows, out, critical, weigh)
     undecided |= rows.doubtful
     status = _loosen(rows, out, undecided, status)
     return SnoopingResult(
-        rows.split(out & ~undecided), rows.split(undecided), rejections, critical, rows.solved, status, rows.fits
+        rejected=rows.split(out & ~undecided),
+        undecided=rows.split(undecided),
+        rejections=rejections,
+        critical=critical,
+        solutions=rows.solved,
+        status=status,
+        fits=rows.fits,
     )
 
 
@@ -492,11 +504,21 @@ def _rejections(rows: _Rows, out: np.ndarray, critical: float, weigh: bool) -> t
             alike = explains & (margins < DECISIVE)
             alike[row] = alike.any()
             undecided |= alike
-        rejections.append(Rejection(*rows.place(int(row)), float(w[row]), float(errors[row]), margin, rival))
+        g, k = rows.place(int(row))
+        rejections.append(
+            Rejection(
+                group=g,
+                row=k,
+                statistic=float(w[row]),
+                estimated_error=float(errors[row]),
+                margin=margin,
+                rival=rival,
+            )
+        )
     return tuple(rejections), undecided
 
 
-def _loosen(rows: _Rows, out: np.ndarray, undecided: np.ndarray, status: str) -> str:
+def _loosen(rows: _Rows, out: np.ndarray, undecided: np.ndarray, status: Status) -> Status:
     """Last solution: rejected rows out, undecided rows with large sigmas.
 
     Returns the status.
@@ -510,4 +532,4 @@ def _loosen(rows: _Rows, out: np.ndarray, undecided: np.ndarray, status: str) ->
         return status
     named = [f"{g}:{k}" for g, k in map(rows.place, np.flatnonzero(holding)[:6])]
     ellipsis = " ..." if np.count_nonzero(holding) > 6 else ""
-    return UNDECIDED.format(rows=", ".join(named) + ellipsis, size=size)
+    return Status(AdjustmentOutcome.UNDECIDED, UNDECIDED.format(rows=", ".join(named) + ellipsis, size=size))

@@ -16,16 +16,13 @@ from typing import Protocol
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, GroupFit
+from catseye.estimation.least_squares.adjustment import GroupFit
+from catseye.estimation.least_squares.status import CONVERGED, AdjustmentOutcome, Status
 
 Scaled = Callable[[Sequence[np.ndarray]], Sequence[GroupFit]]
 
-NOT_CONVERGED = (
-    "not converged: {name} still moved by {step:.2g} of its standard uncertainty after {iterations} iterations"
-)
-INSEPARABLE = (
-    "not separable: {names} have the same effect on the observations; hold one, or observe over other distances"
-)
+NOT_CONVERGED = "{name} still moved by {step:.2g} of its standard uncertainty after {iterations} iterations"
+INSEPARABLE = "{names} have the same effect on the observations; hold one, or observe over other distances"
 LEAST_REDUNDANCY = 1e-6  # sum of redundancy numbers below which a component shows in no residual
 STEP = 1e-3  # relative change of a variance in the derivative of the redundancies: its square is lost
 WORST_CONDITION = 1e-5  # of the information scaled to a unit diagonal; the derivative is good to 1e-6
@@ -188,7 +185,7 @@ class Components:
     values: np.ndarray
     covariance: np.ndarray
     at_zero: np.ndarray
-    status: str
+    status: Status
     iterations: int
     fits: tuple[GroupFit, ...]
 
@@ -250,11 +247,21 @@ def variance_components(
     status = CONVERGED
     if step.max() >= tolerance:
         worst = int(np.argmax(step))
-        status = NOT_CONVERGED.format(name=model.names[worst], step=step[worst], iterations=steps)
+        detail = NOT_CONVERGED.format(name=model.names[worst], step=step[worst], iterations=steps)
+        status = Status(AdjustmentOutcome.NOT_CONVERGED, detail)
         fits = tuple(solve(model.scales(theta)))
     if inseparable:
-        status = INSEPARABLE.format(names=", ".join(model.names[k] for k in inseparable))
-    return Components(model.names, theta, covariance, theta == 0.0, status, steps, fits)
+        names = ", ".join(model.names[k] for k in inseparable)
+        status = Status(AdjustmentOutcome.INSEPARABLE, INSEPARABLE.format(names=names))
+    return Components(
+        names=model.names,
+        values=theta,
+        covariance=covariance,
+        at_zero=theta == 0.0,
+        status=status,
+        iterations=steps,
+        fits=fits,
+    )
 
 
 def _require_redundancy(names: Sequence[str], expected: np.ndarray, bound: np.ndarray) -> None:

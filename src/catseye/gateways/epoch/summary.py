@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, SECONDS_PER_DAY
-from catseye.estimation.least_squares.adjustment import CONVERGED
+from catseye.estimation.least_squares.status import CONVERGED
 from catseye.gateways.epoch.tables import kinds_of
 from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.verdict import Verdict

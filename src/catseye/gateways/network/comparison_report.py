@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.estimation.deformation.deformation import Deformation
 from catseye.estimation.quality.ellipsoid import PLAN, confidence_scale, elevation_view, ellipse
-from catseye.gateways.network.comparison import UNTESTED, ComparedEpochs, comparison_passages, comparison_verdict
+from catseye.gateways.network.comparison import comparison_passages
 from catseye.gateways.network.figures import (
     CaptionedFigure,
     file_ticks,
@@ -22,12 +22,13 @@ from catseye.gateways.network.figures import (
     view_frame,
     views,
 )
-from catseye.gateways.network.findings import Findings
 from catseye.gateways.network.report import network_cards, provenance_section
-from catseye.gateways.network.summary import quantity, verdict
 from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, nice, styled
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.verdict import verdict_line
+from catseye.reduction.network.adjusted import AdjustedNetwork
+from catseye.reduction.network.comparison import UNTESTED, ComparedEpochs
+from catseye.reduction.network.words import quantity
 
 CONTENTS = {"summary": "Summary", "displacements": "Displacements", "epochs": "Epochs", "provenance": "Provenance"}
 CONFIDENCE = 0.95
@@ -55,7 +56,7 @@ def comparison_report(compared: ComparedEpochs, when: datetime, inputs: Mapping[
     settings = {"level of the tests": f"{d.level:g}", "power": f"{d.power:g}", "datums may differ by": d.datum}
     body = [
         header,
-        verdict_line(comparison_verdict(compared)),
+        verdict_line(compared.verdict),
         _summary(compared),
         _displacements(compared),
         _epochs(compared),
@@ -149,7 +150,7 @@ def _cell(value: float, form: str) -> str:
 def _epochs(compared: ComparedEpochs) -> str:
     parts = []
     for title, epoch in (("First epoch", compared.first), ("Second epoch", compared.second)):
-        judged = verdict(epoch)
+        judged = epoch.verdict
         parts += [
             f"<h3>{title}: {escape(epoch.network.source)}</h3>",
             paragraph(judged.text, "" if judged.word == "good" else "bad"),
@@ -246,10 +247,10 @@ def _arrows(ax: Any, compared: ComparedEpochs, drawn: tuple[np.ndarray, np.ndarr
             )
 
 
-def _labels(ax: Any, findings: Findings, bearing: float | None) -> None:
+def _labels(ax: Any, adjusted: AdjustedNetwork, bearing: float | None) -> None:
     if bearing is None:
-        file_ticks(ax.xaxis, findings, 0, word="east", opposite="west")
-        file_ticks(ax.yaxis, findings, 1, word="north", opposite="south")
+        file_ticks(ax.xaxis, adjusted, 0, word="east", opposite="west")
+        file_ticks(ax.yaxis, adjusted, 1, word="north", opposite="south")
     else:
         ax.set_xlabel(f"horizontal distance towards azimuth {(bearing / DEGREE + 90.0) % 360.0:.0f}° (m)")
-        file_ticks(ax.yaxis, findings, 2, word="up", opposite="down")
+        file_ticks(ax.yaxis, adjusted, 2, word="up", opposite="down")

@@ -11,8 +11,8 @@ from matplotlib.ticker import FuncFormatter
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.estimation.quality.ellipsoid import PLAN, Ellipse, elevation_view, ellipse, projected
-from catseye.gateways.network.findings import Findings
 from catseye.gateways.writers.drawing import BAD, FAINT, GRID, INK, SERIES, nice, styled, svg
+from catseye.reduction.network.adjusted import AdjustedNetwork
 
 STATION, TARGET, FIXED, PALE = "#1f5a99", "#1e8e74", "#22303c", "#6f8fa8"
 DENSE = 300  # points or marks from which they are rasterised and only some named
@@ -38,35 +38,35 @@ class CaptionedFigure:
         return svg(self.figure)
 
 
-def network_figures(findings: Findings) -> dict[str, CaptionedFigure]:
+def network_figures(adjusted: AdjustedNetwork) -> dict[str, CaptionedFigure]:
     """Plan, elevation, residuals and redundancy by name, where not empty; x east, y north, z up.
 
-    findings   findings on a solution
+    adjusted   network
     """
     with styled():
-        drawn = {name: _view(findings, bearing) for name, bearing in views(findings).items()}
-        if np.isfinite(findings.table.standardised).any():
-            drawn |= {"residuals": _residuals(findings), "redundancy": _redundancy(findings)}
+        drawn = {name: _view(adjusted, bearing) for name, bearing in views(adjusted).items()}
+        if np.isfinite(adjusted.table.standardised).any():
+            drawn |= {"residuals": _residuals(adjusted), "redundancy": _redundancy(adjusted)}
         return {name: CaptionedFigure(figure, caption) for name, (figure, caption) in drawn.items()}
 
 
-def views(findings: Findings) -> dict[str, float | None]:
+def views(adjusted: AdjustedNetwork) -> dict[str, float | None]:
     """Bearing of each view that has a point to show; None from above.
 
-    findings   findings on a solution
+    adjusted   network
     """
-    existing = findings.network.points.existing
+    existing = adjusted.network.points.existing
     plan_view = {"plan": None} if existing[:, :2].all(axis=1).any() else {}
-    return {**plan_view, **({"elevation": looking(findings)} if existing.all(axis=1).any() else {})}
+    return {**plan_view, **({"elevation": looking(adjusted)} if existing.all(axis=1).any() else {})}
 
 
-def looking(findings: Findings) -> float:
+def looking(adjusted: AdjustedNetwork) -> float:
     """Viewing bearing of the elevation, rad, a whole degree: across the longest extent in plan.
 
-    findings   findings on a solution
+    adjusted   network
     """
-    level = findings.solution.x[:, :2]
-    level = level[findings.network.points.existing[:, :2].all(axis=1)]
+    level = adjusted.solution.x[:, :2]
+    level = level[adjusted.network.points.existing[:, :2].all(axis=1)]
     level = level - np.nanmean(level, axis=0)
     spread = level.T @ level
     if not np.isfinite(spread).all():
@@ -77,29 +77,29 @@ def looking(findings: Findings) -> float:
     return float(np.round(across / DEGREE) % 180.0 * DEGREE)
 
 
-def enlargement(findings: Findings) -> float:
+def enlargement(adjusted: AdjustedNetwork) -> float:
     """Enlargement of the ellipsoids, 1, 2 or 5 times a power of ten; nan for none.
 
-    findings   findings on a solution
+    adjusted   network
 
     The median ellipsoid's longest axis becomes some hundredths of the network's extent, less with many points.
     """
-    longest = findings.ellipsoid.semi_axes[:, 0]
+    longest = adjusted.ellipsoid.semi_axes[:, 0]
     positive = longest[np.isfinite(longest) & (longest > 0.0)]
     if not len(positive):
         return np.nan
     share = SHARE / (1.0 + np.sqrt(len(positive) / 150.0))
-    x = findings.solution.x[:, findings.network.points.existing.any(axis=0)]
+    x = adjusted.solution.x[:, adjusted.network.points.existing.any(axis=0)]
     return nice(
         share * max(float(np.max(np.nanmax(x, axis=0) - np.nanmin(x, axis=0))), 1e-3) / float(np.median(positive))
     )
 
 
-def _view(findings: Findings, bearing: float | None) -> tuple[Figure, str]:
+def _view(adjusted: AdjustedNetwork, bearing: float | None) -> tuple[Figure, str]:
     """Draw points, observation lines and ellipses, from above or along a bearing."""
-    solution = findings.solution
+    solution = adjusted.solution
     axes = PLAN if bearing is None else elevation_view(bearing)
-    existing = findings.network.points.existing[:, :2] if bearing is None else findings.network.points.existing
+    existing = adjusted.network.points.existing[:, :2] if bearing is None else adjusted.network.points.existing
     flat = np.where(existing.all(axis=1, keepdims=True), np.nan_to_num(solution.x) @ axes.T, np.nan)
     finite = np.isfinite(flat).all(axis=1)
     if bearing is not None:
@@ -107,22 +107,22 @@ def _view(findings: Findings, bearing: float | None) -> tuple[Figure, str]:
     low, high = (flat[finite].min(axis=0), flat[finite].max(axis=0)) if finite.any() else (np.zeros(2), np.ones(2))
     size = max(float(np.max(high - low)), 1e-3)
     figure, ax = view_frame(0.5 * (low + high), high - low + 0.16 * size)
-    lines = _lines(ax, findings, flat)
-    scale = enlargement(findings)
+    lines = _lines(ax, adjusted, flat)
+    scale = enlargement(adjusted)
     covariance = np.full((len(flat), 2, 2), np.nan)
     if solution.answered:
-        covariance[finite] = projected(np.nan_to_num(solution.covariance[finite]) * findings.factor, axes)
-    loose, ellipses = _ellipses(ax, findings, flat, ellipse(covariance), scale)
+        covariance[finite] = projected(np.nan_to_num(solution.covariance[finite]) * adjusted.factor, axes)
+    loose, ellipses = _ellipses(ax, adjusted, flat, ellipse(covariance), scale)
     scale_bar(ax, nice(0.2 * size), scale)
-    _marks(ax, findings, flat, loose)
-    point_names(ax, findings, flat)
+    _marks(ax, adjusted, flat, loose)
+    point_names(ax, adjusted, flat)
     if bearing is None:
-        file_ticks(ax.xaxis, findings, 0, word="east", opposite="west")
-        file_ticks(ax.yaxis, findings, 1, word="north", opposite="south")
+        file_ticks(ax.xaxis, adjusted, 0, word="east", opposite="west")
+        file_ticks(ax.yaxis, adjusted, 1, word="north", opposite="south")
         words = "Plan."
     else:
         ax.set_xlabel(f"horizontal distance towards azimuth {(bearing / DEGREE + 90.0) % 360.0:.0f}° (m)")
-        file_ticks(ax.yaxis, findings, 2, word="up", opposite="down")
+        file_ticks(ax.yaxis, adjusted, 2, word="up", opposite="down")
         words = f"Elevation, seen towards azimuth {bearing / DEGREE:.0f}°."
     figure.legend(*ax.get_legend_handles_labels(), loc="lower center", ncols=6)
     return figure, " ".join([words, ellipses, lines])
@@ -142,18 +142,18 @@ def view_frame(centre: np.ndarray, span: np.ndarray) -> tuple[Figure, Any]:
     return figure, ax
 
 
-def file_ticks(axis: Any, findings: Findings, k: int, *, word: str, opposite: str) -> None:
+def file_ticks(axis: Any, adjusted: AdjustedNetwork, k: int, *, word: str, opposite: str) -> None:
     """Set ticks that show the file's own coordinate, in its direction of counting."""
-    axes = findings.network.axes
+    axes = adjusted.network.axes
     j = int(np.argmax(np.abs(axes[k])))
     sign = axes[k, j]
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{sign * value + 0.0:g}".replace("-", "\u2212")))
-    axis.set_label_text(f"{findings.network.axis_names[j]}, {word if sign > 0.0 else opposite} (m)")
+    axis.set_label_text(f"{adjusted.network.axis_names[j]}, {word if sign > 0.0 else opposite} (m)")
 
 
-def _lines(ax: Any, findings: Findings, flat: np.ndarray) -> str:
+def _lines(ax: Any, adjusted: AdjustedNetwork, flat: np.ndarray) -> str:
     """Draw thin lines for the active observations; sentence for the caption."""
-    table = findings.table
+    table = adjusted.table
     start, end = table.ends[table.active, 0], table.ends[table.active, 1]
     pairwise = (start >= 0) & (end >= 0)
     pairs = np.unique(np.sort(np.stack([start[pairwise], end[pairwise]], axis=1), axis=1), axis=0)
@@ -171,7 +171,9 @@ def _lines(ax: Any, findings: Findings, flat: np.ndarray) -> str:
     return "Thin lines: observations." if step == 1 else f"Thin lines: one in {step} of {len(pairs)} observed pairs."
 
 
-def _ellipses(ax: Any, findings: Findings, flat: np.ndarray, outline: Ellipse, scale: float) -> tuple[np.ndarray, str]:
+def _ellipses(
+    ax: Any, adjusted: AdjustedNetwork, flat: np.ndarray, outline: Ellipse, scale: float
+) -> tuple[np.ndarray, str]:
     """Draw standard ellipsoids to scale; mask (n,) of points without one, and the caption's sentence."""
     finite = np.isfinite(outline.major)
     if not (np.isfinite(scale) and np.any(outline.major[finite] > 0.0)):
@@ -179,7 +181,7 @@ def _ellipses(ax: Any, findings: Findings, flat: np.ndarray, outline: Ellipse, s
     usual = float(np.median(outline.major[finite & (outline.major > 0.0)]))
     loose = ~finite | (outline.major > LOOSE * usual)
     rows = np.flatnonzero(~loose & (outline.major > 0.0))
-    colour = np.where(findings.stations[rows], STATION, TARGET)
+    colour = np.where(adjusted.stations[rows], STATION, TARGET)
     many = len(rows) > DENSE
     ax.add_collection(
         EllipseCollection(
@@ -188,7 +190,7 @@ def _ellipses(ax: Any, findings: Findings, flat: np.ndarray, outline: Ellipse, s
             edgecolors=list(colour), linewidths=0.35 if many else 0.7, zorder=3, rasterized=many,
         )
     )  # fmt: skip
-    kind = "variance factor applied" if findings.scaled else "a priori"
+    kind = "variance factor applied" if adjusted.scaled else "a priori"
     return loose, f"Outlines: standard ellipsoids (1σ, {kind}), enlarged {thousands(scale)} times."
 
 
@@ -221,35 +223,35 @@ def _length(value: float) -> str:
     return f"{value / MILLIMETRE:g} mm" if value >= 0.1 * MILLIMETRE else f"{value * 1e6:g} µm"
 
 
-def _marks(ax: Any, findings: Findings, flat: np.ndarray, loose: np.ndarray) -> None:
+def _marks(ax: Any, adjusted: AdjustedNetwork, flat: np.ndarray, loose: np.ndarray) -> None:
     """Draw stations, targets, held and loose points, each with its own mark."""
-    fixed = ~findings.network.points.free.any(axis=1)
+    fixed = ~adjusted.network.points.free.any(axis=1)
     many = len(flat) > DENSE
     for mine, marker, colour, area, name in (
-        (~findings.stations & ~fixed & ~loose, "o", TARGET, 4 if many else 12, "target"),
-        (findings.stations & ~fixed & ~loose, "^", STATION, 26, "station"),
-        (~findings.stations & fixed, "s", FIXED, 20, "held point"),
-        (findings.stations & fixed, "^", FIXED, 26, "held station"),
+        (~adjusted.stations & ~fixed & ~loose, "o", TARGET, 4 if many else 12, "target"),
+        (adjusted.stations & ~fixed & ~loose, "^", STATION, 26, "station"),
+        (~adjusted.stations & fixed, "s", FIXED, 20, "held point"),
+        (adjusted.stations & fixed, "^", FIXED, 26, "held station"),
     ):
         if mine.any():
             ax.scatter(*flat[mine].T, s=area, c=colour, marker=marker, lw=0, zorder=4, label=name, rasterized=many)
-    if loose.any() and findings.answered:
+    if loose.any() and adjusted.answered:
         ax.scatter(
             *flat[loose].T, s=26, facecolors="white", edgecolors=BAD, lw=1.2, zorder=4,
             label=f"no ellipsoid: over {LOOSE:g} times the median",
         )  # fmt: skip
     elif loose.any():
         ax.scatter(*flat[loose].T, s=20, facecolors="white", edgecolors=FAINT, lw=1.0, zorder=4, label="not adjusted")
-    chosen = findings.network.points.datum.any(axis=1)
+    chosen = adjusted.network.points.datum.any(axis=1)
     if chosen.any() and not chosen.all() and not many:
         ax.scatter(*flat[chosen].T, s=85, facecolors="none", edgecolors=SERIES[4], lw=0.8, zorder=3, label="datum")
 
 
-def point_names(ax: Any, findings: Findings, flat: np.ndarray) -> None:
+def point_names(ax: Any, adjusted: AdjustedNetwork, flat: np.ndarray) -> None:
     """Draw point names where they fit, stations first, at the side with least overlap."""
-    order = [*np.flatnonzero(findings.stations), *np.flatnonzero(~findings.stations)]
+    order = [*np.flatnonzero(adjusted.stations), *np.flatnonzero(~adjusted.stations)]
     order = [i for i in order if np.isfinite(flat[i]).all()]
-    chosen = order if len(order) <= NAMED else [i for i in order if findings.stations[i]][:NAMED]
+    chosen = order if len(order) <= NAMED else [i for i in order if adjusted.stations[i]][:NAMED]
     if not chosen:
         return
     where = ax.transData.transform(flat[chosen])
@@ -258,15 +260,15 @@ def point_names(ax: Any, findings: Findings, flat: np.ndarray) -> None:
     point = ax.figure.dpi / 72.0
     occupied = [*np.concatenate([where - 4.0 * point, where + 4.0 * point], axis=1)]  # left, low, right, high
     for i, at, out in zip(chosen, where, outward, strict=True):
-        half = point * np.array([2.5 * len(findings.names[i]), 4.0])
+        half = point * np.array([2.5 * len(adjusted.names[i]), 4.0])
         centres = at + ROUND * (6.0 * point + half)
         boxes = np.concatenate([centres - half, centres + half], axis=1)
         cost = _overlap(boxes, np.array(occupied)) - point * ROUND @ out
         best = int(np.argmin(cost))
         occupied.append(boxes[best])
         ax.annotate(
-            findings.names[i], flat[i], xytext=(centres[best] - at) / point, textcoords="offset points", ha="center",
-            va="center", fontsize=7.5, zorder=5, color=STATION if findings.stations[i] else INK,
+            adjusted.names[i], flat[i], xytext=(centres[best] - at) / point, textcoords="offset points", ha="center",
+            va="center", fontsize=7.5, zorder=5, color=STATION if adjusted.stations[i] else INK,
             path_effects=[withStroke(linewidth=2.2, foreground="white")],
         )  # fmt: skip
 
@@ -281,15 +283,15 @@ def _overlap(boxes: np.ndarray, other_boxes: np.ndarray) -> np.ndarray:
     return np.prod(np.maximum(high - low, 0.0), axis=2).sum(axis=1)
 
 
-def _residuals(findings: Findings) -> tuple[Figure, str]:
+def _residuals(adjusted: AdjustedNetwork) -> tuple[Figure, str]:
     """Standardised residuals in file order, and their histogram against the normal distribution."""
-    table = findings.table
-    tested = np.flatnonzero(np.isfinite(findings.statistic))
-    w = findings.statistic[tested]
+    table = adjusted.table
+    tested = np.flatnonzero(np.isfinite(adjusted.statistic))
+    w = adjusted.statistic[tested]
     figure = Figure(figsize=(WIDTH, 3.9), dpi=RASTER)
     sequence, histogram = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
     figure.subplots_adjust(left=0.065, right=0.985, bottom=0.21, top=0.91, wspace=0.17)
-    span = max(1.25 * (findings.critical if np.isfinite(findings.critical) else 4.0), 4.0)
+    span = max(1.25 * (adjusted.critical if np.isfinite(adjusted.critical) else 4.0), 4.0)
     inside = np.abs(w) <= span
     many = len(w) > 5 * DENSE
     for k, kind in enumerate(table.kinds):
@@ -305,12 +307,12 @@ def _residuals(findings: Findings) -> tuple[Figure, str]:
             tested[~inside], np.clip(far, -0.97 * span, 0.97 * span), s=26, c=BAD, marker="D", lw=0, zorder=3,
             label=f"beyond the edge, to {np.max(np.abs(far)):.3g}",
         )  # fmt: skip
-    for limit in (-findings.critical, findings.critical):
+    for limit in (-adjusted.critical, adjusted.critical):
         sequence.axhline(limit, color=BAD, lw=0.8, ls="--")
     sequence.set_ylim(-span, span)
     sequence.set_title("All tested observations")
     sequence.set_xlabel("number in the file")
-    sequence.set_ylabel(f"test statistic {'τ' if findings.test == 'tau' else 'w'}")
+    sequence.set_ylabel(f"test statistic {'τ' if adjusted.test == 'tau' else 'w'}")
     figure.legend(
         *sequence.get_legend_handles_labels(),
         loc="lower left",
@@ -329,15 +331,15 @@ def _residuals(findings: Findings) -> tuple[Figure, str]:
     histogram.legend(loc="upper left", handlelength=1.2)
     histogram.set_ylim(top=histogram.get_ylim()[1] * 1.25)
     return figure, (
-        f"Left: test statistics of {len(w)} observations; dashed: ±{findings.critical:.2f}, beyond which an "
-        f"observation is suspect (level {findings.level:g} for all tests together). Right: their histogram, and the "
+        f"Left: test statistics of {len(w)} observations; dashed: ±{adjusted.critical:.2f}, beyond which an "
+        f"observation is suspect (level {adjusted.level:g} for all tests together). Right: their histogram, and the "
         "normal distribution that the claimed uncertainties predict."
     )
 
 
-def _redundancy(findings: Findings) -> tuple[Figure, str]:
+def _redundancy(adjusted: AdjustedNetwork) -> tuple[Figure, str]:
     """Share of an error that would show in each observation's residual, by kind."""
-    table = findings.table
+    table = adjusted.table
     active = table.active & np.isfinite(table.redundancy)
     kinds = [k for k in range(len(table.kinds)) if (active & (table.kind == k)).any()]
     figure = Figure(figsize=(WIDTH, 2.6))

@@ -2,22 +2,21 @@
 
 import hashlib
 from collections.abc import Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from catseye.aliases import Progress
 from catseye.gateways.network.comparison import FORMAT as COMPARISON
-from catseye.gateways.network.comparison import ComparedEpochs, comparison_object
-from catseye.gateways.network.findings import Findings
+from catseye.gateways.network.comparison import comparison_object
 from catseye.gateways.network.objects import FORMAT, network_json
 from catseye.gateways.network.tables import coordinates_csv, displacements_csv, observations_csv, parameters_csv
 from catseye.gateways.network.xml import network_xml
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.written import Files, origin, write_files
-
-if TYPE_CHECKING:
-    from catseye.reduction.network import AdjustedNetwork
+from catseye.reduction.network.adjusted import AdjustedNetwork
+from catseye.reduction.network.comparison import ComparedEpochs
 
 
 def input_hashes(source: Path) -> dict[str, str]:
@@ -30,25 +29,23 @@ def input_hashes(source: Path) -> dict[str, str]:
 
 
 def write_network(
-    findings: Findings,
+    adjusted: AdjustedNetwork,
     directory: Path,
     inputs: Mapping[str, str],
     *,
     progress: Progress | None = None,
-    treated: "AdjustedNetwork | None" = None,
 ) -> None:
     """Write tables, JSON, report, and the provenance with their hashes.
 
-    findings    findings on a solution
+    adjusted    adjusted on a solution
     directory   existing, from `writers.output.atomic_directory`
     inputs      SHA-256 of each input file, by name, see `input_hashes`
     progress    called for each file
-    treated     treatment of the observations, if requested
     """
     when = datetime.now(UTC)
-    provenance = {"format": FORMAT, "made_by": "catseye adjust", "settings": _settings(findings)}
+    provenance = {"format": FORMAT, "made_by": "catseye adjust", "settings": _settings(adjusted)}
     write_files(
-        _files(findings, when, inputs, treated=treated),
+        _files(adjusted, when, inputs),
         directory,
         {**provenance, **origin(when, inputs)},
         progress=progress,
@@ -72,8 +69,8 @@ def write_comparison(
         "displacements.csv": lambda: displacements_csv(compared),
         "comparison.json": lambda: [json_page(comparison_object(compared))],
         "report.html": lambda: [comparison_report(compared, when, inputs)],
-        **_files(compared.first, when, inputs, prefix="epoch-1-"),
-        **_files(compared.second, when, inputs, prefix="epoch-2-"),
+        **_files(replace(compared.first, treatment=None), when, inputs, prefix="epoch-1-"),
+        **_files(replace(compared.second, treatment=None), when, inputs, prefix="epoch-2-"),
     }
     d = compared.deformation
     settings = {
@@ -87,26 +84,25 @@ def write_comparison(
     write_files(files, directory, {**provenance, **origin(when, inputs)}, progress=progress)
 
 
-def _settings(findings: Findings) -> dict[str, Any]:
-    return {"level": findings.level, "scaled": findings.scaled, "test": findings.test, "datum": findings.solution.datum}
+def _settings(adjusted: AdjustedNetwork) -> dict[str, Any]:
+    return {"level": adjusted.level, "scaled": adjusted.scaled, "test": adjusted.test, "datum": adjusted.solution.datum}
 
 
 def _files(
-    findings: Findings,
+    adjusted: AdjustedNetwork,
     when: datetime,
     inputs: Mapping[str, str],
     *,
     prefix: str = "",
-    treated: "AdjustedNetwork | None" = None,
 ) -> Files:
     from catseye.gateways.network.report import network_report  # matplotlib is heavy
 
     files: Files = {
-        "coordinates.csv": lambda: coordinates_csv(findings),
-        "observations.csv": lambda: observations_csv(findings),
-        "parameters.csv": lambda: parameters_csv(findings),
-        "adjustment.json": lambda: network_json(findings, lines=True, treated=treated),
-        "adjustment.xml": lambda: network_xml(findings),
-        "report.html": lambda: [network_report(findings, when, inputs, prefix=prefix, treated=treated)],
+        "coordinates.csv": lambda: coordinates_csv(adjusted),
+        "observations.csv": lambda: observations_csv(adjusted),
+        "parameters.csv": lambda: parameters_csv(adjusted),
+        "adjustment.json": lambda: network_json(adjusted, lines=True),
+        "adjustment.xml": lambda: network_xml(adjusted),
+        "report.html": lambda: [network_report(adjusted, when, inputs, prefix=prefix)],
     }
     return {prefix + name: pieces for name, pieces in files.items()}

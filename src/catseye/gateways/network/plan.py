@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from html import escape
 from pathlib import Path
@@ -12,19 +11,19 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.estimation.network.monte_carlo import MonteCarloScatter
-from catseye.estimation.network.plan import Candidate, Plan
-from catseye.gateways.network.findings import Findings
+from catseye.estimation.network.plan import Candidate
 from catseye.gateways.network.objects import network_object
-from catseye.gateways.network.summary import direction_words, quantity
+from catseye.gateways.network.summary import direction_words
 from catseye.gateways.network.tables import candidates_csv, coordinates_csv
 from catseye.gateways.writers.objects import json_page, plain
 from catseye.gateways.writers.page import card, page, paragraph, section, table
 from catseye.gateways.writers.passage import Passage
-from catseye.gateways.writers.verdict import Verdict, verdict_line
+from catseye.gateways.writers.verdict import verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
+from catseye.reduction.network.plan import PlannedNetwork
+from catseye.reduction.network.words import quantity
 
 FORMAT = "catseye-plan-1"
-LARGEST_RATIO = 1.2  # largest acceptable departure over claim in the Monte Carlo
 LISTED = 10  # weakest points and most important observations in text and report
 CONTENTS = {
     "summary": "Summary",
@@ -37,65 +36,18 @@ CONTENTS = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class PlanFindings:
-    """Findings on a plan.
-
-    findings   findings on its predicted solution
-    plan       plan of the network, with the worth of its observations and the candidates
-    picked     schedule of additional ranges, empty without a time budget
-    scatter    Monte Carlo scatter, if requested
-    """
-
-    findings: Findings
-    plan: Plan
-    picked: tuple[Candidate, ...]
-    scatter: MonteCarloScatter | None
-
-    @property
-    def weakest(self) -> np.ndarray:
-        """Rows of the points, (k,), weakest first, without held ones."""
-        order = np.argsort(-self.plan.weakest, kind="stable")
-        return order[self.plan.weakest[order] > 0.0]
-
-    @property
-    def worth(self) -> np.ndarray:
-        """Worth of every observation in table order, (m,) m."""
-        offset = np.cumsum([0, *(len(w) for w in self.plan.worth)])
-        return np.concatenate([np.zeros(0), *self.plan.worth])[
-            offset[self.findings.table.group] + self.findings.table.row
-        ]
-
-
-def plan_verdict(plan_findings: PlanFindings) -> Verdict:
-    """Verdict on the plan: every point determined and every observation checked."""
-    findings = plan_findings.findings
-    if not findings.answered:
-        return Verdict("failed", findings.solution.status)
-    alone = int(np.isinf(plan_findings.worth).sum())
-    if alone:
-        return Verdict("doubtful", f"{alone} observations are indispensable: losing one leaves a point undetermined")
-    unchecked = int(np.sum(~findings.table.checked))
-    if unchecked:
-        return Verdict("doubtful", f"an error in {unchecked} of {len(findings.table)} observations would not show")
-    if plan_findings.scatter is not None and plan_findings.scatter.ratio > LARGEST_RATIO:
-        ratio = plan_findings.scatter.ratio
-        return Verdict("doubtful", f"in the Monte Carlo the departures are {ratio:.2f} times the claimed uncertainties")
-    return Verdict("good", "every point would be determined and every observation checked by others")
-
-
-def plan_object(plan_findings: PlanFindings) -> dict[str, Any]:
+def plan_object(planned: PlannedNetwork) -> dict[str, Any]:
     """Object that `catseye plan --json` prints: the keys of an adjustment, predicted, and the plan's."""
-    plan, findings = plan_findings.plan, plan_findings.findings
-    base = network_object(findings)
-    for row, worth in zip(base["observations"], plain(plan_findings.worth.tolist()), strict=True):
+    plan, predicted = planned.plan, planned.predicted
+    base = network_object(predicted)
+    for row, worth in zip(base["observations"], plain(planned.worth.tolist()), strict=True):
         for key in ("observed", "residual", "standardised", "estimated_error", "test", "p"):
             row[key] = None  # not measured yet
         row["worth"] = worth
-    names, axes = findings.names, findings.network.axes
+    names, axes = predicted.names, predicted.network.axes
     extra = {
         "format": FORMAT,
-        "verdict": plan_verdict(plan_findings).to_object(),
+        "verdict": planned.verdict.to_object(),
         "status": "planned",
         "suspects": [],
         "variance_factor": None,
@@ -103,12 +55,12 @@ def plan_object(plan_findings: PlanFindings) -> dict[str, Any]:
         "interest": [name for name, chosen in zip(names, plan.interest, strict=True) if chosen],
         "weakest": [
             {"point": names[i], "u": plan.weakest[i], "direction": (plan.direction[i] @ axes).tolist()}
-            for i in plan_findings.weakest
+            for i in planned.weakest
         ],
         "candidates": [_candidate(c, scheduled=False) for c in plan.candidates],
         "best_next": _candidate(plan.candidates[0], scheduled=False) if plan.candidates else None,
-        "schedule": [_candidate(c, scheduled=True) for c in plan_findings.picked],
-        "monte_carlo": _scatter(plan_findings.scatter),
+        "schedule": [_candidate(c, scheduled=True) for c in planned.picked],
+        "monte_carlo": _scatter(planned.scatter),
     }
     for key in ("chi_square", "critical", "iterations"):
         base.pop(key, None)
@@ -135,34 +87,34 @@ def _scatter(scatter: MonteCarloScatter | None) -> dict[str, Any] | None:
     }
 
 
-def plan_json(plan_findings: PlanFindings) -> Iterator[str]:
+def plan_json(planned: PlannedNetwork) -> Iterator[str]:
     """Plan as JSON text on one line."""
-    yield json.dumps(plan_object(plan_findings), allow_nan=False)
+    yield json.dumps(plan_object(planned), allow_nan=False)
 
 
-def plan_passages(plan_findings: PlanFindings) -> list[Passage]:
+def plan_passages(planned: PlannedNetwork) -> list[Passage]:
     """Passages on quality, weak points, next observations, and Monte Carlo."""
-    plan, findings = plan_findings.plan, plan_findings.findings
+    plan, predicted = planned.plan, planned.predicted
     u = quantity(plan.mean_u, "m")
     passages = [
         Passage(
             "The plan",
-            f"{len(findings.table)} observations of {len(findings.names)} points would give the coordinates of "
+            f"{len(predicted.table)} observations of {len(predicted.names)} points would give the coordinates of "
             f"{int(plan.interest.sum())} points with a standard uncertainty of {u}, root mean square; "
-            f"datum: {findings.solution.datum}.",
+            f"datum: {predicted.solution.datum}.",
         )
     ]
     weak = [
-        f"{findings.names[i]} {quantity(plan.weakest[i], 'm')} {direction_words(findings, int(i))}"
-        for i in plan_findings.weakest[:3]
+        f"{predicted.names[i]} {quantity(plan.weakest[i], 'm')} {direction_words(predicted, int(i))}"
+        for i in planned.weakest[:3]
     ]
     if weak:
         passages.append(Passage("Weakest", "; ".join(weak) + "."))
-    table, worth = findings.table, plan_findings.worth
+    table, worth = predicted.table, planned.worth
     needed = np.flatnonzero(np.isinf(worth))
     unchecked = int(np.sum(~table.checked))
     text = f"{len(needed)} observations are indispensable: without one of them a point is undetermined"
-    text += f", first {findings.label(int(needed[0]))}." if len(needed) else "." if unchecked else " (none)."
+    text += f", first {predicted.label(int(needed[0]))}." if len(needed) else "." if unchecked else " (none)."
     text = text if len(needed) else "No single observation is indispensable."
     if unchecked:
         text += f" {unchecked} are not checked by others: an error there would not show."
@@ -185,18 +137,18 @@ def plan_passages(plan_findings: PlanFindings) -> list[Passage]:
                 + ".",
             )
         )
-    if plan_findings.picked:
-        last = plan_findings.picked[-1]
-        order = ", ".join(f"{c.from_} - {c.to}" for c in plan_findings.picked[:6])
-        more = f" and {len(plan_findings.picked) - 6} more" if len(plan_findings.picked) > 6 else ""
+    if planned.picked:
+        last = planned.picked[-1]
+        order = ", ".join(f"{c.from_} - {c.to}" for c in planned.picked[:6])
+        more = f" and {len(planned.picked) - 6} more" if len(planned.picked) > 6 else ""
         passages.append(
             Passage(
                 "In the given time",
-                f"{len(plan_findings.picked)} ranges, {order}{more}, would bring it to {quantity(last.mean_u, 'm')}.",
+                f"{len(planned.picked)} ranges, {order}{more}, would bring it to {quantity(last.mean_u, 'm')}.",
             )
         )
-    if plan_findings.scatter is not None:
-        passages.append(Passage("Monte Carlo", scatter_words(plan_findings.scatter)))
+    if planned.scatter is not None:
+        passages.append(Passage("Monte Carlo", scatter_words(planned.scatter)))
     return passages
 
 
@@ -212,44 +164,42 @@ def scatter_words(s: MonteCarloScatter) -> str:
     return text
 
 
-def plan_report(plan_findings: PlanFindings, when: datetime, inputs: Mapping[str, str]) -> str:
+def plan_report(planned: PlannedNetwork, when: datetime, inputs: Mapping[str, str]) -> str:
     """HTML report of a planned network."""
     from catseye.gateways.network.figures import network_figures
     from catseye.gateways.network.report import provenance_section, view_pictures
 
-    findings, plan = plan_findings.findings, plan_findings.plan
-    drawn = network_figures(findings)
-    name = findings.network.source or "network"
+    predicted, plan = planned.predicted, planned.plan
+    drawn = network_figures(predicted)
+    name = predicted.network.source or "network"
     links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())
     header = (
         f"<header><h1>{escape(name)}: plan of a network</h1>"
-        f'<div class="faint">{len(findings.table)} observations of {len(findings.names)} points, predicted by catseye '
-        f"on {when:%Y-%m-%d %H:%M} UTC; nothing here was measured. u = standard uncertainty, 1σ</div>"
+        f'<div class="faint">{len(predicted.table)} observations of {len(predicted.names)} points, predicted by '
+        f"catseye on {when:%Y-%m-%d %H:%M} UTC; nothing here was measured. u = standard uncertainty, 1σ</div>"
         f"<nav>{links}</nav></header>"
     )
-    words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in plan_passages(plan_findings))
+    words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in plan_passages(planned))
     following = _ranges(plan.candidates) if plan.candidates else paragraph("No ranges to add.")
     scheduled = (
-        "<h3>Schedule in the given time</h3>" + _ranges(plan_findings.picked, scheduled=True)
-        if plan_findings.picked
-        else ""
+        "<h3>Schedule in the given time</h3>" + _ranges(planned.picked, scheduled=True) if planned.picked else ""
     )
     scatter = (
-        paragraph(scatter_words(plan_findings.scatter)[0].upper() + scatter_words(plan_findings.scatter)[1:])
-        if plan_findings.scatter
+        paragraph(scatter_words(planned.scatter)[0].upper() + scatter_words(planned.scatter)[1:])
+        if planned.scatter
         else ""
     )
     body = [
         header,
-        verdict_line(plan_verdict(plan_findings)),
+        verdict_line(planned.verdict),
         section(
             "summary",
             CONTENTS["summary"],
-            f'<div class="cards">{"".join(_cards(plan_findings))}</div>',
+            f'<div class="cards">{"".join(_cards(planned))}</div>',
             f"<dl>{words}</dl>",
         ),
         section("network", CONTENTS["network"], *view_pictures(drawn)),
-        section("weakest", CONTENTS["weakest"], _weakest(plan_findings)),
+        section("weakest", CONTENTS["weakest"], _weakest(planned)),
         section(
             "next",
             CONTENTS["next"],
@@ -264,53 +214,53 @@ def plan_report(plan_findings: PlanFindings, when: datetime, inputs: Mapping[str
             "observations",
             CONTENTS["observations"],
             paragraph("Worth: increase of the mean standard uncertainty without the observation."),
-            _worth(plan_findings),
+            _worth(planned),
         ),
-        section("paper", CONTENTS["paper"], scatter or paragraph("Not requested (--runs).", "faint")),
+        section("paper", CONTENTS["paper"], scatter or paragraph("Not requested.", "faint")),
         provenance_section(when, inputs, {"candidates listed": str(len(plan.candidates))}),
     ]
     return page(f"catseye plan: {name}", "\n".join(body))
 
 
-def _cards(plan_findings: PlanFindings) -> list[str]:
-    findings, plan = plan_findings.findings, plan_findings.plan
+def _cards(planned: PlannedNetwork) -> list[str]:
+    predicted, plan = planned.predicted, planned.plan
     return [
         card("Coordinate uncertainty", quantity(plan.mean_u, "m"), "root mean square over the points of interest"),
         card(
             "Weakest point",
-            findings.names[plan_findings.weakest[0]] if len(plan_findings.weakest) else "none",
+            predicted.names[planned.weakest[0]] if len(planned.weakest) else "none",
             f"{quantity(float(plan.weakest.max(initial=0.0)), 'm')} along its longest axis",
         ),
-        card("Indispensable", str(int(np.isinf(plan_findings.worth).sum())), "losing one leaves a point undetermined"),
-        card("Unchecked", str(int(np.sum(~findings.table.checked))), "observations whose error would not show"),
+        card("Indispensable", str(int(np.isinf(planned.worth).sum())), "losing one leaves a point undetermined"),
+        card("Unchecked", str(int(np.sum(~predicted.table.checked))), "observations whose error would not show"),
     ]
 
 
-def _weakest(plan_findings: PlanFindings) -> str:
-    findings, plan = plan_findings.findings, plan_findings.plan
+def _weakest(planned: PlannedNetwork) -> str:
+    predicted, plan = planned.predicted, planned.plan
     return table(
         ("point", "longest axis (mm)", "towards"),
         [
-            (findings.names[i], f"{plan.weakest[i] / MILLIMETRE:.4f}", direction_words(findings, int(i)))
-            for i in plan_findings.weakest[: 5 * LISTED]
+            (predicted.names[i], f"{plan.weakest[i] / MILLIMETRE:.4f}", direction_words(predicted, int(i)))
+            for i in planned.weakest[: 5 * LISTED]
         ],
         "tnt",
     )
 
 
-def _worth(plan_findings: PlanFindings) -> str:
+def _worth(planned: PlannedNetwork) -> str:
     """Table of the observations' worth, the largest first."""
-    findings = plan_findings.findings
-    order = np.argsort(-plan_findings.worth, kind="stable")[: 5 * LISTED]
+    predicted = planned.predicted
+    order = np.argsort(-planned.worth, kind="stable")[: 5 * LISTED]
     return table(
         ("observation", "worth (µm)", "redundancy", "detectable"),
         [
             (
-                findings.label(int(k)),
-                "∞" if np.isinf(plan_findings.worth[k]) else f"{plan_findings.worth[k] * 1e6:.4f}",
-                f"{findings.table.redundancy[k]:.3f}",
-                quantity(findings.table.mdb[k], str(findings.table.unit[k]))
-                if np.isfinite(findings.table.mdb[k])
+                predicted.label(int(k)),
+                "∞" if np.isinf(planned.worth[k]) else f"{planned.worth[k] * 1e6:.4f}",
+                f"{predicted.table.redundancy[k]:.3f}",
+                quantity(predicted.table.mdb[k], str(predicted.table.unit[k]))
+                if np.isfinite(predicted.table.mdb[k])
                 else "never",
             )
             for k in order
@@ -336,7 +286,7 @@ def _ranges(rows: tuple[Candidate, ...], *, scheduled: bool = False) -> str:
 
 
 def write_plan(
-    plan_findings: PlanFindings,
+    planned: PlannedNetwork,
     directory: Path,
     inputs: Mapping[str, str],
     *,
@@ -345,10 +295,10 @@ def write_plan(
     """Write report, tables and JSON of a plan, and last the provenance with their hashes."""
     when = datetime.now(UTC)
     files: Files = {
-        "report.html": lambda: plan_report(plan_findings, when, inputs),
-        "points.csv": lambda: "".join(coordinates_csv(plan_findings.findings)),
-        "candidates.csv": lambda: "".join(candidates_csv(plan_findings.plan.candidates, plan_findings.picked)),
-        "plan.json": lambda: json_page(plan_object(plan_findings)),
+        "report.html": lambda: plan_report(planned, when, inputs),
+        "points.csv": lambda: "".join(coordinates_csv(planned.predicted)),
+        "candidates.csv": lambda: "".join(candidates_csv(planned.plan.candidates, planned.picked)),
+        "plan.json": lambda: json_page(plan_object(planned)),
     }
     provenance = {"format": FORMAT, "made_by": "catseye plan"}
     write_files(files, directory, {**provenance, **origin(when, inputs)}, progress=progress)

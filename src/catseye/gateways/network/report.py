@@ -3,20 +3,17 @@
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from html import escape
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.gateways.network.figures import CaptionedFigure, network_figures
-from catseye.gateways.network.findings import Findings
-from catseye.gateways.network.summary import factor_words, passages, quantity, treatment_passages, verdict
+from catseye.gateways.network.summary import factor_words, passages, treatment_passages
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
 from catseye.gateways.writers.verdict import verdict_line
-
-if TYPE_CHECKING:
-    from catseye.reduction.network import AdjustedNetwork
+from catseye.reduction.network.adjusted import AdjustedNetwork
+from catseye.reduction.network.words import quantity
 
 CONTENTS = {
     "summary": "Summary",
@@ -34,58 +31,56 @@ UNCHECKED = 100  # unchecked observations named
 
 
 def network_report(
-    findings: Findings,
+    adjusted: AdjustedNetwork,
     when: datetime,
     inputs: Mapping[str, str],
     *,
     prefix: str = "",
-    treated: "AdjustedNetwork | None" = None,
 ) -> str:
     """HTML report.
 
-    findings   findings on a solution
+    adjusted   network
     when       UTC
     inputs     SHA-256 of each input file, by name
     prefix     prefix of the tables' file names
-    treated    treatment of the observations, if requested
     """
-    drawn = network_figures(findings)
-    name = findings.network.source or "network"
+    drawn = network_figures(adjusted)
+    name = adjusted.network.source or "network"
     links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())
-    axes = ", ".join(findings.network.axis_names)
+    axes = ", ".join(adjusted.network.axis_names)
     header = (
         f"<header><h1>{escape(name)}: network adjustment</h1>"
-        f'<div class="faint">{len(findings.table)} observations of {len(findings.names)} points, adjusted by catseye '
+        f'<div class="faint">{len(adjusted.table)} observations of {len(adjusted.names)} points, adjusted by catseye '
         f"on {when:%Y-%m-%d %H:%M} UTC; coordinates in the file's own axes ({escape(axes)}), u = standard uncertainty, "
-        f"1σ{', variance factor applied' if findings.scaled else ', as claimed before'}</div>"
+        f"1σ{', variance factor applied' if adjusted.scaled else ', as claimed before'}</div>"
         f"<nav>{links}</nav></header>"
     )
     body = [
         header,
-        verdict_line(verdict(findings)),
-        _summary(findings, treated),
+        verdict_line(adjusted.verdict),
+        _summary(adjusted),
         _network(drawn),
-        _observations(findings, drawn, f"{prefix}observations.csv"),
-        _reliability(findings, drawn),
-        _points(findings, f"{prefix}coordinates.csv"),
-        _datum(findings),
+        _observations(adjusted, drawn, f"{prefix}observations.csv"),
+        _reliability(adjusted, drawn),
+        _points(adjusted, f"{prefix}coordinates.csv"),
+        _datum(adjusted),
         provenance_section(
-            when, inputs, {"level of the tests": f"{findings.level:g}", "variance factor applied": str(findings.scaled)}
+            when, inputs, {"level of the tests": f"{adjusted.level:g}", "variance factor applied": str(adjusted.scaled)}
         ),
     ]
     return page(f"catseye: {name}", "\n".join(body))
 
 
-def _summary(findings: Findings, treated: "AdjustedNetwork | None") -> str:
-    axis = findings.ellipsoid.semi_axes[:, 0]
+def _summary(adjusted: AdjustedNetwork) -> str:
+    axis = adjusted.ellipsoid.semi_axes[:, 0]
     positive = axis[np.isfinite(axis) & (axis > 0.0)]
-    cards = network_cards(findings)
+    cards = network_cards(adjusted)
     if len(positive):
         usual, worst = quantity(float(np.median(positive)), "m"), quantity(float(positive.max()), "m")
         cards.insert(1, card("Point uncertainty", usual, f"longest axis of the median ellipsoid; worst {worst}"))
-    listed = [*passages(findings), *([] if treated is None else treatment_passages(treated, findings))]
+    listed = [*passages(adjusted), *treatment_passages(adjusted)]
     words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in listed)
-    text = findings.network.description.strip()
+    text = adjusted.network.description.strip()
     return section(
         "summary",
         CONTENTS["summary"],
@@ -95,26 +90,26 @@ def _summary(findings: Findings, treated: "AdjustedNetwork | None") -> str:
     )
 
 
-def network_cards(findings: Findings) -> list[str]:
+def network_cards(adjusted: AdjustedNetwork) -> list[str]:
     """Cards with the main numbers.
 
-    findings   findings on a solution
+    adjusted   network
     """
-    overall, active = findings.global_test, findings.table.active
-    unchecked = int(np.sum(active & ~findings.table.checked)) if findings.answered else 0
+    overall, active = adjusted.global_test, adjusted.table.active
+    unchecked = int(np.sum(active & ~adjusted.table.checked)) if adjusted.answered else 0
     interval = f"expected {overall.lower:.3f} to {overall.upper:.3f}" if np.isfinite(overall.p) else "not tested"
-    degrees = findings.solution.degrees_of_freedom
-    suspects = str(len(findings.suspects)) if findings.answered else "unknown"
+    degrees = adjusted.solution.degrees_of_freedom
+    suspects = str(len(adjusted.suspects)) if adjusted.answered else "unknown"
     return [
         card(
             "Variance factor",
             factor_words(overall.factor) if np.isfinite(overall.p) else "unknown",
             f"{interval}, {degrees:.0f} degrees of freedom" if np.isfinite(degrees) else interval,
         ),
-        card("Suspect observations", suspects, f"of {int(active.sum())}, level {findings.level:g} for all"),
+        card("Suspect observations", suspects, f"of {int(active.sum())}, level {adjusted.level:g} for all"),
         card(
             "Unchecked observations",
-            str(unchecked) if findings.answered else "unknown",
+            str(unchecked) if adjusted.answered else "unknown",
             "an error there would not show",
         ),
     ]
@@ -136,9 +131,9 @@ def view_pictures(drawn: dict[str, CaptionedFigure]) -> list[str]:
     ]
 
 
-def _observations(findings: Findings, drawn: dict[str, CaptionedFigure], file: str) -> str:
-    rows = findings.table.worst_first[:WORST]
-    total = len(findings.table)
+def _observations(adjusted: AdjustedNetwork, drawn: dict[str, CaptionedFigure], file: str) -> str:
+    rows = adjusted.table.worst_first[:WORST]
+    total = len(adjusted.table)
     note = (
         f"The {len(rows)} worst of {total}; all are in {file}." if len(rows) < total else f"All {total}, worst first."
     )
@@ -150,46 +145,46 @@ def _observations(findings: Findings, drawn: dict[str, CaptionedFigure], file: s
             f"{note} The residual is observed minus adjusted; the test statistic is the residual in units of its own "
             "uncertainty; the estimated error explains it best if nothing else is wrong."
         ),
-        observation_rows(findings, rows),
+        observation_rows(adjusted, rows),
     )
 
 
-def observation_rows(findings: Findings, rows: Sequence[int] | np.ndarray) -> str:
+def observation_rows(adjusted: AdjustedNetwork, rows: Sequence[int] | np.ndarray) -> str:
     """Table of observations; lengths in mm, angles in arc seconds.
 
-    findings   findings on a solution
+    adjusted   network
     rows       rows of its table
     """
-    t, suspect = findings.table, set(findings.suspects.tolist())
+    t, suspect = adjusted.table, set(adjusted.suspects.tolist())
     fine = {"m": (MILLIMETRE, "mm"), "rad": (ARCSECOND, "″")}
     lines = []
     for i in rows:
         scale, unit = fine.get(str(t.unit[i]), (1.0, ""))
         what = "suspect" if i in suspect else "left out" if not t.active[i] else ""
-        what = "unchecked" if findings.answered and t.active[i] and not t.checked[i] else what
+        what = "unchecked" if adjusted.answered and t.active[i] and not t.checked[i] else what
         lines.append(
             (
-                findings.label(int(i)),
+                adjusted.label(int(i)),
                 *(_number(float(v[i]) / scale, form) for v, form in ((t.residual, "+.4g"), (t.u, ".4g"))),
                 unit,
-                _number(float(findings.statistic[i]), "+.2f"),
-                _number(float(findings.p[i]), ".2g"),
+                _number(float(adjusted.statistic[i]), "+.2f"),
+                _number(float(adjusted.p[i]), ".2g"),
                 _number(float(t.redundancy[i]), ".3f"),
                 *(_number(float(v[i]) / scale, form) for v, form in ((t.estimated_error, "+.4g"), (t.mdb, ".4g"))),
                 what,
             )
         )
     columns = (
-        "observation", "residual", "u", "unit", f"{findings.test} statistic", "p of all", "redundancy",
+        "observation", "residual", "u", "unit", f"{adjusted.test} statistic", "p of all", "redundancy",
         "estimated error", "detectable error", "",
     )  # fmt: skip
     return table(columns, lines, "tnntnnnnnt")
 
 
-def _reliability(findings: Findings, drawn: dict[str, CaptionedFigure]) -> str:
-    if not findings.answered:
+def _reliability(adjusted: AdjustedNetwork, drawn: dict[str, CaptionedFigure]) -> str:
+    if not adjusted.answered:
         return section("reliability", CONTENTS["reliability"], paragraph("Unknown without a solution."))
-    rows = np.flatnonzero(findings.table.active & ~findings.table.checked)
+    rows = np.flatnonzero(adjusted.table.active & ~adjusted.table.checked)
     parts = [picture(drawn["redundancy"].svg, drawn["redundancy"].caption)] if "redundancy" in drawn else []
     if not len(rows):
         parts.append(paragraph("All observations are checked by others."))
@@ -200,30 +195,30 @@ def _reliability(findings: Findings, drawn: dict[str, CaptionedFigure]) -> str:
                 f"{len(rows)} observations are not checked by others; an error in one of them would not show{more}."
             )
         )
-        parts.append(observation_rows(findings, rows[:UNCHECKED]))
+        parts.append(observation_rows(adjusted, rows[:UNCHECKED]))
     return section("reliability", CONTENTS["reliability"], *parts)
 
 
-def _points(findings: Findings, file: str) -> str:
-    count = len(findings.names)
+def _points(adjusted: AdjustedNetwork, file: str) -> str:
+    count = len(adjusted.names)
     rows, note = np.arange(count), ""
     if count > MOST_LISTED:
-        rows = np.argsort(-np.nan_to_num(findings.ellipsoid.semi_axes[:, 0], nan=np.inf), kind="stable")[:WEAKEST]
+        rows = np.argsort(-np.nan_to_num(adjusted.ellipsoid.semi_axes[:, 0], nan=np.inf), kind="stable")[:WEAKEST]
         note = f"The {WEAKEST} weakest of {count}; all are in {file}. "
-    names = findings.network.axis_names
-    points = findings.network.points
+    names = adjusted.network.axis_names
+    points = adjusted.network.points
     roles = np.where(points.datum.any(axis=1), "datum", "")
     roles = np.where(points.fixed.any(axis=1), np.where(points.free.any(axis=1), "partly held", "held"), roles)
-    u, axis = findings.u / MILLIMETRE, findings.ellipsoid.semi_axes / MILLIMETRE
+    u, axis = adjusted.u / MILLIMETRE, adjusted.ellipsoid.semi_axes / MILLIMETRE
     lines = [
         (
-            findings.names[i],
-            "station" if findings.stations[i] else "target",
+            adjusted.names[i],
+            "station" if adjusted.stations[i] else "target",
             str(roles[i]),
-            *(_number(float(v), ".7f") for v in findings.x[i]),
+            *(_number(float(v), ".7f") for v in adjusted.x[i]),
             *(_number(float(v), ".4f") for v in u[i]),
             " / ".join(_number(float(v), ".4g") for v in axis[i]),
-            str(findings.observation_counts[i]),
+            str(adjusted.observation_counts[i]),
         )
         for i in rows.tolist()
     ]
@@ -239,13 +234,13 @@ def _points(findings: Findings, file: str) -> str:
             f"Covariances are in {file}."
         ),
         table(columns, lines, "tttnnnnnnnn"),
-        _relative(findings),
+        _relative(adjusted),
     )
 
 
-def _relative(findings: Findings) -> str:
+def _relative(adjusted: AdjustedNetwork) -> str:
     """Section on the requested pairs of points."""
-    if not findings.relative:
+    if not adjusted.relative:
         return ""
     rows = [
         (
@@ -254,24 +249,24 @@ def _relative(findings: Findings) -> str:
             _number(r.u_distance / MILLIMETRE, ".4f"),
             " / ".join(_number(float(v) / MILLIMETRE, ".4g") for v in r.ellipsoid.semi_axes),
         )
-        for r in findings.relative
+        for r in adjusted.relative
     ]
     return "<h3>Relative positions</h3>" + table(
         ("pair", "distance (m)", "u (mm)", "semi-axes of the relative ellipsoid (mm)"), rows, "tnnn"
     )
 
 
-def _datum(findings: Findings) -> str:
-    solution, parameters = findings.solution, findings.network.parameters
+def _datum(adjusted: AdjustedNetwork) -> str:
+    solution, parameters = adjusted.solution, adjusted.network.parameters
     parts = [
         paragraph(f"Datum: {solution.datum}. {solution.iterations} iterations. Status: {solution.status}."),
     ]
     rows = [
         (p.name, *parameter_cells(float(v), float(u), p.unit), _prior(p.start, p.sigma, p.unit))
-        for p, v, u in zip(parameters, solution.parameters, findings.u_parameters, strict=True)
+        for p, v, u in zip(parameters, solution.parameters, adjusted.u_parameters, strict=True)
     ]
     if rows:
-        axes = "" if np.array_equal(findings.network.axes, np.eye(3)) else " Their axes are x east, y north, z up."
+        axes = "" if np.array_equal(adjusted.network.axes, np.eye(3)) else " Their axes are x east, y north, z up."
         parts.append(paragraph(f"{len(rows)} additional parameters.{axes}"))
         parts.append(table(("parameter", "value", "u", "prior"), rows, "tnnt"))
     return section("datum", CONTENTS["datum"], *parts)

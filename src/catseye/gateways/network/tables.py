@@ -3,40 +3,38 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.estimation.network.plan import Candidate
-from catseye.gateways.network.findings import ROLES, Findings
 from catseye.gateways.writers.columns import Column, Table, each
-
-if TYPE_CHECKING:
-    from catseye.gateways.network.comparison import ComparedEpochs
+from catseye.reduction.network.adjusted import AdjustedNetwork
+from catseye.reduction.network.comparison import ComparedEpochs
+from catseye.reduction.network.observations import ROLES
 
 PAGE = "network.md"
 IN_UNIT = "in `unit`"
 
 
-def _letters(findings: Findings, flags: np.ndarray) -> list[str]:
+def _letters(adjusted: AdjustedNetwork, flags: np.ndarray) -> list[str]:
     """Letters of the file's axes that are flagged at each point."""
-    letters = np.array(findings.network.axis_names)
-    return [" ".join(letters[row]) for row in flags @ np.abs(findings.network.axes) > 0.0]
+    letters = np.array(adjusted.network.axis_names)
+    return [" ".join(letters[row]) for row in flags @ np.abs(adjusted.network.axes) > 0.0]
 
 
-def _mm2(row: int, column: int) -> Column[Findings]:
+def _mm2(row: int, column: int) -> Column[AdjustedNetwork]:
     pair = "xyz"[row] + "xyz"[column]
     doc = f"variance of {pair[0]}" if row == column else f"covariance of {pair[0]} and {pair[1]}"
     return Column(f"cov_{pair}_mm2", "mm2", doc, lambda f: f.covariance[:, row, column] / MILLIMETRE**2, ".9e")
 
 
-def _semi_axis(k: int, word: str) -> Column[Findings]:
+def _semi_axis(k: int, word: str) -> Column[AdjustedNetwork]:
     doc = f"{word} semi-axis of the standard ellipsoid"
     return Column(f"semi_axis_{k + 1}_mm", "mm", doc, lambda f: f.ellipsoid.semi_axes[:, k] / MILLIMETRE, ".7f")
 
 
-COORDINATES = Table[Findings](
+COORDINATES = Table[AdjustedNetwork](
     "coordinates.csv",
     PAGE,
     (
@@ -61,23 +59,23 @@ COORDINATES = Table[Findings](
 class ObservationRows:
     """Source of observations.csv: observations in some order.
 
-    findings   findings on a solution
+    adjusted   network
     order      (m,) rows of its table
     """
 
-    findings: Findings
+    adjusted: AdjustedNetwork
     order: np.ndarray
 
     def measure(self, name: str) -> np.ndarray:
-        return np.asarray(getattr(self.findings.table, name)[self.order])
+        return np.asarray(getattr(self.adjusted.table, name)[self.order])
 
     def ends(self, role: int) -> list[str]:
-        points = [*self.findings.names, ""]
-        return [points[i] for i in self.findings.table.ends[self.order, role]]
+        points = [*self.adjusted.names, ""]
+        return [points[i] for i in self.adjusted.table.ends[self.order, role]]
 
     @property
     def kinds(self) -> list[str]:
-        table = self.findings.table
+        table = self.adjusted.table
         return [table.kinds[k] for k in table.kind[self.order]]
 
     @cached_property
@@ -87,14 +85,14 @@ class ObservationRows:
 
     @property
     def places(self) -> list[str]:
-        places = self.findings.network.places
+        places = self.adjusted.network.places
         return [places[g][r] if places and places[g] else "" for g, r in self.where]
 
     @property
     def suspects(self) -> np.ndarray:
         """Mask (m,) of the suspects."""
-        suspect = np.zeros(len(self.findings.table), dtype=bool)
-        suspect[self.findings.suspects] = True
+        suspect = np.zeros(len(self.adjusted.table), dtype=bool)
+        suspect[self.adjusted.suspects] = True
         return suspect[self.order]
 
 
@@ -130,19 +128,19 @@ OBSERVATIONS = Table[ObservationRows](
             "bias_to_noise", "largest effect of an error of size `mdb` on a result, over its standard uncertainty"
         ),
         _measure("effect", "largest movement of one of its points by an error of size `mdb`, m"),
-        Column("test", "", "test statistic: w, or Pope's tau", lambda o: o.findings.statistic[o.order], ".6g"),
-        Column("p", "", "p-value, corrected for the number of tests", lambda o: o.findings.p[o.order], ".6g"),
+        Column("test", "", "test statistic: w, or Pope's tau", lambda o: o.adjusted.statistic[o.order], ".6g"),
+        Column("p", "", "p-value, corrected for the number of tests", lambda o: o.adjusted.p[o.order], ".6g"),
         Column("suspect", "", "`yes` where the test rejects it", lambda o: _yes(o.suspects)),
         Column("active", "", "`yes` where the adjustment used it", lambda o: _yes(o.measure("active"))),
         Column("checked", "", "`yes` where other observations check it", lambda o: _yes(o.measure("checked"))),
-        Column("group", "", "group of observations", lambda o: [o.findings.network.groups[g].name for g, _ in o.where]),
+        Column("group", "", "group of observations", lambda o: [o.adjusted.network.groups[g].name for g, _ in o.where]),
         Column("place", "", "file and line that it was read from", lambda o: o.places),
     ),
     also=("epoch-*-observations.csv",),
 )
 
 
-PARAMETERS = Table[Findings](
+PARAMETERS = Table[AdjustedNetwork](
     "parameters.csv",
     PAGE,
     (
@@ -168,13 +166,13 @@ PARAMETERS = Table[Findings](
 )
 
 
-def _axis(prefix: str, k: int, doc: str, value: "Callable[[ComparedEpochs], np.ndarray]") -> "Column[ComparedEpochs]":
+def _axis(prefix: str, k: int, doc: str, value: Callable[[ComparedEpochs], np.ndarray]) -> Column[ComparedEpochs]:
     """Column in millimetres of one axis of an (n, 3) array in metres."""
     axis = "xyz"[k]
     return Column(f"{prefix}{axis}_mm", "mm", f"{doc} along {axis}", lambda c: value(c)[:, k] / MILLIMETRE, ".6f")
 
 
-DISPLACEMENTS = Table["ComparedEpochs"](
+DISPLACEMENTS = Table[ComparedEpochs](
     "displacements.csv",
     PAGE,
     (
@@ -227,32 +225,32 @@ CANDIDATES = Table[Sequence[Listed]](
 )
 
 
-def coordinates_csv(findings: Findings) -> Iterator[str]:
+def coordinates_csv(adjusted: AdjustedNetwork) -> Iterator[str]:
     """Table of points with standard uncertainties, covariances and semi-axes of the ellipsoid.
 
-    findings   findings on a solution; variances include its variance factor where it is `scaled`
+    adjusted   network; variances include its variance factor where it is `scaled`
     """
-    return COORDINATES.pieces(findings)
+    return COORDINATES.pieces(adjusted)
 
 
-def observations_csv(findings: Findings, *, worst_first: bool = False) -> Iterator[str]:
+def observations_csv(adjusted: AdjustedNetwork, *, worst_first: bool = False) -> Iterator[str]:
     """Table of observations; lengths in m and angles in rad, as `unit` says.
 
-    findings      findings on a solution
+    adjusted      network
     worst_first   by falling |standardised|; else in file order. `number` counts from 0 in file order, as the indices
                   of `suspects` in JSON do.
     """
-    rows = findings.table
+    rows = adjusted.table
     order = rows.worst_first if worst_first else np.arange(len(rows))
-    return OBSERVATIONS.pieces(ObservationRows(findings, order))
+    return OBSERVATIONS.pieces(ObservationRows(adjusted, order))
 
 
-def parameters_csv(findings: Findings) -> Iterator[str]:
+def parameters_csv(adjusted: AdjustedNetwork) -> Iterator[str]:
     """Table of additional parameters, in x east, y north, z up."""
-    return PARAMETERS.pieces(findings)
+    return PARAMETERS.pieces(adjusted)
 
 
-def displacements_csv(compared: "ComparedEpochs") -> Iterator[str]:
+def displacements_csv(compared: ComparedEpochs) -> Iterator[str]:
     """Table of common points: coordinates, displacements, uncertainties."""
     return DISPLACEMENTS.pieces(compared)
 

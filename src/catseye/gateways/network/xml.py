@@ -14,7 +14,7 @@ from scipy.special import ndtri, stdtrit
 
 from catseye.constants import MILLIMETRE, TWO_PI
 from catseye.estimation.network.diagnosis import pieces_of
-from catseye.gateways.network.findings import Findings
+from catseye.reduction.network.adjusted import AdjustedNetwork
 from catseye.version import __version__
 
 NAMESPACE = "http://www.gnu.org/software/gama/gama-local-adjustment"
@@ -62,30 +62,30 @@ DIFFERENCES = """written by catseye, not by gama-local; it differs in this:
   observations left out of the adjustment, and kinds that gama-local does not have, are missing:"""
 
 
-def network_xml(findings: Findings) -> Iterator[str]:
+def network_xml(adjusted: AdjustedNetwork) -> Iterator[str]:
     """Text of the XML file in pieces; without an answer, only the reason.
 
-    findings   findings on a solution; `scaled` becomes Gama's "aposteriori"
+    adjusted   network; `scaled` becomes Gama's "aposteriori"
 
     Source: [GAMA18] schema gama-local-adjustment.xsd, version 1.00.
     """
     yield f'<?xml version="1.0"?>\n<gama-local-adjustment xmlns="{NAMESPACE}">\n'
-    if not findings.answered:
-        text = _text(findings.solution.status)
+    if not adjusted.answered:
+        text = _text(adjusted.solution.status)
         yield f'<error category="gamaLocalAdjustment"><description>{text}</description></error>\n'
     else:
-        unknowns = _Unknowns(findings)
-        yield _comment(findings)
-        yield f"<description>{_text(findings.network.description)}</description>\n"
+        unknowns = _Unknowns(adjusted)
+        yield _comment(adjusted)
+        yield f"<description>{_text(adjusted.network.description)}</description>\n"
         yield (
             f'<network-general-parameters gama-local-version="catseye {__version__}" '
             f'gama-local-algorithm="gauss-newton" gama-local-compiler="python" '
             f'axes-xy="{unknowns.axes_name}" angles="left-handed"/>\n'
         )
-        yield _summary(findings, unknowns)
-        yield from _coordinates(findings, unknowns)
+        yield _summary(adjusted, unknowns)
+        yield from _coordinates(adjusted, unknowns)
         yield "<observations>\n"
-        yield from _observations(findings, unknowns.turn)
+        yield from _observations(adjusted, unknowns.turn)
         yield "</observations>\n"
     yield "</gama-local-adjustment>\n"
 
@@ -98,8 +98,8 @@ def _text(text: str) -> str:
 class _Unknowns:
     """Unknown, fixed and constrained coordinates, as Gama counts them: x with y, z alone; orientations."""
 
-    def __init__(self, findings: Findings):
-        network = findings.network
+    def __init__(self, adjusted: AdjustedNetwork):
+        network = adjusted.network
         self.turn, self.axes_name = _level_axes(network.axes)
         flags = [(f @ np.abs(self.turn)) > 0.0 for f in (network.points.fixed, network.points.datum)]
         self.fixed, self.datum = (np.stack([f[:, :2].all(axis=1), f[:, 2]], axis=1) for f in flags)
@@ -108,7 +108,7 @@ class _Unknowns:
         self.existing = np.stack([~absent[:, :2].any(axis=1), ~absent[:, 2]], axis=1)
         self.x, self.given = (
             np.where(absent, np.nan, np.where(network.points.absent, 0.0, xyz) @ self.turn)
-            for xyz in (findings.solution.x, network.points.xyz)
+            for xyz in (adjusted.solution.x, network.points.xyz)
         )
         columns: dict[int, int] = {}
         for group in network.groups:
@@ -121,20 +121,20 @@ class _Unknowns:
         self.clockwise = -np.sign(np.linalg.det(self.turn[:2, :2]))  # from x to y
         self.zero = np.arctan2(self.turn[0, 0], self.turn[1, 0])  # azimuth of the x axis
 
-    def covariance(self, findings: Findings) -> tuple[np.ndarray, int]:
+    def covariance(self, adjusted: AdjustedNetwork) -> tuple[np.ndarray, int]:
         """Upper band of the unknowns' covariance by rows, and its width without the diagonal, unscaled."""
         size = len(self.coordinates) + len(self.orientations)
         turns = np.array(list(self.orientations), dtype=int)
         angular = np.full(len(turns), self.clockwise / CC)
         if size > FULL:
-            blocks = np.nan_to_num(findings.solution.covariance)  # absent coordinates are not among these
+            blocks = np.nan_to_num(adjusted.solution.covariance)  # absent coordinates are not among these
             variances = np.einsum("ki,nkl,li->ni", self.turn, blocks, self.turn).ravel()
             return np.concatenate(
-                [variances[self.coordinates] / MILLIMETRE**2, findings.solution.q.diagonal()[turns] / CC**2]
+                [variances[self.coordinates] / MILLIMETRE**2, adjusted.solution.q.diagonal()[turns] / CC**2]
             ), 0
         points, place = np.divmod(self.coordinates, 3)
         named = np.unique(points)
-        q = findings.solution.q.within(np.concatenate([(3 * named[:, None] + np.arange(3)).ravel(), turns]))
+        q = adjusted.solution.q.within(np.concatenate([(3 * named[:, None] + np.arange(3)).ravel(), turns]))
         to = np.zeros((size, len(q)))
         row = np.arange(len(points))
         for axis in range(3):
@@ -151,35 +151,35 @@ def _level_axes(axes: np.ndarray) -> tuple[np.ndarray, str]:
     return axes, "".join(letters[int(axes[0, k]), int(axes[1, k])] for k in (0, 1))
 
 
-def _comment(findings: Findings) -> str:
-    table = findings.table
-    counts = [f"{n} of kind {kind.replace('_', ' ')}" for kind, n in _by_kind(findings) if n and kind not in TAGS]
+def _comment(adjusted: AdjustedNetwork) -> str:
+    table = adjusted.table
+    counts = [f"{n} of kind {kind.replace('_', ' ')}" for kind, n in _by_kind(adjusted) if n and kind not in TAGS]
     counts += [f"{int(np.sum(~table.active))} left out"] if not table.active.all() else []
     text = f"{DIFFERENCES} {', '.join(counts) or 'none here'}"
     return f"<!-- {_text(text).replace('--', '- -')} -->\n"
 
 
-def _by_kind(findings: Findings) -> list[tuple[str, int]]:
+def _by_kind(adjusted: AdjustedNetwork) -> list[tuple[str, int]]:
     """Number of active rows of each kind; vectors and coordinates count once, as in gama-local."""
-    table = findings.table
+    table = adjusted.table
     split = np.array([TAGS.get(kind, "") in ("d", "coordinate-") for kind in table.kinds], dtype=bool)[table.kind]
-    counted = table.active & (~split | (table.component == findings.network.axis_names[0]))
+    counted = table.active & (~split | (table.component == adjusted.network.axis_names[0]))
     return list(zip(table.kinds, np.bincount(table.kind[counted], minlength=len(table.kinds)).tolist(), strict=True))
 
 
-def _summary(findings: Findings, unknowns: _Unknowns) -> str:
-    network, table, overall = findings.network, findings.table, findings.global_test
+def _summary(adjusted: AdjustedNetwork, unknowns: _Unknowns) -> str:
+    network, table, overall = adjusted.network, adjusted.table, adjusted.global_test
     kinds: Counter[str] = Counter()
-    for kind, count in _by_kind(findings):
+    for kind, count in _by_kind(adjusted):
         kinds[TAGS.get(kind, "")] += count
     priors = sum(0.0 < p.sigma < np.inf for p in network.parameters)
     equations = int(table.active.sum()) + priors
     free = int(np.sum(network.points.free)) + sum(p.sigma > 0.0 for p in network.parameters)
-    degrees = round(findings.solution.degrees_of_freedom)
+    degrees = round(adjusted.solution.degrees_of_freedom)
     tested = np.isfinite(overall.p)
     ratio, lower, upper = (np.sqrt(v) if tested else 0.0 for v in (overall.factor, overall.lower, overall.upper))
-    adjusted = ~unknowns.fixed & unknowns.existing
-    states = (("adjusted", adjusted), ("constrained", unknowns.datum), ("fixed", unknowns.fixed))
+    changed = ~unknowns.fixed & unknowns.existing
+    states = (("adjusted", changed), ("constrained", unknowns.datum), ("fixed", unknowns.fixed))
     return "".join(
         [
             "<network-processing-summary>\n<coordinates-summary>\n",
@@ -195,21 +195,21 @@ def _summary(findings: Findings, unknowns: _Unknowns) -> str:
             f"<sum-of-squares>{ratio**2 * degrees:.7e}</sum-of-squares>",
             "<connected-network/>" if not pieces_of(network).any() else "<disconnected-network/>",
             f"</project-equations>\n<standard-deviation><apriori>1</apriori><aposteriori>{ratio:.7e}</aposteriori>"
-            f"<used>{'aposteriori' if findings.scaled else 'apriori'}</used><probability>{1.0 - findings.level:.3f}"
+            f"<used>{'aposteriori' if adjusted.scaled else 'apriori'}</used><probability>{1.0 - adjusted.level:.3f}"
             f"</probability><ratio>{ratio:.6f}</ratio><lower>{lower:.6f}</lower><upper>{upper:.6f}</upper>",
             "<passed/>" if tested and lower < ratio < upper else "<failed/>",
-            f"<confidence-scale>{_confidence_scale(findings):.7e}</confidence-scale></standard-deviation>\n</network-processing-summary>\n",
+            f"<confidence-scale>{_confidence_scale(adjusted):.7e}</confidence-scale></standard-deviation>\n</network-processing-summary>\n",
         ]
     )
 
 
-def _confidence_scale(findings: Findings) -> float:
+def _confidence_scale(adjusted: AdjustedNetwork) -> float:
     """Half a confidence interval in standard deviations: normal, or Student's if scaled."""
-    tail = 0.5 * findings.level
-    return -float(stdtrit(findings.solution.degrees_of_freedom, tail) if findings.scaled else ndtri(tail))
+    tail = 0.5 * adjusted.level
+    return -float(stdtrit(adjusted.solution.degrees_of_freedom, tail) if adjusted.scaled else ndtri(tail))
 
 
-def _coordinates(findings: Findings, unknowns: _Unknowns) -> Iterator[str]:
+def _coordinates(adjusted: AdjustedNetwork, unknowns: _Unknowns) -> Iterator[str]:
     approximate = np.where(np.isfinite(unknowns.given), unknowns.given, unknowns.x)
     yield "<coordinates>\n"
     for tag, xyz, mask in (
@@ -219,18 +219,18 @@ def _coordinates(findings: Findings, unknowns: _Unknowns) -> Iterator[str]:
     ):
         yield f"<{tag}>\n"
         capital = unknowns.datum if tag != "fixed" else np.zeros_like(unknowns.datum)
-        rows = zip(findings.names, xyz.tolist(), mask.tolist(), capital.tolist(), strict=True)
+        rows = zip(adjusted.names, xyz.tolist(), mask.tolist(), capital.tolist(), strict=True)
         yield "".join([_point(*row) for row in rows if any(row[2])])
         yield f"</{tag}>\n"
     yield "<orientation-shifts>\n"
-    start = 3 * len(findings.names)
+    start = 3 * len(adjusted.names)
     for column, point in unknowns.orientations.items():
-        values = (findings.network.parameters[column - start].start, findings.solution.parameters[column - start])
-        approx, adjusted = ((unknowns.clockwise * (v - unknowns.zero)) % TWO_PI / GON for v in values)
-        name = _text(findings.names[point])
-        yield f"  <orientation><id>{name}</id><approx>{approx:.6f}</approx><adj>{adjusted:.8f}</adj></orientation>\n"
-    entries, band = unknowns.covariance(findings)
-    entries = (entries * findings.factor).tolist()
+        values = (adjusted.network.parameters[column - start].start, adjusted.solution.parameters[column - start])
+        approx, corrected = ((unknowns.clockwise * (v - unknowns.zero)) % TWO_PI / GON for v in values)
+        name = _text(adjusted.names[point])
+        yield f"  <orientation><id>{name}</id><approx>{approx:.6f}</approx><adj>{corrected:.8f}</adj></orientation>\n"
+    entries, band = unknowns.covariance(adjusted)
+    entries = (entries * adjusted.factor).tolist()
     size = len(unknowns.coordinates) + len(unknowns.orientations)
     yield f"</orientation-shifts>\n<cov-mat><dim>{size}</dim><band>{band}</band>\n"
     for low in range(0, len(entries), PIECE):
@@ -248,14 +248,14 @@ def _point(name: str, xyz: list[float], mask: list[bool], capital: list[bool]) -
     return f"  <point><id>{_text(name)}</id>{level}{f'<{z}>{xyz[2]:.10f}</{z}>' if mask[1] else ''}</point>\n"
 
 
-def _observations(findings: Findings, turn: np.ndarray) -> Iterator[str]:
-    table = findings.table
-    written = np.abs(turn.T @ findings.network.axes).argmax(axis=0)  # index of the file's axes
-    letter = {name: "xyz"[int(k)] for name, k in zip(findings.network.axis_names, written, strict=True)}
+def _observations(adjusted: AdjustedNetwork, turn: np.ndarray) -> Iterator[str]:
+    table = adjusted.table
+    written = np.abs(turn.T @ adjusted.network.axes).argmax(axis=0)  # index of the file's axes
+    letter = {name: "xyz"[int(k)] for name, k in zip(adjusted.network.axis_names, written, strict=True)}
     supported = np.array([kind in TAGS for kind in table.kinds], dtype=bool)
     rows = np.flatnonzero(table.active & supported[table.kind])
-    names = [_text(name) for name in findings.names]
-    numbers, length = _numbers(findings, table.sign if turn is not findings.network.axes else np.ones(len(table)))
+    names = [_text(name) for name in adjusted.names]
+    numbers, length = _numbers(adjusted, table.sign if turn is not adjusted.network.axes else np.ones(len(table)))
     for low in range(0, len(rows), PIECE):
         part = rows[low : low + PIECE]
         lines = []
@@ -268,28 +268,28 @@ def _observations(findings: Findings, turn: np.ndarray) -> Iterator[str]:
         yield "".join(lines)
 
 
-def _numbers(findings: Findings, sign: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _numbers(adjusted: AdjustedNetwork, sign: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Values that gama-local writes of the observations, (m, 8), and their number (m,).
 
     sign   (m,) sign of components in the written axes
 
     The error is given for uncorrelated observations that are well checked or have a large residual.
     """
-    table, share, scale = findings.table, _adjusted_share(findings), np.sqrt(findings.factor)
+    table, share, scale = adjusted.table, _adjusted_share(adjusted), np.sqrt(adjusted.factor)
     angular = table.unit == "rad"
     value, fine = np.where(angular, GON, 1.0), np.where(angular, CC, MILLIMETRE)
-    observed, adjusted = sign * table.observed / value, sign * (table.observed - table.residual) / value
+    observed, corrected = sign * table.observed / value, sign * (table.observed - table.residual) / value
     turning = np.array([TAGS.get(kind) in TURNING for kind in table.kinds], dtype=bool)[table.kind]
     sigma, v = table.u / fine, -sign * table.residual / fine
     qrr, control = (1.0 - share) * sigma**2, 100.0 * np.abs(1.0 - np.sqrt(share))
     with np.errstate(invalid="ignore", divide="ignore"):  # unchecked: not written
         studentised, error = np.abs(v) / (scale * np.sqrt(qrr)), v / (1.0 - share)
-    alone = np.array([g.covariance.ndim == 1 for g in findings.network.groups], dtype=bool)[table.group]
-    full = alone & ((control >= 5.0) | (studentised > _confidence_scale(findings)))
+    alone = np.array([g.covariance.ndim == 1 for g in adjusted.network.groups], dtype=bool)[table.group]
+    full = alone & ((control >= 5.0) | (studentised > _confidence_scale(adjusted)))
     numbers = np.stack(
         [
             observed,
-            np.where(turning, adjusted % 400.0, adjusted),
+            np.where(turning, corrected % 400.0, corrected),
             scale * sigma * np.sqrt(share),
             qrr,
             control,
@@ -302,12 +302,12 @@ def _numbers(findings: Findings, sign: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return numbers, np.where(control < 0.1, 5, np.where(full, 8, 6))
 
 
-def _adjusted_share(findings: Findings) -> np.ndarray:
+def _adjusted_share(adjusted: AdjustedNetwork) -> np.ndarray:
     """Variance of each adjusted observation over that of the observed one, (m,), variance factor 1."""
-    solution, table = findings.solution, findings.table
+    solution, table = adjusted.solution, adjusted.table
     share = 1.0 - table.redundancy
     x = solution.state
-    for g, group in enumerate(findings.network.groups):
+    for g, group in enumerate(adjusted.network.groups):
         if group.covariance.ndim > 1:  # not valid for correlated observations
             _, jacobian = group.predict(x)
             columns = np.broadcast_to(group.columns, jacobian.shape)

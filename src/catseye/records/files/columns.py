@@ -5,7 +5,7 @@ Lines count from 1; the header is line 1.
 
 import csv
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,19 +24,21 @@ class TextColumns:
     cells    column name -> cells, one per row
     lines    line of each row in the file
     comma    True if cells are separated by semicolons, so that decimal commas are allowed
+    place    word for a row's place: "line" of a file, "row" of arrays
     """
 
     file: str
     cells: dict[str, list[str]]
     lines: Sequence[int]
     comma: bool = False
+    place: str = "line"
 
     def __len__(self) -> int:
         return len(self.lines)
 
     def refuse(self, row: int, problem: str) -> InputError:
         """Error for one row, counted from 0."""
-        return refusal(self.file, f"line {self.lines[row]}, {problem}")
+        return refusal(self.file, f"{self.place} {self.lines[row]}, {problem}")
 
     def numbers(self, name: str, blank: float | None = None) -> np.ndarray:
         """Column as finite numbers (rows,); a blank cell is `blank`, or an error if None."""
@@ -67,7 +69,7 @@ class TextColumns:
 
     def where(self) -> tuple[str, ...]:
         """Place of every row, in words."""
-        return tuple(map("line {}".format, self.lines))
+        return tuple(map(f"{self.place} {{}}".format, self.lines))
 
 
 def pointed(cell: str) -> str:
@@ -105,6 +107,35 @@ def columns_of(text: str, file: str, required: Sequence[str], *, optional: Seque
     width, strip = len(header), str.strip
     columns = {name: list(map(strip, cells[at::width])) for at, name in enumerate(header)}
     return TextColumns(file, columns, lines, comma=between == ";")
+
+
+def columns_of_arrays(
+    columns: Mapping[str, Sequence[object]], table: str, required: Sequence[str], *, optional: Sequence[str] = ()
+) -> TextColumns:
+    """Columns of one table as if they were read from a file.
+
+    columns    texts and numbers by name, of equal lengths; a number that is nan is blank
+    table      name for messages
+    required   required columns
+    optional   optional columns
+
+    A number is written with all its digits and read back the same. Raises InputError as `columns_of`.
+
+    >>> columns_of_arrays({"to": ["T1"], "d": [0.1]}, "ranges", ["to", "d"]).cells
+    {'to': ['T1'], 'd': ['0.1']}
+    """
+    _check_header(table, list(columns), required, optional)
+    cells = {name: [_cell(value) for value in values] for name, values in columns.items()}
+    count = len(next(iter(cells.values())))
+    if not count:
+        raise refusal(table, "holds no rows (expected at least one)")
+    return TextColumns(table, cells, range(count), place="row")
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float):
+        return repr(value) if value == value else ""
+    return str(value)
 
 
 def _check_header(file: str, header: list[str], required: Sequence[str], optional: Sequence[str]) -> None:

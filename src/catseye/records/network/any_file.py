@@ -6,12 +6,20 @@ folder        points.csv and ranges.csv                  `folder`
 .dat          STAR*NET                                   `starnet`
 """
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from catseye.estimation.network.model import ObservationNetwork
+from catseye.records.files.columns import columns_of_arrays
 from catseye.records.files.refusal import refusal, shown
 from catseye.records.network.claim import RangeClaim
-from catseye.records.network.folder import read_network_folder
+from catseye.records.network.folder import (
+    MORE_POINT_COLUMNS,
+    POINT_COLUMNS,
+    network_of_tables,
+    range_columns,
+    read_network_folder,
+)
 from catseye.records.network.gama import read_gama
 from catseye.records.network.plausible import with_lengths_checked
 from catseye.records.network.starnet import read_starnet
@@ -41,6 +49,28 @@ def read_network(
     return network if planned else with_lengths_checked(network)
 
 
+def network_of_columns(
+    tables: Mapping[str, Mapping[str, Sequence[object]]],
+    *,
+    sigma_mm: float | None = None,
+    sigma_ppm: float | None = None,
+    planned: bool = False,
+) -> ObservationNetwork:
+    """Network of the columns of points.csv and ranges.csv.
+
+    tables     "points" and "ranges": columns by name, texts and numbers in m; nan is blank
+    sigma_mm, sigma_ppm, planned   as for `read_network`
+
+    Raises InputError as for a folder.
+    """
+    claim = RangeClaim.from_options(sigma_mm, sigma_ppm)
+    points = columns_of_arrays(tables["points"], "points", POINT_COLUMNS, optional=MORE_POINT_COLUMNS)
+    required, optional = range_columns(planned)
+    ranges = columns_of_arrays(tables["ranges"], "ranges", required, optional=optional)
+    network = network_of_tables(points, ranges, claim, planned=planned)
+    return network if planned else with_lengths_checked(network)
+
+
 def _read(path: Path, *, sigma_mm: float | None, sigma_ppm: float | None, planned: bool) -> ObservationNetwork:
     claim = RangeClaim.from_options(sigma_mm, sigma_ppm)
     if path.is_dir():
@@ -48,7 +78,7 @@ def _read(path: Path, *, sigma_mm: float | None, sigma_ppm: float | None, planne
     if path.suffix.lower() == ".dat":
         return read_starnet(path, claim)
     if claim:
-        raise refusal(path.name, "contains all uncertainties (expected no --sigma-mm, no --sigma-ppm)")
+        raise refusal(path.name, "contains all uncertainties (expected neither sigma_mm nor sigma_ppm)")
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         kinds = f"expected a folder with points.csv and ranges.csv, or {' '.join(READERS)}"

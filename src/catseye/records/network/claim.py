@@ -38,9 +38,9 @@ class RangeClaim(NamedTuple):
     @classmethod
     def from_options(cls, mm: float | None, ppm: float | None) -> "RangeClaim":
         """Claim of two options; InputError for an invalid standard uncertainty."""
-        for name, value, most in (("sigma-mm", mm, LARGEST_MM), ("sigma-ppm", ppm, LARGEST_PPM)):
+        for name, value, most in (("sigma_mm", mm, LARGEST_MM), ("sigma_ppm", ppm, LARGEST_PPM)):
             if value is not None and not 0.0 <= value <= most:
-                raise InputError(f"--{name} = {value:g} (expected 0 to {most:g})")
+                raise InputError(f"{name} = {value:g} (expected 0 to {most:g})")
         return cls(mm, ppm)
 
 

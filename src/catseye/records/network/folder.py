@@ -25,6 +25,7 @@ from catseye.records.network.claim import NO_CLAIM, RangeClaim
 
 POINT_COLUMNS = ("point", "x", "y", "z")
 U_COLUMNS = ("u_x", "u_y", "u_z")
+MORE_POINT_COLUMNS = ("role", *U_COLUMNS)
 RANGE_COLUMNS = ("from", "to", "distance")
 FEWEST = 3  # ranges that determine a point; a target with fewer and a name close to a listed one is a typing error
 CLOSE = 0.7  # similarity of two names, 1 for equal
@@ -39,9 +40,27 @@ def read_network_folder(path: Path, claim: RangeClaim = NO_CLAIM, *, planned: bo
     planned distances may be blank or missing, for a plan
     """
     folder = Folder(path)
-    points = columns_of(folder.text("points.csv"), "points.csv", POINT_COLUMNS, optional=("role", *U_COLUMNS))
-    required, optional = (RANGE_COLUMNS[:2], ("distance", "sigma")) if planned else (RANGE_COLUMNS, ("sigma",))
+    points = columns_of(folder.text("points.csv"), "points.csv", POINT_COLUMNS, optional=MORE_POINT_COLUMNS)
+    required, optional = range_columns(planned)
     ranges = columns_of(folder.text("ranges.csv"), "ranges.csv", required, optional=optional)
+    return network_of_tables(points, ranges, claim, planned=planned, source=path.name)
+
+
+def range_columns(planned: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Required and optional columns of ranges.csv; of a plan the distances are optional."""
+    return (RANGE_COLUMNS[:2], ("distance", "sigma")) if planned else (RANGE_COLUMNS, ("sigma",))
+
+
+def network_of_tables(
+    points: TextColumns, ranges: TextColumns, claim: RangeClaim, *, planned: bool, source: str = ""
+) -> ObservationNetwork:
+    """Network of the two tables.
+
+    points, ranges   columns, as in the files
+    claim            standard uncertainty of a range whose sigma is blank or missing
+    planned          distances may be blank or missing, for a plan
+    source           name of the network
+    """
     names = names_of(points, "point")
     xyz, fixed, datum, priors = _places(points)
     unlisted = _unlisted(ranges, names)
@@ -60,13 +79,13 @@ def read_network_folder(path: Path, claim: RangeClaim = NO_CLAIM, *, planned: bo
         row, axis = np.nonzero(priors > 0.0)
         observed, variance = xyz[row, axis], priors[row, axis] ** 2
         groups.append(ObservedCoordinates("coordinates", observed, variance, 3 * row, axis))
-        places.append(tuple(f"points.csv line {points.lines[int(i)]}" for i in row))
+        places.append(tuple(f"{points.file} {points.place} {points.lines[int(i)]}" for i in row))
     return ObservationNetwork(
         NetworkPoints(tuple(names), xyz, fixed, datum, absent),
         (),
         tuple(groups),
         tuple(places),
-        source=path.name,
+        source=source,
         claims=(claims, *(None for _ in groups[1:])),
         notes=names.notes(),
     )
@@ -145,7 +164,7 @@ def _distances(
     if without.any():
         if not claim:
             row = int(np.argmax(without))
-            raise ranges.refuse(row, "no sigma (expected one, m, or --sigma-mm and --sigma-ppm for ranges without)")
+            raise ranges.refuse(row, "no sigma (expected one, m, or sigma_mm and sigma_ppm for ranges without)")
         sigma = np.where(without, claim.of(np.where(np.isnan(distance), 1.0, distance)), sigma)  # of a plan: there
     if "sigma" in ranges.cells:
         ranges.check("sigma", sigma > 0.0, "above 0 m: no measurement is exact")

@@ -9,14 +9,10 @@ import numpy as np
 from catseye.aliases import Progress
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import (
-    CONVERGED,
-    LeastSquaresSolution,
-    SolverSettings,
-    adjust,
-)
+from catseye.estimation.least_squares.adjustment import LeastSquaresSolution, SolverSettings, adjust
 from catseye.estimation.least_squares.bordered import Border
 from catseye.estimation.least_squares.robust import OutlierSearch, adjust_robustly
+from catseye.estimation.least_squares.status import CONVERGED
 from catseye.estimation.observations.kinds import Linear, ObservationGroup
 from catseye.reduction.epoch.allowance import Allowance, for_families, for_the_air, refused
 from catseye.reduction.epoch.dish import dish_prior

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from catseye.estimation.least_squares.adjustment import SolverSettings
 from catseye.estimation.network.adjustment import NetworkSettings, adjust_network
 from catseye.estimation.network.approximate.given import disagreeing
 from catseye.estimation.network.approximate.sightings import sightings
@@ -42,7 +43,7 @@ def given_as(network, xyz):
 
 
 def residual(network):
-    solution = adjust_network(network, engine="dense", settings=NetworkSettings(tests=False))
+    solution = adjust_network(network, engine="dense", settings=NetworkSettings(SolverSettings(tests=False)))
     assert solution.status == "converged"
     return np.concatenate([fit.residual for fit in solution.fits])
 
@@ -167,8 +168,10 @@ def test_targets_on_both_sides_of_stations_in_a_plane_stay_on_the_side_where_the
     given = true + rng.uniform(-14, 14, true.shape)
     answer = approximate(given_as(network, given))
     assert len(answer.replaced) > 3
-    solution = adjust_network(given_as(network, given), engine="dense", settings=NetworkSettings(tests=False))
-    good = adjust_network(network, engine="dense", settings=NetworkSettings(tests=False))
+    solution = adjust_network(
+        given_as(network, given), engine="dense", settings=NetworkSettings(SolverSettings(tests=False))
+    )
+    good = adjust_network(network, engine="dense", settings=NetworkSettings(SolverSettings(tests=False)))
     apart = [np.linalg.norm(a.x[:, None] - a.x, axis=2) for a in (solution, good)]
     np.testing.assert_allclose(apart[0], apart[1], rtol=0.0, atol=0.01)
 

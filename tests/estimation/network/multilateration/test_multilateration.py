@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.least_squares.adjustment import CONVERGED, adjust
+from catseye.estimation.least_squares.adjustment import SolverSettings, adjust
+from catseye.estimation.least_squares.status import CONVERGED
 from catseye.estimation.network.multilateration import gauss_newton
 from catseye.estimation.network.multilateration.gauss_newton import adjust_ranges
 from catseye.estimation.network.multilateration.network import RangingNetwork
@@ -572,9 +573,11 @@ def test_a_start_one_percent_of_the_size_off_finds_the_same_answer(seed):
 def test_the_cost_never_rises():
     """Far from the answer whole steps overshoot: the cost at every accepted state falls."""
     network = room(3, noise=0.0, offset=4.0)
-    costs = [adjust_ranges(network, iterations=k, tests=False).pvv for k in range(1, 12)]
+    costs = [adjust_ranges(network, solver=SolverSettings(iterations=k, tests=False)).pvv for k in range(1, 12)]
     assert all(b <= a * (1 + 1e-9) for a, b in pairwise(costs))
-    assert adjust_ranges(network, iterations=1, tests=False).status.startswith("not converged: the last step was")
+    assert adjust_ranges(network, solver=SolverSettings(iterations=1, tests=False)).status.startswith(
+        "not converged: the last step was"
+    )
 
 
 @pytest.mark.parametrize("seed", [2, 14, 31])
@@ -732,7 +735,7 @@ def test_one_error_of_a_metre_contradicts_and_is_named_with_its_size():
     assert "at the range S03 to T06 (about 1 m off)" in solution.status
     assert np.argmax(np.abs(solution.standardised)) == 33
     assert solution.estimated_error[33] == pytest.approx(1.0, abs=0.05)
-    assert "at the range" not in adjust_ranges(network, tests=False).status
+    assert "at the range" not in adjust_ranges(network, solver=SolverSettings(tests=False)).status
 
 
 def test_an_error_of_a_millimetre_shows_in_its_test_alone():
@@ -787,7 +790,7 @@ def test_bad_extras_are_refused():
 
 def test_without_tests_the_answer_is_the_same_and_claims_nothing():
     network = room()
-    bare, full = adjust_ranges(network, tests=False), adjust_ranges(network)
+    bare, full = adjust_ranges(network, solver=SolverSettings(tests=False)), adjust_ranges(network)
     assert np.array_equal(bare.targets, full.targets)
     assert np.isnan(bare.covariance).all()
     assert np.isnan(bare.redundancy).all()

@@ -9,7 +9,7 @@ from scipy.linalg import orthogonal_procrustes
 from catseye.errors import ValidityError
 from catseye.estimation.network.unfolding.factors import classical_scaling, match_means
 from catseye.estimation.network.unfolding.location import locate
-from catseye.estimation.network.unfolding.unfold import UNFOLDED, unfold
+from catseye.estimation.network.unfolding.unfold import FigureOutcome, unfold
 from draws import draws, examples
 
 SIGMA = 1e-3  # m, on figures of 100 m
@@ -40,7 +40,7 @@ def apart(found, true):
 
 def check(stations, targets, seed, *, within, **more):
     found = unfold(measured(stations, targets, seed, **more), SIGMA)
-    assert found.status == UNFOLDED
+    assert found.outcome is FigureOutcome.UNFOLDED
     assert apart(np.vstack([found.stations, found.targets]), np.vstack([stations, targets])) < within
     return found
 
@@ -67,7 +67,7 @@ def test_scaling_all_ranges_scales_the_figure(seed, power):
     stations, targets = scene(8, 12, seed)
     ranges, factor = measured(stations, targets, seed), 10.0**power
     small, large = unfold(ranges, SIGMA), unfold(ranges * factor, SIGMA * factor)
-    assert small.status == large.status == UNFOLDED
+    assert small.outcome == large.outcome == FigureOutcome.UNFOLDED
     np.testing.assert_allclose(large.targets / factor, small.targets, rtol=0.0, atol=1e-5)
 
 
@@ -179,7 +179,7 @@ def test_a_point_with_too_few_ranges_is_left_out_and_the_rest_found():
     ranges = measured(stations, targets, 4)
     ranges[3:, 7] = np.nan  # target 7 is seen three times only
     found = unfold(ranges, SIGMA)
-    assert found.status == UNFOLDED
+    assert found.outcome is FigureOutcome.UNFOLDED
     assert np.isnan(found.targets[7]).all()
     rest = np.delete(np.arange(30), 7)
     assert apart(np.vstack([found.stations, found.targets[rest]]), np.vstack([stations, targets[rest]])) < 0.05
@@ -254,7 +254,7 @@ def test_a_target_that_three_stations_see_joins_the_side_of_the_others(seed):
     ranges = measured(stations, targets, seed)
     ranges[[0, 1, 4, 5, 6, 7, 9], 11] = np.nan
     found = unfold(ranges, SIGMA)
-    assert found.status == UNFOLDED
+    assert found.outcome is FigureOutcome.UNFOLDED
     assert found.side_assumed[10 + 11]
     assert not found.side_assumed[10:21].any()
     assert np.all(found.targets[:, 2] > 0.0)

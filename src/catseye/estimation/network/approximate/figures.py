@@ -9,7 +9,7 @@ from catseye.estimation.network.approximate.search import LENIENT, STRICT, Placi
 from catseye.estimation.network.approximate.sightings import BEARING, COORDINATE, DIFFERENCE, RANGE, ZENITH, Sightings
 from catseye.estimation.network.approximate.ties import FLOOR
 from catseye.estimation.network.unfolding.factors import classical_scaling
-from catseye.estimation.network.unfolding.unfold import NO_FIT, TOO_FEW, UNFOLDED, Unfolding, unfold
+from catseye.estimation.network.unfolding.unfold import FigureOutcome, Unfolding, unfold
 from catseye.estimation.shapes.rigid_body import closed_form
 
 
@@ -122,10 +122,11 @@ def _attach_ranges(search: PlacingSearch) -> bool:
     for which in dict.fromkeys(part[~placed].tolist()):
         group = np.flatnonzero(part == which)
         frame = PlacingSearch(rows, np.full(search.xyz.shape, np.nan), {}, [])
-        why = _figure(frame, group) or _laid_down(search, frame)
+        why, too_few = _figure(frame, group)
+        why = why or _laid_down(search, frame)
         if not why:
             return True
-        if len(group) > 1 and not (placed[group].any() and why.startswith(TOO_FEW.split("{")[0])):
+        if len(group) > 1 and not (placed[group].any() and too_few):
             search.unfolding |= dict.fromkeys(group.tolist(), f"; {why}")
     return False
 
@@ -139,14 +140,14 @@ def _parts_tied(rows: Sightings, n: int) -> np.ndarray:
     return connected_components(table, directed=False)[1]
 
 
-def _figure(frame: PlacingSearch, group: np.ndarray) -> str:
+def _figure(frame: PlacingSearch, group: np.ndarray) -> tuple[str, bool]:
     """Fill a frame from the ranges between a group of points.
 
-    Returns the reason of failure, or "".
+    Returns the reason of failure, or "", and True if the ranges are too few.
     """
     rows = frame.rows.only(np.isin(frame.rows.origin, group))
     if not len(rows):
-        return "no range to it"
+        return "no range to it", False
     distance = dict(zip(zip(rows.origin.tolist(), rows.target.tolist(), strict=True), rows.observed, strict=True))
     distance |= {(b, a): d for (a, b), d in distance.items()}
     clique = _clique(distance)
@@ -156,24 +157,24 @@ def _figure(frame: PlacingSearch, group: np.ndarray) -> str:
         if values[2] > STRICT * values[0]:
             frame.xyz[clique] = xyz
             frame.spread()
-            return ""
+            return "", False
     stations = np.unique(rows.origin)
     targets = np.setdiff1d(group, stations)
     ranges = np.array([[distance.get((a, b), np.nan) for b in targets.tolist()] for a in stations.tolist()])
     unfolding = _unfolded(ranges, float(np.median(rows.sigma)))
-    if unfolding.status != UNFOLDED:
-        return unfolding.status
+    if unfolding.outcome is not FigureOutcome.UNFOLDED:
+        return unfolding.status, unfolding.outcome is FigureOutcome.TOO_FEW
     frame.xyz[stations], frame.xyz[targets] = unfolding.stations, unfolding.targets
     frame.sides |= set(np.concatenate([stations, targets])[unfolding.side_assumed].tolist())
     frame.spread()
-    return ""
+    return "", False
 
 
 def _unfolded(ranges: np.ndarray, sigma: float) -> Unfolding:
     """Unfolded figure; unknown zeros and scales may make ranges up to 100 times worse than sigma."""
     unfolding = unfold(ranges, sigma)
     for factor in (10.0, 100.0):
-        if not unfolding.status.startswith(NO_FIT.split("{")[0]):
+        if unfolding.outcome is not FigureOutcome.NO_FIT:
             break
         unfolding = unfold(ranges, factor * sigma)
     return unfolding

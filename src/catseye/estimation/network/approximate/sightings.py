@@ -107,7 +107,15 @@ def _table(
     wide = np.broadcast_to(np.zeros(3) if shift is None else shift, (m, 3))
     origin, target = (np.broadcast_to(np.asarray(end) // 3, (m,)) for end in ends)
     number = np.broadcast_to(np.asarray(which), (m,))
-    return Sightings(np.full(m, code), origin, target, observed, wide, np.sqrt(variance), number)
+    return Sightings(
+        code=np.full(m, code),
+        origin=origin,
+        target=target,
+        observed=observed,
+        shift=wide,
+        sigma=np.sqrt(variance),
+        which=number,
+    )
 
 
 def _of_group(group: ObservationGroup, variance: np.ndarray, start: np.ndarray) -> Sightings | None:

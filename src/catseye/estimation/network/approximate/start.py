@@ -104,7 +104,9 @@ def approximate(network: ObservationNetwork) -> Approximation:
     assumed[list(search.sides | search.conventional)] = True
     named = [tuple(points.names[p] for p in np.flatnonzero(k)) for k in (new, assumed & new, replaced)]
     xyz = np.where(original.absent, np.nan, search.xyz)
-    return Approximation(xyz, values, named[0], missing, named[1], named[2])
+    return Approximation(
+        xyz=xyz, parameters=values, found=named[0], missing=missing, assumed=named[1], replaced=named[2]
+    )
 
 
 def _search(network: ObservationNetwork, values: np.ndarray) -> PlacingSearch:

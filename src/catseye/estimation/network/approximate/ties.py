@@ -70,7 +70,17 @@ class Ties:
         arm = np.array([measured.get(k, size) for k in opposite.tolist()])
         angular = (code == BEARING) | (code == ZENITH)
         weight = 1.0 / np.hypot(np.where(angular, arm, 1.0) * r.sigma, FLOOR)
-        ties = cls(code, anchor, sense, observed, arm, weight, circle, r.which, size)
+        ties = cls(
+            code=code,
+            anchor=anchor,
+            sense=sense,
+            observed=observed,
+            arm=arm,
+            weight=weight,
+            circle=circle,
+            axis=r.which,
+            size=size,
+        )
         return ties._with_coordinates(xyz[p])
 
     def _with_coordinates(self, at: np.ndarray) -> "Ties":

@@ -133,7 +133,7 @@ def linearise(problem: Problem, state: IterationState, rows: np.ndarray, *, root
     a = along * (root * stretch / np.maximum(length, 1e-300))[:, None]
     misclosure = root * (problem.distance[rows] - stretch * length - state.zero[station])
     g = -a if problem.width == 3 else np.concatenate([-a, root[:, None], (root * length)[:, None]], axis=1)
-    return RangeRows(rows, station, target, a, g, misclosure, length)
+    return RangeRows(rows=rows, station=station, target=target, a=a, g=g, misclosure=misclosure, length=length)
 
 
 def invert_targets(v: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -218,7 +218,17 @@ class NumpyBlocks:
             moment += float(np.sum((problem.root[rows] * linear.length) ** 2))
             if np.any((linear.length == 0.0) & (problem.root[rows] > 0.0)):
                 cost = np.nan
-        return Reduced((normal + normal.T) / 2, before, right, inverse, local_step, condition, cost, gain, moment)
+        return Reduced(
+            normal=(normal + normal.T) / 2,
+            before=before,
+            right=right,
+            inverse=inverse,
+            target_step=local_step,
+            condition=condition,
+            cost=cost,
+            gain=gain,
+            moment=moment,
+        )
 
     def follow(self, state: IterationState, old: Reduced) -> Reduced:
         """Right-hand side and cost at a state near `old`, whose matrices are reused."""

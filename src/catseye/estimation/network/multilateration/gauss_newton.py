@@ -16,7 +16,8 @@ import numpy as np
 from scipy.linalg import lapack
 
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.least_squares.adjustment import CONVERGED, NOT_CONVERGED, ROUNDING, STEP_IN_SIGMAS, UNDEFINED
+from catseye.estimation.least_squares.adjustment import COMPLETE, ROUNDING, STEP_IN_SIGMAS, SolverSettings
+from catseye.estimation.least_squares.status import CONVERGED, AdjustmentOutcome, Status, not_converged, undefined
 from catseye.estimation.network.multilateration import status as status_of
 from catseye.estimation.network.multilateration.blocks import IterationState, NumpyBlocks, Reduced, Statistics
 from catseye.estimation.network.multilateration.datum import InnerConstraints, displacements, generators
@@ -46,16 +47,14 @@ class Blocks(Protocol):
 def adjust_ranges(
     network: RangingNetwork,
     *,
-    tests: bool = True,
-    iterations: int = 50,
+    solver: SolverSettings = COMPLETE,
     inflation: np.ndarray | None = None,
     engine: str | None = None,
 ) -> RangingSolution:
     """Best-fit coordinates, zeros and scales of a ranging network, with covariances and tests.
 
     network      see `RangingNetwork`
-    tests        False: covariances and tests are nan
-    iterations   limit of Gauss-Newton steps; a step that raises the cost is halved, at most ten times
+    solver       cap of steps, tests or not; without tests, covariances and tests are nan
     inflation    (m,) factor on each range's sigma, infinite leaves it out but still tests it against its prediction
     engine       "numpy", "numba", or None: compiled from 200 000 ranges on
 
@@ -74,7 +73,7 @@ def adjust_ranges(
     """
     setup = set_up(network, inflation)
     blocks = _engine(setup, engine)
-    return _Iteration(setup, blocks).run(network, iterations, tests)
+    return _Iteration(setup, blocks).run(network, solver)
 
 
 def _engine(setup: Setup, engine: str | None) -> Blocks:
@@ -148,25 +147,25 @@ class _Iteration:
         self.free = np.flatnonzero(self.problem.free_stations.ravel())
         self.steps, self.cost, self.moment = 0, np.nan, 0.0
 
-    def run(self, network: RangingNetwork, iterations: int, tests: bool) -> RangingSolution:
+    def run(self, network: RangingNetwork, solver: SolverSettings) -> RangingSolution:
         """Iterate to convergence, then compute the statistics."""
-        status, answer = NOT_CONVERGED.format(step=np.inf, iterations=0), None
+        status, answer = not_converged(np.inf, 0), None
         reduced, before = self._reduce(self.state), 0.0
-        while self.steps < iterations:
+        while self.steps < solver.iterations:
             self.steps += 1
             step = self._solve(reduced)
-            if isinstance(step, str):
+            if isinstance(step, Status):
                 status = step
                 break
             if step.size < STEP_IN_SIGMAS + step.noise:
                 status, answer = CONVERGED, step
                 break
-            status = NOT_CONVERGED.format(step=step.size, iterations=self.steps)
+            status = not_converged(step.size, self.steps)
             descent = self._descend(step, reduced, keep=self.reuses_matrix and step.size < KEEP_BELOW * before)
             if descent is None:
                 break
             reduced, before = descent, step.size
-        return self._solution(network, status, reduced, answer, tests)
+        return self._solution(network, status, reduced, answer, solver.tests)
 
     def _reduce(self, state: IterationState) -> Reduced:
         """Normal equations at a state; the factor is reset."""
@@ -214,7 +213,7 @@ class _Iteration:
         self.cost = before
         return None
 
-    def _solve(self, reduced: Reduced) -> _Step | str:
+    def _solve(self, reduced: Reduced) -> _Step | Status:
         """Next step, or the reason why there is none."""
         if not np.isfinite(self.cost):
             return self._undefined()
@@ -224,7 +223,7 @@ class _Iteration:
         motions = self.setup.motions(self.state)
         null = self._null(motions, self.state)
         factor = self.factor or self._factorise(reduced, null)
-        if isinstance(factor, str):
+        if isinstance(factor, Status):
             return factor
         self.factor = factor
         first = factor.solve(reduced.right)
@@ -233,25 +232,33 @@ class _Iteration:
         size = gain
         if motions.shape[1]:
             conditions = self._conditions(motions, self.state)
-            if isinstance(conditions, str):
+            if isinstance(conditions, Status):
                 return conditions
             shift = conditions.restore(first.reshape(len(self.state.stations), -1)[:, :3], second)
             turned = null @ shift
             first = first + turned
             second = second + displacements(self.state.targets, motions @ shift) * self.problem.free_targets
             size += float(reduced.before @ turned**2)
-        return _Step(first, second, size**0.5, gain, 4.0 * EPS * self.moment**0.5, factor, motions)
+        return _Step(
+            stations=first,
+            targets=second,
+            size=size**0.5,
+            gain=gain,
+            noise=4.0 * EPS * self.moment**0.5,
+            factor=factor,
+            motions=motions,
+        )
 
-    def _undefined(self) -> str:
+    def _undefined(self) -> Status:
         problem, names = self.problem, self.setup.names
         along = self.state.targets[problem.target] - self.state.stations[problem.station]
         coinciding = np.flatnonzero(~np.any(along != 0.0, axis=1) & (problem.root > 0.0))
         called = [
             f"the range {names.station(problem.station[i])} to {names.target(problem.target[i])}" for i in coinciding
         ]
-        return UNDEFINED.format(names=status_of.listed(called) if called else "a range between stations")
+        return undefined(status_of.listed(called) if called else "a range between stations")
 
-    def _floating(self, reduced: Reduced) -> str | None:
+    def _floating(self, reduced: Reduced) -> Status | None:
         """Reason why a target is not determined relative to its stations, or None."""
         fine = reduced.condition >= WORST_TARGET
         if fine.all():
@@ -274,7 +281,7 @@ class _Iteration:
             self.problem.free_stations.size, motions.shape[1]
         )
 
-    def _factorise(self, reduced: Reduced, null: np.ndarray) -> _Factor | str:
+    def _factorise(self, reduced: Reduced, null: np.ndarray) -> _Factor | Status:
         free = self.free
         before = reduced.before[free]
         empty = np.zeros((0, 0))
@@ -297,30 +304,31 @@ class _Iteration:
             return self._network_floats(np.sum(vectors[:, floating] ** 2, axis=1))
         return _Factor(free, scale, lower, basis)
 
-    def _network_floats(self, part: np.ndarray) -> str:
+    def _network_floats(self, part: np.ndarray) -> Status:
         full = np.zeros(self.problem.free_stations.size)
         full[self.free] = part
         between = self.setup.terms.between
         joined = (between.first, between.second) if between is not None else (self.free[:0], self.free[:0])
         return status_of.floating_network(self.problem, self.setup.names, joined, part=full)
 
-    def _conditions(self, motions: np.ndarray, state: IterationState) -> InnerConstraints | str:
+    def _conditions(self, motions: np.ndarray, state: IterationState) -> InnerConstraints | Status:
         """Inner constraints at a state, or the reason why they do not fix the free motions."""
         datum = self.setup.datum
         count = motions.shape[1]
         if datum.empty:
             words = status_of.described(motions, self.setup.size)
-            return status_of.MOTIONS.format(motions=words, count=count)
+            return Status(AdjustmentOutcome.RANK_DEFICIENT, status_of.MOTIONS.format(motions=words, count=count))
         free = self.problem.free_stations[:, :3], self.problem.free_targets
         conditions = datum.conditions(state, motions, free)
         _, values, vectors = np.linalg.svd(conditions.response)
         loose = values <= 1e-10 * max(values[0], 1.0)
         if loose.any():
-            return status_of.DATUM.format(motions=status_of.described(motions @ vectors[loose].T, self.setup.size))
+            words = status_of.described(motions @ vectors[loose].T, self.setup.size)
+            return Status(AdjustmentOutcome.RANK_DEFICIENT, status_of.DATUM.format(motions=words))
         return conditions
 
     def _solution(
-        self, network: RangingNetwork, status: str, reduced: Reduced, answer: _Step | None, tests: bool
+        self, network: RangingNetwork, status: Status, reduced: Reduced, answer: _Step | None, tests: bool
     ) -> RangingSolution:
         problem, at, n = self.problem, self.at, self.problem.free_stations.size
         state, pvv = self.state, self.cost
@@ -344,26 +352,26 @@ class _Iteration:
         if status == CONVERGED and degrees > 0 and pvv > status_of.BELIEVABLE**2 * degrees:
             status = status_of.contradiction(problem, state, self.setup.names, statistics=computed) or status
         return RangingSolution(
-            network,
-            state.stations + self.setup.origin,
-            state.targets + self.setup.origin,
-            state.zero,
-            state.scale,
-            status,
-            self.steps,
-            pvv,
-            degrees,
-            problem.width,
-            covariance,
-            statistics.covariance,
-            statistics.redundancy,
-            statistics.standardised,
-            statistics.detectable,
-            self.setup,
-            at,
-            state,
-            reduced.inverse,
-            gauge,
+            network=network,
+            stations=state.stations + self.setup.origin,
+            targets=state.targets + self.setup.origin,
+            zero=state.zero,
+            scale=state.scale,
+            status=status,
+            iterations=self.steps,
+            pvv=pvv,
+            degrees_of_freedom=degrees,
+            width=problem.width,
+            covariance=covariance,
+            covariance_targets=statistics.covariance,
+            redundancy=statistics.redundancy,
+            standardised=statistics.standardised,
+            detectable=statistics.detectable,
+            _setup=self.setup,
+            _at=at,
+            _answer=state,
+            _inverse=reduced.inverse,
+            _gauge=gauge,
         )
 
     def _covariance(self, answer: _Step, reduced: Reduced) -> tuple[np.ndarray, Gauge]:
@@ -379,7 +387,7 @@ class _Iteration:
         if not f:
             return q, gauge
         conditions = self._conditions(motions, self.at)
-        if isinstance(conditions, str):  # they were fixed one step before
+        if isinstance(conditions, Status):  # they were fixed one step before
             raise EstimationError(conditions)
         by_station = np.zeros((*self.problem.free_stations.shape, f))
         by_station[:, :3] = conditions.at_stations

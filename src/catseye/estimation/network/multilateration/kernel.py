@@ -76,7 +76,17 @@ class KernelBlocks:
             (normal, before, right),
             (inverse, target_step, condition),
         )
-        return Reduced(normal, before, right, inverse, target_step, condition, cost, gain, moment)
+        return Reduced(
+            normal=normal,
+            before=before,
+            right=right,
+            inverse=inverse,
+            target_step=target_step,
+            condition=condition,
+            cost=cost,
+            gain=gain,
+            moment=moment,
+        )
 
     def follow(self, state: IterationState, old: Reduced) -> Reduced:
         """Right-hand side, as `NumpyBlocks.follow`."""

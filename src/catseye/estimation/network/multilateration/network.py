@@ -141,7 +141,17 @@ def set_up(network: RangingNetwork, inflation: np.ndarray | None) -> Setup:
             still[first + prior.index] = True
     size = float(max(np.abs(state.stations).max(), np.abs(state.targets).max()))
     dilation = width == 5 and terms.between is None and bool(np.all(np.isinf(gauges[1][1])))
-    return Setup(problem, state, datum, terms, names, origin, size or 1.0, dilation, still)
+    return Setup(
+        problem=problem,
+        start=state,
+        datum=datum,
+        terms=terms,
+        names=names,
+        origin=origin,
+        size=size or 1.0,
+        dilation=dilation,
+        still=still,
+    )
 
 
 def _points(xyz, called) -> np.ndarray:

@@ -7,7 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, GroupFit
+from catseye.estimation.least_squares.adjustment import GroupFit
+from catseye.estimation.least_squares.status import CONVERGED, Status
 from catseye.estimation.network.multilateration.blocks import UNCHECKED, IterationState, linearise
 from catseye.estimation.network.multilateration.network import RangingNetwork, Setup
 
@@ -58,7 +59,7 @@ class RangingSolution:
     targets: np.ndarray
     zero: np.ndarray
     scale: np.ndarray
-    status: str
+    status: Status
     iterations: int
     pvv: float
     degrees_of_freedom: int
@@ -116,15 +117,15 @@ class RangingSolution:
         """Fits of the ranges and of all other groups (between stations, priors)."""
         problem = self._setup.problem
         ranges = GroupFit(
-            "ranges",
-            problem.root > 0.0,
-            self.residual,
-            problem.sigma,
-            self.redundancy,
-            self.standardised,
-            self.estimated_error,
-            self.detectable,
-            float(np.sum((problem.root * self.residual) ** 2)),
+            name="ranges",
+            active=problem.root > 0.0,
+            residual=self.residual,
+            sigma=problem.sigma,
+            redundancy=self.redundancy,
+            standardised=self.standardised,
+            estimated_error=self.estimated_error,
+            detectable_error=self.detectable,
+            pvv=float(np.sum((problem.root * self.residual) ** 2)),
         )
         return ranges, *self._setup.terms.fits(self._answer, self.covariance, self.covariance_targets, self.width)
 

@@ -5,17 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.estimation.least_squares.adjustment import CONVERGED, NOT_CONVERGED, RANK_DEFICIENT, UNDEFINED
+from catseye.estimation.least_squares.status import AdjustmentOutcome, Status, rank_deficient
 from catseye.estimation.network.multilateration.blocks import UNCHECKED, IterationState, Problem, Statistics, linearise
 
-__all__ = ["CONVERGED", "NOT_CONVERGED", "RANK_DEFICIENT", "UNDEFINED", "Names", "contradiction"]
-
-TARGET = "rank deficient: {name} {why}{others}; add ranges from other directions, hold it or give it a prior"
-MOTIONS = "rank deficient: the whole network floats ({motions}); hold {count} more coordinates, or mark datum points"
-DATUM = "rank deficient: the datum does not hold {motions}; mark more coordinates as datum, or hold them"
-PIECES = "rank deficient: the network is in {count} pieces that no observation connects: {pieces}; \
+TARGET = "{name} {why}{others}; add ranges from other directions, hold it or give it a prior"
+MOTIONS = "the whole network floats ({motions}); hold {count} more coordinates, or mark datum points"
+DATUM = "the datum does not hold {motions}; mark more coordinates as datum, or hold them"
+PIECES = "the network is in {count} pieces that no observation connects: {pieces}; \
 add ranges between them, or hold each one"
-CONTRADICTORY = "contradictory: half of the residuals exceed {median:.0f} standard uncertainties, worst at {worst}; \
+CONTRADICTORY = "half of the residuals exceed {median:.0f} standard uncertainties, worst at {worst}; \
 a range may be grossly wrong, two points exchanged, or the starting coordinates too far off"
 
 LISTED = 4  # names in one line
@@ -54,7 +52,7 @@ def listed(names: Sequence[str]) -> str:
     return ", ".join(names[:LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
-def floating_targets(problem: Problem, state: IterationState, names: Names, *, floating: np.ndarray) -> str:
+def floating_targets(problem: Problem, state: IterationState, names: Names, *, floating: np.ndarray) -> Status:
     """Status of targets `floating` (indices, worst first) not determined by their stations."""
     worst = int(floating[0])
     rows = np.flatnonzero((problem.target == worst) & (problem.root > 0.0))
@@ -70,9 +68,8 @@ def floating_targets(problem: Problem, state: IterationState, names: Names, *, f
         line = len(values) > 1 and values[1] < 1e-6 * values[0]
         why = f"lies on one {'line' if line else 'plane'} with all {stations} stations that see it"
     other_targets = [names.target(int(i)) for i in floating[1:]]
-    return TARGET.format(
-        name=names.target(worst), why=why, others=f" (so do {listed(other_targets)})" if other_targets else ""
-    )
+    others = f" (so do {listed(other_targets)})" if other_targets else ""
+    return Status(AdjustmentOutcome.RANK_DEFICIENT, TARGET.format(name=names.target(worst), why=why, others=others))
 
 
 def described(motions: np.ndarray, size: float) -> str:
@@ -112,22 +109,24 @@ def pieces(problem: Problem, names: Names, joined: tuple[np.ndarray, np.ndarray]
     return [f"[{listed(m)}]" for m in sorted(members, key=len)]
 
 
-def floating_network(problem: Problem, names: Names, joined: tuple[np.ndarray, np.ndarray], *, part: np.ndarray) -> str:
+def floating_network(
+    problem: Problem, names: Names, joined: tuple[np.ndarray, np.ndarray], *, part: np.ndarray
+) -> Status:
     """Status of a singular reduced system.
 
     `part` (n,) is each parameter's share in the null space.
     """
     parts = pieces(problem, names, joined)
     if len(parts) > 1:
-        return PIECES.format(count=len(parts), pieces=" and ".join(parts[:3]))
+        return Status(AdjustmentOutcome.RANK_DEFICIENT, PIECES.format(count=len(parts), pieces=" and ".join(parts[:3])))
     worst = np.argsort(-np.round(part / part.max(), 6), kind="stable")  # roundoff must not change the order
     called = [names.parameter(int(i), problem.width) for i in worst if part[i] > 1e-3 * part.max()]
-    return RANK_DEFICIENT.format(names=listed(called))
+    return rank_deficient(listed(called))
 
 
 def contradiction(
     problem: Problem, state: IterationState, names: Names, *, statistics: Statistics | None
-) -> str | None:
+) -> Status | None:
     """Status of implausibly large residuals overall, or None.
 
     Less exact without statistics.
@@ -146,4 +145,4 @@ def contradiction(
         off = statistics.residual[i] / max(statistics.redundancy[i], UNCHECKED)
         ends = f"{names.station(int(problem.station[i]))} to {names.target(int(problem.target[i]))}"
         where += f" and at the range {ends} (about {off:.2g} m off)"
-    return CONTRADICTORY.format(median=median, worst=where)
+    return Status(AdjustmentOutcome.CONTRADICTORY, CONTRADICTORY.format(median=median, worst=where))

@@ -181,13 +181,13 @@ def _fit(name: str, off: np.ndarray, covariance: np.ndarray, q: np.ndarray) -> G
     ).ravel()
     redundancy = 1.0 - np.einsum("kii->ki", leverage)
     return GroupFit(
-        name,
-        np.ones(off.size, dtype=bool),
-        off.ravel(),
-        np.sqrt(np.einsum("kii->ki", covariance)).ravel(),
-        redundancy.ravel(),
-        pv.ravel() / np.sqrt(visible),
-        pv.ravel() / visible,
-        NONCENTRALITY / np.sqrt(visible),
-        float(np.sum(off * pv)),
+        name=name,
+        active=np.ones(off.size, dtype=bool),
+        residual=off.ravel(),
+        sigma=np.sqrt(np.einsum("kii->ki", covariance)).ravel(),
+        redundancy=redundancy.ravel(),
+        standardised=pv.ravel() / np.sqrt(visible),
+        estimated_error=pv.ravel() / visible,
+        detectable_error=NONCENTRALITY / np.sqrt(visible),
+        pvv=float(np.sum(off * pv)),
     )

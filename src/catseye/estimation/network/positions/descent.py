@@ -179,7 +179,14 @@ def _step(a: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndar
 def descend(r: Ranges, start: np.ndarray, *, damped: bool = True) -> Descent:
     """Gauss-Newton from start (k, 3), with Levenberg-Marquardt damping if `damped`."""
     k, s = len(r.d), r.stations
-    out = Descent(start.copy(), np.empty((k, 3, 3)), np.empty(k), np.zeros(k, int), np.empty(k), np.zeros(k, bool))
+    out = Descent(
+        x=start.copy(),
+        covariance=np.empty((k, 3, 3)),
+        pvv=np.empty(k),
+        iterations=np.zeros(k, int),
+        bend=np.empty(k),
+        settled=np.zeros(k, bool),
+    )
     lanes, x, damping = np.arange(k), np.ascontiguousarray(start.T), np.zeros(k)
     d, root = np.ascontiguousarray(r.d.T), np.ascontiguousarray(1.0 / r.u.T)
     a = _normal(s, d, root, x)

@@ -115,7 +115,14 @@ def positions(
     if compiled is None:
         compiled = targets.d.size >= COMPILED_FROM
     status, ranges, iterations = (np.empty(t, dtype=kind) for kind in (np.int8, np.int32, np.int32))
-    out = Positions(np.empty((t, 3)), np.empty((t, 3, 3)), status, ranges, iterations, np.empty(t))
+    out = Positions(
+        x=np.empty((t, 3)),
+        covariance=np.empty((t, 3, 3)),
+        status=status,
+        ranges=ranges,
+        iterations=iterations,
+        pvv=np.empty(t),
+    )
     origin = s.mean(axis=0)
     s = s - origin
     if targets.near is not None:
@@ -172,12 +179,27 @@ def _compiled(s: np.ndarray, all_stations: Planes, origin: np.ndarray) -> Callab
         s, all_stations.half_square[0], np.ascontiguousarray(all_stations.rows[0]), frame, origin
     )
     d = descent
-    limits = kernel.PositionLimits(FLAT, SIGNIFICANT, d.ENOUGH, d.SINGULAR, d.BENT, d.CONTRADICTION, d.CAP_UNDAMPED)
+    limits = kernel.PositionLimits(
+        flat=FLAT,
+        significant=SIGNIFICANT,
+        enough=d.ENOUGH,
+        singular=d.SINGULAR,
+        bent=d.BENT,
+        contradiction=d.CONTRADICTION,
+        cap=d.CAP_UNDAMPED,
+    )
 
     def fast(chunk: _Chunk, part: Positions) -> np.ndarray:
         good = np.empty(len(chunk.d), dtype=bool)
         near = np.full((1, 3), np.nan) if chunk.near is None else np.ascontiguousarray(chunk.near)
-        answers = kernel.Answers(part.x, part.covariance, part.ranges, part.iterations, part.pvv, good)
+        answers = kernel.Answers(
+            x=part.x,
+            covariance=part.covariance,
+            ranges=part.ranges,
+            iterations=part.iterations,
+            pvv=part.pvv,
+            good=good,
+        )
         kernel.locate(kernel.MeasuredRanges(chunk.d, chunk.u, near), site, limits, answers)
         part.status[:] = PositionStatus.FOUND
         return good

@@ -46,7 +46,15 @@ def planes_of(s: np.ndarray, patterns: np.ndarray) -> Planes:
     extended = extent > FLAT * extent[:, :1]
     inverse = np.where(extended, 1.0 / np.where(extended, extent, 1.0), np.inf)
     rows = axes @ np.swapaxes(q, 1, 2) * np.where(extended, inverse, 0.0)[..., None]
-    return Planes(centre, axes, rows, np.sum(q * q, axis=2) / 2, inverse, count, ~extended[:, 1])
+    return Planes(
+        centre=centre,
+        axes=axes,
+        rows=rows,
+        half_square=np.sum(q * q, axis=2) / 2,
+        inverse=inverse,
+        count=count,
+        collinear=~extended[:, 1],
+    )
 
 
 def patterns_of(table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -10,6 +10,7 @@ estimated here: it must be known to a few standard uncertainties, or the ranges 
 """
 
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 
@@ -18,17 +19,32 @@ from catseye.estimation.network.unfolding.factors import Figure, factors, in_pla
 from catseye.estimation.network.unfolding.fit import FIT, FigureFit, flattest, least_squares, loose
 from catseye.estimation.network.unfolding.sides import extend, settle_sides
 
-UNFOLDED = "unfolded"
-TOO_FEW = "not unfolded, too few ranges: {m} between {s} stations and {t} targets leave no complete part with 4 of \
-each and as many ranges as unknowns; measure more pairs"
-IN_LINE = "not unfolded: the stations or the targets lie on one line, about which the others may turn; add some off it"
-PLANE_TOO_FEW = "not unfolded: {s} stations or {t} targets lie in one plane, where at least 6 are needed; add more, or \
-some off it"
-NO_FIT = "not unfolded: the best figure leaves {rms:.2g} m where {sigma:.2g} m is expected: the ranges do not fit one \
-figure"
-LOOSE = "not unfolded: the ranges between {s} stations and {t} targets let the figure bend by a thirtieth of its size; \
-points in one plane may lie on one circle or other conic: add a station off it"
-AMBIGUOUS = "not unfolded: different figures fit {s} stations and {t} targets equally well; measure more pairs"
+
+class FigureOutcome(Enum):
+    """Outcome of an unfolding; the value is the text of its status."""
+
+    UNFOLDED = "unfolded"
+    TOO_FEW = (
+        "not unfolded, too few ranges: {m} between {s} stations and {t} targets leave no complete part with 4 of each "
+        "and as many ranges as unknowns; measure more pairs"
+    )
+    IN_LINE = (
+        "not unfolded: the stations or the targets lie on one line, about which the others may turn; add some off it"
+    )
+    PLANE_TOO_FEW = (
+        "not unfolded: {s} stations or {t} targets lie in one plane, where at least 6 are needed; add more, or some "
+        "off it"
+    )
+    NO_FIT = (
+        "not unfolded: the best figure leaves {rms:.2g} m where {sigma:.2g} m is expected: the ranges do not fit one "
+        "figure"
+    )
+    LOOSE = (
+        "not unfolded: the ranges between {s} stations and {t} targets let the figure bend by a thirtieth of its size; "
+        "points in one plane may lie on one circle or other conic: add a station off it"
+    )
+    AMBIGUOUS = "not unfolded: different figures fit {s} stations and {t} targets equally well; measure more pairs"
+
 
 NOISE = 3.0  # a singular value below this multiple of the noise's is zero
 ENOUGH = 120  # stations or targets in the initial figure; the others follow
@@ -47,13 +63,15 @@ class Unfolding:
     side_assumed   (S + T,) bool, stations first: points that fit as well on the other side of the plane of their
                    partners; they are put on the side of the others
     rms            m, of the residuals, over the degrees of freedom
-    status         "unfolded", or one line with problem and remedy
+    outcome        of the search
+    status         its text: "unfolded", or one line with problem and remedy
     """
 
     stations: np.ndarray
     targets: np.ndarray
     side_assumed: np.ndarray
     rms: float
+    outcome: FigureOutcome
     status: str
 
 
@@ -79,14 +97,14 @@ def unfold(ranges: np.ndarray, sigma: float, *, seed: int = 0) -> Unfolding:
     (s, t), m = ranges.shape, int(np.isfinite(ranges).sum())
     rows, columns = _complete_part(np.isfinite(ranges))
     if not len(rows):
-        return _failed(s, t, TOO_FEW.format(s=s, t=t, m=m))
+        return _failed(s, t, FigureOutcome.TOO_FEW, s=s, t=t, m=m)
     rows, columns = (k[np.linspace(0, len(k) - 1, min(len(k), ENOUGH)).astype(int)] for k in (rows, columns))
     part = ranges[np.ix_(rows, columns)]
     size = float(np.sqrt(np.mean(part**2)))
-    figure, status = _part_figure(part / size, sigma / size, np.random.default_rng(seed))
+    figure, outcome = _part_figure(part / size, sigma / size, np.random.default_rng(seed))
     if figure is None:
-        too_few = status == TOO_FEW
-        return _failed(s, t, status.format(s=s if too_few else len(rows), t=t if too_few else len(columns), m=m))
+        counted = (s, t) if outcome is FigureOutcome.TOO_FEW else (len(rows), len(columns))
+        return _failed(s, t, outcome, s=counted[0], t=counted[1], m=m)
     stations, targets = np.full((s, 3), np.nan), np.full((t, 3), np.nan)
     stations[rows], targets[columns] = figure[0] * size, figure[1] * size
     extend(stations, targets, ranges, sigma=sigma)
@@ -108,18 +126,31 @@ def _fitted(stations: np.ndarray, targets: np.ndarray, ranges: np.ndarray, *, si
         assumed[at] = settle_sides(targets[to], stations, at, table=table, sigma=sigma)
         fit = least_squares(stations[at], targets[to], table)
     if fit.rms > FIT * sigma:
-        return _failed(s, t, NO_FIT.format(rms=fit.rms, sigma=sigma))
+        return _failed(s, t, FigureOutcome.NO_FIT, rms=fit.rms, sigma=sigma)
     if loose(fit, table, sigma):
-        return _failed(s, t, LOOSE.format(s=len(at), t=len(to)))
+        return _failed(s, t, FigureOutcome.LOOSE, s=len(at), t=len(to))
     stations[at], targets[to] = in_space(fit.stations), in_space(fit.targets)
     stations, targets = _oriented(stations, targets)
-    return Unfolding(stations, targets, assumed, fit.rms, UNFOLDED)
+    return Unfolding(
+        stations=stations,
+        targets=targets,
+        side_assumed=assumed,
+        rms=fit.rms,
+        outcome=FigureOutcome.UNFOLDED,
+        status=FigureOutcome.UNFOLDED.value,
+    )
 
 
-def _failed(s: int, t: int, status: str) -> Unfolding:
-    """Result without a figure, with the reason."""
-    nowhere = np.full((s, 3), np.nan), np.full((t, 3), np.nan)
-    return Unfolding(*nowhere, np.zeros(s + t, dtype=bool), float("nan"), status)
+def _failed(count: int, targets: int, outcome: FigureOutcome, **numbers: float) -> Unfolding:
+    """Result without a figure of `count` stations and `targets`, with the numbers that its text names."""
+    return Unfolding(
+        stations=np.full((count, 3), np.nan),
+        targets=np.full((targets, 3), np.nan),
+        side_assumed=np.zeros(count + targets, dtype=bool),
+        rms=float("nan"),
+        outcome=outcome,
+        status=outcome.value.format(**numbers),
+    )
 
 
 def _complete_part(measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -144,15 +175,15 @@ def _complete_part(measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return best[1], best[2]
 
 
-def _part_figure(ranges: np.ndarray, sigma: float, rng: np.random.Generator) -> tuple[Figure | None, str]:
-    """Figure of a complete part of size about 1, or None and the status."""
+def _part_figure(ranges: np.ndarray, sigma: float, rng: np.random.Generator) -> tuple[Figure | None, FigureOutcome]:
+    """Figure of a complete part of size about 1, or None, and the outcome."""
     s, t = ranges.shape
     squares = ranges**2
     u, v, values = factors(squares)
     floor = NOISE * sigma * (np.sqrt(s) + np.sqrt(t)) + 1e-13 * values[0]
     rank = int(np.sum(values[:3] > floor))
     if rank < 2:
-        return None, IN_LINE
+        return None, FigureOutcome.IN_LINE
     spare = s * t - 3 * (s + t) + 6
     dimensions = [3] * (rank == 3 and min(s, t) >= 4 and spare >= 0) + [2] * (rank == 2)
     fits: list[FigureFit] = []
@@ -166,13 +197,13 @@ def _part_figure(ranges: np.ndarray, sigma: float, rng: np.random.Generator) -> 
         if fits and fits[0].rms <= FIT * sigma and (max(s, t) >= 10 or (search and spare > 2) or rank == 2):
             break
     if not fits or (min(s, t) < 4 and fits[0].rms > FIT * sigma):
-        return None, TOO_FEW
+        return None, FigureOutcome.TOO_FEW
     if rank == 2 and max(s, t) < 6 and fits[0].rms > FIT * sigma:
-        return None, PLANE_TOO_FEW
+        return None, FigureOutcome.PLANE_TOO_FEW
     fitting = [fit for fit in fits if fit.rms <= FIT * sigma]
     if rank == 3 and any(_differ(fits[0], fit, sigma) for fit in fitting[1:]):
-        return None, AMBIGUOUS
-    return (in_space(fits[0].stations), in_space(fits[0].targets)), UNFOLDED
+        return None, FigureOutcome.AMBIGUOUS
+    return (in_space(fits[0].stations), in_space(fits[0].targets)), FigureOutcome.UNFOLDED
 
 
 def _differ(a: FigureFit, b: FigureFit, sigma: float) -> bool:

@@ -1,201 +1,34 @@
-"""Findings on an adjusted network, shared by all outputs, in the axes of its own file."""
+"""Adjusted network: coordinates, tests of its observations and verdict, in the axes of its own file."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from operator import itemgetter
 
 import numpy as np
 
+from catseye.aliases import Progress
 from catseye.errors import EstimationError
-from catseye.estimation.least_squares.adjustment import CONVERGED, NONCENTRALITY
-from catseye.estimation.network.external import effects_at_ends
-from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, label, points_of
+from catseye.estimation.least_squares.status import CONVERGED
+from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, label
 from catseye.estimation.quality.ellipsoid import Ellipsoid, ellipsoid, relative_covariance
 from catseye.estimation.quality.reliability import (
+    TOO_LARGE,
+    TOO_SMALL,
     GlobalTest,
-    bias_to_noise,
-    checked,
     global_test,
     observation_tests,
     single_level,
     tau_critical,
+    too_good,
     w_critical,
 )
+from catseye.reduction.network.observations import ObservationTable, in_file_axes, observation_table
+from catseye.reduction.network.treatment import AdjustmentOptions, Treatment, treated
+from catseye.reduction.network.words import NAMED, listed, quantity
+from catseye.verdict import Verdict
 
-ROLES = ("from", "to", "third", "fourth")
+UNIT = 300.0  # times too large: above the geometric mean of 100 and 1000, mm for m is the likely cause
 STATIONED = ("distance", "direction", "angle", "azimuth")  # words in the names of kinds measured from a station
-MEASURES = (
-    "observed",
-    "u",
-    "residual",
-    "standardised",
-    "redundancy",
-    "mdb",
-    "estimated_error",
-    "bias_to_noise",
-    "effect",
-)
-NUMBER = re.compile(r"\d+")
-COMPONENTS = ("x", "y", "z")
-
-
-@dataclass(frozen=True, eq=False)
-class ObservationTable:
-    """All m observations of a network in file order, as columns; lengths in m, angles in rad.
-
-    kinds             names of kinds, indexed by `kind`
-    kind              (m,) int
-    unit              (m,) "m", "rad" or "1"
-    component         (m,) axis of the file, for one coordinate of a point or vector; else ""
-    sign              (m,) -1 where the file's axis is opposite to this package's
-    ends              (m, 4) rows of the points by role, from, to, third, fourth; -1 for none
-    group, row        (m,) int: position in the network's groups
-    active            (m,) bool: used in the adjustment
-    checked           (m,) bool: an error in it would show by other observations
-    bias_to_noise     (m,) largest effect of an error just not detectable on any result, in its standard uncertainties;
-                      nan where unknown, as within correlated groups
-    effect            (m,) m, largest movement of a named point by an error of the size of mdb, or nan
-    observed, residual, u, redundancy, standardised, mdb, estimated_error   (m,) as in `GroupFit`; mdb is its
-                      detectable_error; the last three are nan for unchecked observations, and all four without
-                      an answer
-    """
-
-    kinds: tuple[str, ...]
-    kind: np.ndarray
-    unit: np.ndarray
-    component: np.ndarray
-    sign: np.ndarray
-    ends: np.ndarray
-    group: np.ndarray
-    row: np.ndarray
-    active: np.ndarray
-    checked: np.ndarray
-    observed: np.ndarray
-    residual: np.ndarray
-    u: np.ndarray
-    redundancy: np.ndarray
-    standardised: np.ndarray
-    mdb: np.ndarray
-    estimated_error: np.ndarray
-    bias_to_noise: np.ndarray
-    effect: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.kind)
-
-    @cached_property
-    def worst_first(self) -> np.ndarray:
-        """Rows by falling |standardised|, (m,), untested ones last; by |residual| / u if none has a test."""
-        size = np.abs(self.standardised)
-        if not np.isfinite(size).any():
-            size = np.abs(self.residual) / self.u
-        return np.argsort(-np.nan_to_num(size, nan=-1.0), kind="stable")
-
-
-def observation_table(solution: NetworkSolution) -> ObservationTable:
-    """Observations of a solution, in file order where known, else group by group.
-
-    solution   an adjusted network
-
-    The sign of components along an axis opposite in the file is reversed, with all derived values.
-    """
-    network = solution.network
-    kinds: dict[str, int] = {}
-    effects = effects_at_ends(solution)
-    parts = [_part(solution, g, kinds, effects[g]) for g in range(len(network.groups))]
-    order = _file_order(network)
-    joined = {
-        name: np.concatenate([part[name] for part in parts])[order] if parts else np.zeros(0) for name in _COLUMNS
-    }
-    if not parts:
-        joined |= {"ends": np.zeros((0, len(ROLES)), dtype=int), "component": np.zeros(0, dtype="U1")}
-    return ObservationTable(kinds=tuple(kinds), **joined)
-
-
-_COLUMNS = tuple(ObservationTable.__dataclass_fields__)[1:]
-
-
-def _part(solution: NetworkSolution, g: int, kinds: dict[str, int], effect: np.ndarray) -> dict[str, np.ndarray]:
-    """Columns of one group, given the effects of undetected errors; its kinds are added to `kinds`."""
-    group, fit = solution.network.groups[g], solution.fits[g]
-    m = len(fit.residual)
-    group_kind = getattr(group, "kind", "") if "kinds" not in type(group).__dict__ else ""  # else a kind per row
-    names, at = (
-        (np.array([group_kind]), np.zeros(m, dtype=int))
-        if group_kind
-        else np.unique(_row_texts(group, "kinds"), return_inverse=True)
-    )
-    code = np.array([kinds.setdefault(str(name), len(kinds)) for name in names], dtype=int)
-    ends = np.full((m, len(ROLES)), -1)
-    for role, end in enumerate(points_of(group)[: len(ROLES)]):
-        ends[:, role] = end
-    component, sign = _components(solution.network, getattr(group, "component", np.full(m, "")))
-    computed = fit.detectable_error > 0.0  # zero without statistics
-    tested_rows = fit.active & computed & checked(fit)
-    independent = group.covariance.ndim == 1
-    tested = np.where(tested_rows | (computed & ~fit.active), sign, np.nan)
-    return {
-        "kind": code[at],
-        "unit": np.asarray(getattr(group, "units", np.full(m, getattr(group, "unit", "") or "1"))),
-        "component": component,
-        "sign": sign,
-        "ends": ends,
-        "group": np.full(m, g),
-        "row": np.arange(m),
-        "active": fit.active,
-        "checked": tested_rows,
-        "observed": sign * group.observed,
-        "residual": sign * fit.residual,
-        "u": fit.sigma,
-        "redundancy": np.where(computed, fit.redundancy, np.nan),
-        "standardised": tested * fit.standardised,
-        "mdb": np.abs(tested) * fit.detectable_error,
-        "estimated_error": tested * fit.estimated_error,
-        "bias_to_noise": np.where(tested_rows & independent, bias_to_noise(fit.redundancy, NONCENTRALITY), np.nan),
-        "effect": np.where(tested_rows, effect, np.nan),
-    }
-
-
-def _row_texts(group: object, name: str) -> np.ndarray:
-    """Texts of a group's rows, (m,); the group's name for foreign kinds."""
-    texts = getattr(group, name, None)
-    return np.asarray(texts) if texts is not None else np.full(len(group.observed), group.name)  # type: ignore[attr-defined]
-
-
-def _components(network: ObservationNetwork, component: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Components in the file's names, and their signs."""
-    called, sign = component.astype("U8"), np.ones(len(component))
-    for k, name in enumerate(COMPONENTS):
-        mine = component == name
-        if mine.any():
-            j = int(np.argmax(np.abs(network.axes[k])))
-            called[mine], sign[mine] = network.axis_names[j], network.axes[k, j]
-    return called, sign
-
-
-def in_file_axes(network: ObservationNetwork, x: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates or displacements (n, 3) and covariances (n, 3, 3) in the axes of the network's file.
-
-    By exchange and sign, not by a product: an unknown coordinate does not affect the others.
-    """
-    at = np.argmax(np.abs(network.axes), axis=0)
-    sign = network.axes[at, np.arange(3)]
-    return sign * x[:, at], np.outer(sign, sign) * covariance[:, at[:, None], at]
-
-
-def _file_order(network: ObservationNetwork) -> np.ndarray:
-    """Rows of all groups in file order; unchanged if a group has no places in the file."""
-    total = sum(len(g.observed) for g in network.groups)
-    if len(network.groups) < 2 or len(network.places) != len(network.groups) or not all(network.places):
-        return np.arange(total)
-    rank: dict[str, int] = {}
-    keys = []
-    for place in (place for places in network.places for place in places):
-        words = NUMBER.sub("", place)
-        keys.append((rank.setdefault(words, len(rank)), *map(int, NUMBER.findall(place))))
-    return np.array([i for i, _ in sorted(enumerate(keys), key=itemgetter(1))], dtype=int)
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,8 +51,8 @@ class Relative:
 
 
 @dataclass(frozen=True, eq=False)
-class Findings:
-    """Findings on a solution, in the axes of its file.
+class AdjustedNetwork:
+    """Network adjusted and tested, in the axes of its file.
 
     solution      adjusted network
     x             (n, 3) m; nan where a coordinate is absent
@@ -236,6 +69,7 @@ class Findings:
     level_single  of a single test; nan if nothing is tested
     relative      between the requested pairs of points
     critical      |statistic| above which an observation is suspect; nan if nothing is tested
+    treatment     of its observations; None where nothing treated them, as in a plan
     """
 
     solution: NetworkSolution
@@ -254,6 +88,7 @@ class Findings:
     level_single: float
     critical: float
     relative: tuple[Relative, ...] = ()
+    treatment: Treatment | None = None
 
     @property
     def network(self) -> ObservationNetwork:
@@ -263,10 +98,20 @@ class Findings:
     def names(self) -> tuple[str, ...]:
         return self.network.points.names
 
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Verdict on the adjustment."""
+        return _verdict(self)
+
+    @cached_property
+    def likely(self) -> np.ndarray:
+        """Rows of `table` that data snooping would leave out, or did."""
+        return np.flatnonzero(self.in_table(self.treatment.likely)) if self.treatment else np.zeros(0, dtype=int)
+
     @property
     def answered(self) -> bool:
         """True if there are coordinates, valid within their covariance."""
-        return self.solution.status.startswith(CONVERGED)
+        return self.solution.status.usable
 
     @cached_property
     def u(self) -> np.ndarray:
@@ -330,19 +175,47 @@ class Findings:
         return self.table.kinds[self.table.kind[row]]
 
 
-def findings(
+def adjusted(
+    network: ObservationNetwork,
+    options: AdjustmentOptions | None = None,
+    *,
+    progress: Progress | None = None,
+) -> AdjustedNetwork:
+    """Network adjusted as its options say, with tests and verdict.
+
+    network    from `records.network.any_file.read_network`
+    options    treatment of the observations, tests and solver; None: every observation as claimed
+    progress   called with (what, done, of how many)
+
+    Raises EstimationError for an unknown method, for a name that is not in the network, and where a network without an
+    answer is to be treated.
+    """
+    options = options or AdjustmentOptions()
+    solution, treatment = treated(network, options, progress=progress)
+    return adjusted_network(
+        solution,
+        scaled=options.scale_by_variance_factor,
+        level=options.level,
+        pairs=options.relative,
+        treatment=treatment,
+    )
+
+
+def adjusted_network(
     solution: NetworkSolution,
     *,
     scaled: bool = False,
     level: float = 0.05,
     pairs: Sequence[tuple[str, str]] = (),
-) -> Findings:
-    """Findings on a solution.
+    treatment: Treatment | None = None,
+) -> AdjustedNetwork:
+    """Adjusted network with tests and verdict, from its solution.
 
-    solution   an adjusted network, with an answer or without
-    scaled     multiply covariances by the variance factor, and test observations against it (tau tests)
-    level      of the chi-square test, and of all tests of single observations together
-    pairs      pairs of points, by name, for relative ellipsoids
+    solution    with an answer or without
+    scaled      multiply covariances by the variance factor, and test observations against it (tau tests)
+    level       of the chi-square test, and of all tests of single observations together
+    pairs       pairs of points, by name, for relative ellipsoids
+    treatment   of the observations
 
     Raises EstimationError for a name that is not in the network, and if `scaled` without redundancy.
     """
@@ -368,7 +241,7 @@ def findings(
     if count:
         limit = tau_critical(single, solution.degrees_of_freedom) if tau else w_critical(single)
     degrees = solution.degrees_of_freedom
-    return Findings(
+    return AdjustedNetwork(
         solution=solution,
         x=x,
         covariance=covariance,
@@ -385,6 +258,7 @@ def findings(
         level_single=single,
         critical=limit,
         relative=tuple(_relative(solution, pair, factor) for pair in pairs),
+        treatment=treatment,
     )
 
 
@@ -402,4 +276,80 @@ def _relative(solution: NetworkSolution, pair: tuple[str, str], factor: float) -
     distance = float(np.linalg.norm(vector[common]))
     unit = vector[common] / distance if distance > 0.0 else np.full(len(common), np.nan)
     u = float(np.sqrt(np.maximum(unit @ covariance[np.ix_(common, common)] @ unit, 0.0))) if len(common) else np.nan
-    return Relative(*pair, distance, u, covariance, ellipsoid(covariance))
+    return Relative(
+        first=pair[0],
+        second=pair[1],
+        distance=distance,
+        u_distance=u,
+        covariance=covariance,
+        ellipsoid=ellipsoid(covariance),
+    )
+
+
+def _verdict(network: AdjustedNetwork) -> Verdict:
+    """Verdict on the adjustment, with reasons."""
+    status, overall = network.solution.status, network.global_test
+    if not network.answered:
+        return Verdict("failed", f"no answer: {status}")
+    if status != CONVERGED or network.network.doubts:
+        reasons = [*network.network.doubts[:NAMED], *([status] if status != CONVERGED else [])]
+        return Verdict("doubtful", "; ".join(reasons))
+    sides = network.solution.assumed if network.network.points.fixed.any() else ()
+    if sides:  # the side of a free network is a convention
+        text = f"the side on which these points lie is undetermined; a mirror image fits as well: {listed(sides)}"
+        return Verdict("doubtful", f"{text}; give approximate coordinates, or measure a zenith angle or a height")
+    if not np.isfinite(overall.p):
+        return Verdict("doubtful", "unchecked: no redundancy, so no error would show")
+    if overall.outcome == TOO_LARGE:
+        more = 100.0 * (np.sqrt(overall.factor) - 1.0)
+        text = f"the observations scatter {more:.0f} % more than their uncertainties claim"
+        return Verdict("doubtful", f"{text}; {suspects_words(network) or 'no single observation stands out'}")
+    if len(network.suspects):
+        text = "the network agrees overall with the claimed uncertainties, single observations do not"
+        return Verdict("doubtful", f"{text}; {suspects_words(network)}")
+    if too_good(overall.factor * network.solution.degrees_of_freedom, network.solution.degrees_of_freedom):
+        return Verdict("doubtful", _too_good(network))
+    if overall.outcome == TOO_SMALL:
+        less = 100.0 * (1.0 - np.sqrt(overall.factor))
+        text = f"better than claimed: the observations scatter {less:.0f} % less than their uncertainties claim"
+    else:
+        text = "the observations agree with each other as their uncertainties claim"
+    unchecked, out = int(np.sum(network.table.active & ~network.table.checked)), int(np.sum(~network.table.active))
+    text += f", {out} left out" if out else ""
+    return Verdict("good", text + (f", but {unchecked} of them are not checked by others" if unchecked else ""))
+
+
+def _too_good(network: AdjustedNetwork) -> str:
+    """Explanation of a variance factor too small for chance, with the factor of the sigmas."""
+    factor = network.global_test.factor
+    times = 1.0 / np.sqrt(factor) if factor > 0.0 else np.inf
+    less = 100.0 * (1.0 - np.sqrt(factor))
+    text = f"the observations scatter {less:.0f} % less than their uncertainties claim, too little for chance "
+    text += f"(variance factor {factor:.3g}): the uncertainties are "
+    text += f"about {times:.2g} times too large" if np.isfinite(times) else "not those of these observations"
+    if times >= UNIT:
+        return f"{text}; most likely their unit: sigmas in mm typed as m, or in the wrong column"
+    return f"{text}; most likely their unit, or the claim of another instrument"
+
+
+def suspects_words(network: AdjustedNetwork) -> str:
+    """Number of suspects and the first, in words."""
+    count = len(network.suspects)
+    if not count:
+        return ""
+    noun = "observation is" if count == 1 else "observations are"
+    return f"{count} {noun} suspect, first {observation_words(network, int(network.suspects[0]))}"
+
+
+def observation_words(network: AdjustedNetwork, row: int) -> str:
+    """Observation, residual and test in words.
+
+    network   adjusted
+    row       of its table
+    """
+    table, unit = network.table, str(network.table.unit[row])
+    words = f"{network.label(row)}: residual {quantity(table.residual[row], unit)}"
+    if np.isfinite(network.statistic[row]):
+        words += f", {abs(network.statistic[row]):.2f} of its standard uncertainties"
+        words += f", as if it were wrong by {quantity(table.estimated_error[row], unit)}"
+    return words

@@ -1,0 +1,1 @@
+"""Recipes of networks: adjustment, comparison of two epochs, plan."""

@@ -1,0 +1,147 @@
+"""An adjusted network judges itself: agreement, claims, blunders, no answer; and its treatment says what it did."""
+
+import re
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from catseye.errors import ArgumentError, EstimationError
+from catseye.estimation.network.adjustment import adjust_network
+from catseye.records.network.any_file import read_network
+from catseye.reduction.network.adjusted import adjusted, adjusted_network
+from catseye.reduction.network.comparison import compared
+from catseye.reduction.network.plan import MonteCarloOptions, PlanOptions, planned
+from catseye.reduction.network.treatment import AdjustmentOptions
+from repository import ROOT, TESTS
+
+NETWORKS = TESTS / "vectors" / "networks"
+EXAMPLES = ROOT / "examples" / "networks"
+
+
+@pytest.fixture(scope="module")
+def tunnel():
+    return adjusted_network(adjust_network(read_network(NETWORKS / "monitoring" / "phase-0-1TK.gkf")))
+
+
+@pytest.fixture(scope="module")
+def ranging():
+    return adjusted_network(adjust_network(read_network(NETWORKS / "ranging-18x500")))
+
+
+@pytest.fixture(scope="module")
+def ring():
+    return read_network(EXAMPLES / "ground-ring")
+
+
+def with_error(network, row, error):
+    """The same ranges with an error in one of them."""
+    ranges, *others = network.groups
+    observed = ranges.observed.copy()
+    observed[row] += error
+    return replace(network, groups=(replace(ranges, observed=observed), *others))
+
+
+def test_a_good_network_is_called_good(ranging, tunnel):
+    assert ranging.verdict.word == "good"
+    assert "checked by others" not in ranging.verdict.why
+    assert "but 3 of them are not checked by others" in tunnel.verdict.why  # 211 was sighted once
+
+
+@pytest.mark.parametrize(("factor", "word"), [(0.5, "101 % more"), (3.0, "66 % less")])
+def test_wrong_claims_are_detected_by_the_scatter(tunnel, factor, word):
+    groups = tuple(replace(g, covariance=g.covariance * factor**2) for g in tunnel.network.groups)
+    found = adjusted_network(adjust_network(replace(tunnel.network, groups=groups)))
+    assert found.verdict.word == "doubtful"
+    ratio = np.sqrt(found.global_test.factor)
+    assert ratio * factor == pytest.approx(np.sqrt(tunnel.global_test.factor), rel=1e-6)
+    assert word.split()[-1] in found.verdict.why
+    # a [pvv] so small comes by chance less often than once in ten thousand: the claim, or its unit, is in doubt
+    assert ("unit" in found.verdict.why) == (factor == 3.0)
+    assert f"{abs(100 * (ratio - 1)):.0f} %" in found.verdict.why
+
+
+def test_a_blunder_is_named_with_its_size(ranging):
+    found = adjusted_network(adjust_network(with_error(ranging.network, 1234, 0.002)))
+    word, text = found.verdict
+    assert word == "doubtful"
+    assert found.suspects[0] == 1234
+    assert ranging.label(1234) in text
+    size = float(re.search(r"as if it were wrong by ([-\d.]+) mm", text).group(1))
+    assert size == pytest.approx(2.0, abs=0.4)
+
+
+def test_a_network_without_an_answer_says_why(tunnel):
+    points = tunnel.network.points
+    loose = replace(tunnel.network, points=replace(points, datum=np.zeros_like(points.datum)))
+    found = adjusted(loose)
+    assert not found.answered
+    assert found.verdict.word == "failed"
+    assert found.verdict.why == f"no answer: {found.solution.status}"
+
+
+def test_one_blunder_is_likely_as_claimed_and_left_out_on_request(ring):
+    network = with_error(ring, 5, 0.01)
+    claimed, without = adjusted(network), adjusted(network, AdjustmentOptions(reject=True))
+    assert claimed.treatment.method == "plain"
+    assert claimed.table.active.all()
+    assert claimed.likely.tolist() == without.likely.tolist() == [5]
+    assert without.treatment.method == "rejected"
+    assert not without.table.active[5]
+    assert (claimed.verdict.word, without.verdict.word) == ("doubtful", "good")
+    assert without.verdict.why.endswith(", 1 left out")
+
+
+def test_a_weight_tells_how_far_each_observation_counts(ring):
+    found = adjusted(with_error(ring, 5, 0.01), AdjustmentOptions(robust="igg3"))
+    weights = found.in_table(found.treatment.weights)
+    assert found.treatment.method == "igg3"
+    assert weights[5] < 1e-3 < 0.1 < np.median(weights)
+
+
+@pytest.mark.parametrize(
+    ("options", "kind", "said"),
+    [
+        ({"robust": "strange"}, EstimationError, "robust method 'strange' is unknown"),
+        ({"components": "strange"}, EstimationError, "expected rangers or groups"),
+        ({"level": 0.0}, ArgumentError, "level = 0 is invalid"),
+        ({"reject": True, "robust": "huber"}, ArgumentError, "either weigh or leave out"),
+    ],
+)
+def test_invalid_options_are_refused_before_any_work(options, kind, said):
+    with pytest.raises(kind, match=said):
+        AdjustmentOptions(**options)
+
+
+def test_a_comparison_is_at_most_as_good_as_its_epochs(ring):
+    good, bad = adjusted(ring), adjusted(with_error(ring, 5, 0.01))
+    names = ring.points.names[:6]
+    assert compared(good, good, points=names).verdict.word == "good"
+    verdict = compared(good, bad, points=names).verdict
+    assert verdict.word == "doubtful"
+    assert verdict.why == f"the second epoch: {bad.verdict.why}"
+
+
+def test_a_plan_says_which_observation_is_indispensable_and_what_is_unchecked(tunnel):
+    network = read_network(EXAMPLES / "feed-arm.toml", planned=True)
+    found = planned(network, PlanOptions(most=3, budget_s=10.0, monte_carlo=MonteCarloOptions(runs=2)))
+    assert (found.verdict.word, len(found.plan.candidates), found.scatter.asked) == ("good", 3, 2)
+    assert found.picked
+    scattered = replace(found, scatter=replace(found.scatter, ratio=1.5))
+    assert scattered.verdict.why == "in the Monte Carlo the departures are 1.50 times the claimed uncertainties"
+    needed = replace(found, plan=replace(found.plan, worth=tuple(np.full_like(w, np.inf) for w in found.plan.worth)))
+    assert "observations are indispensable" in needed.verdict.why
+
+
+def test_nothing_of_gateways_is_needed_for_an_answer_and_its_verdict():
+    """The recipe runs and judges in a process in which no writer of a network was ever imported."""
+    code = (
+        "import sys, catseye\n"
+        "answer = catseye.adjust('networks/ground-ring', 'networks/ground-ring')\n"
+        "assert answer.verdict.word and answer.first.verdict.word and catseye.plan('networks/feed-arm.toml').verdict\n"
+        "print([name for name in sys.modules if name.startswith('catseye.gateways.network')])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert done.stdout.strip() == "[]"
