@@ -93,6 +93,27 @@ def test_rows_are_written_by_tables_alone():
     assert found <= OTHER_WRITERS, "a table is a `Table` of gateways.writers.columns"
 
 
+def files_of(tree):
+    """Names of the CSV files that a module maps to what writes them, "*" where a name is made up."""
+    for node in ast.walk(tree):
+        keys = node.keys if isinstance(node, ast.Dict) else [node.slice] if isinstance(node, ast.Subscript) else []
+        for key in keys:
+            parts = key.values if isinstance(key, ast.JoinedStr) else [key]
+            name = "".join(str(part.value) if isinstance(part, ast.Constant) else "*" for part in parts)
+            if name.endswith(".csv"):
+                yield name
+
+
+def test_every_csv_that_is_written_is_a_table():
+    named = [
+        (path, name) for path in (SOURCE / "gateways").rglob("*.py") for name in files_of(ast.parse(path.read_text()))
+    ]
+    assert len(named) >= 30
+    known = {pattern for table in TABLES for pattern in (table.file, *table.also)}
+    for path, name in named:
+        assert any(fnmatch(name, pattern) or fnmatch(pattern, name) for pattern in known), f"{path}: {name}"
+
+
 def test_tables_are_defined_where_they_are_found():
     """At the top level of a module: what a function makes, `tables` does not see."""
     for path in (SOURCE / "gateways").rglob("*.py"):

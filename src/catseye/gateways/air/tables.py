@@ -116,7 +116,9 @@ SHOTS = Table[Shots](
             lambda s: s.path.temperatures.u_group_refractivity[s.k] / PPM,
             ".4f",
         ),
-        Column("status", "", "`good`, or what the table below says", each(lambda s: s.path.status(s.k))),
+        Column(
+            "status", "", "of each direction `good`, or what the table below says", each(lambda s: s.path.status(s.k))
+        ),
     ),
 )
 

@@ -111,7 +111,7 @@ OBSERVATIONS = Table["BaselineCalibration"](
             "`used`, or the reason of the exclusion",
             lambda c: [reason or "used" for reason in c.rejected],
         ),
-        Column("place", "", "file and line", lambda c: c.observations.where),
+        Column("place", "", "line of the file", lambda c: c.observations.where),
     ),
 )
 
