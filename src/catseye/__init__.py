@@ -14,7 +14,9 @@ from catseye.errors import ArgumentError, CatseyeError, EstimationError, FrameEr
 from catseye.version import __version__
 
 if TYPE_CHECKING:
-    from catseye.api.laboratory import baseline, calibrate, triplet
+    from catseye.api.air_paths import acoustic, refractometer
+    from catseye.api.baseline import baseline
+    from catseye.api.laboratory import calibrate, certificate, save_triplet_form, triplet
     from catseye.api.living import replay, simulate
     from catseye.api.network import adjust, compare, locate, plan
     from catseye.api.night import explain, night, reduce
@@ -23,10 +25,12 @@ if TYPE_CHECKING:
     from catseye.api.result import save, show
     from catseye.api.steering import point, track
     from catseye.api.telescope import pose, surface
-    from catseye.api.weather import air, refractometer, sound
+    from catseye.api.weather import air, sound
 
 FACE = {  # file of catseye.api -> its exported names
-    "laboratory": ("baseline", "calibrate", "triplet"),
+    "air_paths": ("acoustic", "refractometer"),
+    "baseline": ("baseline",),
+    "laboratory": ("calibrate", "certificate", "save_triplet_form", "triplet"),
     "living": ("replay", "simulate"),
     "network": ("adjust", "compare", "locate", "plan"),
     "night": ("explain", "night", "reduce"),
@@ -35,7 +39,7 @@ FACE = {  # file of catseye.api -> its exported names
     "result": ("save", "show"),
     "steering": ("point", "track"),
     "telescope": ("pose", "surface"),
-    "weather": ("air", "refractometer", "sound"),
+    "weather": ("air", "sound"),
 }
 
 __all__ = [
@@ -46,11 +50,13 @@ __all__ = [
     "InputError",
     "ValidityError",
     "__version__",
+    "acoustic",
     "adjust",
     "air",
     "baseline",
     "beam",
     "calibrate",
+    "certificate",
     "compare",
     "examples",
     "explain",
@@ -67,6 +73,7 @@ __all__ = [
     "replay",
     "safety",
     "save",
+    "save_triplet_form",
     "show",
     "simulate",
     "sound",

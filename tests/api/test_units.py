@@ -21,7 +21,7 @@ import catseye
 import catseye.api
 from catseye.api.units import In, declared, plain, plain_arguments, unit_of_name, with_units
 from catseye.errors import InputError
-from catseye.reduction.baseline.lengths import BaselineSettings
+from catseye.reduction.baseline.settings import BaselineSettings
 
 NUMBERS = re.compile(r"\b(float|int|complex|object|Any|ndarray|NDArray|ArrayLike|number|Number|Quantity)\b")
 OUR_OWN = {  # functions that people do not call: what goes in is catseye's own numbers
@@ -48,6 +48,8 @@ OTHER = {  # unit of ours -> another unit, and what one of ours is in it, by han
     "mmHg": ("hPa", 1.33322387415),
     "min": ("s", 60.0),
     "GHz": ("MHz", 1e3),
+    "Hz": ("kHz", 1e-3),
+    "mrad / h(1/2)": ("rad / h(1/2)", 1e-3),
     "": ("percent", 100.0),
     "mjd": ("h", 24.0),
 }
@@ -107,7 +109,14 @@ def test_the_unit_declared_is_the_one_of_the_name(function, argument, unit):
     if said is not None:
         assert (unit.unit, unit.difference) == (said.unit, said.difference)
     else:
-        assert unit.unit in ("", "m", "s", "m / s2", "min")  # no ending: SI, or a pure number; `minutes` says it whole
+        assert unit.unit in (
+            "",
+            "m",
+            "s",
+            "m / s2",
+            "min",
+            "mrad / h(1/2)",
+        )  # no ending: SI, a pure number, or said whole
 
 
 def arguments(function, argument, value):

@@ -18,6 +18,7 @@ import catseye as catseye_package
 from catseye import __version__
 from catseye.atmosphere.index.air import MODELS
 from catseye.cli.commands import app
+from catseye.cli.inputs import WRITTEN
 from catseye.cli.vocabularies import AIR_MODELS
 from command_scene import command_line
 from process_scene import ends_with_us
@@ -245,12 +246,28 @@ def test_quick_answers_spare_the_heavy_imports(arguments):
     assert done.stderr.strip() == "[]"
 
 
-ONE_CALL = ["air", "beam", "explain", "glass", "link", "night", "plan", "reduce", "replay", "safety", "sound"]
+ONE_CALL = [
+    *("acoustic", "air", "baseline", "beam", "calibrate", "certificate", "explain", "glass", "link", "night", "plan"),
+    *("reduce", "refractometer", "replay", "safety", "sound", "triplet"),
+]
 OF_THE_TERMINAL = {"json", "out", "quiet", "strict", "page", "threads"}
+
+
+def signatures(name):
+    """Parameters of a command, and of its function."""
+    command = next(each.callback for each in app.registered_commands if each.callback.__name__ == name)
+    return inspect.signature(command).parameters, inspect.signature(getattr(catseye_package, name)).parameters
 
 
 @pytest.mark.parametrize("name", ONE_CALL)
 def test_function_takes_every_option_of_its_command(name):
-    command = next(each.callback for each in app.registered_commands if each.callback.__name__ == name)
-    options = set(inspect.signature(command).parameters) - OF_THE_TERMINAL
-    assert options <= set(inspect.signature(getattr(catseye_package, name)).parameters)
+    options, parameters = signatures(name)
+    assert set(options) - OF_THE_TERMINAL - WRITTEN <= set(parameters)
+
+
+@pytest.mark.parametrize("name", ONE_CALL)
+def test_function_has_the_defaults_of_its_command(name):
+    options, parameters = signatures(name)
+    defaults = {key: options[key].default for key in set(options) & set(parameters) - OF_THE_TERMINAL}
+    stated = {key: value for key, value in defaults.items() if isinstance(value, bool | int | float | str)}
+    assert stated == pytest.approx({key: parameters[key].default for key in stated})

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from catseye.reduction.optics.link_budget import LinkBudget
 
 DISTANCES = (0.01, 1e6)  # m, of a beam's reflector
-HEIGHTS_MM = (1.0, 1000.0)  # of a prism: metres typed as millimetres are below
 SAFETY_ROWS = {  # column -> key of a duration's row, and unit
     "duration": ("duration", "s"),
     "mpe_eye": ("mpe_eye", "W / m2"),
@@ -98,17 +97,13 @@ def glass(
     1.52746375
     """
     from catseye.gateways.optics.glass_objects import glass_object, table_object
-    from catseye.verdict import Verdict
+    from catseye.reduction.optics.glass import ALL_GLASSES, glass_state, require_height
 
-    if not HEIGHTS_MM[0] <= height_mm <= HEIGHTS_MM[1]:
-        low, high = HEIGHTS_MM
-        text = f"height_mm = {height_mm} is not a prism's height (expected {low:g} to {high:g})"
-        raise ArgumentError(text, "height_mm")
     if name is None:
-        values = table_object()
-    else:
-        values = glass_object(name, wavelength_um, temperature_c, height_mm=height_mm)
-    return GlassResult(Verdict(**values["verdict"]), name, values)
+        require_height(height_mm)
+        return GlassResult(ALL_GLASSES, None, table_object())
+    state = glass_state(name, wavelength_um, temperature_c, height_mm=height_mm)
+    return GlassResult(state.verdict, name, glass_object(state))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -305,14 +300,12 @@ def safety(
     >>> safety(10.0, 0.780, 20.0, 0.05).values["class"]
     '3B'
     """
-    from catseye.gateways.optics.safety_objects import Question, safety_object
+    from catseye.gateways.optics.safety_objects import safety_object
     from catseye.optics.safety.hazard import LaserBeam
-    from catseye.verdict import Verdict
+    from catseye.reduction.optics.safety import SafetyQuestion, assess_safety
 
-    if scan_period_s is not None and scan_rad_per_s is None:
-        raise ArgumentError("scan_period_s needs scan_rad_per_s", "scan_period_s", "scan_rad_per_s")
-    values = safety_object(
-        Question(
+    assessment = assess_safety(
+        SafetyQuestion(
             LaserBeam(power_mw * 1e-3, wavelength_um, diameter_mm * MILLIMETRE, divergence_mrad * 1e-3, waist_distance),
             edition=edition,
             duration=duration_s,
@@ -324,7 +317,7 @@ def safety(
             reflector_diameter=reflector_diameter_mm * MILLIMETRE,
         )
     )
-    return SafetyResult(Verdict(**values["verdict"]), values)
+    return SafetyResult(assessment.verdict, safety_object(assessment))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -404,7 +397,7 @@ class BeamResult(Result):
         """Write the files of `catseye beam --out`."""
         from catseye.gateways.optics.beam_figures import write_beam
 
-        write_beam(self.beam, directory, dict(self.hashes))
+        write_beam(self.beam, directory, dict(self.hashes), progress)
 
 
 @with_units
@@ -416,12 +409,11 @@ def beam(file: "str | os.PathLike[str]", *, distance_m: Annotated[Any, In("m", o
 
     Raises InputError: an invalid record; ArgumentError: a distance outside 0.01 to 1e6 m.
     """
-    from catseye.gateways.optics.beam_figures import beam_object, read_beam
-    from catseye.verdict import Verdict
+    from catseye.reduction.optics.beam import read_beam
 
     if distance_m is not None and not DISTANCES[0] <= distance_m <= DISTANCES[1]:
         low, high = DISTANCES
         raise ArgumentError(f"distance_m = {distance_m} is not within {low:g} to {high:g} m", "distance_m")
     source = place_of(file)
     path, hashes = read_beam(source, distance_m)
-    return BeamResult(Verdict(**beam_object(path)["verdict"]), path, source, hashes)
+    return BeamResult(path.verdict, path, source, hashes)

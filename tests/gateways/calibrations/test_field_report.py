@@ -12,12 +12,6 @@ from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import InputError
 from catseye.gateways.calibrations.field_report import MATRIX_CELLS, field_report, mark, sketches
 from catseye.gateways.calibrations.field_report_fields import (
-    FORMS,
-    ReportEntry,
-    ReportField,
-    blank_report,
-    matrix_uncertainty,
-    read_report,
     report_object,
     written_aid,
     written_matrix,
@@ -25,6 +19,14 @@ from catseye.gateways.calibrations.field_report_fields import (
     written_value,
 )
 from catseye.geometry.mirror.mount import gamma, lambda_
+from catseye.reduction.calibrations.field_report import (
+    FORMS,
+    ReportEntry,
+    ReportField,
+    blank_report,
+    matrix_uncertainty,
+    read_report,
+)
 from repository import ROOT
 
 EXAMPLES = ROOT / "examples"

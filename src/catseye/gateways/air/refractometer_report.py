@@ -11,14 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from catseye.atmosphere.weather.humidity import humidity_doubts
 from catseye.constants import PPM, TWO_PI
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.passage import Passage
-from catseye.gateways.writers.verdict import Verdict, verdict_line
+from catseye.gateways.writers.verdict import verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
-from catseye.records.site.validity import expired
 from catseye.reduction.air.group_index import phase_slope
 from catseye.reduction.air.refractometer_calibration import STATUS
 from catseye.signal.cycles.whole import CycleStatus
@@ -33,31 +31,12 @@ SERIES = ("mjd_utc", "section", "phase_rad", "group_refractivity_ppm", "u_group_
           "u_temperature_c", "weather_refractivity_ppm", "residual_ppm", "standardised", "status")  # fmt: skip
 
 
-def refractometer_verdict(calibration: "PathCalibration") -> Verdict:
-    """Verdict on scatter against the claim, slope of the phase, and validity of the sheet."""
-    readings = calibration.readings
-    doubts = expired({"the path": readings.sheet}, readings.mjd_utc[-1]) + humidity_doubts(readings.humidity_percent)
-    return _own_verdict(calibration).hearing(doubts)
-
-
-def _own_verdict(calibration: "PathCalibration") -> Verdict:
-    if not calibration.slope.agrees:
-        ratio = calibration.slope.ratio
-        return Verdict("doubtful", f"the slope of phase against the weather's index is {ratio:.3f} of theory, not 1")
-    factor, degrees = calibration.variance_factor, calibration.degrees_of_freedom
-    if not degrees >= 1.0:
-        return Verdict("doubtful", "the calibration has no redundancy to check it")
-    if factor > 1.0 + 3.0 * (2.0 / degrees) ** 0.5:
-        return Verdict("doubtful", f"phases and weather scatter more than claimed (variance factor {factor:.2f})")
-    return Verdict("good", f"phases and weather agree as claimed (variance factor {factor:.2f})")
-
-
 def refractometer_object(calibration: "PathCalibration") -> dict[str, Any]:
     """Object that `catseye refractometer --json` prints."""
     sheet, readings, parameters = calibration.readings.sheet, calibration.readings, _parameters(calibration)
     counts = Counter(calibration.status)
     return {
-        "verdict": refractometer_verdict(calibration).to_object(),
+        "verdict": calibration.verdict.to_object(),
         "path": sheet.path,
         "path_length": sheet.path_length_m,
         "modulation_hz": sheet.modulation_hz,
@@ -315,7 +294,7 @@ def refractometer_report(calibration: "PathCalibration", when: datetime) -> str:
     body = [
         f"<header><h1>{escape(sheet.path)}: refractometer</h1><div class='faint'>calibrated by catseye on "
         f"{when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ</div></header>",
-        verdict_line(refractometer_verdict(calibration)),
+        verdict_line(calibration.verdict),
         section("summary", "Summary", f'<div class="cards">{"".join(cards)}</div>', f"<dl>{words}</dl>"),
         section(
             "night",

@@ -5,11 +5,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE, PPM
-from catseye.gateways.baseline.objects import baseline_object, spans
 from catseye.gateways.writers.written import cell, csv_text
 
 if TYPE_CHECKING:
-    from catseye.reduction.baseline.instrument import BaselineCalibration
+    from catseye.reduction.baseline.result import BaselineCalibration
 
 OBSERVATIONS = (
     "row", "from_pillar", "to_pillar", "set", "setup", "slope_m", "group_refractivity_ppm", "first_velocity_mm",
@@ -21,31 +20,23 @@ OBSERVATIONS = (
 def pillars_csv(calibration: "BaselineCalibration") -> str:
     """Pillars along the line with their standard uncertainties."""
     rows = [
-        (name, f"{p['x']:.6f}", f"{p['y']:.6f}", cell(p["height"], ".6f"), f"{p['u_x'] / MILLIMETRE:.4f}",
-         f"{p['u_y'] / MILLIMETRE:.4f}")
-        for name, p in baseline_object(calibration)["pillars"].items()
+        (name, f"{p.x:.6f}", f"{p.y:.6f}", cell(p.height, ".6f"), f"{p.u_x / MILLIMETRE:.4f}",
+         f"{p.u_y / MILLIMETRE:.4f}")
+        for name, p in calibration.pillars.items()
     ]  # fmt: skip
     return csv_text(("pillar", "x_m", "y_m", "height_m", "u_x_mm", "u_y_mm"), rows)
 
 
 def distances_csv(calibration: "BaselineCalibration") -> str:
     """Horizontal distances of all pairs of pillars at the reference height, with uncertainty."""
-    rows = [(a, b, f"{d:.6f}", f"{u / MILLIMETRE:.4f}") for a, b, d, u in spans(calibration)]
+    rows = [(a, b, f"{d:.6f}", f"{u / MILLIMETRE:.4f}") for a, b, d, u in calibration.spans]
     return csv_text(("from_pillar", "to_pillar", "distance_m", "u_distance_mm"), rows)
-
-
-def shot_residuals(calibration: "BaselineCalibration") -> np.ndarray:
-    """Observed minus adjusted of every shot, (m,) m; nan for excluded shots."""
-    used = calibration.solution.used
-    residual = np.full(len(calibration.keep), np.nan)
-    residual[calibration.keep] = calibration.solution.residual[used.set] + used.within
-    return residual
 
 
 def observations_csv(calibration: "BaselineCalibration") -> str:
     """Every shot from the displayed length to its residual."""
     shots, lengths, s = calibration.observations, calibration.lengths, calibration.solution
-    residual = shot_residuals(calibration)
+    residual = calibration.shot_residuals
     w_shot, w_set = np.full(len(shots), np.nan), np.full(len(shots), np.nan)
     w_shot[calibration.keep], w_set[calibration.keep] = s.w_shot, s.w_set[s.used.set]
     rows = [

@@ -15,7 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.atmosphere.index.air import MODELS, group_refractivity
+from catseye.atmosphere.weather.humidity import humidity_doubts
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
+from catseye.records.site.validity import expired
 from catseye.reduction.air.group_index import AbsoluteIndex, absolute_group_index
 from catseye.reduction.air.refractometer_fit import PathFit
 from catseye.reduction.air.refractometer_night import (
@@ -28,10 +30,12 @@ from catseye.reduction.air.refractometer_night import (
     path_weather,
 )
 from catseye.signal.cycles.whole import CycleStatus
+from catseye.verdict import Verdict
 
 AGREES = 3.0  # standard uncertainties within which slopes agree
 UNKNOWN_SLOPE = 1e3  # prior u of a free slope over the theoretical one
 LEAST_SLOPE = 0.3  # u of the slope's ratio beyond which it is meaningless
+LARGE_FACTOR = 3.0  # standard deviations of a variance factor above 1 beyond which the scatter is more than claimed
 STATUS = ("good", "stray", "left out", "weather off", "no weather", "uncalibrated")
 
 
@@ -108,6 +112,26 @@ class PathCalibration:
     path_length: float
     u_path_length: float
     notes: tuple[str, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Verdict on scatter against the claim, slope of the phase, and validity of the sheet."""
+        readings = self.readings
+        validity = expired({"the path": readings.sheet}, readings.mjd_utc[-1])
+        return self._agreement().hearing(validity + humidity_doubts(readings.humidity_percent))
+
+    def _agreement(self) -> Verdict:
+        """Verdict on phases and weather alone."""
+        if not self.slope.agrees:
+            ratio = self.slope.ratio
+            why = f"the slope of phase against the weather's index is {ratio:.3f} of theory, not 1"
+            return Verdict("doubtful", why)
+        factor, degrees = self.variance_factor, self.degrees_of_freedom
+        if not degrees >= 1.0:
+            return Verdict("doubtful", "the calibration has no redundancy to check it")
+        if factor > 1.0 + LARGE_FACTOR * (2.0 / degrees) ** 0.5:
+            return Verdict("doubtful", f"phases and weather scatter more than claimed (variance factor {factor:.2f})")
+        return Verdict("good", f"phases and weather agree as claimed (variance factor {factor:.2f})")
 
     def of(self, name: str) -> tuple[float, float]:
         """Parameter and its standard uncertainty."""

@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import takewhile
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,8 +20,10 @@ from catseye.aliases import Array
 from catseye.constants import DEGREE, MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import InputError, ValidityError
 from catseye.optics import abcd, coating, detector, gaussian_beam, glass, isolator, receiver
+from catseye.records.files.reading import Folder
 from catseye.records.site.beam import BeamElement, BeamTrain, Laser
 from catseye.signal.systematics.feedback import fringe_contrast
+from catseye.verdict import Verdict
 
 WIDE = 5.0  # beam radii: size of a missing aperture
 UNCLIPPED = 1e-5  # of the power lost: the beam then stays Gaussian, to 1e-3 of a share, 5e-3 through a pinhole
@@ -94,6 +97,30 @@ class BeamPath:
     range_effects: dict[str, float]
     u_image: float
     laser: dict[str, float]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Good where the power is known at every distance."""
+        if self.status != "ok":
+            return Verdict("doubtful", self.status)
+        failures = [row for row in self.returned if row.status != "ok"]
+        if failures:
+            distances = ", ".join(f"{row.distance:g}" for row in failures)
+            return Verdict("doubtful", f"no power from {distances} m: {failures[0].status}")
+        return Verdict("good", "every element passes the beam")
+
+
+def read_beam(file: Path, distance: float | None = None) -> tuple[BeamPath, dict[str, str]]:
+    """Beam train of a file, reduced, and the file's hash.
+
+    file       the record
+    distance   m, overrides the record's
+    """
+    folder = Folder(file.parent)
+    train = folder.record(file.name, BeamTrain)
+    if distance is not None:
+        train = train.model_copy(update={"distance_m": distance})
+    return reduce_beam(train), folder.hashes
 
 
 def reduce_beam(train: BeamTrain) -> BeamPath:
