@@ -33,7 +33,7 @@ SERIES = ("mjd_utc", "section", "phase_rad", "group_refractivity_ppm", "u_group_
 
 def refractometer_object(calibration: "PathCalibration") -> dict[str, Any]:
     """Object that `catseye refractometer --json` prints."""
-    sheet, readings, parameters = calibration.readings.sheet, calibration.readings, _parameters(calibration)
+    sheet, readings = calibration.readings.sheet, calibration.readings
     counts = Counter(calibration.status)
     return {
         "verdict": calibration.verdict.to_object(),
@@ -54,8 +54,8 @@ def refractometer_object(calibration: "PathCalibration") -> dict[str, Any]:
         "phase_per_index": float(phase_slope(sheet.path_length_m, modulation_hz=sheet.modulation_hz)),
         "budget": calibration.budget,
         "slope": {"ratio": calibration.slope.ratio, "u_ratio": calibration.slope.u, "agrees": calibration.slope.agrees},
-        "thermometers": {n: {"offset_c": v, "u_offset_c": u} for n, (v, u) in parameters["thermometers"].items()},
-        "drift": [{"hours": h, "phase": v, "u_phase": u} for h, v, u in parameters["drift"]],
+        "thermometers": {n: {"offset_c": v, "u_offset_c": u} for n, (v, u) in calibration.thermometers.items()},
+        "drift": [{"hours": h, "phase": v, "u_phase": u} for h, v, u in calibration.drift],
         "noise": {
             "thermometers_over_claimed": calibration.thermometer_scatter,
             "places_over_claimed": calibration.places,
@@ -103,14 +103,6 @@ def _sections(calibration: "PathCalibration") -> list[dict[str, Any]]:
         }
         for k, s in enumerate(calibration.followed.sections)
     ]
-
-
-def _parameters(calibration: "PathCalibration") -> dict[str, Any]:
-    drift = [name for name in calibration.names if name.startswith("drift at ")]
-    return {
-        "thermometers": {name: calibration.of(name) for name in calibration.readings.thermometers},
-        "drift": [(float(name.split()[2]), *calibration.of(name)) for name in drift],
-    }
 
 
 def passages(calibration: "PathCalibration") -> list[Passage]:
@@ -277,7 +269,6 @@ def refractometer_report(calibration: "PathCalibration", when: datetime) -> str:
     """HTML report; `when` is UTC."""
     drawn, sheet = _svgs(calibration), calibration.readings.sheet
     words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in passages(calibration))
-    parameters = _parameters(calibration)["thermometers"]
     cards = [
         card(
             "n_g − 1",
@@ -289,7 +280,7 @@ def refractometer_report(calibration: "PathCalibration", when: datetime) -> str:
             "Readings", f"{calibration.status.count('good')} of {len(calibration.readings)}", "used in the calibration"
         ),
     ]
-    thermometers = [(n, f"{v:+.3f}", f"{u:.3f}") for n, (v, u) in parameters.items()]
+    thermometers = [(n, f"{v:+.3f}", f"{u:.3f}") for n, (v, u) in calibration.thermometers.items()]
     facts = [*versions().items(), *((k, str(v)) for k, v in sheet.model_dump(exclude_none=True).items())]
     body = [
         f"<header><h1>{escape(sheet.path)}: refractometer</h1><div class='faint'>calibrated by catseye on "

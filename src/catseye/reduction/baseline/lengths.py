@@ -124,4 +124,14 @@ def reduce_lengths(
         effects[f"height of {shots.names[k]}"] = (per_start + per_end) * u_height[k]
     columns = np.stack(list(effects.values()), axis=1)
     level = distance - straight
-    return Lengths(state.group_index, first, second, chord, level, distance, stretch, columns, tuple(effects))
+    return Lengths(
+        index=state.group_index,
+        first=first,
+        second=second,
+        chord=chord,
+        level=level,
+        distance=distance,
+        stretch=stretch,
+        systematic=columns,
+        effects=tuple(effects),
+    )

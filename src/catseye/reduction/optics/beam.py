@@ -263,7 +263,16 @@ def _outward(train: BeamTrain) -> tuple[NDArray[np.complex128], tuple[BeamPlace,
         clipped, passed_share = 1.0 - passed / passed_share, passed
         power *= (1.0 - clipped) * _transmission(train, element)
         places.append(
-            BeamPlace("outward", _called(element), path, w, abcd.wavefront_curvature(q), edge, clipped, power)
+            BeamPlace(
+                leg="outward",
+                name=_called(element),
+                way=path,
+                radius=w,
+                curvature=abcd.wavefront_curvature(q),
+                aperture=edge,
+                clipped=clipped,
+                power=power,
+            )
         )
         q, path = abcd.onward(q, _matrices(train, element)), path + _length(element)
     return q, tuple(places), power
@@ -281,7 +290,14 @@ def _returned(
     power *= hit * train.reflector.reflectance
     places = [
         BeamPlace(
-            "reflector", train.reflector.name or "reflector", path, w, abcd.wavefront_curvature(q), face, 1 - hit, power
+            leg="reflector",
+            name=train.reflector.name or "reflector",
+            way=path,
+            radius=w,
+            curvature=abcd.wavefront_curvature(q),
+            aperture=face,
+            clipped=1 - hit,
+            power=power,
         )
     ]
     system, path, passed_share = np.broadcast_to(space, (2, 2, 2)), path + distance, 1.0
@@ -318,10 +334,23 @@ def _returned(
                 (abcd.radius(beam, light), abcd.wavefront_curvature(beam)) if unclipped else (np.full(2, np.nan),) * 2
             )
             leg = "detector" if ending else "inward"
-            places.append(BeamPlace(leg, _called(element), path, size, bend, edge, clipped, power))
+            places.append(
+                BeamPlace(
+                    leg=leg,
+                    name=_called(element),
+                    way=path,
+                    radius=size,
+                    curvature=bend,
+                    aperture=edge,
+                    clipped=clipped,
+                    power=power,
+                )
+            )
         power *= element.transmission if element.kind == "space" else 1.0
         system, past_stop, path = step @ system, step @ past_stop, path + _length(element)
-    return Returned(distance, w, hit, float(passed_share), float(power), status), tuple(places)
+    return Returned(
+        distance=distance, radius=w, hit=hit, collected=float(passed_share), power=float(power), status=status
+    ), tuple(places)
 
 
 def beam_profile(train: BeamTrain, points: int = 60) -> dict[str, tuple[Array, Array]]:
