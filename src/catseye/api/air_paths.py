@@ -46,7 +46,7 @@ class AcousticResult(Result):
     read: tuple[Path, ...]
 
     def passages(self) -> "Sequence[Passage]":
-        """Temperature, contributions, wind and index of each path, and the shots that were not used."""
+        """Temperature, contributions, wind and index of each path; unused shots."""
         from catseye.gateways.air.acoustic_objects import passages
 
         return passages(self.reduction)
@@ -90,7 +90,7 @@ class AcousticResult(Result):
         }
 
     def figures(self) -> "dict[str, Figure]":
-        """Recording, correlation and temperature of each path, by the names of its ends."""
+        """Recording, correlation and temperature of each path, by its ends."""
         from catseye.gateways.air.acoustic_figures import acoustic_drawings
 
         return {
@@ -168,7 +168,7 @@ def acoustic(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RefractometerResult(Result):
-    """A fixed path calibrated by a night of phases and weather: n readings.
+    """Path calibrated by a night of phases and weather: n readings.
 
     mjd                        (n,) UTC
     group_refractivity, u_group_refractivity   (n,) n_g - 1 along the path, from each phase
@@ -189,7 +189,7 @@ class RefractometerResult(Result):
     path: Path
 
     def passages(self) -> "Sequence[Passage]":
-        """The readings, the index, the slope, the thermometers, what an absolute length would give."""
+        """Readings, index, slope, and the index by an absolute length."""
         from catseye.gateways.air.refractometer_report import passages
 
         return passages(self.calibration)
@@ -246,7 +246,7 @@ def refractometer(
     drift_mrad_per_root_hour: Annotated[Any, In("mrad / h(1/2)", one=True)] = None,
     progress: Progress | None = None,
 ) -> RefractometerResult:
-    """Group index along a fixed path: calibrated by a night of phases and weather, then from each phase.
+    """Group index along a fixed path, from phases and weather.
 
     readings   table (docs/formats/refractometer.md)
     sheet      what is known of the path; the file beside the table with the ending .toml without

@@ -35,7 +35,7 @@ UNCERTAINTIES = (
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BaselineResult(Result):
-    """An EDM baseline: n pillars in their order along the line, and the instrument that measured it.
+    """EDM baseline: n pillars along the line, and the instrument.
 
     pillars            names
     x                  (n, 2) m: along the line from the first pillar, and to its left
@@ -153,7 +153,7 @@ def baseline(
     report: str | None = None,
     progress: Progress | None = None,
 ) -> BaselineResult:
-    """Pillars of an EDM baseline, and an instrument's zero, scale and cyclic terms, with ISO 17123-4's tests.
+    """Pillars of an EDM baseline, and the instrument's errors, with tests of ISO 17123-4.
 
     observations         shots with their weather (docs/formats/baseline.md)
     heights, against     heights of pillars, level without; known pillars (BASELINE.toml), which fix the scale
@@ -230,7 +230,7 @@ def _calibrated(
 
 
 def _require_valid(settings: BaselineSettings) -> None:
-    """Raise ArgumentError for a setting outside its limits, by the name of the argument."""
+    """Raise ArgumentError for a setting outside its limits."""
     for name in UNCERTAINTIES:
         value = getattr(settings, name)
         if not 0.0 <= value <= LARGEST:
@@ -257,7 +257,7 @@ def _require_valid(settings: BaselineSettings) -> None:
 
 
 def _day(day: "date | str | None") -> date | None:
-    """Day of a date or of a text as 2026-11-21; ArgumentError for another text."""
+    """Day of a date, or of a text as 2026-11-21."""
     if day is None or isinstance(day, date):
         return day
     try:

@@ -66,7 +66,7 @@ class CalibrationResult(Result):
         return calibration_object(self.calibration)
 
     def tables(self) -> "dict[str, QTable]":
-        """`quantities`: a row a quantity, in its own unit, which stands beside it; `readings`: a row a reading."""
+        """`quantities`: a row a quantity, in its unit; `readings`: a row a reading."""
         found = self.calibration.quantities
         columns = {
             "quantity": (self.keys, ""),
@@ -119,7 +119,7 @@ def calibrate(
     *,
     reject: bool = False,
 ) -> CalibrationResult:
-    """A calibration from a table of readings: quantities with covariance, residuals and tests.
+    """Calibration from a table of readings: quantities with covariance and tests.
 
     kind       what is calibrated, as `catseye calibrate --help` lists
     readings   table (docs/formats/calibrations.md)
@@ -152,7 +152,7 @@ def calibrate(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CertificateResult(Result):
-    """Calibration report of a monument or a mirror, as the notes print it: f fields.
+    """Calibration report of a monument or a mirror: f fields.
 
     kind      "monument" or "mirror"
     keys      of the fields in the record
@@ -223,7 +223,7 @@ class CertificateResult(Result):
 
 
 def certificate(kind: str, record: "str | os.PathLike[str] | None" = None, *, blank: bool = False) -> CertificateResult:
-    """Calibration report of a monument or a mirror, filled or blank, to print and sign.
+    """Calibration report of a monument or a mirror, filled or blank.
 
     kind     "monument" or "mirror"
     record   record that fills it; None: a blank form
@@ -254,7 +254,7 @@ def certificate(kind: str, record: "str | os.PathLike[str] | None" = None, *, bl
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TripletsResult(Result):
-    """Triplet units measured in the laboratory, n of them, in the order of their sheets.
+    """Triplet units measured in the laboratory: n, in the sheets' order.
 
     names         of the units
     h_corr, u_h_corr       (n,) m: ball centre above the prisms' mid-point, towards the prism side
@@ -295,7 +295,7 @@ class TripletsResult(Result):
         return "\n".join(text_sheet(unit, path.name).rstrip() for path, unit in self.units)
 
     def to_object(self) -> Any:
-        """JSON object of `catseye triplet --json`: one object, or a list of them for several sheets."""
+        """JSON object of `catseye triplet --json`; a list for several sheets."""
         from catseye.gateways.triplet.objects import triplet_object
 
         objects = [triplet_object(unit, path.name) for path, unit in self.units]
@@ -381,7 +381,7 @@ def triplet(*files: "str | os.PathLike[str]", progress: Progress | None = None) 
 
 
 def save_triplet_form(path: "str | os.PathLike[str]") -> Path:
-    """Write the blank form of a triplet's sheet, to print and fill in.
+    """Write the blank form of a triplet's sheet.
 
     path   new, or an earlier form of catseye; its name ends in .html
 

@@ -45,7 +45,7 @@ class GlassResult(Result):
     values: Mapping[str, Any]
 
     def passages(self) -> "Sequence[Passage]":
-        """Indices, slopes, what a prism does to a range, and the cost of another glass."""
+        """Indices, slopes, effects of a prism, and errors of another glass."""
         from catseye.gateways.optics.glass_objects import glass_rows, table_rows
         from catseye.gateways.writers.passage import Passage
 
@@ -84,7 +84,7 @@ def glass(
     temperature_c: Annotated[Any, In("deg_C", one=True)] = 20.0,
     height_mm: Annotated[Any, In("mm", one=True)] = 38.1,
 ) -> GlassResult:
-    """Indices of a glass, their slopes, range constant of a prism of it, and the cost of another glass.
+    """Indices of a glass, a prism of it, and errors of another glass.
 
     name            of a glass; None: a table of all
     wavelength_um   in vacuum, µm
@@ -189,7 +189,7 @@ def link(
     background_uw: Annotated[Any, In("uW", one=True)] = 0.0,
     measured_volt: Annotated[Any, In("V", one=True)] = None,
 ) -> LinkResult:
-    """Link budget: from the laser's power to the expected return and the noise of the range.
+    """Link budget: laser's power to expected return and range noise.
 
     distance             ranger to retroreflector, m
     incidence_deg        on the reflector's face, degrees
@@ -230,7 +230,7 @@ def link(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SafetyResult(Result):
-    """Limits of exposure, class and hazard distances of a beam: for planning, never a certificate.
+    """Limits of exposure, class and hazard distances: for planning, never a certificate.
 
     values   by JSON's keys
     """
@@ -281,7 +281,7 @@ def safety(
     subtense_mrad: Annotated[Any, In("mrad", one=True)] = 1.5,
     edition: str = "iec2014",
 ) -> SafetyResult:
-    """Laser safety of a beam: limits of exposure, class with reasons, hazard distances.
+    """Laser safety of a beam: limits of exposure, class, hazard distances.
 
     power_mw          of the beam, continuous, mW
     wavelength_um     0.4 to 1.4 µm
@@ -322,7 +322,7 @@ def safety(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BeamResult(Result):
-    """A laser beam through a head to a retroreflector and back to the detector.
+    """Laser beam through a head to a retroreflector and back.
 
     beam     sizes, clipping and power at each element
     source   file that was read
@@ -402,7 +402,7 @@ class BeamResult(Result):
 
 @with_units
 def beam(file: "str | os.PathLike[str]", *, distance_m: Annotated[Any, In("m", one=True)] = None) -> BeamResult:
-    """Sizes, clipping and power of a beam through lenses, mirrors and a retroreflector to the detector.
+    """Sizes, clipping and power of a beam, laser to detector.
 
     file         record of the beam's elements, laser to detector (docs/formats/beam.md)
     distance_m   to the reflector, m; None: that of the file

@@ -42,7 +42,7 @@ class SinglePage(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
-    """An answer: frozen, with its verdict; `repr` is a paragraph, a notebook shows all its sentences.
+    """Answer with its verdict; `repr` is a paragraph, a notebook shows all.
 
     verdict   whether it may be relied on: word ("good", "doubtful", "failed") and why
     """
@@ -50,7 +50,7 @@ class Result:
     verdict: "Verdict"
 
     def passages(self) -> "Sequence[Passage]":
-        """The sentences that the command prints, each under a word or two, without the verdict."""
+        """Sentences that the command prints, by title, without the verdict."""
         raise NotImplementedError
 
     def to_object(self) -> dict[str, Any]:
@@ -58,7 +58,7 @@ class Result:
         raise NotImplementedError
 
     def tables(self) -> "dict[str, QTable]":
-        """Every table of the answer by its name, the main one first; columns have units where they have one."""
+        """Tables of the answer by name, the main one first, with units."""
         raise NotImplementedError
 
     def to_table(self, name: str | None = None) -> "QTable":
@@ -78,7 +78,7 @@ class Result:
         return {}
 
     def pages(self) -> dict[str, SinglePage]:
-        """Single files by their names, such as a record or a certificate; none unless a result has some."""
+        """Single files by name, such as a record or a certificate."""
         return {}
 
     def page_texts(self, names: Mapping[str, str]) -> "dict[str, Callable[[datetime], str]]":
@@ -104,7 +104,7 @@ class Result:
             pass
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
-        """Its files into a directory that is there and empty: tables as CSV, figures, the whole as JSON."""
+        """Write tables as CSV, figures and JSON into an empty directory."""
         self.write_files(directory, progress)
 
     def write_files(
@@ -113,7 +113,7 @@ class Result:
         progress: Progress | None = None,
         pages: "Mapping[str, Callable[[datetime], str]] | None" = None,
     ) -> None:
-        """The whole as JSON, each table as CSV, each figure as SVG, and pages; last the provenance.
+        """Write JSON, tables as CSV, figures as SVG, pages; last the provenance.
 
         pages   name -> what gives its text, told when it is made, UTC
         """
@@ -136,7 +136,7 @@ class Result:
         write_files(files, directory, {**made_by, **origin(now, self.inputs())}, progress=progress)
 
     def inputs(self) -> dict[str, str]:
-        """SHA-256 of each file that went in, by its name; none where there was no file."""
+        """SHA-256 of each input file, by its name."""
         return {}
 
     def sources(self) -> tuple[Path, ...]:
@@ -271,7 +271,7 @@ def require_writable(out: "Path | None", *sources: "str | Path | None", **pages:
 
 @contextmanager
 def _opened(result: Result, paths: "Mapping[str, str | Path | None]", directory: Path | None = None) -> Iterator[None]:
-    """Single files of a result, written on success; none is begun where one of them cannot be written."""
+    """Write single files of a result on success, all or none."""
     from datetime import UTC, datetime
 
     from catseye.gateways.writers.output import atomic_file, refuse_suffix
@@ -293,7 +293,7 @@ def _opened(result: Result, paths: "Mapping[str, str | Path | None]", directory:
 
 
 def _require_pages(pages: Mapping[str, Path], sources: Sequence[Path], directory: Path | None) -> None:
-    """Raise InputError for a single file that is an input, another one, or in no place for it."""
+    """Raise InputError for a single file that may not be written."""
     read = {source.resolve() for source in sources}
     names: dict[Path, str] = {}
     for name, path in pages.items():

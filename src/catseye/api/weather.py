@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AirResult(Result):
-    """The index of air; arrays have the shape of the inputs, broadcast together.
+    """Index of air; arrays have the inputs' shape, broadcast together.
 
     temperature_c, pressure_hpa, humidity_percent, wavelength_um   the state; relative humidity over liquid water
     group_index, phase_index     n_g and n
@@ -59,7 +59,7 @@ class AirResult(Result):
     found: "WeatherIndex"
 
     def passages(self) -> "Sequence[Passage]":
-        """The index, its uncertainty and its slopes; dew or frost on the surface."""
+        """Index with uncertainty and slopes; dew or frost on the surface."""
         from catseye.gateways.air.objects import air_passages
 
         return air_passages(self.found)
@@ -189,7 +189,7 @@ def _air_result(found: "WeatherIndex") -> AirResult:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SoundResult(Result):
-    """The speed of sound; arrays have the shape of the inputs, broadcast together.
+    """Speed of sound; arrays have the inputs' shape, broadcast together.
 
     temperature_c, pressure_hpa, humidity_percent   the state; relative humidity over liquid water
     speed, dry_speed       m/s
@@ -218,7 +218,7 @@ class SoundResult(Result):
     found: "SoundSpeed"
 
     def passages(self) -> "Sequence[Passage]":
-        """The speed, its slopes and what other formulas say; of an array, how far it goes."""
+        """Speed, slopes and other formulas; of an array, the extremes."""
         from catseye.gateways.air.sound_objects import sound_passages
 
         return sound_passages(self.found)

@@ -72,7 +72,7 @@ class _Inputs(NamedTuple):
 
 
 class _Settings(NamedTuple):
-    """Options of a baseline calibration; names say units, those without are m or plain numbers."""
+    """Options of a baseline calibration; without a unit m or numbers."""
 
     reference_index: Annotated[
         float, typer.Option("--reference-index", help="Group index for which the instrument shows lengths.")
@@ -161,7 +161,7 @@ def baseline(
     quiet: Quiet = False,
     strict: Strict = False,
 ) -> None:
-    """Pillars of an EDM baseline, and an instrument's zero, scale and cyclic terms, with ISO 17123-4's tests."""
+    """Pillars of an EDM baseline, and the instrument's errors, with tests of ISO 17123-4."""
     from catseye.api.baseline import baseline as calibrated
     from catseye.api.result import require_writable, save
 

@@ -42,7 +42,7 @@ def calibrate(  # noqa: PLR0913 - its options are its command line
     quiet: Quiet = False,
     strict: Strict = False,
 ) -> None:
-    """A calibration from a table of readings: record with uncertainties, residuals, tests and a certificate."""
+    """Calibration from a table of readings: record, tests and certificate."""
     from catseye.api.laboratory import calibrate as calibrated
     from catseye.api.result import require_writable
 

@@ -34,7 +34,7 @@ def certificate(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """The calibration report of a monument or a mirror, as a page to print and sign."""
+    """Calibration report of a monument or a mirror, to print and sign."""
     if out is None and not json:
         raise typer.BadParameter("is needed unless --json is given.", param_hint="'--out'")
     from catseye.api.laboratory import certificate as report_of

@@ -60,7 +60,7 @@ def triplet(
 
 
 def _reduced(files: list[Path], out: Path | None, quiet: bool) -> "TripletsResult":
-    """Every sheet read and reduced, in order; with an `out`, written whole or not at all."""
+    """Sheets reduced, in order; with an `out`, written whole or not."""
     from catseye.api.laboratory import triplet as reduced
     from catseye.api.result import require_writable, save
 

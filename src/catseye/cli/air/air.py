@@ -79,7 +79,7 @@ def air(  # noqa: PLR0913 - its options are its command line
     ] = 0.0,
     json: Json = False,
 ) -> None:
-    """Index of air, its sensitivities and its uncertainty, from whatever instruments stand there."""
+    """Index of air from any instruments, with sensitivities and uncertainty."""
     from catseye.api.weather import air as air_of
 
     result = air_of(

@@ -96,7 +96,7 @@ def refractometer(  # noqa: PLR0913 - its options are its command line
     quiet: Quiet = False,
     strict: Strict = False,
 ) -> None:
-    """The group index along a fixed path: calibrated by a night of phases and weather, then from each phase."""
+    """Group index along a fixed path, from phases and weather."""
     from catseye.api.air_paths import refractometer as calibrated
     from catseye.api.result import require_writable, save
 

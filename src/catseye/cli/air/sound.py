@@ -39,7 +39,7 @@ def sound(  # noqa: PLR0913 - its options are its command line
     u_co2_ppm: Annotated[float, typer.Option(help="Standard uncertainty of the carbon dioxide, ppm.", **U)] = 0.0,
     json: Json = False,
 ) -> None:
-    """Speed of sound in air, its sensitivities and its uncertainty, by the notes' formula and today's."""
+    """Speed of sound in air, with sensitivities and uncertainty."""
     from catseye.api.weather import sound as sound_of
 
     result = sound_of(

@@ -26,7 +26,7 @@ def beam(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """A laser beam through lenses, mirrors and a retroreflector to the detector: sizes, clipping, power."""
+    """Sizes, clipping and power of a beam, laser to detector."""
     from catseye.api.optics import beam as beam_of
     from catseye.api.result import require_writable, save
 

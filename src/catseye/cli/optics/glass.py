@@ -22,7 +22,7 @@ def glass(
     ] = 38.1,
     json: Json = False,
 ) -> None:
-    """Index of a glass, its slopes, what a prism of it does to a range, and what a wrong glass costs."""
+    """Indices of a glass, a prism of it, and errors of another glass."""
     from catseye.api.optics import glass as glass_of
 
     tell(glass_of(name, wavelength_um=wavelength_um, temperature_c=temperature_c, height_mm=height_mm), json=json)

@@ -51,7 +51,7 @@ def safety(  # noqa: PLR0913 - its options are its command line
     ] = "iec2014",
     json: Json = False,
 ) -> None:
-    """Laser safety of a beam: limits of exposure, class with reasons, hazard distances."""
+    """Laser safety of a beam: limits of exposure, class, hazard distances."""
     from catseye.api.optics import safety as safety_of
 
     result = safety_of(

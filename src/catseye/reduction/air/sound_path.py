@@ -102,7 +102,7 @@ class AcousticPath:
 
     @property
     def mean(self) -> PathMean:
-        """Means over the used shots, with the full covariance: common errors do not average out."""
+        """Means over the used shots, with the full covariance."""
         used, air = self.used, self.temperatures
         count = int(used.sum())
         if count == 0:
@@ -126,7 +126,7 @@ class AcousticReduction:
 
     @property
     def verdict(self) -> Verdict:
-        """Verdict on temperatures, share of used shots, validity of the sheets and humidities."""
+        """Verdict on used shots, validity of the sheets and humidities."""
         doubts: list[str] = []
         for path in self.paths:
             ends = f"{path.sheet.ranger} to {path.sheet.target}"
@@ -136,7 +136,7 @@ class AcousticReduction:
 
     @property
     def inputs(self) -> dict[str, str]:
-        """SHA-256 by file; equal file names get their path's name as a prefix."""
+        """SHA-256 by file; equal names have their path's as a prefix."""
         digests: dict[str, str] = {}
         for path in self.paths:
             for name, digest in path.hashes.items():

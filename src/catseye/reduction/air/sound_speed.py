@@ -42,7 +42,7 @@ class FrequencyExcess(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SoundSpeed:
-    """Speed of sound by weather; arrays have the shape of the inputs, broadcast together.
+    """Speed of sound by weather; arrays have the inputs' broadcast shape.
 
     state      of the sound
     temperature_c, pressure_hpa, humidity_percent   the weather; relative humidity over liquid water
@@ -67,7 +67,7 @@ class SoundSpeed:
 
     @cached_property
     def by_formula(self) -> Mapping[str, "Sound | ValidityError"]:
-        """State by every formula, or the error where its limits exclude this weather."""
+        """State by every formula, or the error outside its limits."""
         states: dict[str, Sound | ValidityError] = {}
         for name in MODELS:
             try:
@@ -80,7 +80,7 @@ class SoundSpeed:
 
     @property
     def misprint(self) -> MisprintCost:
-        """Effect of the misprinted ratio of specific heats of water in the notes, at this weather."""
+        """Effect of the notes' misprinted ratio of specific heats of water."""
         weather = (self.temperature_c, self.pressure_hpa, self.state.vapour_pressure_hpa)
         printed = parker2004.speed(*weather)
         right = parker2004.speed(*weather, gamma_water=parker2004.GAMMA_VAPOUR)

@@ -9,7 +9,7 @@ WEATHER = ("temperature", "pressure", "humidity")  # inputs of every index and e
 
 
 def stated_inputs(**u: ArrayLike) -> tuple[str, ...]:
-    """Names of the inputs with an uncertainty above zero, in the order of the arguments.
+    """Names of the inputs with an uncertainty above zero, in order.
 
     >>> stated_inputs(temperature=0.1, pressure=0.0, humidity=[0.0, 2.0])
     ('temperature', 'humidity')

@@ -23,7 +23,7 @@ from catseye.verdict import Verdict
 
 @dataclass(frozen=True, eq=False)
 class WeatherIndex:
-    """Index of air by weather instruments; arrays have the shape of the inputs, broadcast together.
+    """Index of air by instruments; arrays have the inputs' broadcast shape.
 
     state           of the air
     wavelength_um   in vacuum

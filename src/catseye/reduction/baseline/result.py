@@ -96,7 +96,7 @@ class BaselineCalibration:
 
     @property
     def verdict(self) -> Verdict:
-        """Verdict from the tests of ISO 17123-4 and of the shots, and from the humidities."""
+        """Verdict from the tests of ISO 17123-4, shots and humidities."""
         return self._tests().hearing(humidity_doubts(self.observations.humidity_percent))
 
     def _tests(self) -> Verdict:

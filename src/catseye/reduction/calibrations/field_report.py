@@ -60,7 +60,7 @@ class Form:
 
 @dataclass(frozen=True)
 class ReportField:
-    """Field with its value from the record; value and u are None where missing."""
+    """Field with value and u from the record; None: missing."""
 
     entry: ReportEntry
     value: FieldValue = None
@@ -68,7 +68,7 @@ class ReportField:
 
     @property
     def number(self) -> float | None:
-        """Value as a number; None for text, a day, and where it is missing."""
+        """Value as a number; None for another one."""
         return float(self.value) if isinstance(self.value, int | float) else None
 
 
@@ -247,7 +247,7 @@ def _uncertainty(entry: ReportEntry, record: Reported | None) -> float | None:
 
 
 def _matrix(form: Form, record: Reported | None) -> tuple[ReportField, ...]:
-    """The nine direction cosines, row by row, with u propagated from the angles."""
+    """Nine direction cosines, row by row, with u from the angles."""
     entries = [
         ReportEntry(f"{form.symbol}{SUBSCRIPTS[i]}{SUBSCRIPTS[j]}", f"{form.matrix}_{i + 1}{j + 1}")
         for i in range(3)

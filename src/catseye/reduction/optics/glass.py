@@ -32,7 +32,7 @@ HEIGHTS_MM = (1.0, 1000.0)  # of a prism: metres typed as millimetres are below
 
 @dataclass(frozen=True)
 class GlassPrism:
-    """Prism of a glass at its temperature, in air; lengths in metres, slopes by °C.
+    """Prism of a glass in air; metres, slopes by °C.
 
     air                      of the notes' example, in words, with its indices
     height                   at 20 °C, face to corner
@@ -60,7 +60,7 @@ class GlassPrism:
 
 @dataclass(frozen=True)
 class GlassExchange:
-    """Errors of assuming another glass: of the indices, and of a range, m."""
+    """Errors of assuming another glass: indices, and a range, m."""
 
     phase_index: float
     group_index: float
@@ -165,7 +165,7 @@ def require_height(height_mm: float) -> None:
 
 
 def _surrounding_air(wavelength_um: float) -> tuple[str, float, float]:
-    """Air of the notes' example in words, and its phase and group index.
+    """Air of the notes' example: words, phase and group index.
 
     The makers' reference air is taken where the notes' model is not valid.
     """

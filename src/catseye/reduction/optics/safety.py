@@ -138,7 +138,7 @@ class SafetyAssessment:
 
     @property
     def verdict(self) -> Verdict:
-        """Verdict; at best that no limit is exceeded: a warning, never a certificate."""
+        """Verdict by class: a warning, never a certificate."""
         laser_class = self.outcome.laser_class
         if laser_class == "1":
             return Verdict("good", "class 1 as described; this is a computation, never a certificate")
@@ -148,7 +148,7 @@ class SafetyAssessment:
 
 
 def assess_safety(question: SafetyQuestion) -> SafetyAssessment:
-    """Laser safety of a beam: limits of exposure, class with reasons, hazard distances.
+    """Laser safety of a beam: limits of exposure, class, hazard distances.
 
     question   beam and viewing conditions; a period needs a rate
 
